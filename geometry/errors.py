@@ -1,0 +1,76 @@
+"""Errors that a user can meet, each with the exit code of the command line."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+class PatchlawError(Exception):
+    """Base of every error that patchlaw raises on purpose."""
+
+    exit_code = 1
+
+
+class InputError(PatchlawError, ValueError):
+    """Something the user gave is wrong; nothing has been computed or written.
+
+    The text reads ``file: key = value: problem (allowed: …)``, with the parts that are known.
+
+    Args:
+        problem: What is wrong, in one sentence without a full stop.
+        value: The offending value; left out of the text when not given.
+        allowed: What would be accepted.
+        key: Dotted key of the scene file, such as ``block.young_modulus``.
+        file: The file that the value came from.
+    """
+
+    exit_code = 2
+    _UNSET = object()
+
+    def __init__(
+        self,
+        problem: str,
+        *,
+        value: Any = _UNSET,
+        allowed: str | None = None,
+        key: str | None = None,
+        file: str | None = None,
+    ) -> None:
+        self.problem, self.value, self.allowed = problem, value, allowed
+        self.key, self.file = key, file
+        super().__init__(problem)
+
+    def located(self, *, key: str | None = None, file: str | None = None) -> InputError:
+        """Return the same error with key and file filled in where they are still unknown."""
+        return type(self)(
+            self.problem,
+            value=self.value,
+            allowed=self.allowed,
+            key=self.key or key,
+            file=self.file or file,
+        )
+
+    def __str__(self) -> str:
+        shown = None if self.value is self._UNSET else f"{self.value!r}"
+        subject = " = ".join(part for part in (self.key, shown) if part)
+        text = ": ".join(part for part in (self.file, subject, self.problem) if part)
+        return f"{text} (allowed: {self.allowed})" if self.allowed else text
+
+
+class NotConverged(PatchlawError, RuntimeError):
+    """An iteration ended without its answer; what was accepted before it is kept.
+
+    Args:
+        what: Which iteration, and at which load.
+        reason: The name of the reason.
+        iterations: Iterations spent.
+        remedy: What to change, with the scene key where there is one.
+    """
+
+    exit_code = 3
+
+    def __init__(self, what: str, *, reason: str, iterations: int, remedy: str) -> None:
+        self.what, self.reason, self.iterations, self.remedy = what, reason, iterations, remedy
+        super().__init__(
+            f"{what} did not converge: {reason} after {iterations} iterations; {remedy}"
+        )

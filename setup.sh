@@ -1,0 +1,49 @@
+#!/usr/bin/env bash
+# Install everything patchlaw needs on a Debian machine (12 or newer), then the package itself into .venv.
+# Run it as root or with sudo at hand; when all is there it does nothing.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")"
+
+# Compiled parts come from Debian, built against one MPI, one PETSc and one numpy.
+packages=(
+  python3 python3-venv python3-pip
+  python3-dolfinx python3-petsc4py python3-mpi4py python3-gmsh
+  python3-numpy python3-scipy python3-h5py python3-matplotlib
+  mpi-default-bin libopenblas0-pthread gcc libc6-dev
+)
+python=/usr/bin/python3 # dolfinx belongs to Debian's interpreter; another python3 may come first on PATH
+stamp=.venv/patchlaw-ready
+
+say() { printf 'setup: %s\n' "$*"; }
+fail() { printf 'setup: %s\n' "$*" >&2; exit 1; }
+
+missing=()
+for package in "${packages[@]}"; do
+  dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'install ok installed' || missing+=("$package")
+done
+
+if [ ${#missing[@]} -gt 0 ]; then
+  command -v apt-get >/dev/null || fail "this needs Debian's packages (${missing[*]}), and there is no apt-get here"
+  if [ "$(id -u)" -eq 0 ]; then as_root=(); elif command -v sudo >/dev/null; then as_root=(sudo); else
+    fail "these packages are missing, and neither root nor sudo is at hand. Ask an administrator for: apt-get install ${missing[*]}"
+  fi
+  say "installing ${missing[*]}"
+  "${as_root[@]}" apt-get update -q || say "apt-get update failed; trying with the package lists at hand"
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "${missing[@]}" ||
+    fail "apt-get could not install: ${missing[*]}"
+fi
+
+"$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || fail "$python is older than Python 3.11; Debian 12 or newer is needed"
+
+# The stamp ties the environment to this checkout, this interpreter and these requirements.
+wanted="$PWD $("$python" --version) $(sha256sum pyproject.toml)"
+if [ ! -x .venv/bin/patchlaw ] || [ "$(cat "$stamp" 2>/dev/null)" != "$wanted" ]; then
+  say "making .venv"
+  "$python" -m venv --clear --system-site-packages .venv || fail "could not make .venv with $python"
+  .venv/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[test]' ||
+    fail "pip could not install patchlaw and its pure-Python requirements (is a package index reachable?)"
+  .venv/bin/python -c 'import dolfinx, petsc4py, mpi4py, gmsh, h5py, scipy, matplotlib, pydantic, pint, rich' ||
+    fail "the installed packages cannot be imported together; see the message above"
+  printf '%s\n' "$wanted" >"$stamp"
+fi
+say "ready: .venv/bin/patchlaw"
