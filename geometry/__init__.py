@@ -1,1 +1,21 @@
-"""TBD."""
+"""Geometry of rough contact.
+
+A spectrum or a file gives a surface; the surface gives its statistics, its asperities and its
+means over patches; a block shape gives the mesh of the body that carries it.
+"""
+
+from geometry.asperities import Asperities, find_asperities
+from geometry.errors import InputError, NotConverged, PatchlawError
+from geometry.patches import PatchGrid, patch_means
+from geometry.surface import Surface
+
+__all__ = [
+    "Asperities",
+    "InputError",
+    "NotConverged",
+    "PatchGrid",
+    "PatchlawError",
+    "Surface",
+    "find_asperities",
+    "patch_means",
+]

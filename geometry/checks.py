@@ -1,0 +1,68 @@
+"""Checks that several records of this package share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.errors import InputError
+
+
+def positive_lengths(value: Any, what: str) -> tuple[float, float]:
+    """Return two positive, finite side lengths as floats.
+
+    Args:
+        value: Candidate for (Lx, Ly) [mm].
+        what: What the lengths belong to, such as ``"the surface"``.
+
+    Raises:
+        InputError: When there are not two of them, or one is not positive and finite.
+    """
+    allowed = "two positive numbers (Lx, Ly) in mm"
+    pair = _two_numbers(value, f"the lengths of {what} are not a pair of numbers", allowed)
+    if not all(math.isfinite(side) and side > 0.0 for side in pair):
+        raise InputError(
+            f"the lengths of {what} must be positive", value=tuple(value), allowed=allowed
+        )
+    return pair
+
+
+def cell_counts(value: Any, what: str, *, dimension: int = 2, smallest: int = 1) -> tuple[int, ...]:
+    """Return whole numbers of cells per direction as a tuple of int.
+
+    Args:
+        value: Candidate for the numbers of cells.
+        what: What is counted, such as ``"the patch grid"``.
+        dimension: How many numbers are expected.
+        smallest: Least number allowed in every direction.
+
+    Raises:
+        InputError: When their number, type or size is wrong.
+    """
+    allowed = f"{dimension} whole numbers, each at least {smallest}"
+    if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str):
+        raise InputError(f"{what} needs {dimension} whole numbers", value=value, allowed=allowed)
+    counts = tuple(value)
+    whole = all(isinstance(n, int | np.integer) and not isinstance(n, bool) for n in counts)
+    if len(counts) != dimension or not whole or min(counts, default=0) < smallest:
+        raise InputError(f"{what} does not fit", value=counts, allowed=allowed)
+    return tuple(int(n) for n in counts)
+
+
+def frozen_array(value: Any) -> NDArray[np.float64]:
+    """Return a contiguous, read-only float64 copy."""
+    array = np.array(value, dtype=np.float64, order="C")
+    array.setflags(write=False)
+    return array
+
+
+def _two_numbers(value: Any, problem: str, allowed: str) -> tuple[float, float]:
+    try:
+        first, second = (float(part) for part in value)
+    except (TypeError, ValueError):
+        raise InputError(problem, value=value, allowed=allowed) from None
+    return first, second

@@ -1,0 +1,140 @@
+"""The tensor cubic spline through heights at cell centres, and its highest point."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import RectBivariateSpline
+from scipy.optimize import minimize
+
+from geometry.errors import InputError
+
+Array = NDArray[np.float64]
+
+# The influence of a sample on a cubic spline decays by 2 − √3 per cell: after 28 cells it is
+# below 1e-16, so a padded spline is the periodic spline to rounding.
+_PADDING = 28
+_MOST_SPANS = 20_000
+_MOST_STARTS = 8
+
+
+class Interpolant:
+    """Tensor cubic spline through samples at cell centres, defined on the whole rectangle.
+
+    Within the outer half cells the last polynomial piece goes on (not-a-knot); a periodic one
+    wraps instead. Cubic polynomials are reproduced, smooth surfaces at fourth order.
+
+    Args:
+        heights: Samples at cell centres, shape (nx, ny) [mm].
+        lengths: Sides (Lx, Ly) of the rectangle [mm].
+        periodic: Whether the samples continue periodically.
+    """
+
+    def __init__(
+        self, heights: Array, lengths: tuple[float, float], *, periodic: bool = False
+    ) -> None:
+        self.lengths, self.periodic = lengths, periodic
+        self._spacing = (lengths[0] / heights.shape[0], lengths[1] / heights.shape[1])
+        padding = _PADDING if periodic else 0
+        samples = np.pad(heights, padding, mode="wrap") if periodic else heights
+        centres, box = [], []
+        for length, step, count in zip(lengths, self._spacing, heights.shape, strict=True):
+            centres.append((np.arange(-padding, count + padding) + 0.5) * step)
+            box += [min(0.0, centres[-1][0]), max(length, centres[-1][-1])]
+        self._spline = RectBivariateSpline(*centres, samples, bbox=box, kx=3, ky=3, s=0)
+
+    def __call__(self, x: ArrayLike, y: ArrayLike, *, dx: int = 0, dy: int = 0) -> Array:
+        """Evaluate the spline or one of its derivatives.
+
+        Args:
+            x: Abscissae [mm]; broadcast against ``y``.
+            y: Ordinates [mm].
+            dx: Order of the derivative in x, 0 to 2.
+            dy: Order of the derivative in y, 0 to 2.
+
+        Returns:
+            Values of the broadcast shape [mm / mm^(dx + dy)].
+
+        Raises:
+            InputError: When a point lies outside and the samples are not periodic.
+        """
+        x, y = np.broadcast_arrays(self._inside(x, 0), self._inside(y, 1))
+        return np.asarray(self._spline.ev(x, y, dx=dx, dy=dy), dtype=np.float64)
+
+    def maximum(self) -> tuple[float, float, float]:
+        """Return (x, y, z) of the highest point over the closed rectangle [mm].
+
+        On a span between knots a spline stays below the largest of its 4 × 4 B-spline
+        coefficients, so spans that cannot exceed the best sample are discarded; the others are
+        sampled, and the best points refined by bounded quasi-Newton iterations.
+        """
+        x, y, z = self._starts()
+        refined = [self._climb(*start) for start in zip(x, y, strict=True)]
+        best = int(np.argmax(z))
+        return max([(float(x[best]), float(y[best]), float(z[best])), *refined], key=lambda p: p[2])
+
+    def _inside(self, coordinate: ArrayLike, axis: int) -> Array:
+        value = np.asarray(coordinate, dtype=np.float64)
+        length = self.lengths[axis]
+        if self.periodic:
+            return np.mod(value, length)
+        outside = ~((value >= 0.0) & (value <= length))
+        if outside.any():
+            raise InputError(
+                f"{int(outside.sum())} points lie outside the surface",
+                value=float(value[outside].flat[0]),
+                allowed=f"0 ≤ {'xy'[axis]} ≤ {length} mm",
+            )
+        return value
+
+    def _starts(self) -> tuple[Array, Array, Array]:
+        """Return the highest points of a fine sampling of the spans that can hold the maximum."""
+        x, y = (self._edges(axis) for axis in range(2))
+        bound = self._span_bounds()
+        floor = float(self._spline(0.5 * (x[:, 0] + x[:, 1]), 0.5 * (y[:, 0] + y[:, 1])).max())
+        spans = np.flatnonzero(bound >= floor)
+        if len(spans) > _MOST_SPANS:
+            spans = spans[np.argsort(bound.flat[spans])[-_MOST_SPANS:]]
+        ix, iy = np.unravel_index(spans, bound.shape)
+        u, v = (part.ravel() for part in np.mgrid[0.0:1.0:5j, 0.0:1.0:5j])
+        px = x[ix, :1] + u * np.diff(x[ix])
+        py = y[iy, :1] + v * np.diff(y[iy])
+        z = self._spline.ev(px, py)
+        inner = np.argmax(z, axis=1)
+        rows = np.argsort(z.max(axis=1))[-_MOST_STARTS:]
+        return px[rows, inner[rows]], py[rows, inner[rows]], z[rows, inner[rows]]
+
+    def _edges(self, axis: int) -> Array:
+        """Return the two ends of every span, cut to the rectangle, shape (n, 2) [mm]."""
+        knots = np.clip(self._spline.get_knots()[axis][3:-3], 0.0, self.lengths[axis])
+        return np.stack([knots[:-1], knots[1:]], axis=1)
+
+    def _span_bounds(self) -> Array:
+        """Return an upper bound of the spline on every span, −inf on those outside [mm]."""
+        shape = [len(knots) - 4 for knots in self._spline.get_knots()]
+        windows = sliding_window_view(self._spline.get_coeffs().reshape(shape), (4, 4))
+        bound = windows.max(axis=(2, 3))
+        for axis in range(2):
+            empty = np.diff(self._edges(axis))[:, 0] <= 0.0
+            bound[(empty, slice(None)) if axis == 0 else (slice(None), empty)] = -np.inf
+        return bound
+
+    def _climb(self, x: float, y: float) -> tuple[float, float, float]:
+        """Return the local maximum reached from (x, y) without leaving the rectangle."""
+        origin, (dx, dy) = np.array([x, y]), self._spacing
+        height = float(np.ptp(self._spline.get_coeffs())) or 1.0
+
+        def depth(step: Array) -> tuple[float, Array]:
+            px, py = origin + step * (dx, dy)
+            slope = [dx * self._spline.ev(px, py, dx=1), dy * self._spline.ev(px, py, dy=1)]
+            return -float(self._spline.ev(px, py)) / height, -np.array(slope) / height
+
+        limits: list[tuple[float, float]] = [
+            (float(-origin[i] / size), float((self.lengths[i] - origin[i]) / size))
+            for i, size in enumerate((dx, dy))
+        ]
+        options = {"ftol": 1e-16, "gtol": 1e-12}
+        found = minimize(depth, np.zeros(2), jac=True, bounds=limits, options=options)
+        px, py = np.clip(origin + found.x * (dx, dy), 0.0, self.lengths)
+        return float(px), float(py), float(self._spline.ev(px, py))

@@ -1,0 +1,171 @@
+"""The division of a rectangle into Nx × Ny equal patches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from geometry.checks import cell_counts, positive_lengths
+from geometry.errors import InputError
+from geometry.surface import Surface
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PatchGrid:
+    """Nx × Ny equal rectangular patches; patch (ix, iy) has the flat index ix Ny + iy.
+
+    Args:
+        grid: Numbers of patches (Nx, Ny).
+        lengths: Sides (Lx, Ly) of the divided rectangle [mm].
+        origin: Its lower corner [mm].
+
+    Raises:
+        InputError: When a number of patches is not whole and positive or a length not positive.
+    """
+
+    grid: tuple[int, int]
+    lengths: tuple[float, float]
+    origin: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "grid", cell_counts(self.grid, "the patch grid"))
+        object.__setattr__(self, "lengths", positive_lengths(self.lengths, "the patch grid"))
+        x, y = self.origin
+        if not np.isfinite([x, y]).all():
+            raise InputError("the origin of the patch grid must be finite", value=self.origin)
+        object.__setattr__(self, "origin", (float(x), float(y)))
+
+    @property
+    def count(self) -> int:
+        """Number of patches N."""
+        return self.grid[0] * self.grid[1]
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Sides (sx, sy) of a patch [mm]."""
+        return self.lengths[0] / self.grid[0], self.lengths[1] / self.grid[1]
+
+    @property
+    def half_sizes(self) -> tuple[float, float]:
+        """Half sides (a, b) of a patch [mm], as Love's solution takes them."""
+        return 0.5 * self.size[0], 0.5 * self.size[1]
+
+    @property
+    def area(self) -> float:
+        """Area of one patch [mm²]."""
+        return self.size[0] * self.size[1]
+
+    @property
+    def borders_x(self) -> Array:
+        """Borders along x, shape (Nx + 1,) [mm]."""
+        return self.origin[0] + np.linspace(0.0, self.lengths[0], self.grid[0] + 1)
+
+    @property
+    def borders_y(self) -> Array:
+        """Borders along y, shape (Ny + 1,) [mm]."""
+        return self.origin[1] + np.linspace(0.0, self.lengths[1], self.grid[1] + 1)
+
+    @property
+    def centres(self) -> Array:
+        """Centres of the patches in flat order, shape (N, 2) [mm]."""
+        x, y = self.borders_x, self.borders_y
+        mesh = np.meshgrid(0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1]), indexing="ij")
+        return np.stack([part.ravel() for part in mesh], axis=1)
+
+    def unravel(self, i: int) -> tuple[int, int]:
+        """Return (ix, iy) of the patch with flat index ``i``.
+
+        Raises:
+            InputError: When there is no such patch.
+        """
+        if not 0 <= i < self.count:
+            raise InputError("there is no such patch", value=i, allowed=f"0 … {self.count - 1}")
+        return divmod(int(i), self.grid[1])
+
+    def bounds(self, i: int) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Return ((x0, x1), (y0, y1)) of patch ``i`` [mm].
+
+        Raises:
+            InputError: When there is no such patch.
+        """
+        ix, iy = self.unravel(i)
+        (x0, x1), (y0, y1) = self.borders_x[ix : ix + 2], self.borders_y[iy : iy + 2]
+        return (float(x0), float(x1)), (float(y0), float(y1))
+
+    def single(self, i: int) -> PatchGrid:
+        """Return the grid that holds patch ``i`` alone, at its place.
+
+        Raises:
+            InputError: When there is no such patch.
+        """
+        (x0, x1), (y0, y1) = self.bounds(i)
+        return PatchGrid(grid=(1, 1), lengths=(x1 - x0, y1 - y0), origin=(x0, y0))
+
+    def index_of(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.intp]:
+        """Return the flat index of the patch that holds each point.
+
+        A border belongs to the patch above it, the far border to the last patch: every point of
+        the closed rectangle is in exactly one patch.
+
+        Args:
+            x: Abscissae [mm]; broadcast against ``y``.
+            y: Ordinates [mm].
+
+        Returns:
+            Flat indices of the broadcast shape.
+
+        Raises:
+            InputError: When a point lies outside the rectangle.
+        """
+        ix = _interval_of(np.asarray(x, dtype=np.float64), self.borders_x, "x")
+        iy = _interval_of(np.asarray(y, dtype=np.float64), self.borders_y, "y")
+        return ix * self.grid[1] + iy
+
+
+def patch_means(surface: Surface, patches: PatchGrid) -> Array:
+    """Average the heights over every patch; cells that straddle a border are shared by area.
+
+    Args:
+        surface: Heights, constant on every cell here.
+        patches: Patches inside the surface's rectangle.
+
+    Returns:
+        Mean heights in flat order, shape (N,) [mm].
+
+    Raises:
+        InputError: When a patch reaches beyond the surface.
+    """
+    shares_x = _shares(patches.borders_x, surface.lengths[0], surface.grid[0], "x")
+    shares_y = _shares(patches.borders_y, surface.lengths[1], surface.grid[1], "y")
+    return (shares_x @ surface.heights @ shares_y.T).ravel()
+
+
+def _interval_of(value: Array, borders: Array, axis: str) -> NDArray[np.intp]:
+    outside = ~((value >= borders[0]) & (value <= borders[-1]))
+    if outside.any():
+        raise InputError(
+            f"{int(outside.sum())} points lie outside the patches",
+            value=float(value[outside].flat[0]),
+            allowed=f"{borders[0]} ≤ {axis} ≤ {borders[-1]} mm",
+        )
+    return np.searchsorted(borders[1:-1], value, side="right")
+
+
+def _shares(borders: Array, length: float, cells: int, axis: str) -> Array:
+    """Return the share of every cell in every interval's mean, shape (intervals, cells)."""
+    slack = 1e-9 * length  # rounding of borders that were computed from an origin
+    if borders[0] < -slack or borders[-1] > length + slack:
+        raise InputError(
+            f"the patches reach beyond the surface along {axis}",
+            value=(float(borders[0]), float(borders[-1])),
+            allowed=f"0 … {length} mm",
+        )
+    edges = np.linspace(0.0, length, cells + 1)
+    upper = np.minimum(borders[1:, None], edges[None, 1:])
+    lower = np.maximum(borders[:-1, None], edges[None, :-1])
+    overlap = np.clip(upper - lower, 0.0, None)
+    return overlap / overlap.sum(axis=1, keepdims=True)

@@ -1,0 +1,220 @@
+"""A rough surface: heights on a regular grid and the smooth interpolant through them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from geometry.checks import frozen_array, positive_lengths
+from geometry.errors import InputError
+from geometry.interpolant import Interpolant
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Surface:
+    """Heights at the centres of nx × ny equal cells of a rectangle.
+
+    The sample [ix, iy] lies at x = (ix + ½) Lx/nx, y = (iy + ½) Ly/ny.
+
+    Args:
+        heights: Heights, shape (nx, ny) [mm]; kept as a read-only float64 copy.
+        lengths: Sides (Lx, Ly) of the rectangle [mm].
+        periodic: Whether the heights continue periodically in both directions.
+        source: Where the heights came from, for reports.
+
+    Raises:
+        InputError: When the heights are not a finite array of at least 4 × 4 or a length is not
+            positive.
+    """
+
+    heights: Array
+    lengths: tuple[float, float]
+    periodic: bool = False
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "lengths", positive_lengths(self.lengths, "the surface"))
+        object.__setattr__(self, "heights", _checked_heights(self.heights))
+
+    @property
+    def grid(self) -> tuple[int, int]:
+        """Numbers of cells (nx, ny)."""
+        nx, ny = self.heights.shape
+        return nx, ny
+
+    @property
+    def spacing(self) -> tuple[float, float]:
+        """Sides (dx, dy) of a cell [mm]."""
+        return self.lengths[0] / self.grid[0], self.lengths[1] / self.grid[1]
+
+    @property
+    def area(self) -> float:
+        """Nominal area Lx Ly [mm²]."""
+        return self.lengths[0] * self.lengths[1]
+
+    @property
+    def x(self) -> Array:
+        """Cell centres along x, shape (nx,) [mm]."""
+        return (np.arange(self.grid[0]) + 0.5) * self.spacing[0]
+
+    @property
+    def y(self) -> Array:
+        """Cell centres along y, shape (ny,) [mm]."""
+        return (np.arange(self.grid[1]) + 0.5) * self.spacing[1]
+
+    @property
+    def mean_height(self) -> float:
+        """Mean of the heights [mm]."""
+        return float(self.heights.mean())
+
+    @cached_property
+    def interpolant(self) -> Interpolant:
+        """The smooth surface through the heights that every coupling sees."""
+        return Interpolant(self.heights, self.lengths, periodic=self.periodic)
+
+    @property
+    def highest(self) -> float:
+        """Height z_M of the highest point of the interpolant [mm]; approach counts from it."""
+        return self._summit[2]
+
+    @property
+    def highest_point(self) -> tuple[float, float]:
+        """Position (x, y) of the highest point of the interpolant [mm]."""
+        return self._summit[:2]
+
+    @cached_property
+    def _summit(self) -> tuple[float, float, float]:
+        return self.interpolant.maximum()
+
+    def height_at(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Evaluate the interpolant at any points, up to and on the border.
+
+        Args:
+            x: Abscissae [mm]; broadcast against ``y``.
+            y: Ordinates [mm].
+
+        Returns:
+            Heights of the broadcast shape [mm].
+
+        Raises:
+            InputError: When a point lies outside a surface that is not periodic.
+        """
+        return self.interpolant(x, y)
+
+    def gradient_at(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Evaluate the gradient (∂h/∂x, ∂h/∂y) of the interpolant.
+
+        Args:
+            x: Abscissae [mm]; broadcast against ``y``.
+            y: Ordinates [mm].
+
+        Returns:
+            Slopes, broadcast shape + (2,).
+
+        Raises:
+            InputError: When a point lies outside a surface that is not periodic.
+        """
+        return np.stack([self.interpolant(x, y, dx=1), self.interpolant(x, y, dy=1)], axis=-1)
+
+    def detrended(self, order: int = 1) -> Surface:
+        """Subtract the least-squares polynomial of total degree ``order``.
+
+        A plane or a quadratic does not continue periodically, so the result is periodic only for
+        order 0.
+
+        Args:
+            order: 0 mean, 1 mean plane, 2 mean quadratic.
+
+        Raises:
+            InputError: For another order.
+        """
+        if order not in (0, 1, 2):
+            raise InputError("this order of detrending is unknown", value=order, allowed="0, 1, 2")
+        u, v = np.meshgrid(self.x / self.lengths[0], self.y / self.lengths[1], indexing="ij")
+        powers = [(i, j) for i in range(order + 1) for j in range(order + 1 - i)]
+        basis = np.stack([((2 * u - 1) ** i * (2 * v - 1) ** j).ravel() for i, j in powers], axis=1)
+        weights, *_ = np.linalg.lstsq(basis, self.heights.ravel(), rcond=None)
+        heights = self.heights - (basis @ weights).reshape(self.grid)
+        return replace(self, heights=heights, periodic=self.periodic and order == 0)
+
+    def cropped(
+        self, *, x: tuple[float, float] | None = None, y: tuple[float, float] | None = None
+    ) -> Surface:
+        """Cut out a rectangle, rounded to whole cells; its lower corner becomes the origin.
+
+        Args:
+            x: Interval (lo, hi) kept along x [mm]; all when not given.
+            y: Interval (lo, hi) kept along y [mm]; all when not given.
+
+        Returns:
+            A surface that is not periodic.
+
+        Raises:
+            InputError: When an interval is empty or leaves the surface.
+        """
+        rows = _cells_between(x, self.lengths[0], self.grid[0], "x")
+        columns = _cells_between(y, self.lengths[1], self.grid[1], "y")
+        heights = self.heights[rows, columns]
+        lengths = (heights.shape[0] * self.spacing[0], heights.shape[1] * self.spacing[1])
+        return replace(self, heights=heights, lengths=lengths, periodic=False)
+
+    def shifted(self, i: int, j: int) -> Surface:
+        """Move a periodic surface by whole cells.
+
+        Args:
+            i: Cells along x; the height at cell (0, 0) moves to (i, j).
+            j: Cells along y.
+
+        Raises:
+            InputError: When the surface is not periodic.
+        """
+        if not self.periodic:
+            raise InputError("only a periodic surface can be shifted")
+        return replace(self, heights=np.roll(self.heights, (i, j), axis=(0, 1)))
+
+    def scaled(self, factor: float) -> Surface:
+        """Multiply all heights by ``factor``."""
+        return replace(self, heights=self.heights * factor)
+
+
+def _checked_heights(heights: ArrayLike) -> Array:
+    try:
+        array = frozen_array(heights)
+    except (TypeError, ValueError):
+        raise InputError("the heights are not an array of real numbers") from None
+    if array.ndim != 2 or min(array.shape) < 4:
+        raise InputError(
+            "a surface needs at least 4 × 4 heights on a two-dimensional grid",
+            value=array.shape,
+            allowed="shape (nx, ny) with nx, ny ≥ 4",
+        )
+    bad = np.argwhere(~np.isfinite(array))
+    if len(bad):
+        first = tuple(int(index) for index in bad[0])
+        raise InputError(
+            f"{len(bad)} of {array.size} heights are not finite, the first at index {first}",
+            value=float(array[first]),
+            allowed="finite heights in mm",
+        )
+    return array
+
+
+def _cells_between(
+    interval: tuple[float, float] | None, length: float, count: int, axis: str
+) -> slice:
+    """Return the cells between two coordinates, rounded to whole cells."""
+    if interval is None:
+        return slice(None)
+    lo, hi = (round(float(edge) / length * count) for edge in interval)
+    if not 0 <= lo < hi <= count:
+        raise InputError(
+            f"the crop along {axis} does not lie within the surface or keeps no cell",
+            value=tuple(interval),
+            allowed=f"0 ≤ lo < hi ≤ {length} mm",
+        )
+    return slice(lo, hi)
