@@ -1,0 +1,70 @@
+"""Lets all ranks of a communicator succeed or fail together.
+
+The communicator is only ever asked for mpi4py's lower-case methods, so nothing here imports MPI;
+``None`` stands for a single process.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
+
+def on_root(comm: Any, work: Callable[[], T]) -> T:
+    """Do work on rank 0 and give its result, or its error, to every rank.
+
+    Args:
+        comm: MPI communicator (mpi4py), or None.
+        work: What to do; its result must be picklable.
+
+    Returns:
+        The result, on every rank.
+
+    Raises:
+        Exception: Whatever the work raised, on every rank.
+
+    Note:
+        Collective.
+    """
+    if comm is None or comm.size == 1:
+        return work()
+    result, error = _attempt(work) if comm.rank == 0 else (None, None)
+    result, error = comm.bcast((result, error), root=0)
+    if error is not None:
+        raise error
+    return result  # type: ignore[return-value]
+
+
+def together(comm: Any, work: Callable[[], T]) -> T:
+    """Do work on every rank; when one fails, all raise the error of the lowest failing rank.
+
+    Args:
+        comm: MPI communicator (mpi4py), or None.
+        work: What to do; must not communicate itself, or fail on all ranks alike.
+
+    Returns:
+        This rank's own result.
+
+    Raises:
+        Exception: The first failing rank's error, on every rank.
+
+    Note:
+        Collective.
+    """
+    if comm is None or comm.size == 1:
+        return work()
+    result, error = _attempt(work)
+    failures = [other for other in comm.allgather(error) if other is not None]
+    if failures:
+        raise failures[0]
+    return result  # type: ignore[return-value]
+
+
+def _attempt(work: Callable[[], T]) -> tuple[T | None, Exception | None]:
+    """Return the result or the error of some work."""
+    try:
+        return work(), None
+    except Exception as error:  # passed on by the caller on every rank
+        return None, error

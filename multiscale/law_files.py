@@ -1,0 +1,106 @@
+"""Stores patch laws in HDF5 and reads them back bit for bit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from geometry.errors import InputError
+from geometry.patches import PatchGrid
+
+from multiscale.laws import PatchLaw
+
+_COLUMNS = {
+    "approach": "mm",
+    "closure": "mm",
+    "pressure": "MPa",
+    "contact_area_fraction": "1",
+    "contacts": "1",
+}
+_SCALARS = {"touch": "mm", "reach": "mm", "interpolation_error": "1"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LawTable:
+    """The laws of all patches of an interface.
+
+    Attributes:
+        patches: The partition.
+        laws: One law per patch, in the order of the flat patch index.
+        made_by: How they were made: micro model, Love's displacement, tolerance.
+    """
+
+    patches: PatchGrid
+    laws: tuple[PatchLaw, ...]
+    made_by: dict[str, str]
+
+    def __post_init__(self) -> None:
+        if len(self.laws) != self.patches.count:
+            raise InputError("needs one law per patch", value=len(self.laws))
+
+    def __getitem__(self, index: int) -> PatchLaw:
+        return self.laws[index]
+
+
+def write_laws(path: Path, table: LawTable) -> None:
+    """Write all laws to one HDF5 file: a group ``patch_IX_IY`` per patch, a dataset per column."""
+    with h5py.File(path, "w") as file:
+        file.attrs["format"] = "patchlaw laws 1"
+        file.attrs["patch_grid"] = table.patches.grid
+        file.attrs["lengths_mm"] = table.patches.lengths
+        file.attrs["origin_mm"] = table.patches.origin
+        for name, text in table.made_by.items():
+            file.attrs[f"made_by_{name}"] = text
+        for index, law in enumerate(table.laws):
+            group = file.create_group(_group_name(table.patches, index))
+            for name, unit in _COLUMNS.items():
+                group.create_dataset(name, data=getattr(law, name)).attrs["unit"] = unit
+            for name in _SCALARS:
+                group.attrs[name] = getattr(law, name)
+
+
+def read_laws(path: Path) -> LawTable:
+    """Read a law file.
+
+    Raises:
+        InputError: When the file cannot be read, is no law file or lacks anything.
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            if file.attrs.get("format") != "patchlaw laws 1":
+                raise InputError("is not a law file of patchlaw", file=str(path))
+            patches = PatchGrid(
+                grid=_pair(file.attrs["patch_grid"], int),
+                lengths=_pair(file.attrs["lengths_mm"], float),
+                origin=_pair(file.attrs["origin_mm"], float),
+            )
+            groups = [file[_group_name(patches, index)] for index in range(patches.count)]
+            made_by = {
+                name.removeprefix("made_by_"): str(text)
+                for name, text in file.attrs.items()
+                if name.startswith("made_by_")
+            }
+            return LawTable(patches=patches, laws=tuple(map(_law, groups)), made_by=made_by)
+    except (OSError, KeyError) as error:
+        raise InputError(f"is not a readable law file: {error}", file=str(path)) from None
+    except InputError as error:
+        raise error.located(file=str(path)) from None
+
+
+def _law(group: Any) -> PatchLaw:
+    columns = {name: np.asarray(group[name][()]) for name in _COLUMNS}
+    return PatchLaw(**columns, **{name: float(group.attrs[name]) for name in _SCALARS})
+
+
+def _group_name(patches: PatchGrid, index: int) -> str:
+    ix, iy = patches.unravel(index)
+    return f"patch_{ix}_{iy}"
+
+
+def _pair(values: Sequence[Any], kind: type) -> Any:
+    first, second = values
+    return kind(first), kind(second)

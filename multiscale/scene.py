@@ -1,0 +1,238 @@
+"""The scene: everything a run needs to know, read from TOML and checked before anything runs."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from geometry.errors import InputError
+from geometry.spectrum import Spectrum
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from multiscale.quantities import Length, Pressure, Slope, SpectralAmplitude
+from multiscale.refusals import first_refusal
+
+PositiveLength = Annotated[Length, Field(gt=0)]
+Pair = Annotated[tuple[int, int], Field(description="x, y")]
+Band = Annotated[tuple[float, float], Field(description="lower, upper number of waves per side")]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class SpectrumSection(_Section):
+    """A synthesised self-affine surface; see `geometry.Spectrum` for the meaning of each key."""
+
+    hurst: Annotated[float, Field(gt=0, le=1)]
+    waves: Band | None = None
+    waves_x: Band | None = None
+    waves_y: Band | None = None
+    rms_slope: Annotated[Slope, Field(gt=0)] | None = None
+    rms_height: PositiveLength | None = None
+    s0: Annotated[SpectralAmplitude, Field(gt=0)] | None = None
+    seed: Annotated[int, Field(ge=0, strict=True)] = 0
+
+    @model_validator(mode="after")
+    def _makes_a_spectrum(self) -> Self:
+        self.spectrum()
+        return self
+
+    def spectrum(self) -> Spectrum:
+        """Return the geometric record."""
+        return Spectrum(**self.model_dump())
+
+
+class SurfaceSection(_Section):
+    """Exactly one source of heights, and the rectangle it covers."""
+
+    spectrum: SpectrumSection | None = None
+    file: str | None = None
+    grid: Annotated[Pair, Field(description="heights in x, y")] | None = None
+    lengths: tuple[PositiveLength, PositiveLength] | None = None
+    detrend: Literal["none", "mean", "plane", "quadratic"] = "none"
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if (self.spectrum is None) == (self.file is None):
+            raise ValueError("needs exactly one source (allowed: either 'spectrum' or 'file')")
+        if self.spectrum is not None and (self.grid is None or self.lengths is None):
+            raise ValueError("a 'spectrum' needs 'grid' and 'lengths' beside it")
+        if self.grid is not None and min(self.grid) < 1:
+            raise ValueError(f"'grid' = {list(self.grid)} must have positive entries")
+        return self
+
+
+class BlockSection(_Section):
+    """The elastic block below the interface, pressed by a rigid plane."""
+
+    height: PositiveLength = 1.0
+    young_modulus: Annotated[Pressure, Field(gt=0)]
+    poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)]
+    sides: Literal["free", "roller"] = "free"
+    cells: Annotated[tuple[int, int, int], Field(description="cells in x, y, z")] = (40, 40, 25)
+    element: Literal["Q1", "Q2", "P1", "P2"] = "Q1"
+    grading: Annotated[float, Field(ge=1, description="bottom to top layer height")] = 1.0
+    margin: Annotated[Length, Field(ge=0, description="block beyond the interface")] = 0.0
+    margin_cells: Annotated[int, Field(ge=1)] = 8
+    margin_grading: Annotated[float, Field(ge=1)] = 8.0
+
+    @model_validator(mode="after")
+    def _some_cells(self) -> Self:
+        if min(self.cells) < 1:
+            raise ValueError(f"'cells' = {list(self.cells)} must have positive entries")
+        return self
+
+
+class PatchesSection(_Section):
+    """The partition of the interface."""
+
+    grid: Pair = (4, 4)
+
+    @model_validator(mode="after")
+    def _some_patches(self) -> Self:
+        if min(self.grid) < 1:
+            raise ValueError(f"'grid' = {list(self.grid)} must have positive entries")
+        return self
+
+
+class MicroSection(_Section):
+    """The micro model that gives the laws."""
+
+    model: Literal["elliptic", "circular", "elliptic-independent", "circular-independent"] = (
+        "elliptic"
+    )
+    solver: Literal["active-set", "truncated-newton"] = "active-set"
+
+
+class CouplingSection(_Section):
+    """How micro and macro model are put together."""
+
+    kind: Literal["isolated", "analytic"] = "isolated"
+    love: Literal["mean", "centre"] = "mean"
+    interface: Literal["patchwise", "pointwise"] = "patchwise"
+    table_tolerance: Annotated[float, Field(gt=0, lt=0.1)] = 1e-4
+
+
+class LoadSection(_Section):
+    """The motion of the rigid plane."""
+
+    approach: PositiveLength
+    steps: Annotated[int, Field(ge=1, le=1_000_000, strict=True)] = 8
+    tilt: Annotated[tuple[Slope, Slope], Field(description="d approach/dx, d approach/dy")] = (
+        0.0,
+        0.0,
+    )
+
+
+class OutputSection(_Section):
+    """What is written beside the tables; nothing else is computed."""
+
+    figures: bool = True
+    report: bool = True
+    fields: bool = False
+
+
+class Scene(_Section):
+    """A complete scene. Lengths in mm, pressures in MPa.
+
+    The section ``[load]`` is the attribute `loading`, for `Scene.load` reads a file.
+    """
+
+    surface: SurfaceSection
+    block: BlockSection
+    patches: PatchesSection = PatchesSection()
+    micro: MicroSection = MicroSection()
+    coupling: CouplingSection = CouplingSection()
+    loading: Annotated[LoadSection, Field(alias="load")]
+    output: OutputSection = OutputSection()
+    _source: Path | None = None
+
+    @classmethod
+    def load(cls, path: str | Path, overrides: Sequence[str] = ()) -> Scene:
+        """Read and check a scene file.
+
+        Args:
+            path: TOML file.
+            overrides: ``key=value`` strings with dotted keys; a value is TOML, or else a plain
+                string (``load.approach=4 um``).
+
+        Raises:
+            InputError: When the file cannot be read or anything in it is wrong.
+        """
+        path = Path(path)
+        data = _read_toml(path)
+        for text in overrides:
+            _override(data, text)
+        return cls.from_dict(data, source=path)
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any], source: Path | None = None) -> Scene:
+        """Check a scene given as nested dictionaries.
+
+        Args:
+            data: The sections, as in a scene file.
+            source: The file they came from: named in errors; relative paths start in its folder.
+
+        Raises:
+            InputError: When anything is wrong; names file, key, value and what is allowed.
+        """
+        try:
+            scene = cls.model_validate(data)
+        except ValidationError as error:
+            raise first_refusal(error, cls).located(file=str(source) if source else None) from None
+        scene._source = source
+        return scene
+
+    @property
+    def name(self) -> str:
+        """Name of the scene: its file's stem."""
+        return self._source.stem if self._source else "scene"
+
+    @property
+    def file(self) -> str | None:
+        """The file the scene was read from."""
+        return str(self._source) if self._source else None
+
+    @property
+    def surface_path(self) -> Path | None:
+        """Path of the heights, relative paths taken from the scene's folder."""
+        if self.surface.file is None:
+            return None
+        folder = self._source.parent if self._source else Path()
+        return folder / self.surface.file
+
+    @property
+    def approaches(self) -> list[float]:
+        """Approach of the plane at each load step [mm]."""
+        approach, steps = self.loading.approach, self.loading.steps
+        return [approach * step / steps for step in range(1, steps + 1)]
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_bytes().decode())
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", file=str(path)) from None
+    except UnicodeDecodeError as error:
+        raise InputError(f"is not UTF-8 text: {error}", file=str(path)) from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"is not valid TOML: {error}", file=str(path)) from None
+
+
+def _override(data: dict[str, Any], text: str) -> None:
+    """Set one dotted key in nested dictionaries."""
+    key, equals, value = (part.strip() for part in text.partition("="))
+    if not equals or not key:
+        raise InputError("is not an override", value=text, allowed="--set key=value")
+    *sections, name = key.split(".")
+    for section in sections:
+        data = data.setdefault(section, {})
+        if not isinstance(data, dict):
+            raise InputError(f"'{section}' is not a section", value=text, key=key)
+    try:
+        data[name] = tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        data[name] = value
