@@ -6,16 +6,21 @@ means over patches; a block shape gives the mesh of the body that carries it.
 
 from geometry.asperities import Asperities, find_asperities
 from geometry.errors import InputError, NotConverged, PatchlawError
+from geometry.meshes import Alignment, BlockShape, alignment, flat_block
 from geometry.patches import PatchGrid, patch_means
 from geometry.surface import Surface
 
 __all__ = [
+    "Alignment",
     "Asperities",
+    "BlockShape",
     "InputError",
     "NotConverged",
     "PatchGrid",
     "PatchlawError",
     "Surface",
+    "alignment",
     "find_asperities",
+    "flat_block",
     "patch_means",
 ]

@@ -1,0 +1,177 @@
+"""Transfinite gmsh meshes of a rectangular lattice of boxes with graded lines."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Settings that a caller's own gmsh session may have changed; they are put back afterwards.
+_OPTIONS = {
+    "General.Verbosity": 0,
+    "General.Terminal": 0,
+    "Mesh.ElementOrder": 1,
+    "Mesh.RecombineAll": 0,
+    "Mesh.SubdivisionAlgorithm": 0,
+    "Mesh.SaveAll": 0,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Segment:
+    """A straight piece of a grid line, divided geometrically.
+
+    Args:
+        start: First coordinate [mm].
+        end: Last coordinate [mm].
+        cells: Number of cells.
+        growth: Size of the last cell relative to the first.
+    """
+
+    start: float
+    end: float
+    cells: int
+    growth: float = 1.0
+
+    @property
+    def ratio(self) -> float:
+        """Ratio of the sizes of successive cells."""
+        return self.growth ** (1.0 / (self.cells - 1)) if self.cells > 1 else 1.0
+
+    @property
+    def ticks(self) -> NDArray[np.float64]:
+        """Coordinates of the grid planes, shape (cells + 1,) [mm]."""
+        sizes = self.ratio ** np.arange(self.cells)
+        share = np.concatenate([[0.0], np.cumsum(sizes) / sizes.sum()])
+        return self.start + (self.end - self.start) * share
+
+
+Axes = tuple[Sequence[Segment], Sequence[Segment], Sequence[Segment]]
+
+
+@contextmanager
+def gmsh_session(name: str) -> Iterator[Any]:
+    """Give a silent gmsh with a new current model, and leave a caller's session as it was.
+
+    Args:
+        name: Name of the new model, which is removed at the end.
+
+    Yields:
+        The gmsh module.
+    """
+    import gmsh  # here, so that everything without a mesh works without gmsh
+
+    owned = not _is_initialised(gmsh)
+    if owned:
+        gmsh.initialize(["", "-v", "0"], readConfigFiles=False)
+    current = gmsh.model.getCurrent()
+    kept = {option: gmsh.option.getNumber(option) for option in _OPTIONS}
+    try:
+        for option, value in _OPTIONS.items():
+            gmsh.option.setNumber(option, value)
+        gmsh.model.add(name)
+        yield gmsh
+    finally:
+        if owned:
+            gmsh.finalize()
+        else:
+            gmsh.model.setCurrent(name)
+            gmsh.model.remove()
+            gmsh.model.setCurrent(current)
+            for option, value in kept.items():
+                gmsh.option.setNumber(option, value)
+
+
+def mesh_lattice(gmsh: Any, axes: Axes, *, hexahedra: bool) -> dict[str, list[int]]:
+    """Mesh the boxes between the segments of three axes conformingly.
+
+    Args:
+        gmsh: The module, inside a session.
+        axes: Adjoining segments along x, y and z.
+        hexahedra: Hexahedra, or six tetrahedra in the place of each.
+
+    Returns:
+        Tags of the volumes under ``"volumes"`` and of the outer faces under ``"x-"``, ``"x+"``,
+        ``"y-"`` … ``"z+"``.
+    """
+    geo = gmsh.model.geo
+    corners = [[axis[0].start, *(segment.end for segment in axis)] for axis in axes]
+    shape = [len(axis) for axis in axes]
+    points = {
+        place: geo.addPoint(*(corners[k][place[k]] for k in range(3)))
+        for place in itertools.product(*(range(n + 1) for n in shape))
+    }
+    lines = _add_lines(geo, axes, points)
+    faces = _add_faces(geo, shape, points, lines, recombine=hexahedra)
+    volumes = []
+    for place in itertools.product(*(range(n) for n in shape)):
+        shell = [faces[k, _next(place, k, side)] for k in range(3) for side in (0, 1)]
+        volumes.append(geo.addVolume([geo.addSurfaceLoop(shell)]))
+        geo.mesh.setTransfiniteVolume(volumes[-1])
+    geo.synchronize()
+    gmsh.model.mesh.generate(3)
+    groups = {"volumes": volumes}
+    for k, letter in enumerate("xyz"):
+        groups[letter + "-"] = [tag for (n, at), tag in faces.items() if n == k and at[k] == 0]
+        groups[letter + "+"] = [
+            tag for (n, at), tag in faces.items() if n == k and at[k] == shape[k]
+        ]
+    return groups
+
+
+Place = tuple[int, ...]
+
+
+def _next(place: Place, axis: int, step: int = 1) -> Place:
+    return tuple(index + step * (k == axis) for k, index in enumerate(place))
+
+
+def _add_lines(geo: Any, axes: Axes, points: dict[Place, int]) -> dict[tuple[int, Place], int]:
+    """Add the edges of all boxes, keyed by direction and first point."""
+    lines = {}
+    for place, k in itertools.product(points, range(3)):
+        if place[k] < len(axes[k]):
+            segment = axes[k][place[k]]
+            tag = geo.addLine(points[place], points[_next(place, k)])
+            geo.mesh.setTransfiniteCurve(tag, segment.cells + 1, "Progression", segment.ratio)
+            lines[k, place] = tag
+    return lines
+
+
+def _add_faces(
+    geo: Any,
+    shape: Sequence[int],
+    points: dict[Place, int],
+    lines: dict[tuple[int, Place], int],
+    *,
+    recombine: bool,
+) -> dict[tuple[int, Place], int]:
+    """Add the faces of all boxes, keyed by normal and lowest corner."""
+    faces = {}
+    for place, k in itertools.product(points, range(3)):
+        first, second = (axis for axis in range(3) if axis != k)
+        if place[first] == shape[first] or place[second] == shape[second]:
+            continue
+        right, above = _next(place, first), _next(place, second)
+        loop = [lines[first, place], lines[second, right], -lines[first, above]]
+        tag = geo.addPlaneSurface([geo.addCurveLoop([*loop, -lines[second, place]])])
+        corner = [points[at] for at in (place, right, _next(right, second), above)]
+        geo.mesh.setTransfiniteSurface(tag, "Left", corner)
+        if recombine:
+            geo.mesh.setRecombine(2, tag)
+        faces[k, place] = tag
+    return faces
+
+
+def _is_initialised(gmsh: Any) -> bool:
+    if hasattr(gmsh, "isInitialized"):
+        return bool(gmsh.isInitialized())
+    try:  # gmsh 4.8 answers 0, or raises, before it is initialised
+        return bool(gmsh.option.getNumber("Mesh.ElementOrder") >= 1.0)
+    except Exception:
+        return False
