@@ -8,6 +8,8 @@ from geometry.asperities import Asperities, find_asperities
 from geometry.errors import InputError, NotConverged, PatchlawError
 from geometry.meshes import Alignment, BlockShape, alignment, flat_block
 from geometry.patches import PatchGrid, patch_means
+from geometry.spectrum import Spectrum, synthesise
+from geometry.statistics import PowerSpectrum, Roughness, power_spectrum, roughness
 from geometry.surface import Surface
 
 __all__ = [
@@ -18,9 +20,15 @@ __all__ = [
     "NotConverged",
     "PatchGrid",
     "PatchlawError",
+    "PowerSpectrum",
+    "Roughness",
+    "Spectrum",
     "Surface",
     "alignment",
     "find_asperities",
     "flat_block",
     "patch_means",
+    "power_spectrum",
+    "roughness",
+    "synthesise",
 ]

@@ -1,0 +1,230 @@
+"""Random surfaces with a self-affine, band-limited spectrum."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from geometry.checks import cell_counts, positive_lengths
+from geometry.errors import InputError
+from geometry.surface import Surface
+
+Array = NDArray[np.float64]
+
+_AMPLITUDES = ("rms_slope", "rms_height", "s0")
+_ROUNDING = 1.0 + 1e-12  # waves that lie on the border of a band belong to it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spectrum:
+    """Power spectral density S = S0 |k|^(−2 (H + 1)) in a band of waves, 0 outside.
+
+    k = (kx, ky) counts waves per side. On a rectangle its length is measured along x,
+    |k| = Lx |q| / 2π with the angular wavenumber q, so that the surface stays isotropic. The
+    band is either the ring lo ≤ |k| ≤ hi, or the box |kx| ≤ hi_x, |ky| ≤ hi_y without the inner
+    ellipse (kx/lo_x)² + (ky/lo_y)² < 1.
+
+    Args:
+        hurst: Hurst exponent H, 0 … 1.
+        waves: Ring (lo, hi) [waves per Lx].
+        waves_x: Limits (lo_x, hi_x) of the box along x [waves per Lx].
+        waves_y: Limits (lo_y, hi_y) of the box along y [waves per Ly].
+        rms_slope: Amplitude by sqrt<|∇h|²>, met exactly by every surface [-].
+        rms_height: Amplitude by sqrt<h²>, met exactly by every surface [mm].
+        s0: Amplitude S0 itself [mm⁴]; <h²> is the integral of S over the angular wavenumbers.
+        seed: Seed of the phases.
+
+    Raises:
+        InputError: When a value is out of range, or not exactly one kind of band and one
+            amplitude is given.
+
+    Source: Waddad et al. 2016, section 1.1, doi 10.1016/j.triboint.2015.12.023.
+    """
+
+    hurst: float
+    waves: tuple[float, float] | None = None
+    waves_x: tuple[float, float] | None = None
+    waves_y: tuple[float, float] | None = None
+    rms_slope: float | None = None
+    rms_height: float | None = None
+    s0: float | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.hurst <= 1.0:
+            raise InputError(
+                "the Hurst exponent is out of range", value=self.hurst, allowed="0 … 1"
+            )
+        ring, box = self.waves is not None, (self.waves_x is not None, self.waves_y is not None)
+        if (ring and any(box)) or not (ring or all(box)):
+            raise InputError(
+                "a spectrum needs exactly one band",
+                value=[name for name in ("waves", "waves_x", "waves_y") if getattr(self, name)],
+                allowed="waves, or waves_x and waves_y together",
+            )
+        for name in ("waves", "waves_x", "waves_y"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, _checked_band(getattr(self, name), name))
+        given = [name for name in _AMPLITUDES if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise InputError(
+                "a spectrum needs exactly one amplitude",
+                value=given,
+                allowed="one of " + ", ".join(_AMPLITUDES),
+            )
+        amplitude = getattr(self, given[0])
+        if not (math.isfinite(amplitude) and amplitude > 0.0):
+            raise InputError(f"{given[0]} must be positive", value=amplitude, allowed="> 0")
+        if not isinstance(self.seed, int | np.integer) or self.seed < 0:
+            raise InputError("the seed does not fit", value=self.seed, allowed="a whole number ≥ 0")
+
+    def __str__(self) -> str:
+        parts = [
+            f"{item.name} {getattr(self, item.name)}"
+            for item in fields(self)
+            if getattr(self, item.name) is not None
+        ]
+        return "spectrum with " + ", ".join(parts)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Waves:
+    """The waves of one random surface, h = Σ 2 B cos(2π (kx x/Lx + ky y/Ly) + φ).
+
+    Only one wave of each pair ±k is listed; the factor 2 counts the other.
+
+    Args:
+        kx: Waves per side along x, 0 or positive, shape (n,).
+        ky: Waves per side along y, shape (n,).
+        amplitude: Amplitudes B of each of the pair, shape (n,) [mm].
+        phase: Phases φ, shape (n,) [rad].
+    """
+
+    kx: NDArray[np.int64]
+    ky: NDArray[np.int64]
+    amplitude: Array
+    phase: Array
+
+
+def random_waves(spectrum: Spectrum, lengths: tuple[float, float]) -> Waves:
+    """Draw the waves of a surface, whatever grid will sample it.
+
+    The real surface is the sum over the whole band of B cos(2π k·x/L + φ) with φ(−k) = −φ(k)
+    and B = 2π sqrt(S/A0), so that <h²> = Σ B² = ∫ S d²q. The phase of a wave depends on nothing
+    but the seed and (kx, ky): phases are drawn for all waves in the order of kx² + ky², then
+    kx, then ky, whether in the band or not. So the same seed gives the same surface on any
+    grid, and a band that is widened keeps the waves it had.
+
+    Args:
+        spectrum: The spectrum.
+        lengths: Sides (Lx, Ly) of the surface [mm].
+
+    Raises:
+        InputError: When no wave lies in the band.
+    """
+    kx, ky = _half_plane(_reach(spectrum, lengths))
+    phase = np.random.Generator(np.random.PCG64(spectrum.seed)).uniform(0.0, 2.0 * np.pi, len(kx))
+    inside = _in_band(spectrum, lengths, kx, ky)
+    if not inside.any():
+        raise InputError("no wave lies in the band of the spectrum", value=str(spectrum))
+    kx, ky, phase = kx[inside], ky[inside], phase[inside]
+    squared = kx**2 + (ky * (lengths[0] / lengths[1])) ** 2
+    shape = squared ** (-0.5 * (spectrum.hurst + 1.0))
+    if spectrum.s0 is not None:
+        factor = 2.0 * np.pi * math.sqrt(spectrum.s0 / (lengths[0] * lengths[1]))
+    elif spectrum.rms_height is not None:
+        factor = spectrum.rms_height / math.sqrt(2.0 * np.sum(shape**2))
+    else:
+        slope = 2.0 * np.pi / lengths[0] * math.sqrt(2.0 * np.sum(shape**2 * squared))
+        factor = (spectrum.rms_slope or 0.0) / slope
+    return Waves(kx=kx, ky=ky, amplitude=factor * shape, phase=phase)
+
+
+def synthesise(
+    spectrum: Spectrum, *, grid: tuple[int, int], lengths: tuple[float, float]
+) -> Surface:
+    """Synthesise a periodic random surface with uniformly distributed phases.
+
+    Args:
+        spectrum: The spectrum.
+        grid: Numbers of cells (nx, ny).
+        lengths: Sides (Lx, Ly) [mm].
+
+    Returns:
+        The periodic surface.
+
+    Raises:
+        InputError: When the grid is too coarse for the band, or no wave lies in the band.
+
+    Source: Waddad et al. 2016, section 1.1, doi 10.1016/j.triboint.2015.12.023.
+    """
+    nx, ny = cell_counts(grid, "the grid of the surface", smallest=4)
+    lengths = positive_lengths(lengths, "the surface")
+    waves = random_waves(spectrum, lengths)
+    needed = tuple(max(4, 2 * int(np.abs(k).max()) + 1) for k in (waves.kx, waves.ky))
+    if nx < needed[0] or ny < needed[1]:
+        raise InputError(
+            "the grid is too coarse for the shortest waves of the spectrum",
+            value=(nx, ny),
+            allowed=f"at least {needed[0]} × {needed[1]} heights",
+        )
+    shift = np.pi * (waves.kx / nx + waves.ky / ny)  # samples lie at cell centres
+    coefficient = waves.amplitude * np.exp(1j * (waves.phase + shift))
+    half = np.zeros((nx, ny // 2 + 1), dtype=np.complex128)
+    for sign in (1, -1):  # the real transform keeps ky ≥ 0, and ±kx at ky = 0
+        kept = sign * waves.ky >= 0
+        value = coefficient if sign > 0 else coefficient.conj()
+        half[sign * waves.kx[kept], sign * waves.ky[kept]] = value[kept]
+    heights = scipy.fft.irfft2(half, s=(nx, ny), norm="forward")
+    return Surface(heights=heights, lengths=lengths, periodic=True, source=str(spectrum))
+
+
+def _checked_band(band: tuple[float, float], name: str) -> tuple[float, float]:
+    try:
+        lo, hi = (float(limit) for limit in band)
+    except (TypeError, ValueError):
+        lo, hi = math.nan, math.nan
+    if not (0.0 <= lo <= hi < math.inf):
+        raise InputError(f"{name} is not a band", value=band, allowed="0 ≤ lo ≤ hi, waves per side")
+    return lo, hi
+
+
+def _reach(spectrum: Spectrum, lengths: tuple[float, float]) -> tuple[int, int]:
+    """Return the largest |kx| and |ky| that the band can hold."""
+    if spectrum.waves is not None:
+        hi = spectrum.waves[1] * _ROUNDING
+        return int(hi), int(hi * lengths[1] / lengths[0])
+    assert spectrum.waves_x is not None and spectrum.waves_y is not None
+    return int(spectrum.waves_x[1]), int(spectrum.waves_y[1])
+
+
+def _half_plane(reach: tuple[int, int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return one wave of each pair ±k ≠ 0 of a disc around the box ``reach``, in order."""
+    radius = math.isqrt(reach[0] ** 2 + reach[1] ** 2) + 1
+    kx, ky = (k.ravel() for k in np.mgrid[0 : radius + 1, -radius : radius + 1])
+    squared = kx**2 + ky**2
+    kept = ((kx > 0) | (ky > 0)) & (squared <= radius**2)
+    order = np.argsort(squared[kept], kind="stable")
+    return kx[kept][order], ky[kept][order]
+
+
+def _in_band(
+    spectrum: Spectrum,
+    lengths: tuple[float, float],
+    kx: NDArray[np.int64],
+    ky: NDArray[np.int64],
+) -> NDArray[np.bool_]:
+    if spectrum.waves is not None:
+        lo, hi = spectrum.waves
+        squared = kx**2 + (ky * (lengths[0] / lengths[1])) ** 2
+        return (squared * _ROUNDING >= lo**2) & (squared <= hi**2 * _ROUNDING)
+    assert spectrum.waves_x is not None and spectrum.waves_y is not None
+    inner = np.zeros(kx.shape)
+    for k, (lo, _) in ((kx, spectrum.waves_x), (ky, spectrum.waves_y)):
+        inner += (k / lo) ** 2 if lo > 0.0 else np.where(k == 0, 0.0, np.inf)
+    within = (np.abs(kx) <= spectrum.waves_x[1]) & (np.abs(ky) <= spectrum.waves_y[1])
+    return within & (inner * _ROUNDING >= 1.0)

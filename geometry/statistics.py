@@ -1,0 +1,187 @@
+"""Roughness parameters and the radially averaged power spectrum of a surface."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from geometry.errors import InputError
+from geometry.surface import Surface
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Roughness:
+    """Areal roughness parameters and spectral moments; heights count from their mean.
+
+    Profile moments are averages over profiles along x and along y; radial moments belong to the
+    surface. On an isotropic surface <|∇h|²> = 2 m2 and <(∇²h)²> = 8/3 m4, so that the radial
+    Nayak parameter is 2/3 of the usual one.
+
+    Args:
+        sa: Arithmetical mean height <|h|> [mm].
+        sq: Root mean square height [mm].
+        ssk: Skewness <h³>/Sq³ [-]; not a number on a flat surface.
+        sku: Kurtosis <h⁴>/Sq⁴ [-]; not a number on a flat surface.
+        sz: Highest minus lowest height [mm].
+        sdq: Root mean square gradient sqrt<|∇h|²> [-].
+        m0: Variance of the heights [mm²].
+        m2: Profile moment (<h_x²> + <h_y²>)/2 [-].
+        m4: Profile moment (<h_xx²> + <h_yy²>)/2 [1/mm²].
+        m2_radial: <|∇h|²> [-].
+        m4_radial: <(∇²h)²> [1/mm²].
+
+    Source: ISO 25178-2; Nayak 1971, doi 10.1115/1.3451608.
+    """
+
+    sa: float
+    sq: float
+    ssk: float
+    sku: float
+    sz: float
+    sdq: float
+    m0: float
+    m2: float
+    m4: float
+    m2_radial: float
+    m4_radial: float
+
+    @property
+    def nayak(self) -> float:
+        """Nayak's parameter α = m0 m4/m2² of the profile moments [-]."""
+        return self.m0 * self.m4 / self.m2**2 if self.m2 > 0.0 else math.nan
+
+    @property
+    def nayak_radial(self) -> float:
+        """The same ratio of the radial moments [-]."""
+        return self.m0 * self.m4_radial / self.m2_radial**2 if self.m2_radial > 0.0 else math.nan
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PowerSpectrum:
+    """Two-dimensional power spectral density, averaged over rings of angular wavenumber.
+
+    Args:
+        wavenumber: Mean |q| of the waves in each ring, ascending, shape (n,) [rad/mm].
+        density: Mean density C, shape (n,) [mm⁴]; ∫ C d²q is the variance of the heights.
+        waves: Number of waves of the transform in each ring, shape (n,).
+        cell: Area Δqx Δqy of a wave in the plane of wavenumbers [1/mm²].
+    """
+
+    wavenumber: Array
+    density: Array
+    waves: NDArray[np.intp]
+    cell: float
+
+    @property
+    def variance(self) -> float:
+        """Sum of C Δqx Δqy over all waves, Sq² by Parseval's theorem [mm²]."""
+        return float(np.sum(self.density * self.waves) * self.cell)
+
+
+def roughness(surface: Surface) -> Roughness:
+    """Compute roughness parameters from the heights.
+
+    Derivatives are those of the trigonometric interpolant when the surface is periodic, and
+    central differences over the inner cells otherwise.
+
+    Args:
+        surface: The surface.
+    """
+    h = surface.heights - surface.mean_height
+    variance = float(np.mean(h**2))
+    flat = np.ptp(h) <= 1e-14 * np.abs(surface.heights).max()
+    xx, yy, x4, y4, laplacian = _spectral(surface) if surface.periodic else _differences(surface)
+    return Roughness(
+        sa=float(np.mean(np.abs(h))),
+        sq=math.sqrt(variance),
+        ssk=math.nan if flat else float(np.mean(h**3)) / variance**1.5,
+        sku=math.nan if flat else float(np.mean(h**4)) / variance**2,
+        sz=float(np.ptp(h)),
+        sdq=math.sqrt(xx + yy),
+        m0=variance,
+        m2=0.5 * (xx + yy),
+        m4=0.5 * (x4 + y4),
+        m2_radial=xx + yy,
+        m4_radial=laplacian,
+    )
+
+
+def power_spectrum(surface: Surface, *, window: str | None = None) -> PowerSpectrum:
+    """Average the power spectral density over rings one wave wide.
+
+    Without a window the variance is that of the heights. Hann's window, scaled to unit mean
+    square, keeps it in the mean over many surfaces and suppresses the jump at the border.
+
+    Args:
+        surface: The surface; its mean is subtracted.
+        window: ``none`` or ``hann``; when not given, ``none`` if the surface is periodic.
+
+    Raises:
+        InputError: For another window.
+    """
+    window = window or ("none" if surface.periodic else "hann")
+    if window not in ("none", "hann"):
+        raise InputError("this window is unknown", value=window, allowed="none, hann")
+    h, (qx, qy) = surface.heights, _wavenumbers(surface)
+    weight = np.ones(surface.grid)
+    if window == "hann":
+        wx, wy = (np.sin(np.pi * (np.arange(n) + 0.5) / n) ** 2 for n in surface.grid)
+        weight = np.outer(wx, wy)
+        weight /= math.sqrt(np.mean(weight**2))
+    power = _power((h - np.mean(h * weight) / np.mean(weight)) * weight)
+    step = 2.0 * np.pi / min(surface.lengths)
+    size = np.hypot(qx, qy)
+    ring = np.rint(size / step).astype(np.intp).ravel()
+    waves = np.bincount(ring)
+    waves[0] -= 1  # q = 0, whose power is none
+    kept = waves > 0
+    count = waves[kept]
+    cell = 4.0 * np.pi**2 / surface.area
+    return PowerSpectrum(
+        wavenumber=np.bincount(ring, weights=size.ravel())[kept] / count,
+        density=np.bincount(ring, weights=power.ravel())[kept] / count / cell,
+        waves=count,
+        cell=cell,
+    )
+
+
+def _wavenumbers(surface: Surface) -> tuple[Array, Array]:
+    """Return angular wavenumbers in the order of the transform, shapes (nx, 1) and (1, ny)."""
+    qx, qy = (
+        2.0 * np.pi * scipy.fft.fftfreq(n, d)
+        for n, d in zip(surface.grid, surface.spacing, strict=True)
+    )
+    return qx[:, None], qy[None, :]
+
+
+def _power(h: Array) -> Array:
+    """Return the variance carried by every wave of the discrete transform [mm²]."""
+    return np.abs(scipy.fft.fft2(h, norm="forward")) ** 2
+
+
+def _spectral(surface: Surface) -> tuple[float, float, float, float, float]:
+    """Return <h_x²>, <h_y²>, <h_xx²>, <h_yy²>, <(∇²h)²> of the trigonometric interpolant."""
+    power = _power(surface.heights - surface.mean_height)
+    qx, qy = _wavenumbers(surface)
+    weights = (qx**2, qy**2, qx**4, qy**4, (qx**2 + qy**2) ** 2)
+    first, second, third, fourth, last = (float(np.sum(power * weight)) for weight in weights)
+    return first, second, third, fourth, last
+
+
+def _differences(surface: Surface) -> tuple[float, float, float, float, float]:
+    """Return the same means from central differences over the inner cells."""
+    h, (dx, dy) = surface.heights, surface.spacing
+    x = (h[2:, :] - h[:-2, :]) / (2.0 * dx)
+    y = (h[:, 2:] - h[:, :-2]) / (2.0 * dy)
+    xx = (h[2:, :] - 2.0 * h[1:-1, :] + h[:-2, :]) / dx**2
+    yy = (h[:, 2:] - 2.0 * h[:, 1:-1] + h[:, :-2]) / dy**2
+    laplacian = xx[:, 1:-1] + yy[1:-1, :]
+    squares = (float(np.mean(part**2)) for part in (x, y, xx, yy, laplacian))
+    first, second, third, fourth, last = squares
+    return first, second, third, fourth, last
