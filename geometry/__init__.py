@@ -6,6 +6,7 @@ means over patches; a block shape gives the mesh of the body that carries it.
 
 from geometry.asperities import Asperities, find_asperities
 from geometry.errors import InputError, NotConverged, PatchlawError
+from geometry.files import read_surface
 from geometry.meshes import Alignment, BlockShape, alignment, flat_block
 from geometry.patches import PatchGrid, patch_means
 from geometry.spectrum import Spectrum, synthesise
@@ -29,6 +30,7 @@ __all__ = [
     "flat_block",
     "patch_means",
     "power_spectrum",
+    "read_surface",
     "roughness",
     "synthesise",
 ]

@@ -184,9 +184,12 @@ class Surface:
 
 def _checked_heights(heights: ArrayLike) -> Array:
     try:
-        array = frozen_array(heights)
-    except (TypeError, ValueError):
-        raise InputError("the heights are not an array of real numbers") from None
+        kind = np.asarray(heights).dtype.kind
+    except ValueError:  # ragged rows
+        kind = "O"
+    if kind not in "biuf":
+        raise InputError("the heights are not an array of real numbers")
+    array = frozen_array(heights)
     if array.ndim != 2 or min(array.shape) < 4:
         raise InputError(
             "a surface needs at least 4 × 4 heights on a two-dimensional grid",

@@ -1,0 +1,157 @@
+"""Surfaces from files: numpy arrays, text matrices, point lists, instrument formats."""
+
+from __future__ import annotations
+
+import io
+import os
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.checks import cell_counts, positive_lengths
+from geometry.errors import InputError
+from geometry.instruments import read_instrument
+from geometry.surface import Surface
+
+Array = NDArray[np.float64]
+Content = tuple[Array, tuple[float, float] | None]
+
+_PLACE_TOLERANCE = 0.01  # of a cell: a point further from its place is not on a regular grid
+
+
+def read_surface(
+    path: str | os.PathLike[str],
+    *,
+    lengths: tuple[float, float] | None = None,
+    grid: tuple[int, int] | None = None,
+    periodic: bool = False,
+) -> Surface:
+    """Read heights at cell centres from a file, told by its suffix.
+
+    * ``.npy``: an array with index [ix, iy];
+    * ``.txt``, ``.dat``, ``.csv``: a matrix whose row index is ix, columns separated by white
+      space, commas or semicolons, comments after ``#``;
+    * ``.xyz``: columns x, y, z of the points of a regular grid in any order [mm];
+    * any other: an instrument's format, through the optional package SurfaceTopography.
+
+    Args:
+        path: The file.
+        lengths: Sides (Lx, Ly) [mm]. Needed for arrays and matrices; overrides what a point list
+            or an instrument's file says.
+        grid: Numbers of heights (nx, ny) that the file must have; any when not given.
+        periodic: Whether the heights continue periodically.
+
+    Returns:
+        The surface, with heights in mm.
+
+    Raises:
+        InputError: When the file is missing, unreadable or does not fit, naming the file.
+    """
+    file = Path(path)
+    try:
+        if not file.is_file():
+            raise InputError("there is no such file")
+        heights, found = _READERS.get(file.suffix.lower(), read_instrument)(file)
+        sides = lengths if lengths is not None else found
+        if sides is None:
+            raise InputError(
+                "the file has no lengths, they must be given", allowed="lengths (Lx, Ly) in mm"
+            )
+        surface = Surface(
+            heights=heights,
+            lengths=positive_lengths(sides, "the surface"),
+            periodic=periodic,
+            source=str(file),
+        )
+        if grid is not None and surface.grid != cell_counts(grid, "the grid of the surface"):
+            raise InputError(
+                "the file's number of heights differs from the grid that was asked for",
+                value=surface.grid,
+                allowed=f"{tuple(grid)}",
+            )
+    except InputError as error:
+        raise error.located(file=str(file)) from None
+    return surface
+
+
+def _read_array(file: Path) -> Content:
+    try:
+        return np.load(file, allow_pickle=False), None
+    except (OSError, ValueError, EOFError) as error:
+        raise InputError(f"not a readable numpy array: {_first_line(error)}") from None
+
+
+def _read_matrix(file: Path) -> Content:
+    return _load_text(file), None
+
+
+def _read_points(file: Path) -> Content:
+    points = _load_text(file)
+    if points.shape[1] != 3:
+        raise InputError(
+            "a point list needs three columns x, y, z",
+            value=points.shape[1],
+            allowed="3 columns",
+        )
+    if not np.isfinite(points[:, :2]).all():
+        raise InputError("some coordinates x, y are not finite")
+    (ix, dx), (iy, dy) = _places(points[:, 0], "x"), _places(points[:, 1], "y")
+    heights = np.full((ix.max() + 1, iy.max() + 1), np.nan)
+    times = np.bincount(np.ravel_multi_index((ix, iy), heights.shape), minlength=heights.size)
+    if np.any(times != 1):
+        raise InputError(
+            f"the points do not fill a regular grid of {heights.shape[0]} × {heights.shape[1]}: "
+            f"{np.count_nonzero(times == 0)} places are empty, "
+            f"{np.count_nonzero(times > 1)} taken more than once"
+        )
+    heights[ix, iy] = points[:, 2]
+    return heights, (heights.shape[0] * dx, heights.shape[1] * dy)
+
+
+_READERS: dict[str, Callable[[Path], Content]] = {
+    ".npy": _read_array,
+    ".txt": _read_matrix,
+    ".dat": _read_matrix,
+    ".csv": _read_matrix,
+    ".xyz": _read_points,
+}
+
+
+def _load_text(file: Path) -> Array:
+    """Return a matrix of numbers, whichever of the usual separators the text has."""
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+        rows = (line.partition("#")[0].strip() for line in text.splitlines())
+        first = next((row for row in rows if row), "")
+        # One separator for all rows: a decimal comma is an error then, not another column.
+        separator = next((sign for sign in ";," if sign in first), None)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # an empty file is reported below
+            matrix = np.loadtxt(io.StringIO(text), delimiter=separator, ndmin=2)
+    except (OSError, ValueError) as error:
+        raise InputError(f"not a matrix of numbers: {_first_line(error)}") from None
+    if matrix.size == 0:
+        raise InputError("the file is empty")
+    return matrix
+
+
+def _places(coordinate: Array, axis: str) -> tuple[NDArray[np.intp], float]:
+    """Return the index of every coordinate on an even division, and the division's step [mm]."""
+    lowest, span = coordinate.min(), float(np.ptp(coordinate))
+    gaps = np.diff(np.sort(coordinate))
+    if not span:
+        raise InputError(f"all points have the same {axis}, they are not a surface")
+    count = round(span / float(np.median(gaps[gaps > 0.3 * gaps.max()])))  # without rounding noise
+    step = span / count
+    place = (coordinate - lowest) / step
+    index = np.rint(place).astype(np.intp)
+    if np.max(np.abs(place - index)) > _PLACE_TOLERANCE:
+        raise InputError(f"the points are not evenly spaced along {axis}")
+    return index, step
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0].rstrip(".")
