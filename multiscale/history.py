@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from geometry.patches import PatchGrid
 from numpy.typing import NDArray
+
+from geometry.patches import PatchGrid
 
 Array = NDArray[np.float64]
 
@@ -101,7 +102,9 @@ class History:
 
     def __getattr__(self, name: str) -> NDArray:
         if name not in COLUMNS:
-            raise AttributeError(f"a history has no column {name!r} (columns: {', '.join(COLUMNS)})")
+            raise AttributeError(
+                f"a history has no column {name!r} (columns: {', '.join(COLUMNS)})"
+            )
         return np.array([getattr(step, name) for step in self.steps])
 
     @property

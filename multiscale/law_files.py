@@ -9,9 +9,9 @@ from typing import Any
 
 import h5py
 import numpy as np
+
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
-
 from multiscale.laws import PatchLaw
 
 _COLUMNS = {

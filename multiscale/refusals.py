@@ -5,8 +5,9 @@ from __future__ import annotations
 import difflib
 from typing import Any
 
-from geometry.errors import InputError
 from pydantic import BaseModel, ValidationError
+
+from geometry.errors import InputError
 
 
 def first_refusal(error: ValidationError, model: type[BaseModel]) -> InputError:
@@ -26,6 +27,8 @@ def first_refusal(error: ValidationError, model: type[BaseModel]) -> InputError:
     key = ".".join(path) or None
     if problem["type"] == "missing":
         return InputError("is required and missing", key=key)
+    if problem["type"] == "model_type":
+        return InputError("must be a section", key=key, value=problem["input"])
     text, _, allowed = problem["msg"].removeprefix("Value error, ").partition(" (allowed: ")
     text = text.replace("Input should be", "must be")
     if isinstance(problem["input"], dict):

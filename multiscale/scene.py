@@ -7,15 +7,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from geometry.errors import InputError
-from geometry.spectrum import Spectrum
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from geometry.errors import InputError
+from geometry.spectrum import Spectrum
 from multiscale.quantities import Length, Pressure, Slope, SpectralAmplitude
 from multiscale.refusals import first_refusal
 
 PositiveLength = Annotated[Length, Field(gt=0)]
-Pair = Annotated[tuple[int, int], Field(description="x, y")]
+Count = Annotated[int, Field(ge=1, strict=True)]
+Pair = Annotated[tuple[Count, Count], Field(description="x, y")]
 Band = Annotated[tuple[float, float], Field(description="lower, upper number of waves per side")]
 
 
@@ -60,8 +61,6 @@ class SurfaceSection(_Section):
             raise ValueError("needs exactly one source (allowed: either 'spectrum' or 'file')")
         if self.spectrum is not None and (self.grid is None or self.lengths is None):
             raise ValueError("a 'spectrum' needs 'grid' and 'lengths' beside it")
-        if self.grid is not None and min(self.grid) < 1:
-            raise ValueError(f"'grid' = {list(self.grid)} must have positive entries")
         return self
 
 
@@ -72,30 +71,22 @@ class BlockSection(_Section):
     young_modulus: Annotated[Pressure, Field(gt=0)]
     poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)]
     sides: Literal["free", "roller"] = "free"
-    cells: Annotated[tuple[int, int, int], Field(description="cells in x, y, z")] = (40, 40, 25)
+    cells: Annotated[tuple[Count, Count, Count], Field(description="cells in x, y, z")] = (
+        40,
+        40,
+        25,
+    )
     element: Literal["Q1", "Q2", "P1", "P2"] = "Q1"
     grading: Annotated[float, Field(ge=1, description="bottom to top layer height")] = 1.0
     margin: Annotated[Length, Field(ge=0, description="block beyond the interface")] = 0.0
-    margin_cells: Annotated[int, Field(ge=1)] = 8
+    margin_cells: Count = 8
     margin_grading: Annotated[float, Field(ge=1)] = 8.0
-
-    @model_validator(mode="after")
-    def _some_cells(self) -> Self:
-        if min(self.cells) < 1:
-            raise ValueError(f"'cells' = {list(self.cells)} must have positive entries")
-        return self
 
 
 class PatchesSection(_Section):
     """The partition of the interface."""
 
     grid: Pair = (4, 4)
-
-    @model_validator(mode="after")
-    def _some_patches(self) -> Self:
-        if min(self.grid) < 1:
-            raise ValueError(f"'grid' = {list(self.grid)} must have positive entries")
-        return self
 
 
 class MicroSection(_Section):

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from geometry.patches import PatchGrid
-from micro.asperity_models import AsperityModel
-from micro.love import love_centre, love_mean
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
+from geometry.collective import together
+from geometry.patches import PatchGrid
+from micro.asperity_models import AsperityModel
+from micro.love import love_centre, love_mean
+from multiscale.law_files import LawTable
 from multiscale.laws import PatchLaw
 
 Array = NDArray[np.float64]
@@ -121,7 +124,10 @@ def _increasing(rows: Array) -> Array:
 def _around(points: Array, centres: Array) -> Array:
     """Return the middles of the intervals on either side of some of the points."""
     index = np.searchsorted(points, centres[centres < points[-1]])
-    return np.unique(0.5 * np.concatenate((points[index - 1], points[index + 1])) + 0.5 * np.tile(points[index], 2))
+    return np.unique(
+        0.5 * np.concatenate((points[index - 1], points[index + 1]))
+        + 0.5 * np.tile(points[index], 2)
+    )
 
 
 def _law(rows: Array, touch: float, reach: float, error: float) -> PatchLaw:
@@ -137,12 +143,66 @@ def _law(rows: Array, touch: float, reach: float, error: float) -> PatchLaw:
     )
 
 
-def isolated_patch(
-    model: AsperityModel, patches: PatchGrid, index: int, mean_height: float, love: str
-) -> IsolatedPatch:
-    """Cut one patch with the asperities whose summits it holds out of a surface's model."""
-    asperities = model.asperities
-    own = asperities.subset(patches.index_of(asperities.x, asperities.y) == index)
-    return IsolatedPatch(
-        model=model.on(own), patch=patches.single(index), mean_height=mean_height, love=love
+def isolated_laws(
+    model: AsperityModel,
+    patches: PatchGrid,
+    *,
+    mean_heights: Array,
+    closure_ends: Array,
+    love: str = "mean",
+    tolerance: float = 1e-4,
+    comm: Any = None,
+) -> LawTable:
+    """Tabulate the isolated laws of all patches.
+
+    Args:
+        model: Micro model of the whole surface.
+        patches: Partition of the surface; each asperity belongs to the patch of its summit.
+        mean_heights: Mean height of the surface over each patch, shape (N,) [mm].
+        closure_ends: Largest closure each law will be asked for, shape (N,) [mm].
+        love: Displacement in the closure, ``mean`` or ``centre``.
+        tolerance: Interpolation error of the pressure, relative to each law's largest pressure.
+        comm: MPI communicator; the patches are shared over its ranks by number of summits.
+
+    Returns:
+        All laws, on every rank.
+
+    Note:
+        Collective.
+
+    Source:
+        Waddad et al. 2016, section 3.2, eq. 29-31, doi 10.1016/j.triboint.2015.12.023.
+    """
+    owner = patches.index_of(model.asperities.x, model.asperities.y)
+    work = np.bincount(owner, minlength=patches.count)
+
+    def make(index: int) -> PatchLaw:
+        patch = IsolatedPatch(
+            model=replace(model, asperities=model.asperities.subset(owner == index)),
+            patch=patches.single(index),
+            mean_height=float(mean_heights[index]),
+            love=love,
+        )
+        return patch.law(float(closure_ends[index]), tolerance)
+
+    rank, size = (0, 1) if comm is None else (comm.rank, comm.size)
+    mine = _shares(work, size)[rank]
+    made = together(comm, lambda: {index: make(index) for index in mine})
+    parts = [made] if comm is None else comm.allgather(made)
+    laws = {index: law for part in parts for index, law in part.items()}
+    return LawTable(
+        patches=patches,
+        laws=tuple(laws[index] for index in range(patches.count)),
+        made_by={"coupling": "isolated", "love": love, "tolerance": f"{tolerance:g}"},
     )
+
+
+def _shares(work: NDArray[np.int64], size: int) -> list[list[int]]:
+    """Deal jobs to ranks, the largest first, each to the rank with the least work so far."""
+    shares: list[list[int]] = [[] for _ in range(size)]
+    loads = np.zeros(size)
+    for job in np.argsort(-work, kind="stable"):
+        rank = int(np.argmin(loads))
+        shares[rank].append(int(job))
+        loads[rank] += work[job] ** 2 + 1  # a dense interaction matrix per solution
+    return shares

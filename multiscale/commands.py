@@ -1,0 +1,106 @@
+"""The commands behind the command line: run, plan, laws, surface, schema."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from geometry.collective import on_root
+from geometry.errors import InputError
+from geometry.statistics import roughness
+from multiscale import plan, terminal
+from multiscale.law_files import write_laws
+from multiscale.outputs import write_whole
+from multiscale.results import write_fields, write_figure, write_results
+from multiscale.run import Run
+from multiscale.scene import Scene
+from multiscale.stage import make_stage
+
+
+def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
+    """Run a scene; write history, laws, figures and report."""
+    scene, folder = _scene_and_folder(choice, comm)
+    run = Run(scene, comm)
+    terminal.show_plan(comm, run.stage)
+    try:
+        with terminal.progress(comm, len(scene.approaches)) as advance:
+            for step in run.load_steps():
+                advance(step)
+    finally:
+        # A step that fails for good keeps what was accepted before it; an earlier error, nothing.
+        if run.steps:
+            terminal.show_history(comm, run.history())
+            files = on_root(comm, lambda: write_results(folder, run, options=options))
+            if scene.output.fields:
+                files.append(write_fields(folder, run))
+            terminal.show_files(comm, files)
+
+
+def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
+    """Say what a run would do, and why; run nothing expensive."""
+    scene, _ = _scene_and_folder(choice, comm)
+    terminal.show_plan(comm, on_root(comm, lambda: make_stage(scene)))
+
+
+def tabulate_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
+    """Tabulate the patch laws of a scene; write and draw them."""
+    scene, folder = _scene_and_folder(choice, comm)
+    run = Run(scene, comm)
+    terminal.show_plan(comm, run.stage)
+    table = run.make_laws()
+
+    def write() -> list[Path]:
+        from multiscale.figures import law_figure
+
+        laws = write_whole(folder / "laws.h5", lambda path: write_laws(path, table))
+        return [laws, write_figure(folder / "laws.png", law_figure(table))]
+
+    terminal.show_files(comm, on_root(comm, write))
+    for note in run.history().notes:
+        terminal.say(comm, f"note: {note}")
+
+
+def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
+    """Describe and draw the surface of a scene."""
+    scene, folder = _scene_and_folder(choice, comm)
+    stage = on_root(comm, lambda: make_stage(scene))
+    rough = roughness(stage.surface)
+    pairs = [
+        ("surface", dict(plan.statements(stage))["surface"]),
+        ("Sa, Sq, Sz", f"{1e3 * rough.sa:.4g}, {1e3 * rough.sq:.4g}, {1e3 * rough.sz:.4g} µm"),
+        ("Ssk, Sku, Sdq", f"{rough.ssk:.4g}, {rough.sku:.4g}, {rough.sdq:.4g}"),
+        ("m0, m2, m4", f"{rough.m0:.4g} mm², {rough.m2:.4g}, {rough.m4:.4g} 1/mm² (profile)"),
+        ("Nayak α", f"{rough.nayak:.3g} (profile), {rough.nayak_radial:.3g} (radial moments)"),
+        ("highest point", f"{1e3 * stage.surface.highest:.6g} µm"),
+        ("summits", f"{stage.asperities.count}, border maxima {stage.asperities.border_x.size}"),
+    ]
+    terminal.show_pairs(comm, pairs)
+
+    def write() -> list[Path]:
+        from multiscale.figures import surface_figure
+
+        figure = surface_figure(stage.surface, stage.asperities, stage.patches)
+        return [write_figure(folder / "surface.png", figure)]
+
+    terminal.show_files(comm, on_root(comm, write))
+
+
+def print_schema(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
+    """Print the JSON Schema of scene files."""
+    if terminal.speaks(comm):
+        print(json.dumps(Scene.model_json_schema(by_alias=True), indent=2))
+
+
+def _scene_and_folder(choice: argparse.Namespace, comm: Any) -> tuple[Scene, Path]:
+    """Read the scene on rank 0 and settle where results would go."""
+
+    def read() -> tuple[Scene, Path]:
+        scene = Scene.load(choice.scene, choice.set)
+        folder = choice.out or Path("results") / scene.name
+        if folder.exists() and not folder.is_dir():
+            raise InputError("is not a folder", key="--out", value=str(folder))
+        return scene, folder
+
+    return on_root(comm, read)

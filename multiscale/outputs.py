@@ -1,0 +1,72 @@
+"""Writes results: every file whole or not at all."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from multiscale.history import COLUMNS, PATCH_COLUMNS, History
+
+
+def write_whole(path: Path, write: Callable[[Path], None]) -> Path:
+    """Write a file under a temporary name beside it and rename it when it is complete.
+
+    Args:
+        path: Final name; its folder is made when missing.
+        write: Writes the file whose name it is given; the suffix is that of the final name.
+
+    Returns:
+        The final name.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f".{path.stem}.partial-{os.getpid()}{path.suffix}")
+    try:
+        write(partial)
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+    return path
+
+
+def write_tables(folder: Path, history: History) -> list[Path]:
+    """Write ``history.csv`` and ``patches.csv``."""
+    return [
+        _write_csv(folder / "history.csv", COLUMNS, history.rows()),
+        _write_csv(folder / "patches.csv", PATCH_COLUMNS, history.patch_rows()),
+    ]
+
+
+def write_json(path: Path, content: dict[str, Any]) -> Path:
+    """Write a dictionary as indented JSON."""
+    text = json.dumps(content, indent=2, default=str) + "\n"
+    return write_whole(path, lambda partial: _write_text(partial, text))
+
+
+def write_text(path: Path, text: str) -> Path:
+    """Write a text as UTF-8."""
+    return write_whole(path, lambda partial: _write_text(partial, text))
+
+
+def _write_text(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
+
+
+def _write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> Path:
+    """Write rows; numbers keep all their digits (Python's shortest exact form)."""
+
+    def write(partial: Path) -> None:
+        with partial.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(header)
+            writer.writerows([_plain(value) for value in row] for row in rows)
+
+    return write_whole(path, write)
+
+
+def _plain(value: Any) -> Any:
+    """Return numpy scalars as Python's own: their text is the same on every numpy release."""
+    return value.item() if hasattr(value, "item") else value

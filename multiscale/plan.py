@@ -1,0 +1,82 @@
+"""States what a run will do, and why, before anything expensive starts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from geometry.meshes import alignment
+from geometry.statistics import roughness
+from multiscale.stage import Stage
+
+
+def statements(stage: Stage) -> Iterator[tuple[str, str]]:
+    """Yield pairs of topic and sentence that say what will be done and why."""
+    scene = stage.scene
+    yield "surface", _surface(stage)
+    yield (
+        "summits",
+        f"{stage.asperities.count} found, {int(stage.reached.sum())} within the largest approach; "
+        "the others cost nothing",
+    )
+    yield "micro model", f"{scene.micro.model}, solved by {scene.micro.solver}"
+    yield "coupling", _coupling(stage)
+    if stage.embedded:
+        yield "block", _block(stage)
+    yield (
+        "load",
+        f"{scene.loading.steps} steps to an approach of {1e3 * scene.loading.approach:g} µm"
+        + (f", tilt {scene.loading.tilt}" if any(scene.loading.tilt) else ""),
+    )
+
+
+def warnings(stage: Stage) -> Iterator[str]:
+    """Yield what a user should know about the validity of the scene."""
+    if stage.reached_at_border:
+        yield (
+            f"{stage.reached_at_border} maxima on the surface's border lie within the largest "
+            "approach: an 8-neighbour search cannot confirm them, and they carry no load here"
+        )
+    if not stage.embedded:
+        return
+    fit = alignment(stage.shape, stage.patches)
+    if not fit.aligned:
+        yield fit.sentence
+    if max(stage.patches.size) > 0.5 * min(stage.shape.height, *stage.surface.lengths):
+        yield (
+            "the patches are not small against the block: the half-space correction (Love) inside "
+            "their laws is an approximation there"
+        )
+
+
+def _surface(stage: Stage) -> str:
+    surface, rough = stage.surface, roughness(stage.surface)
+    return (
+        f"{surface.source}; {surface.grid[0]} × {surface.grid[1]} heights on "
+        f"{surface.lengths[0]:g} × {surface.lengths[1]:g} mm, rms height {1e3 * rough.sq:.3g} µm, "
+        f"rms gradient {rough.sdq:.3g}"
+    )
+
+
+def _coupling(stage: Stage) -> str:
+    coupling, patches, summits = stage.scene.coupling, stage.patches, stage.asperities
+    if not stage.embedded:
+        return "analytic: the micro model alone on a half-space, no finite elements"
+    reached = np.unique(patches.index_of(summits.x, summits.y)[stage.reached]).size
+    return (
+        f"{coupling.kind}: {patches.grid[0]} × {patches.grid[1]} patches, {reached} get a law, "
+        f"{patches.count - reached} stay open; Love's {coupling.love} displacement, "
+        f"{coupling.interface} closure"
+    )
+
+
+def _block(stage: Stage) -> str:
+    shape, block = stage.shape, stage.scene.block
+    nx, ny, nz = shape.cells
+    kind = "hexahedra" if shape.element.startswith("Q") else "hexahedra split into tetrahedra"
+    return (
+        f"{nx} × {ny} × {nz} {kind} ({shape.element}) under the interface, grading "
+        f"{shape.grading:g}, {block.sides} sides, contact modulus "
+        f"{stage.model.contact_modulus:.6g} MPa"
+    )

@@ -1,0 +1,71 @@
+"""What a result was made with and from."""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy
+import scipy
+
+from multiscale.run import Run
+
+
+def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
+    """Collect versions, scene, options, times and convergence of a run.
+
+    Args:
+        run: The run, finished or stopped.
+        options: PETSc options given by the user.
+
+    Returns:
+        A dictionary that JSON can hold.
+    """
+    history = run.history()
+    return {
+        "patchlaw": version("patchlaw"),
+        "written": datetime.now(UTC).isoformat(timespec="seconds"),
+        "scene_file": run.scene.file,
+        "scene": run.scene.model_dump(by_alias=True, mode="json"),
+        "units": "mm, N, MPa",
+        "surface": {
+            "source": run.stage.surface.source,
+            "highest_mm": run.stage.surface.highest,
+            "summits": run.stage.asperities.count,
+            "summits_in_reach": int(run.stage.reached.sum()),
+            "border_maxima_in_reach": run.stage.reached_at_border,
+        },
+        "ranks": 1 if run.comm is None else run.comm.size,
+        "threads": os.environ.get("OMP_NUM_THREADS"),
+        "petsc_options": options,
+        "unknowns": None if run.pressed is None else run.pressed.block.unknowns,
+        "seconds": history.seconds,
+        "steps": len(history),
+        "reasons": sorted(set(history.reason)) if len(history) else [],
+        "notes": list(history.notes),
+        "versions": _versions(),
+        "machine": platform.platform(),
+    }
+
+
+def _versions() -> dict[str, str]:
+    """Return the versions of what took part; compiled parts only when they were loaded."""
+    found = {
+        "python": platform.python_version(),
+        "numpy": numpy.__version__,
+        "scipy": scipy.__version__,
+    }
+    for name in ("dolfinx", "petsc4py", "mpi4py", "gmsh"):
+        module = sys.modules.get(name)
+        if module is not None:
+            found[name] = str(getattr(module, "__version__", "unknown"))
+    for name in ("h5py", "pydantic", "pint", "matplotlib"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "unknown"
+    return found

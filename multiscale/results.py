@@ -1,0 +1,90 @@
+"""Writes everything a run leaves behind: tables, laws, provenance, figures, report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from multiscale import plan
+from multiscale.law_files import write_laws
+from multiscale.outputs import write_json, write_tables, write_text, write_whole
+from multiscale.provenance import provenance
+from multiscale.report import report_html
+from multiscale.run import Run
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
+    """Write the files of a run, finished or stopped; call it on one rank.
+
+    Args:
+        folder: Where to; made when missing.
+        run: The run.
+        options: PETSc options given by the user, for the provenance.
+
+    Returns:
+        The files written.
+    """
+    history = run.history()
+    files = write_tables(folder, history)
+    table = run.table
+    if table is not None:
+        files.append(write_whole(folder / "laws.h5", lambda path: write_laws(path, table)))
+    files.append(write_json(folder / "provenance.json", provenance(run, options=options)))
+    output = run.scene.output
+    drawn = {}
+    if output.figures and len(history):
+        for name, caption, figure in _figures(run):
+            drawn[caption] = write_figure(folder / f"{name}.png", figure)
+        files.extend(drawn.values())
+    if output.report:
+        page = report_html(
+            title=f"patchlaw: {run.scene.name}",
+            statements=plan.statements(run.stage),
+            warnings=list(plan.warnings(run.stage)),
+            history=history,
+            figures=drawn,
+        )
+        files.append(write_text(folder / "report.html", page))
+    return files
+
+
+def write_figure(path: Path, figure: Figure) -> Path:
+    """Write a figure as PNG."""
+    return write_whole(path, lambda partial: figure.savefig(partial, dpi=130))
+
+
+def _figures(run: Run) -> Iterator[tuple[str, str, Figure]]:
+    """Yield file name, caption and figure; matplotlib is loaded only when one is wanted."""
+    from multiscale import figures
+
+    stage, history = run.stage, run.history()
+    yield (
+        "surface",
+        "The rough surface with its summits and the patches.",
+        figures.surface_figure(stage.surface, stage.asperities, stage.patches),
+    )
+    yield (
+        "curves",
+        "Mean pressure, contact area and mean separation.",
+        figures.history_figure({run.scene.coupling.kind: history}),
+    )
+    yield (
+        "pressures",
+        "Mean pressure of every patch at the last load step.",
+        figures.pressure_figure(history),
+    )
+    if run.table is not None:
+        yield "laws", "The patch laws.", figures.law_figure(run.table)
+
+
+def write_fields(folder: Path, run: Run) -> Path:
+    """Write displacement and patch pressure of the last load step for ParaView.
+
+    Note:
+        Collective: every rank writes its part.
+    """
+    raise NotImplementedError

@@ -1,0 +1,153 @@
+"""Turns a scene into its cheap ingredients: surface, summits, patches, micro model, block shape."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.asperities import Asperities, find_asperities
+from geometry.errors import InputError
+from geometry.files import read_surface
+from geometry.meshes import BlockShape
+from geometry.patches import PatchGrid, patch_means
+from geometry.spectrum import synthesise
+from geometry.surface import Surface
+from micro.asperity_models import AsperityModel, asperity_model
+from micro.hertz import contact_modulus
+from multiscale.coupling import tilted_approaches
+from multiscale.scene import Scene
+
+_DETREND_ORDER = {"mean": 0, "plane": 1, "quadratic": 2}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stage:
+    """Everything that is known before laws and finite elements are made.
+
+    Attributes:
+        scene: The scene.
+        surface: Its rough surface.
+        asperities: The surface's summits.
+        model: Micro model of the whole surface.
+        patches: Partition of the interface.
+        mean_heights: Mean height of each patch, shape (N,) [mm].
+        shape: The block's shape and mesh.
+    """
+
+    scene: Scene
+    surface: Surface
+    asperities: Asperities
+    model: AsperityModel
+    patches: PatchGrid
+    mean_heights: NDArray[np.float64]
+    shape: BlockShape
+
+    @property
+    def embedded(self) -> bool:
+        """Whether finite elements take part."""
+        return self.scene.coupling.kind != "analytic"
+
+    @property
+    def closure_ends(self) -> NDArray[np.float64]:
+        """Largest approach, and so closure, that each patch can see, shape (N,) [mm]."""
+        loading = self.scene.loading
+        return tilted_approaches(self.patches, loading.approach, loading.tilt)
+
+    @property
+    def reached(self) -> NDArray[np.bool_]:
+        """Which summits lie within the largest approach, shape (n,)."""
+        return self._within(self.asperities.x, self.asperities.y, self.asperities.z)
+
+    @property
+    def reached_at_border(self) -> int:
+        """Number of the border's maxima within the largest approach."""
+        cut = self.asperities
+        return int(np.sum(self._within(cut.border_x, cut.border_y, cut.border_z)))
+
+    def _within(self, x: NDArray, y: NDArray, z: NDArray) -> NDArray[np.bool_]:
+        loading = self.scene.loading
+        from_centre = np.column_stack((x, y)) - 0.5 * np.asarray(self.surface.lengths)
+        approach = loading.approach + from_centre @ np.asarray(loading.tilt)
+        return np.asarray(approach > self.asperities.highest - z)
+
+
+def make_stage(scene: Scene) -> Stage:
+    """Make or read the surface, find its summits and check that everything fits together.
+
+    Raises:
+        InputError: When something cannot be made or does not fit; names file, key and value.
+    """
+    surface = make_surface(scene)
+    patches = PatchGrid(grid=scene.patches.grid, lengths=surface.lengths)
+    _check_patches(scene, surface)
+    block = scene.block
+    asperities = find_asperities(surface, periodic=False)  # the block's sides are free
+    return Stage(
+        scene=scene,
+        surface=surface,
+        asperities=asperities,
+        model=asperity_model(
+            scene.micro.model,
+            asperities,
+            contact_modulus=contact_modulus(block.young_modulus, block.poisson_ratio),
+            solver=scene.micro.solver,
+        ),
+        patches=patches,
+        mean_heights=patch_means(surface, patches),
+        shape=BlockShape(
+            interface=surface.lengths,
+            height=block.height,
+            cells=block.cells,
+            element=block.element,
+            grading=block.grading,
+            margin=block.margin,
+            margin_cells=block.margin_cells,
+            margin_grading=block.margin_grading,
+        ),
+    )
+
+
+def make_surface(scene: Scene) -> Surface:
+    """Make or read the surface of a scene.
+
+    Raises:
+        InputError: When it cannot be made or read; names file and key.
+    """
+    section = scene.surface
+    make: Callable[..., Surface]
+    if section.spectrum is not None:
+        make, source, key = synthesise, section.spectrum.spectrum(), "surface.spectrum"
+    else:
+        make, source, key = read_surface, scene.surface_path, "surface.file"
+    surface = _located(scene, key, lambda: make(source, grid=section.grid, lengths=section.lengths))
+    if section.detrend == "none":
+        return surface
+    return surface.detrended(_DETREND_ORDER[section.detrend])
+
+
+def _check_patches(scene: Scene, surface: Surface) -> None:
+    """Refuse patches that no element or no height can resolve."""
+    limits = [("heights of the surface", surface.grid)]
+    if scene.coupling.kind != "analytic":
+        limits.append(("cells of the interface (block.cells)", scene.block.cells[:2]))
+    for what, limit in limits:
+        if any(patches > most for patches, most in zip(scene.patches.grid, limit, strict=True)):
+            raise InputError(
+                f"more patches than {what}",
+                key="patches.grid",
+                value=list(scene.patches.grid),
+                allowed=f"at most {list(limit)}",
+                file=scene.file,
+            )
+
+
+def _located(scene: Scene, key: str, make: Callable[[], Any]) -> Any:
+    """Make something; an error gets the scene's file and the key."""
+    try:
+        return make()
+    except InputError as error:
+        raise error.located(key=key, file=scene.file) from None

@@ -1,0 +1,104 @@
+"""What the command line prints; only rank 0 speaks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from geometry.errors import PatchlawError
+from multiscale import plan
+from multiscale.history import History, LoadStep
+from multiscale.report import curve_cells
+from multiscale.stage import Stage
+
+
+def speaks(comm: Any) -> bool:
+    """Tell whether this process talks to the terminal and writes files."""
+    return comm is None or comm.rank == 0
+
+
+def complain(comm: Any, error: PatchlawError) -> None:
+    """Print one error message on the error stream."""
+    if speaks(comm):
+        # Long lines stay whole: a message may be searched for, or cut and pasted.
+        Console(stderr=True, soft_wrap=True).print(f"[bold red]patchlaw:[/] {escape(str(error))}")
+
+
+def say(comm: Any, text: str) -> None:
+    """Print one line."""
+    if speaks(comm):
+        Console(soft_wrap=True, highlight=False).print(escape(text))
+
+
+def show_pairs(comm: Any, pairs: Sequence[tuple[str, str]], warnings: Sequence[str] = ()) -> None:
+    """Print topics with a sentence each, then warnings."""
+    if not speaks(comm):
+        return
+    console = Console(highlight=False)
+    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
+    for topic, sentence in pairs:
+        table.add_row(f"[bold]{escape(topic)}[/]", escape(sentence))
+    console.print(table)
+    for warning in warnings:
+        console.print(f"[yellow]note:[/] {escape(warning)}")
+
+
+def show_plan(comm: Any, stage: Stage) -> None:
+    """Print what a run will do, and why."""
+    if speaks(comm):
+        show_pairs(comm, list(plan.statements(stage)), list(plan.warnings(stage)))
+
+
+@contextmanager
+def progress(comm: Any, steps: int) -> Iterator[Callable[[LoadStep], None]]:
+    """Show a progress bar over load steps; yields the function to call with every step."""
+    bar = Progress(
+        TextColumn("[bold]load steps"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.description}"),
+        console=Console(),
+        disable=not speaks(comm),
+    )
+    with bar:
+        task = bar.add_task("preparing laws and block", total=steps)
+
+        def advance(step: LoadStep) -> None:
+            text = f"{1e3 * step.approach_mm:.3g} µm, {step.force_N:.4g} N"
+            bar.update(task, advance=1, description=text)
+
+        yield advance
+
+
+def show_history(comm: Any, history: History) -> None:
+    """Print the force–approach table and where the time went."""
+    if not speaks(comm):
+        return
+    console = Console(highlight=False)
+    header, rows = curve_cells(history)
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    for name in header:
+        table.add_column(name.replace(" [", "\n["), justify="right")
+    for row in rows:
+        table.add_row(*row)
+    console.print(table)
+    times = ", ".join(f"{name} {seconds:.2f} s" for name, seconds in history.seconds.items())
+    console.print(f"wall time: {times}")
+    for note in history.notes:
+        console.print(f"note: {note}")
+
+
+def show_files(comm: Any, files: Sequence[Path]) -> None:
+    """Print where results are."""
+    if speaks(comm) and files:
+        folder = files[0].parent
+        names = ", ".join(path.name for path in files)
+        Console(soft_wrap=True, highlight=False).print(f"results in {escape(str(folder))}: {names}")

@@ -1,0 +1,60 @@
+"""The structure that README draws: imports go down only, and heavy packages stay where they are."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+BELOW = {
+    "geometry": set(),
+    "micro": {"geometry"},
+    "macro": {"geometry"},
+    "multiscale": {"geometry", "micro", "macro"},
+}
+FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
+HEAVY = {
+    "geometry": FINITE_ELEMENTS | {"h5py", "matplotlib", "pydantic"},
+    "micro": FINITE_ELEMENTS | {"gmsh", "h5py", "matplotlib", "pydantic"},
+    "macro": {"gmsh", "h5py", "matplotlib", "pydantic"},
+    # the command line alone names MPI and hands options to PETSc
+    "multiscale": {"dolfinx", "ufl", "basix", "ffcx", "gmsh"},
+}
+
+
+def imports(path):
+    """Return the top-level names that a module imports."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.split(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield (node.module or "").split(".")[0]
+
+
+@pytest.mark.parametrize("package", BELOW)
+def test_imports_go_down_only(package):
+    forbidden = (set(BELOW) - BELOW[package] - {package}) | HEAVY[package]
+    for path in (ROOT / package).glob("*.py"):
+        crossing = forbidden & set(imports(path))
+        assert not crossing, f"{path.name} imports {crossing}"
+
+
+def test_only_one_module_knows_dolfinx_releases():
+    for path in (ROOT / "macro").glob("*.py"):
+        if path.name != "compat.py":
+            assert "__version__" not in path.read_text(encoding="utf-8")
+
+
+def test_micro_scene_loads_no_finite_elements():
+    code = (
+        "import sys; from multiscale.run import run; from multiscale.scene import Scene;"
+        "run(Scene.load('demos/scenes/paper.toml', ['coupling.kind=analytic', 'load.steps=1']));"
+        "print([name for name in ('dolfinx', 'petsc4py', 'gmsh', 'matplotlib') if name in sys.modules])"
+    )
+    shown = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert shown.stdout.strip() == "[]"

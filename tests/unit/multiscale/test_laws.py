@@ -1,0 +1,113 @@
+"""A patch law against closed forms that its table was made from."""
+
+import numpy as np
+import pytest
+
+from geometry.errors import InputError
+from multiscale.laws import ExtendedLaw, PatchLaw
+
+
+def law_of(form, *, touch=1e-3, end=9e-3, rows=12, **changes):
+    closure = np.linspace(touch, end, rows)
+    columns = {
+        "closure": closure,
+        "pressure": form(closure - touch),
+        "approach": closure,
+        "contact_area_fraction": 3.0 * (closure - touch),
+        "contacts": np.arange(rows),
+        "touch": touch,
+        "reach": 0.02,
+    }
+    return PatchLaw(**(columns | changes))
+
+
+def hertz(indentation):
+    return 4e3 * indentation**1.5
+
+
+def test_hertz_law_is_exact_between_rows():
+    law = law_of(hertz)
+    closure = np.linspace(1e-3, 9e-3, 357)
+    pressure, stiffness = law.at(closure)
+    # p^(2/3) is a straight line: only round-off remains
+    np.testing.assert_allclose(pressure, hertz(closure - 1e-3), rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(stiffness, 6e3 * np.sqrt(closure - 1e-3), rtol=1e-12, atol=1e-9)
+
+
+def test_stiffness_is_the_derivative_of_the_interpolant():
+    law = law_of(lambda w: 4e3 * w**1.5 + 6e3 * np.maximum(w - 2e-3, 0) ** 1.5)
+    closure, h = np.linspace(1.05e-3, 8.95e-3, 211), 1e-8
+    difference = (law.at(closure + h)[0] - law.at(closure - h)[0]) / (2 * h)
+    # second-order differences of a C¹ function: h times the jump of its second derivative
+    np.testing.assert_allclose(law.at(closure)[1], difference, rtol=2e-5)
+
+
+def test_interpolant_never_decreases():
+    law = law_of(lambda w: 4e3 * w**1.5 + 1e4 * np.maximum(w - 2e-3, 0) ** 1.5, rows=7)
+    pressure, stiffness = law.at(np.linspace(0, 9e-3, 4001))
+    assert np.all(np.diff(pressure) >= 0)
+    assert np.all(stiffness >= 0)
+
+
+def test_zero_before_touch():
+    pressure, stiffness = law_of(hertz).at(np.array([-1.0, 0.0, 1e-3]))
+    assert not pressure.any()
+    assert not stiffness.any()
+
+
+def test_beyond_the_table_raises_with_the_range():
+    with pytest.raises(InputError, match=r"0.0095: closure beyond .*up to 0.009 mm .first touch at"):
+        law_of(hertz).at(9.5e-3)
+
+
+def test_extension_continues_the_tangent():
+    law = ExtendedLaw(law_of(hertz))
+    closure = np.array([0.02, 0.5, 3.0])  # far beyond: Newton's first iterate may be anywhere
+    np.testing.assert_allclose(law.pressure(closure), hertz(closure - 1e-3), rtol=1e-10)
+    np.testing.assert_allclose(law.stiffness(closure), 6e3 * np.sqrt(closure - 1e-3), rtol=1e-10)
+
+
+def test_open_patch():
+    empty = np.empty(0)
+    law = law_of(
+        hertz,
+        closure=empty,
+        pressure=empty,
+        approach=empty,
+        contact_area_fraction=empty,
+        contacts=np.empty(0, dtype=np.int64),
+        touch=5e-3,
+    )
+    assert law.is_open
+    assert not law.at(np.array([0.0, 5e-3]))[0].any()
+    assert law.area_fraction_at(1e-3) == 0.0
+    assert law.contacts_at(1e-3) == 0
+    with pytest.raises(InputError, match=r"closure beyond the end .*first touch at 0.005 mm"):
+        law.at(6e-3)
+
+
+def test_contacts_are_those_of_the_row_before():
+    law = law_of(hertz)
+    spacing = law.closure[1] - law.closure[0]
+    assert law.contacts_at([0.0, 1e-3, 1e-3 + 1.5 * spacing, 9e-3]).tolist() == [0, 0, 1, 11]
+
+
+def test_area_and_separation():
+    law = law_of(hertz)
+    # a straight line through the rows: only round-off
+    np.testing.assert_allclose(law.area_fraction_at([0, 4e-3]), [0.0, 9e-3], rtol=1e-12)
+    np.testing.assert_allclose(law.separation_at([0, 4e-3]), [0.02, 0.016], rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"closure": np.linspace(1e-3, 9e-3, 11)}, "columns of one length"),
+        ({"closure": np.r_[np.full(2, 1e-3), np.linspace(2e-3, 9e-3, 10)]}, "increasing closure"),
+        ({"pressure": np.r_[0.0, np.full(11, np.nan)]}, "increasing pressure"),
+        ({"pressure": np.linspace(1, 2, 12)}, "starts at zero pressure"),
+    ],
+)
+def test_impossible_tables_are_refused(changes, text):
+    with pytest.raises(InputError, match=text):
+        law_of(hertz, **changes)
