@@ -1,1 +1,41 @@
-"""TBD."""
+"""Contact of a rough surface with a rigid plane on the scale of its asperities.
+
+Asperities and a contact modulus make an `AsperityModel`; solved along approaches it gives a
+`Response` of the surface and its patches; `love` tells how patches of pressure move the half-space.
+"""
+
+from micro.asperity_models import MODELS, SOLVERS, AsperityModel, ModelKind, asperity_model
+from micro.asperity_state import AsperityState
+from micro.ellipse import (
+    area_factor,
+    axis_factor,
+    axis_ratio,
+    eccentricity,
+    eccentricity_approximate,
+    force_factor,
+)
+from micro.hertz import HertzContact, contact_modulus
+from micro.love import love_centre, love_integral, love_mean, love_mutual
+from micro.response import Response
+
+__all__ = [
+    "MODELS",
+    "SOLVERS",
+    "AsperityModel",
+    "AsperityState",
+    "HertzContact",
+    "ModelKind",
+    "Response",
+    "area_factor",
+    "asperity_model",
+    "axis_factor",
+    "axis_ratio",
+    "contact_modulus",
+    "eccentricity",
+    "eccentricity_approximate",
+    "force_factor",
+    "love_centre",
+    "love_integral",
+    "love_mean",
+    "love_mutual",
+]

@@ -1,0 +1,259 @@
+"""The four discrete models: asperities, elliptic or circular, with or without interaction.
+
+A rigid plane that has approached by δ asks every summit for the displacement
+d_k = <δ(x_k) − (z_M − z_k)>. Without interaction each contact makes it alone, w_k = d_k; with
+interaction the displacements by all contacts add up to w_k (`micro.contact_problem`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from geometry import Asperities, PatchGrid
+from geometry.errors import InputError
+from micro.active_set import active_set
+from micro.asperity_state import AsperityState, HertzCoefficients
+from micro.contact_problem import ContactProblem, Method, Solution, solve
+from micro.curve import PatchSums
+from micro.hertz import HertzContact
+from micro.interaction import Interaction
+from micro.plane import RigidPlane
+from micro.response import Response
+from micro.truncated_newton import truncated_newton
+
+Array = NDArray[np.float64]
+
+_LEVEL = (0.0, 0.0)
+
+
+class ModelKind(NamedTuple):
+    """What distinguishes the four models.
+
+    Attributes:
+        elliptic: Whether contacts are ellipses; circles of radius sqrt(R' R'') otherwise.
+        interacting: Whether contacts displace each other's summits.
+    """
+
+    elliptic: bool
+    interacting: bool
+
+
+MODELS: Mapping[str, ModelKind] = MappingProxyType(
+    {
+        "elliptic": ModelKind(elliptic=True, interacting=True),
+        "circular": ModelKind(elliptic=False, interacting=True),
+        "elliptic-independent": ModelKind(elliptic=True, interacting=False),
+        "circular-independent": ModelKind(elliptic=False, interacting=False),
+    }
+)
+"""The models (1) to (4) of Waddad et al. 2016, section 2.2, by name."""
+
+SOLVERS: Mapping[str, Method] = MappingProxyType(
+    {"active-set": active_set, "truncated-newton": truncated_newton}
+)
+"""Solvers of the models with interaction, by name."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class AsperityModel:
+    """One of the four discrete models on given asperities.
+
+    Matrices are dense: time and memory grow with the square of the number of summits in reach.
+
+    Args:
+        asperities: The n summits, with the highest point z_M that the approach counts from.
+        contact_modulus: E* [MPa].
+        elliptic: Whether contacts are ellipses; circles of radius sqrt(R' R'') otherwise.
+        interacting: Whether contacts displace each other's summits.
+        solver: Solver of the models with interaction, a name in `SOLVERS`.
+
+    Raises:
+        InputError: When the modulus is not positive or the solver unknown.
+
+    Source:
+        Waddad et al. 2016, section 1.2, doi 10.1016/j.triboint.2015.12.023.
+    """
+
+    asperities: Asperities
+    contact_modulus: float
+    elliptic: bool
+    interacting: bool
+    solver: str = "active-set"
+
+    def __post_init__(self) -> None:
+        _known(self.solver, SOLVERS, "solver")
+        _ = self._hertz  # checks the modulus
+
+    @property
+    def name(self) -> str:
+        """Name of the model in `MODELS`."""
+        kind = ModelKind(self.elliptic, self.interacting)
+        return next(name for name, value in MODELS.items() if value == kind)
+
+    def solve(
+        self,
+        approach: float,
+        *,
+        tilt: tuple[float, float] = _LEVEL,
+        start: AsperityState | None = None,
+    ) -> AsperityState:
+        """Solve the contact at one approach of the plane.
+
+        Args:
+            approach: Rigid approach δ at the centre of the rectangle [mm].
+            tilt: Slopes (tx, ty) of the approach: δ(x, y) = δ + tx (x − xc) + ty (y − yc).
+            start: A solution nearby to start from.
+
+        Raises:
+            InputError: When the approach or the tilt is not finite.
+            NotConverged: When the contact conditions cannot be met to 1e-10.
+        """
+        plane = RigidPlane.above(self.asperities, approach, tilt)
+        required = plane.required(self.asperities)
+        first = np.zeros(len(required)) if start is None else start.indentation
+        found = self._solution(required, first)
+        own = found.indentation
+        return AsperityState(
+            approach=plane.approach,
+            required=required,
+            displacement=own + self._lift(own),
+            indentation=own,
+            semi_axes=self._hertz.semi_axes * np.sqrt(own)[:, None],
+            contact_area=self._hertz.area * own,
+            force=self._hertz.force * own**1.5,
+            peak_pressure=self._hertz.peak_pressure * np.sqrt(own),
+            engulfed=found.engulfed,
+            iterations=found.iterations,
+            residual=found.residual,
+        )
+
+    def respond(
+        self,
+        approaches: ArrayLike,
+        *,
+        patches: PatchGrid,
+        mean_heights: ArrayLike,
+        tilt: tuple[float, float] = _LEVEL,
+    ) -> Response:
+        """Solve along approaches, each from the solution before it.
+
+        Args:
+            approaches: Rigid approaches in any order, shape (m,) [mm].
+            patches: Patches; every asperity lies in one.
+            mean_heights: Mean heights of the surface on the patches, shape (N,) [mm].
+            tilt: Slopes (tx, ty) of the approach.
+
+        Returns:
+            The response, in the order of ``approaches``.
+
+        Raises:
+            InputError: When the approaches are not a finite, non-empty list, a summit lies outside
+                the patches, or the mean heights do not fit them.
+            NotConverged: When the contact conditions cannot be met to 1e-10.
+        """
+        given = np.atleast_1d(np.asarray(approaches, float))
+        sums = PatchSums(
+            asperities=self.asperities,
+            patches=patches,
+            mean_heights=np.asarray(mean_heights, float),
+            hertz=self._hertz,
+            contact_modulus=self.contact_modulus,
+        )
+        rows: dict[int, dict[str, Any]] = {}
+        own = np.zeros(len(self.asperities))
+        for index in np.argsort(given, kind="stable"):
+            plane = RigidPlane.above(self.asperities, given[index], tilt)
+            found = self._solution(plane.required(self.asperities), own)
+            own = found.indentation
+            rows[int(index)] = sums.row(plane, found)
+        return sums.response(self.name, [rows[index] for index in range(len(given))])
+
+    def surface_displacement(self, state: AsperityState, x: ArrayLike, y: ArrayLike) -> Array:
+        """Return the normal displacement of the surface at points, by all contacts [mm].
+
+        The field of every contact is Hertz's, also where contacts merge.
+
+        Args:
+            state: A solution of this model.
+            x: Abscissae [mm]; broadcast against ``y``.
+            y: Ordinates [mm].
+        """
+        total = np.zeros(np.broadcast_shapes(np.shape(x), np.shape(y)))
+        a = self.asperities
+        for k in np.flatnonzero(state.in_contact):  # one field at a time bounds the memory
+            contact = self._contact(state.indentation[k], k)
+            dx, dy = np.asarray(x, float) - a.x[k], np.asarray(y, float) - a.y[k]
+            cos, sin = np.cos(a.angle[k]), np.sin(a.angle[k])
+            total += contact.displacement(cos * dx + sin * dy, cos * dy - sin * dx)
+        return total
+
+    def _contact(self, indentation: ArrayLike, index: int | slice = slice(None)) -> HertzContact:
+        a = self.asperities
+        return HertzContact(
+            contact_modulus=self.contact_modulus,
+            radius_major=(a.radius_major if self.elliptic else a.radius)[index],
+            radius_minor=(a.radius_minor if self.elliptic else a.radius)[index],
+            indentation=indentation,
+        )
+
+    @cached_property
+    def _hertz(self) -> HertzCoefficients:
+        return HertzCoefficients.of(self._contact(1.0))
+
+    @cached_property
+    def _interaction(self) -> Interaction:
+        shape = self._contact(0.0).shape
+        return Interaction.among(self.asperities, shape, circular=not self.elliptic)
+
+    def _lift(self, own: Array) -> Array | float:
+        return self._interaction.lift(own).displacement if self.interacting else 0.0
+
+    def _solution(self, required: Array, start: Array) -> Solution:
+        """Solve for the summits in reach; the displacement of the others is left at 0."""
+        if not self.interacting:
+            return Solution(required, required, 0, 0.0, 0)
+        reached = np.flatnonzero(required > 0.0)
+        own, displacement = np.zeros_like(required), np.zeros_like(required)
+        if reached.size == 0:
+            return Solution(own, displacement, 0, 0.0, 0)
+        problem = ContactProblem(
+            interaction=self._interaction.subset(reached), required=required[reached]
+        )
+        found = solve(problem, SOLVERS[self.solver], start[reached])
+        own[reached], displacement[reached] = found.indentation, found.displacement
+        return found._replace(indentation=own, displacement=displacement)
+
+
+def asperity_model(
+    name: str, asperities: Asperities, *, contact_modulus: float, solver: str = "active-set"
+) -> AsperityModel:
+    """Return the model of a given name on some asperities.
+
+    Args:
+        name: A name in `MODELS`.
+        asperities: The summits.
+        contact_modulus: E* [MPa].
+        solver: A name in `SOLVERS`, for the models with interaction.
+
+    Raises:
+        InputError: When a name is unknown or the modulus not positive.
+    """
+    _known(name, MODELS, "micro model")
+    return AsperityModel(
+        asperities=asperities,
+        contact_modulus=contact_modulus,
+        solver=solver,
+        **MODELS[name]._asdict(),
+    )
+
+
+def _known(name: str, table: Mapping[str, Any], what: str) -> None:
+    if name not in table:
+        raise InputError(f"this {what} is unknown", value=name, allowed=", ".join(table))

@@ -1,0 +1,110 @@
+"""From the indentations of asperities to the response of the surface and its patches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry import Asperities, PatchGrid
+from geometry.errors import InputError
+from micro.asperity_state import HertzCoefficients
+from micro.contact_problem import Solution
+from micro.patch_displacement import patch_displacements
+from micro.plane import RigidPlane
+from micro.response import Response
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PatchSums:
+    """Sums and means over patches of what the asperities do.
+
+    An asperity counts whole for the patch that holds its summit, as in the paper.
+
+    Args:
+        asperities: The n asperities.
+        patches: The N patches; every summit lies in one.
+        mean_heights: Mean heights of the patches, shape (N,) [mm].
+        hertz: Coefficients of the asperities.
+        contact_modulus: E* [MPa].
+
+    Raises:
+        InputError: When a summit lies outside the patches, or not every patch has a mean height.
+    """
+
+    asperities: Asperities
+    patches: PatchGrid
+    mean_heights: Array
+    hertz: HertzCoefficients
+    contact_modulus: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mean_heights", np.asarray(self.mean_heights, float))
+        if self.mean_heights.shape != (self.patches.count,):
+            raise InputError(
+                "every patch needs one mean height",
+                value=self.mean_heights.shape,
+                allowed=f"shape ({self.patches.count},)",
+            )
+        _ = self.owner  # refuses summits outside
+
+    @cached_property
+    def owner(self) -> NDArray[np.intp]:
+        """Flat index of the patch that holds each summit, shape (n,)."""
+        return self.patches.index_of(self.asperities.x, self.asperities.y)
+
+    def row(self, plane: RigidPlane, solution: Solution) -> dict[str, Any]:
+        """Return the fields of a response for one approach."""
+        t = solution.indentation
+        on = np.flatnonzero(t > 0.0)
+        force, area = self.hertz.force[on] * t[on] ** 1.5, self.hertz.area[on] * t[on]
+        displacement = self._displacement(on, t[on], force)
+        below = self.asperities.highest - plane.at(*self.patches.centres.T)
+        separation = below - self.mean_heights + displacement
+        return {
+            "approach": plane.approach,
+            "force": force.sum(),
+            "contact_area": area.sum(),
+            "contacts": len(on),
+            "mean_separation": separation.mean(),
+            "iterations": solution.iterations,
+            "residual": solution.residual,
+            "engulfed": solution.engulfed,
+            "patch_force": self._summed(on, force),
+            "patch_contact_area": self._summed(on, area),
+            "patch_contacts": self._summed(on, None),
+            "patch_displacement": displacement,
+            "patch_separation": separation,
+        }
+
+    def response(self, name: str, rows: Sequence[dict[str, Any]]) -> Response:
+        """Put rows together, in their order."""
+        if not rows:
+            raise InputError("a response needs at least one approach", value=[])
+        columns = {key: np.array([row[key] for row in rows]) for key in rows[0]}
+        return Response(
+            model=name,
+            contact_modulus=self.contact_modulus,
+            nominal_area=self.patches.area * self.patches.count,
+            **columns,
+        )
+
+    def _summed(self, on: NDArray[np.intp], values: Array | None) -> NDArray[Any]:
+        return np.bincount(self.owner[on], values, minlength=self.patches.count)
+
+    def _displacement(self, on: NDArray[np.intp], t: Array, force: Array) -> Array:
+        a = self.asperities
+        return patch_displacements(
+            self.patches,
+            np.stack([a.x[on], a.y[on]], axis=1),
+            self.hertz.semi_axes[on] * np.sqrt(t)[:, None],
+            a.angle[on],
+            force,
+            self.contact_modulus,
+        )

@@ -1,0 +1,105 @@
+"""Response of a rough surface to the approach of a rigid plane, as a whole and patch by patch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.errors import InputError
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Response:
+    """Results at n approaches on N patches.
+
+    The separation is the average gap between the plane and the *displaced* surface:
+    g_i = z_M − mean height − mean approach + mean displacement, per patch; for the models without
+    interaction too, as their forces move the surface all the same. The paper's eq. 9 leaves the
+    displacement out.
+
+    Args:
+        model: Name of the micro model.
+        contact_modulus: E* [MPa].
+        nominal_area: Area of all patches [mm²].
+        approach: Rigid approach at the centre, counted from first touch, shape (n,) [mm].
+        force: Normal force, shape (n,) [N].
+        contact_area: Real contact area, shape (n,) [mm²].
+        contacts: Number of asperities in contact, shape (n,).
+        mean_separation: Average gap, shape (n,) [mm].
+        iterations: Iterations of the solver, shape (n,).
+        residual: Complementarity error relative to the largest required displacement, shape (n,).
+        engulfed: Pairs of merged asperities, shape (n,).
+        patch_force: Force of the asperities with their summit in the patch, shape (n, N) [N].
+        patch_contact_area: Their contact area, shape (n, N) [mm²].
+        patch_contacts: Their number, shape (n, N).
+        patch_displacement: Mean normal displacement of the patch by all contacts, (n, N) [mm].
+        patch_separation: Average gap of the patch, shape (n, N) [mm].
+
+    Raises:
+        InputError: When the arrays do not fit each other.
+    """
+
+    model: str
+    contact_modulus: float
+    nominal_area: float
+    approach: Array
+    force: Array
+    contact_area: Array
+    contacts: Counts
+    mean_separation: Array
+    iterations: Counts
+    residual: Array
+    engulfed: Counts
+    patch_force: Array
+    patch_contact_area: Array
+    patch_contacts: Counts
+    patch_displacement: Array
+    patch_separation: Array
+
+    def __post_init__(self) -> None:
+        count = len(self.approach)
+        columns = self.patch_force.shape[1:]
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if not isinstance(value, np.ndarray):
+                continue
+            expected = (count, *columns) if item.name.startswith("patch_") else (count,)
+            if value.shape != expected:
+                raise InputError(
+                    f"{item.name} of a response does not fit",
+                    value=value.shape,
+                    allowed=f"shape {expected}",
+                )
+
+    @property
+    def mean_pressure(self) -> Array:
+        """Force per nominal area, shape (n,) [MPa]."""
+        return self.force / self.nominal_area
+
+    @property
+    def patch_pressure(self) -> Array:
+        """Force per area of the patch, shape (n, N) [MPa]."""
+        return self.patch_force * (self.patch_force.shape[1] / self.nominal_area)
+
+    @property
+    def contact_area_fraction(self) -> Array:
+        """Real over nominal contact area A/A0, shape (n,)."""
+        return self.contact_area / self.nominal_area
+
+    def kappa(self, rms_slope: float) -> Array:
+        """Return κ of A/A0 = κ p/(rms slope · E*), shape (n,); NaN where nothing touches.
+
+        Args:
+            rms_slope: Root of the mean squared gradient of the surface, sqrt<|∇h|²>.
+
+        Source:
+            Waddad et al. 2016, section 2.2, doi 10.1016/j.triboint.2015.12.023.
+        """
+        area = self.contact_area_fraction * rms_slope * self.contact_modulus
+        result = np.full_like(area, np.nan)
+        return np.divide(area, self.mean_pressure, out=result, where=self.force > 0.0)
