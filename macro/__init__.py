@@ -1,1 +1,27 @@
-"""TBD."""
+"""The elastic block in dolfinx, pressed by a rigid plane through one contact law per patch.
+
+BlockShape → block_mesh → Block (with a Material) → Interface (with a PatchGrid)
+→ PressedBlock (with one ContactLaw per patch) → PressState for every approach.
+"""
+
+from macro.block import Block
+from macro.elasticity import Material
+from macro.interface import ContactLaw, Interface
+from macro.mesh import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
+from macro.output import write_fields
+from macro.pressed import PressedBlock, PressState
+
+__all__ = [
+    "BOTTOM",
+    "SIDES",
+    "TOP",
+    "Block",
+    "BlockMesh",
+    "ContactLaw",
+    "Interface",
+    "Material",
+    "PressState",
+    "PressedBlock",
+    "block_mesh",
+    "write_fields",
+]

@@ -1,0 +1,159 @@
+"""The elastic block: displacement space, supports, assembled stiffness and its solver."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal, get_args
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from geometry.errors import InputError
+from macro import compat
+from macro.elasticity import Material, rigid_body_modes, stiffness_form
+from macro.mesh import BOTTOM, SIDES, BlockMesh
+from macro.solvers import linear_solver, solve_linear
+
+Sides = Literal["free", "roller"]
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """An elastic block, clamped at the bottom, ready to be loaded on its top.
+
+    Stiffness and preconditioner are made once, on first use, and serve every load afterwards.
+
+    Args:
+        mesh: Mesh with marked faces.
+        material: Elastic constants.
+        sides: ``"free"`` of traction, or ``"roller"``: no normal displacement on the four side
+            planes, no shear traction.
+
+    Raises:
+        InputError: When ``sides`` is neither.
+
+    Note:
+        Construction and every method are collective over the mesh's communicator.
+    """
+
+    mesh: BlockMesh
+    material: Material
+    sides: Sides = "free"
+
+    def __post_init__(self) -> None:
+        if self.sides not in get_args(Sides):
+            raise InputError(
+                "unknown support of the sides", value=self.sides, allowed="free, roller"
+            )
+
+    @cached_property
+    def space(self) -> Any:
+        """Vector Lagrange space of the displacements."""
+        return compat.vector_space(self.mesh.mesh, self.degree)
+
+    @property
+    def degree(self) -> int:
+        """Polynomial degree of the displacements."""
+        return self.mesh.shape.degree
+
+    @property
+    def dofs(self) -> int:
+        """Number of degrees of freedom, all ranks together."""
+        return 3 * int(self.space.dofmap.index_map.size_global)
+
+    @property
+    def owned_dofs(self) -> int:
+        """Number of degrees of freedom that this rank owns."""
+        return 3 * int(self.space.dofmap.index_map.size_local)
+
+    @cached_property
+    def conditions(self) -> list[Any]:
+        """Dirichlet conditions: the clamped bottom and, on request, the rollers."""
+        clamped = fem.locate_dofs_topological(self.space, 2, self._facets(BOTTOM))
+        conditions = [fem.dirichletbc(np.zeros(3, PETSc.ScalarType), clamped, self.space)]
+        if self.sides == "roller":
+            conditions += [self._roller(axis) for axis in (0, 1)]
+        return conditions
+
+    @cached_property
+    def stiffness(self) -> PETSc.Mat:
+        """Stiffness matrix [N/mm] with unit rows for constrained degrees of freedom."""
+        matrix = compat.assemble_matrix(compat.compile_form(self._form), self.conditions)
+        matrix.setOption(PETSc.Mat.Option.SPD, True)
+        matrix.setNearNullSpace(rigid_body_modes(self.space))
+        return matrix
+
+    @cached_property
+    def solver(self) -> PETSc.KSP:
+        """Linear solver of the block alone; its preconditioner also serves the contact solves."""
+        return linear_solver(self.stiffness)
+
+    def solve(self, load: PETSc.Vec) -> Any:
+        """Return the displacement under a nodal load.
+
+        Args:
+            load: Nodal forces [N], zero at constrained degrees of freedom.
+
+        Returns:
+            dolfinx Function, ghosts up to date [mm].
+
+        Raises:
+            NotConverged: When the linear solver fails.
+        """
+        solution = self.stiffness.createVecRight()
+        solve_linear(self.solver, load, solution)
+        return self.function(solution.array_r)
+
+    def function(self, values: NDArray[np.float64], name: str = "displacement") -> Any:
+        """Return rank-local displacements as a Function.
+
+        Args:
+            values: Owned degrees of freedom [mm], ghosts may follow.
+            name: Name of the function in files.
+        """
+        function = fem.Function(self.space, name=name)
+        function.x.array[: self.owned_dofs] = values[: self.owned_dofs]
+        function.x.scatter_forward()
+        return function
+
+    def reaction(self, displacement: PETSc.Vec) -> float:
+        """Return the force that the clamped bottom bears, from nodal residuals [N].
+
+        Args:
+            displacement: Owned degrees of freedom [mm].
+        """
+        return float(self._bottom_row.dot(displacement))
+
+    @cached_property
+    def _form(self) -> Any:
+        # exact on boxes and affine tetrahedra, full integration on distorted hexahedra
+        degree = 2 * self.degree if self.mesh.shape.hexahedral else 2 * (self.degree - 1)
+        return stiffness_form(self.space, self.material, degree)
+
+    @cached_property
+    def _bottom_row(self) -> PETSc.Vec:
+        """Sum of the unconstrained stiffness' rows of the bottom's vertical displacements."""
+        lift = fem.Function(self.space)
+        lift.x.array[fem.locate_dofs_topological(self.space.sub(2), 2, self._facets(BOTTOM))] = 1.0
+        lift.x.scatter_forward()
+        return compat.assemble_vector(compat.compile_form(ufl.action(self._form, lift)))
+
+    def _facets(self, marker: int) -> NDArray[np.int32]:
+        return self.mesh.facet_tags.find(marker)
+
+    def _roller(self, axis: int) -> Any:
+        """Fix the normal displacement on the two side planes across an axis."""
+        facets = self._facets(SIDES)
+        shape = self.mesh.shape
+        low, high = -shape.margin, shape.interface[axis] + shape.margin
+        place = dmesh.compute_midpoints(self.mesh.mesh, 2, facets)[:, axis]
+        slack = 1e-6 * (high - low)  # far below a cell, far above rounding
+        across = facets[(place < low + slack) | (place > high - slack)]
+        part = self.space.sub(axis)
+        dofs = fem.locate_dofs_topological(part, 2, across)
+        return fem.dirichletbc(PETSc.ScalarType(0.0), dofs, part)

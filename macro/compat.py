@@ -1,0 +1,155 @@
+"""The one place that knows dolfinx releases: 0.5, 0.9 and 0.11 behind one set of functions.
+
+Every difference is probed by feature, never by version number. Callers use only what is here, what
+all releases share, and petsc4py.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import basix
+import numpy as np
+from dolfinx import fem, io
+from dolfinx.fem import petsc as fem_petsc
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+try:
+    from dolfinx.io import gmsh as _gmsh_io
+except ImportError:
+    from dolfinx.io import gmshio as _gmsh_io
+
+_JIT = {"timeout": 60}  # another process may be compiling the same form on a slow machine
+_CELLS = {"hexahedron": basix.CellType.hexahedron, "tetrahedron": basix.CellType.tetrahedron}
+
+
+@contextmanager
+def _quiet_compiler() -> Iterator[None]:
+    """Keep the compiler's command lines, which older releases log, from the user's terminal."""
+    root = logging.getLogger()
+    level, disabled = root.level, root.manager.disable
+    logging.disable(logging.INFO)
+    try:
+        yield
+    finally:
+        root.setLevel(level)  # setuptools changes it
+        logging.disable(disabled)
+
+
+@_quiet_compiler()
+def mesh_from_gmsh(model: Any, comm: Any) -> tuple[Any, Any]:
+    """Distribute the gmsh model of rank 0 as (mesh, facet tags).
+
+    Args:
+        model: ``gmsh.model`` on rank 0; not looked at elsewhere.
+        comm: MPI communicator.
+
+    Note:
+        Collective. Facet tags may include ghost facets (dolfinx 0.5).
+    """
+    data = _gmsh_io.model_to_mesh(model, comm, 0, gdim=3)
+    return (data.mesh, data.facet_tags) if hasattr(data, "mesh") else (data[0], data[2])
+
+
+@_quiet_compiler()
+def vector_space(mesh: Any, degree: int) -> Any:
+    """Return the continuous Lagrange space of displacements, three components per node."""
+    if hasattr(fem, "functionspace"):
+        return fem.functionspace(mesh, ("Lagrange", degree, (3,)))
+    return fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
+
+
+@_quiet_compiler()
+def cellwise_space(mesh: Any) -> Any:
+    """Return the space of scalars that are constant on every cell."""
+    if hasattr(fem, "functionspace"):
+        return fem.functionspace(mesh, ("DG", 0))
+    return fem.FunctionSpace(mesh, ("DG", 0))
+
+
+def cell_nodes(space: Any) -> NDArray[np.int32]:
+    """Return the rank-local nodes of every rank-local cell, shape (cells, nodes per cell)."""
+    return _as_table(space.dofmap.list, space.mesh)
+
+
+def cell_vertices(mesh: Any) -> NDArray[np.int32]:
+    """Return the rows of ``mesh.geometry.x`` of every rank-local cell, shape (cells, vertices)."""
+    geometry = mesh.geometry
+    table = geometry.dofmaps[0] if hasattr(geometry, "dofmaps") else geometry.dofmap
+    return _as_table(table, mesh)
+
+
+def _as_table(table: Any, mesh: Any) -> NDArray[np.int32]:
+    if isinstance(table, np.ndarray):
+        return table
+    cells = mesh.topology.index_map(mesh.topology.dim)
+    # a rank without a single cell has nothing to infer the width from
+    count = cells.size_local + cells.num_ghosts
+    return table.array.reshape(count, -1 if count else 1)
+
+
+def lagrange_values(cell_name: str, degree: int, points: NDArray[np.float64]) -> NDArray:
+    """Tabulate the scalar Lagrange basis on the reference cell, shape (points, nodes)."""
+    element = basix.create_element(
+        basix.ElementFamily.P, _CELLS[cell_name], degree, basix.LagrangeVariant.equispaced
+    )
+    if not len(points):  # basix 0.5 aborts the process on no points
+        return np.empty((0, element.dim))
+    return element.tabulate(0, points)[0].reshape(len(points), -1)
+
+
+def reference_facets(cell_name: str) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Return the reference cell's vertices (nv, 3) and the vertices of its facets (nf, ·)."""
+    cell = _CELLS[cell_name]
+    return np.asarray(basix.geometry(cell)), np.asarray(basix.topology(cell)[2], dtype=np.intp)
+
+
+def triangle_rule(degree: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return points (n, 2) and weights (n,), of sum ½, exact to ``degree`` on the triangle."""
+    points, weights = basix.make_quadrature(basix.CellType.triangle, degree)
+    return points, weights
+
+
+@_quiet_compiler()
+def compile_form(form: Any) -> Any:
+    """Compile a UFL form."""
+    try:
+        return fem.form(form, jit_options=dict(_JIT))
+    except TypeError:
+        return fem.form(form, jit_params=dict(_JIT))
+
+
+def assemble_matrix(form: Any, conditions: Sequence[Any]) -> PETSc.Mat:
+    """Assemble a compiled bilinear form, with ones on the diagonal of the constrained rows."""
+    matrix = fem_petsc.create_matrix(form)
+    fem_petsc.assemble_matrix(matrix, form, list(conditions), 1.0)
+    matrix.assemble()
+    return matrix
+
+
+def assemble_vector(form: Any) -> PETSc.Vec:
+    """Assemble a compiled linear form, contributions of all ranks added."""
+    vector = fem_petsc.assemble_vector(form)
+    vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+    return vector
+
+
+def petsc_vector(function: Any) -> PETSc.Vec:
+    """Return the PETSc view of a function's degrees of freedom."""
+    return function.x.petsc_vec if hasattr(function.x, "petsc_vec") else function.vector
+
+
+def write_xdmf(path: str, mesh: Any, functions: Sequence[Any]) -> None:
+    """Write a mesh and functions of its degree, or constant on cells, as XDMF with HDF5.
+
+    Note:
+        Collective.
+    """
+    with io.XDMFFile(mesh.comm, path, "w") as file:
+        file.write_mesh(mesh)
+        for function in functions:
+            file.write_function(function)

@@ -1,0 +1,54 @@
+"""Turns a gmsh block into a distributed dolfinx mesh with marked faces."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Any
+
+from geometry.collective import on_root
+from geometry.meshes import BlockShape, flat_block
+from macro import compat
+
+BOTTOM, TOP, SIDES = 1, 2, 3
+"""Markers of the block's faces: z = −height, z = 0, and the four planes between them."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BlockMesh:
+    """A block's mesh, distributed over the ranks of a communicator.
+
+    Args:
+        mesh: The dolfinx mesh; lengths in mm.
+        facet_tags: Its facets marked BOTTOM, TOP or SIDES; may include ghosts.
+        shape: What was meshed.
+    """
+
+    mesh: Any
+    facet_tags: Any
+    shape: BlockShape
+
+    @property
+    def comm(self) -> Any:
+        """Communicator of the mesh."""
+        return self.mesh.comm
+
+
+def block_mesh(shape: BlockShape, comm: Any) -> BlockMesh:
+    """Mesh a block with gmsh on rank 0 and distribute it.
+
+    Args:
+        shape: Size, cells and element of the block.
+        comm: MPI communicator that the mesh will live on.
+
+    Raises:
+        InputError: Whatever gmsh's part of the work raised on rank 0, on every rank.
+
+    Note:
+        Collective.
+    """
+    with ExitStack() as gmsh_session:
+        models: list[Any] = []
+        on_root(comm, lambda: models.append(gmsh_session.enter_context(flat_block(shape))))
+        mesh, facet_tags = compat.mesh_from_gmsh(models[0] if models else None, comm)
+    return BlockMesh(mesh=mesh, facet_tags=facet_tags, shape=shape)

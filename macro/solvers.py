@@ -1,0 +1,98 @@
+"""PETSc solvers under one prefix: defaults that the user's options override."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+
+from petsc4py import PETSc
+
+from geometry.errors import NotConverged
+
+PREFIX = "patchlaw_"
+"""Prefix of every PETSc option: ``-patchlaw_ksp_rtol 1e-6`` on the command line wins."""
+
+LINEAR_DEFAULTS: Mapping[str, object] = {
+    "ksp_type": "cg",
+    "ksp_norm_type": "unpreconditioned",
+    "ksp_rtol": 1e-10,
+    "ksp_max_it": 1000,
+    "pc_type": "gamg",
+    "pc_gamg_threshold": 0.01,
+    "mg_levels_ksp_type": "chebyshev",
+    "mg_levels_pc_type": "jacobi",
+}
+"""Conjugate gradients and smoothed aggregation; Jacobi smooths on every release of PETSc."""
+
+NONLINEAR_DEFAULTS: Mapping[str, object] = {
+    "snes_type": "newtonls",
+    "snes_linesearch_type": "bt",
+    "snes_rtol": 1e-10,
+    "snes_max_it": 25,
+}
+"""Newton with backtracking; ``snes_rtol`` is relative to the current interface load."""
+
+
+@contextmanager
+def default_options(prefix: str, defaults: Mapping[str, object]) -> Iterator[None]:
+    """Put defaults into PETSc's option database where the user left them open, then take them out.
+
+    Args:
+        prefix: Prefix of the options; must not be empty, lest other solvers see the defaults.
+        defaults: Option names without prefix, and values.
+    """
+    if not prefix:
+        raise ValueError("PETSc options need a prefix")
+    database = PETSc.Options(prefix)
+    added = [name for name in defaults if not database.hasName(name)]
+    for name in added:
+        database.setValue(name, defaults[name])
+    try:
+        yield
+    finally:
+        for name in added:
+            database.delValue(name)
+
+
+def user_set(name: str, prefix: str = PREFIX) -> bool:
+    """Tell whether the user gave an option (outside of :func:`default_options`)."""
+    return PETSc.Options(prefix).hasName(name)
+
+
+def linear_solver(matrix: PETSc.Mat, prefix: str = PREFIX) -> PETSc.KSP:
+    """Return a solver for a symmetric positive definite matrix, its preconditioner set up.
+
+    Note:
+        Collective.
+    """
+    solver = PETSc.KSP().create(matrix.comm)
+    solver.setOptionsPrefix(prefix)
+    solver.setOperators(matrix)
+    with default_options(prefix, LINEAR_DEFAULTS):
+        solver.setFromOptions()
+        solver.setUp()  # multigrid reads the options of its levels here
+    return solver
+
+
+def solve_linear(solver: PETSc.KSP, load: PETSc.Vec, solution: PETSc.Vec) -> int:
+    """Solve and return the number of iterations.
+
+    Raises:
+        NotConverged: With the name of PETSc's reason.
+    """
+    solver.solve(load, solution)
+    if solver.reason < 0:
+        raise NotConverged(
+            "the linear solve of the block",
+            reason=reason_name(PETSc.KSP.ConvergedReason, solver.reason),
+            iterations=solver.its,
+            remedy="see the PETSc options under -patchlaw_ksp_ and -patchlaw_pc_",
+        )
+    return int(solver.its)
+
+
+def reason_name(reasons: type, code: int) -> str:
+    """Return the name of a PETSc converged reason, such as ``DIVERGED_LINE_SEARCH``."""
+    names = [name for name, value in vars(reasons).items() if value == code and name.isupper()]
+    # aliases without a prefix exist (MAX_IT): the longest name is the one PETSc documents
+    return max(names, key=len, default=f"reason {code}")
