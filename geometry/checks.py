@@ -22,12 +22,10 @@ def positive_lengths(value: Any, what: str) -> tuple[float, float]:
     Raises:
         InputError: When there are not two of them, or one is not positive and finite.
     """
-    allowed = "two positive numbers (Lx, Ly) in mm"
-    pair = _two_numbers(value, f"the lengths of {what} are not a pair of numbers", allowed)
-    if not all(math.isfinite(side) and side > 0.0 for side in pair):
-        raise InputError(
-            f"the lengths of {what} must be positive", value=tuple(value), allowed=allowed
-        )
+    problem, allowed = f"the lengths of {what} do not fit", "two positive numbers (Lx, Ly) in mm"
+    pair = finite_pair(value, problem, allowed=allowed)
+    if min(pair) <= 0.0:
+        raise InputError(problem, value=pair, allowed=allowed)
     return pair
 
 
@@ -60,9 +58,21 @@ def frozen_array(value: Any) -> NDArray[np.float64]:
     return array
 
 
-def _two_numbers(value: Any, problem: str, allowed: str) -> tuple[float, float]:
+def finite_pair(value: Any, problem: str, *, allowed: str) -> tuple[float, float]:
+    """Return two finite numbers as floats.
+
+    Args:
+        value: Candidate for the pair.
+        problem: What to say when it is none.
+        allowed: What would be accepted.
+
+    Raises:
+        InputError: When there are not two of them, or one is not finite.
+    """
     try:
         first, second = (float(part) for part in value)
     except (TypeError, ValueError):
         raise InputError(problem, value=value, allowed=allowed) from None
+    if not (math.isfinite(first) and math.isfinite(second)):
+        raise InputError(problem, value=value, allowed=allowed)
     return first, second

@@ -38,7 +38,9 @@ def read_instrument(file: Path) -> tuple[Array, tuple[float, float]]:
     try:
         topography = library.read_topography(str(file))
     except Exception as error:  # its readers raise errors of many families
-        raise InputError(f"SurfaceTopography cannot read it: {error}") from None
+        lines = str(error).splitlines()  # many when it tried all its readers in vain
+        reason = lines[0] if len(lines) == 1 else type(error).__name__
+        raise InputError(f"SurfaceTopography cannot read it: {reason}") from None
     if topography.dim != 2:
         raise InputError("the file holds a profile, not a surface", value=topography.dim)
     if not topography.unit:

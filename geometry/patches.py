@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry.checks import cell_counts, positive_lengths
+from geometry.checks import cell_counts, finite_pair, positive_lengths
 from geometry.errors import InputError
 from geometry.surface import Surface
 
@@ -24,7 +24,8 @@ class PatchGrid:
         origin: Its lower corner [mm].
 
     Raises:
-        InputError: When a number of patches is not whole and positive or a length not positive.
+        InputError: When a number of patches is not whole and positive, or a length not positive, or the
+            origin not finite.
     """
 
     grid: tuple[int, int]
@@ -34,10 +35,9 @@ class PatchGrid:
     def __post_init__(self) -> None:
         object.__setattr__(self, "grid", cell_counts(self.grid, "the patch grid"))
         object.__setattr__(self, "lengths", positive_lengths(self.lengths, "the patch grid"))
-        x, y = self.origin
-        if not np.isfinite([x, y]).all():
-            raise InputError("the origin of the patch grid must be finite", value=self.origin)
-        object.__setattr__(self, "origin", (float(x), float(y)))
+        problem = "the origin of the patch grid does not fit"
+        origin = finite_pair(self.origin, problem, allowed="two finite numbers in mm")
+        object.__setattr__(self, "origin", origin)
 
     @property
     def count(self) -> int:

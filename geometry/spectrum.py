@@ -9,7 +9,7 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from geometry.checks import cell_counts, positive_lengths
+from geometry.checks import cell_counts, finite_pair, positive_lengths
 from geometry.errors import InputError
 from geometry.surface import Surface
 
@@ -184,12 +184,10 @@ def synthesise(
 
 
 def _checked_band(band: tuple[float, float], name: str) -> tuple[float, float]:
-    try:
-        lo, hi = (float(limit) for limit in band)
-    except (TypeError, ValueError):
-        lo, hi = math.nan, math.nan
-    if not (0.0 <= lo <= hi < math.inf):
-        raise InputError(f"{name} is not a band", value=band, allowed="0 ≤ lo ≤ hi, waves per side")
+    problem, allowed = f"{name} is not a band", "0 ≤ lo ≤ hi, waves per side"
+    lo, hi = finite_pair(band, problem, allowed=allowed)
+    if not 0.0 <= lo <= hi:
+        raise InputError(problem, value=band, allowed=allowed)
     return lo, hi
 
 

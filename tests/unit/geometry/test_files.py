@@ -1,0 +1,118 @@
+import numpy as np
+import pytest
+
+from geometry import InputError, read_surface
+
+HEIGHTS = np.random.default_rng(0).normal(size=(5, 4))
+SIDES = (2.5, 2.0)
+
+
+def points(order=None, decimals=9):
+    """Return the columns x, y, z of HEIGHTS on cells of 0.5 mm."""
+    x, y = np.meshgrid(3.0 + 0.5 * np.arange(5), -1.0 + 0.5 * np.arange(4), indexing="ij")
+    rows = np.round(np.stack([x.ravel(), y.ravel(), HEIGHTS.ravel()], axis=1), decimals)
+    return rows if order is None else rows[order]
+
+
+@pytest.mark.parametrize("suffix", [".txt", ".dat", ".csv", ".TXT"])
+@pytest.mark.parametrize("separator", [" ", "\t", ",", ";", ", "])
+def test_text_matrices_have_rows_along_x(tmp_path, suffix, separator):
+    file = tmp_path / f"scan{suffix}"
+    rows = [separator.join(repr(float(value)) for value in row) for row in HEIGHTS]
+    file.write_text("# heights, in mm; [ix, iy]\n\n" + "\n".join(rows) + "\n")
+    surface = read_surface(file, lengths=SIDES, grid=(5, 4), periodic=True)
+    np.testing.assert_array_equal(surface.heights, HEIGHTS)
+    assert surface.lengths == SIDES and surface.periodic and surface.source == str(file)
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32", "int16"])
+def test_numpy_arrays(tmp_path, dtype):
+    file = tmp_path / "scan.npy"
+    heights = (100 * HEIGHTS).astype(dtype)
+    np.save(file, heights)
+    np.testing.assert_array_equal(read_surface(str(file), lengths=SIDES).heights, heights)
+
+
+@pytest.mark.parametrize("seed", [None, 0, 1])
+def test_point_lists_come_in_any_order(tmp_path, seed):
+    order = None if seed is None else np.random.default_rng(seed).permutation(20)
+    file = tmp_path / "scan.xyz"
+    np.savetxt(file, points(order))
+    surface = read_surface(file)
+    np.testing.assert_allclose(surface.heights, HEIGHTS, atol=1e-9)  # nine decimals were written
+    # lengths are cells times spacing: samples lie at cell centres
+    assert surface.lengths == pytest.approx(SIDES, rel=1e-12)
+    assert read_surface(file, lengths=(1.0, 1.0)).lengths == (1.0, 1.0)
+
+
+def test_point_lists_may_carry_rounded_coordinates(tmp_path):
+    file = tmp_path / "scan.xyz"
+    rows = points()
+    rows[:, :2] += np.random.default_rng(2).uniform(-1e-3, 1e-3, (20, 2))
+    np.savetxt(file, rows)
+    surface = read_surface(file)
+    assert surface.grid == (5, 4)
+    assert surface.lengths == pytest.approx(SIDES, abs=4e-3)  # as good as the coordinates
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("a.txt", "1 2 3 4\n1 2 3\n", "not a matrix of numbers: .*columns changed"),
+        ("a.csv", "1,2,x\n", "not a matrix of numbers: could not convert"),
+        ("a.csv", "1,5;2,5\n1,5;2,5\n", "not a matrix of numbers"),  # decimal commas
+        ("a.csv", "1,5 2,5\n1,5 2,5\n", "not a matrix of numbers"),
+        ("a.dat", "", "the file is empty"),
+        ("a.dat", "# nothing\n", "the file is empty"),
+        ("a.txt", "1 2 3 4\n" * 3 + "1 nan 3 4\n", r"1 of 16 heights are not finite.*\(3, 1\)"),
+        ("a.txt", "1 2 3 4 5\n", r"\(1, 5\): a surface needs at least 4 × 4"),
+        ("a.npy", "not an array", "not a readable numpy array"),
+        ("a.npy", "", "not a readable numpy array"),
+        ("a.xyz", "1 2\n3 4\n", "2: a point list needs three columns"),
+        ("a.xyz", "0 0 1\n0 1 1\n0 2 1\n", "all points have the same x"),
+        ("a.xyz", "0 0 1\n1 0 1\nnan 1 1\n", "some coordinates x, y are not finite"),
+        ("a.xyz", "0 0 1\n1 0 1\n1 1 1\n", "2 × 2: 1 places are empty, 0 taken more than once"),
+        ("a.xyz", "0 0 1\n1 0 1\n1 1 1\n0 1 1\n0 1 1\n", "0 places are empty, 1 taken more"),
+        ("a.xyz", "0 0 1\n1 0 1\n2.3 1 1\n3 1 1\n", "not evenly spaced along x"),
+    ],
+)
+def test_unreadable_content_names_the_file_and_the_fault(tmp_path, name, text, message):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(InputError, match=rf"a\.\w+: .*{message}"):
+        read_surface(tmp_path / name, lengths=(1.0, 1.0))
+
+
+def test_missing_files_and_folders(tmp_path):
+    with pytest.raises(InputError, match=r"gone\.npy: there is no such file"):
+        read_surface(tmp_path / "gone.npy", lengths=SIDES)
+    with pytest.raises(InputError, match="there is no such file"):
+        read_surface(tmp_path, lengths=SIDES)
+
+
+def test_pickled_objects_are_never_loaded(tmp_path):
+    file = tmp_path / "scan.npy"
+    np.save(file, np.array([{"a": 1}], dtype=object), allow_pickle=True)
+    with pytest.raises(InputError, match=r"not a readable numpy array: .*allow_pickle"):
+        read_surface(file, lengths=SIDES)
+
+
+@pytest.mark.parametrize("array", [HEIGHTS + 1j, HEIGHTS.astype(str)])
+def test_arrays_of_other_kinds_are_refused(tmp_path, array):
+    file = tmp_path / "scan.npy"
+    np.save(file, array)
+    with pytest.raises(InputError, match=r"scan\.npy: the heights are not an array of real"):
+        read_surface(file, lengths=SIDES)
+
+
+@pytest.mark.parametrize("name", ["scan.npy", "scan.txt"])
+def test_lengths_are_needed_where_the_file_has_none(tmp_path, name):
+    np.save(tmp_path / "scan.npy", HEIGHTS)
+    np.savetxt(tmp_path / "scan.txt", HEIGHTS)
+    with pytest.raises(InputError, match=rf"{name}: the file has no lengths"):
+        read_surface(tmp_path / name)
+
+
+def test_the_grid_must_match_when_given(tmp_path):
+    np.save(tmp_path / "scan.npy", HEIGHTS)
+    with pytest.raises(InputError, match=r"\(5, 4\): the file's number of heights.*\(4, 5\)"):
+        read_surface(tmp_path / "scan.npy", lengths=SIDES, grid=(4, 5))

@@ -1,0 +1,97 @@
+import numpy as np
+import pytest
+
+from geometry import Surface
+from geometry.interpolant import Interpolant
+
+
+def cubic(x, y):
+    return 1.0 + x - 2.0 * y + x * y - x**2 * y + 0.5 * y**3 - x**3 * y**3
+
+
+def test_cubics_are_reproduced_up_to_the_border():
+    lengths = (1.0, 2.0)
+    blank = Surface(heights=np.zeros((7, 9)), lengths=lengths)
+    x, y = np.meshgrid(blank.x, blank.y, indexing="ij")
+    h = Interpolant(cubic(x, y), lengths)
+    px, py = np.meshgrid(np.linspace(0.0, 1.0, 11), np.linspace(0.0, 2.0, 11), indexing="ij")
+    # a not-a-knot spline through samples of a cubic is that cubic; rounding grows near the border
+    np.testing.assert_allclose(h(px, py), cubic(px, py), atol=1e-12)
+    slope = 1.0 + py - 2.0 * px * py - 3.0 * px**2 * py**3
+    np.testing.assert_allclose(h(px, py, dx=1), slope, atol=1e-11)
+    np.testing.assert_allclose(h(px, py, dx=1, dy=1), 1 - 2 * px - 9 * px**2 * py**2, atol=1e-10)
+
+
+@pytest.mark.parametrize("shape", [(4, 4), (5, 31), (40, 8)])
+@pytest.mark.parametrize("periodic", [False, True])
+def test_samples_are_met(shape, periodic):
+    heights = np.random.default_rng(3).normal(size=shape)
+    surface = Surface(heights=heights, lengths=(1.0, 2.0), periodic=periodic)
+    x, y = np.meshgrid(surface.x, surface.y, indexing="ij")
+    np.testing.assert_allclose(surface.height_at(x, y), heights, atol=1e-13)  # rounding
+
+
+@pytest.mark.parametrize("dx, dy", [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)])
+def test_periodic_interpolant_is_smooth_over_the_border(dx, dy):
+    heights = np.random.default_rng(4).normal(size=(8, 9))
+    h = Interpolant(heights, (1.0, 1.0), periodic=True)
+    t = np.linspace(0.0, 1.0, 17)
+    # wrapped padding decays to 1e-16 of the samples; two derivatives cost (8 cells per mm)²
+    np.testing.assert_allclose(h(0.0, t, dx=dx, dy=dy), h(1.0 - 1e-15, t, dx=dx, dy=dy), atol=1e-10)
+    np.testing.assert_allclose(h(t, -0.3, dx=dx, dy=dy), h(t + 2.0, 1.7, dx=dx, dy=dy), atol=1e-10)
+
+
+def test_periodic_interpolant_is_the_periodic_spline():
+    from scipy.interpolate import make_interp_spline
+
+    heights = np.random.default_rng(5).normal(size=(12, 6))
+    x = (np.arange(13) + 0.5) / 12
+    y = (np.arange(7) + 0.5) / 6
+    wrapped = np.pad(heights, ((0, 1), (0, 1)), mode="wrap")
+    along_x = make_interp_spline(x, wrapped, k=3, bc_type="periodic")
+    px, py = np.random.default_rng(6).uniform(1 / 6, 1.0, (2, 50))
+    exact = [
+        make_interp_spline(y, along_x(a), k=3, bc_type="periodic")(b)
+        for a, b in zip(px, py, strict=True)
+    ]
+    h = Interpolant(heights, (1.0, 1.0), periodic=True)
+    np.testing.assert_allclose(h(px, py), exact, atol=1e-12)  # padding error 1e-16, rounding
+
+
+@pytest.mark.parametrize("sign, corner", [(1.0, (1.0, 2.0)), (-1.0, (0.0, 0.0))])
+def test_maximum_of_a_plane_is_its_corner(sign, corner):
+    blank = Surface(heights=np.zeros((6, 5)), lengths=(1.0, 2.0))
+    x, y = np.meshgrid(blank.x, blank.y, indexing="ij")
+    surface = Surface(heights=sign * (x + y), lengths=blank.lengths)
+    assert surface.highest_point == pytest.approx(corner, abs=1e-12)  # rounding
+    assert surface.highest == pytest.approx(sign * sum(corner), abs=1e-12)
+
+
+def test_maximum_on_one_side_of_the_border():
+    blank = Surface(heights=np.zeros((10, 10)), lengths=(1.0, 1.0))
+    x, y = np.meshgrid(blank.x, blank.y, indexing="ij")
+    surface = Surface(heights=x - (y - 0.43) ** 2, lengths=(1.0, 1.0))
+    # the height is exact to rounding, the place to its square root
+    assert surface.highest == pytest.approx(1.0, abs=1e-13)
+    assert surface.highest_point == pytest.approx((1.0, 0.43), abs=1e-7)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("periodic", [False, True])
+def test_maximum_of_noise_against_dense_sampling(seed, periodic):
+    # white noise is the hardest case: the interpolant overshoots far from its samples
+    heights = np.random.default_rng(seed).normal(size=(12, 15))
+    surface = Surface(heights=heights, lengths=(1.2, 1.5), periodic=periodic)
+    x, y = np.linspace(0.0, 1.2, 601), np.linspace(0.0, 1.5, 751)
+    dense = surface.height_at(x[:, None], y[None, :]).max()
+    # dense sampling misses the top by at most |h''| d²/4 ≈ 10 · 50² / 10⁴ (d = 0.02 cells) ≈ 2e-3
+    assert dense - 1e-12 <= surface.highest <= dense + 2e-3
+    x_top, y_top = surface.highest_point
+    assert surface.height_at(x_top, y_top) == pytest.approx(surface.highest, abs=1e-12)
+
+
+@pytest.mark.parametrize("value", [0.0, -3.7])
+@pytest.mark.parametrize("shape", [(4, 4), (64, 64), (200, 200)])
+def test_maximum_of_a_flat_surface(value, shape):
+    surface = Surface(heights=np.full(shape, value), lengths=(1.0, 1.0))
+    assert surface.highest == pytest.approx(value, abs=1e-13)  # rounding of the spline's sums

@@ -1,0 +1,151 @@
+import pickle
+
+import numpy as np
+import pytest
+
+from geometry import InputError, Surface
+
+
+def plane(nx=8, ny=6, lengths=(2.0, 3.0), **options):
+    surface = Surface(heights=np.zeros((nx, ny)), lengths=lengths)
+    x, y = np.meshgrid(surface.x, surface.y, indexing="ij")
+    return Surface(heights=1.0 + 2.0 * x - 3.0 * y, lengths=lengths, **options)
+
+
+def test_samples_lie_at_cell_centres():
+    surface = plane()
+    assert surface.grid == (8, 6)
+    assert surface.spacing == (0.25, 0.5)
+    assert surface.area == 6.0
+    assert surface.x[0] == 0.125 and surface.x[-1] == 1.875
+    assert surface.y[0] == 0.25 and surface.y[-1] == 2.75
+    # the mean of a plane is its value in the middle, to rounding
+    assert surface.mean_height == pytest.approx(1.0 + 2.0 - 4.5, abs=1e-14)
+
+
+def test_heights_are_a_read_only_copy():
+    heights = np.zeros((4, 4))
+    surface = Surface(heights=heights, lengths=(1, 1))
+    heights[0, 0] = 1.0
+    assert surface.heights[0, 0] == 0.0
+    assert surface.lengths == (1.0, 1.0) and isinstance(surface.lengths[0], float)
+    with pytest.raises(ValueError, match="read-only"):
+        surface.heights[0, 0] = 2.0
+
+
+def test_whole_numbers_are_accepted_as_heights():
+    surface = Surface(heights=np.eye(4, dtype=np.int16), lengths=(1.0, 1.0))
+    assert surface.heights.dtype == np.float64
+
+
+@pytest.mark.parametrize(
+    ("heights", "message"),
+    [
+        (np.zeros((1, 9)), r"\(1, 9\): a surface needs at least 4 × 4 heights"),
+        (np.zeros(16), r"\(16,\): a surface needs at least 4 × 4 heights"),
+        (np.zeros((4, 4, 1)), "a surface needs at least 4 × 4 heights"),
+        (np.zeros((4, 4), dtype=complex), "not an array of real numbers"),
+        ([[1.0, 2.0], [3.0]], "not an array of real numbers"),
+        ([["a"] * 4] * 4, "not an array of real numbers"),
+    ],
+)
+def test_heights_that_are_no_surface_are_refused(heights, message):
+    with pytest.raises(InputError, match=message):
+        Surface(heights=heights, lengths=(1.0, 1.0))
+
+
+def test_heights_that_are_not_finite_are_counted_and_located():
+    heights = np.zeros((5, 4))
+    heights[2, 3], heights[4, 0] = np.nan, np.inf
+    with pytest.raises(InputError, match=r"2 of 20 heights are not finite.*index \(2, 3\)"):
+        Surface(heights=heights, lengths=(1.0, 1.0))
+
+
+@pytest.mark.parametrize("lengths", [(1.0,), (1.0, 0.0), (-1.0, 1.0), (np.inf, 1.0), "mm", 1.0])
+def test_lengths_must_be_two_positive_numbers(lengths):
+    with pytest.raises(InputError, match=r"lengths of the surface.*two positive numbers"):
+        Surface(heights=np.zeros((4, 4)), lengths=lengths)
+
+
+def test_points_outside_are_refused_with_their_number():
+    with pytest.raises(InputError, match=r"2\.5: 1 points lie outside the surface.*≤ x ≤ 2\.0"):
+        plane().height_at([0.0, 2.5], 1.0)
+    with pytest.raises(InputError, match="≤ y ≤"):
+        plane().gradient_at(1.0, -1e-9)
+    with pytest.raises(InputError, match="outside"):
+        plane().height_at(np.nan, 1.0)
+
+
+def test_evaluation_broadcasts():
+    surface = plane()
+    assert surface.height_at(np.zeros((3, 1)), np.zeros(4)).shape == (3, 4)
+    assert surface.gradient_at(np.zeros((3, 1)), np.zeros(4)).shape == (3, 4, 2)
+    assert surface.height_at(1.0, 1.0).shape == ()
+    assert surface.height_at([], []).shape == (0,)
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_detrending_removes_exactly_its_polynomials(order):
+    rng = np.random.default_rng(1)
+    surface = Surface(heights=rng.normal(size=(9, 12)), lengths=(2.0, 3.0))
+    x, y = np.meshgrid(surface.x, surface.y, indexing="ij")
+    terms = [x**i * y**j for i in range(order + 1) for j in range(order + 1 - i)]
+    trend = sum((k + 1.0) * term for k, term in enumerate(terms))
+    tilted = Surface(heights=surface.heights + trend, lengths=surface.lengths)
+    flat = tilted.detrended(order)
+    # a least-squares residual does not see the trend and is orthogonal to it, to rounding
+    np.testing.assert_allclose(flat.heights, surface.detrended(order).heights, atol=1e-12)
+    for term in terms:
+        assert np.mean(flat.heights * term) == pytest.approx(0.0, abs=1e-13)
+
+
+def test_detrending_beyond_the_mean_ends_periodicity():
+    surface = plane(periodic=True)
+    assert surface.detrended(0).periodic
+    assert not surface.detrended(1).periodic
+    with pytest.raises(InputError, match=r"3: this order of detrending.*0, 1, 2"):
+        surface.detrended(3)
+
+
+def test_crop_keeps_whole_cells():
+    surface = plane(periodic=True)
+    part = surface.cropped(x=(0.5, 1.52))  # cells are 0.25 mm wide
+    assert part.grid == (4, 6) and part.lengths == (1.0, 3.0) and not part.periodic
+    np.testing.assert_array_equal(part.heights, surface.heights[2:6])
+    both = surface.cropped(x=(0.0, 1.0), y=(1.0, 3.0))
+    np.testing.assert_array_equal(both.heights, surface.heights[:4, 2:])
+
+
+@pytest.mark.parametrize("interval", [(1.0, 1.0), (1.5, 1.0), (-1.0, 1.0), (0.0, 2.5)])
+def test_crop_must_lie_within(interval):
+    with pytest.raises(InputError, match=r"crop along x.*0 ≤ lo < hi ≤ 2\.0 mm"):
+        plane().cropped(x=interval)
+
+
+def test_shift_moves_the_interpolant_of_a_periodic_surface():
+    rng = np.random.default_rng(2)
+    surface = Surface(heights=rng.normal(size=(8, 6)), lengths=(2.0, 3.0), periodic=True)
+    moved = surface.shifted(3, -1)
+    assert moved.heights[3, 5] == surface.heights[0, 0]
+    x, y = rng.uniform(0.0, 2.0, 20), rng.uniform(0.0, 3.0, 20)
+    # the same spline, shifted by whole cells; wrapped padding is exact to 1e-16 per cell of it
+    np.testing.assert_allclose(
+        moved.height_at(x + 0.75, y - 0.5), surface.height_at(x, y), atol=1e-12
+    )
+    assert moved.highest == pytest.approx(surface.highest, abs=1e-12)
+    with pytest.raises(InputError, match="only a periodic surface can be shifted"):
+        plane().shifted(1, 0)
+
+
+def test_scaling_scales_the_highest_point():
+    surface = plane()
+    assert surface.scaled(0.5).highest == pytest.approx(0.5 * surface.highest, rel=1e-14)
+    assert surface.scaled(0.5).source == surface.source
+
+
+def test_a_surface_survives_pickling():
+    surface = plane()
+    highest = surface.highest
+    copy = pickle.loads(pickle.dumps(surface))
+    np.testing.assert_array_equal(copy.heights, surface.heights)
+    assert copy.highest == highest and copy.lengths == surface.lengths
