@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+from enum import Enum
 from typing import Any
+
+
+class _Value(Enum):
+    """Stands for a value that is not told; an enum stays itself when it is sent between ranks."""
+
+    UNTOLD = "untold"
 
 
 class PatchlawError(Exception):
@@ -25,13 +32,12 @@ class InputError(PatchlawError, ValueError):
     """
 
     exit_code = 2
-    _UNSET = object()
 
     def __init__(
         self,
         problem: str,
         *,
-        value: Any = _UNSET,
+        value: Any = _Value.UNTOLD,
         allowed: str | None = None,
         key: str | None = None,
         file: str | None = None,
@@ -51,7 +57,7 @@ class InputError(PatchlawError, ValueError):
         )
 
     def __str__(self) -> str:
-        shown = None if self.value is self._UNSET else f"{self.value!r}"
+        shown = None if self.value is _Value.UNTOLD else f"{self.value!r}"
         subject = " = ".join(part for part in (self.key, shown) if part)
         text = ": ".join(part for part in (self.file, subject, self.problem) if part)
         return f"{text} (allowed: {self.allowed})" if self.allowed else text
@@ -74,3 +80,11 @@ class NotConverged(PatchlawError, RuntimeError):
         super().__init__(
             f"{what} did not converge: {reason} after {iterations} iterations; {remedy}"
         )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let the error travel between ranks."""
+        return _not_converged, (self.what, self.reason, self.iterations, self.remedy)
+
+
+def _not_converged(what: str, reason: str, iterations: int, remedy: str) -> NotConverged:
+    return NotConverged(what, reason=reason, iterations=iterations, remedy=remedy)

@@ -34,7 +34,7 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
             terminal.show_history(comm, run.history())
             files = on_root(comm, lambda: write_results(folder, run, options=options))
             if scene.output.fields:
-                files.append(write_fields(folder, run))
+                files += write_fields(folder, run)
             terminal.show_files(comm, files)
 
 

@@ -17,7 +17,7 @@ from multiscale.history import LoadStep, PatchState
 from multiscale.law_files import LawTable
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro.solvers import PressedBlock, PressState
+    from macro import PressedBlock, PressState
 
 Array = NDArray[np.float64]
 _MOST_HALVINGS = 8
@@ -83,7 +83,7 @@ class AnalyticCoupling:
             )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(slots=True, kw_only=True)
 class EmbeddedCoupling:
     """Patch laws on the flat interface of an elastic block (Waddad et al. 2016, section 3.2).
 
@@ -91,11 +91,13 @@ class EmbeddedCoupling:
         pressed: The block with the laws on its interface.
         table: The laws, which also give contact area, contacts and separation.
         tilt: Slopes of the plane's approach along x and y.
+        last: The block's latest equilibrium; histories of displacement fields are not kept.
     """
 
     pressed: PressedBlock
     table: LawTable
     tilt: tuple[float, float] = (0.0, 0.0)
+    last: PressState | None = None
 
     def load_steps(self, approaches: Sequence[float]) -> Iterator[LoadStep]:
         """Yield one load step per approach [mm]; a step that fails is halved.
@@ -109,6 +111,7 @@ class EmbeddedCoupling:
             start = time.perf_counter()
             press, newton, linear = self._advance(number, last, float(approach))
             step = self._load_step(number, press, newton, linear)
+            self.last = press
             yield replace(step, wall_s=time.perf_counter() - start)
             last = float(approach)
 

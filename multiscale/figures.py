@@ -162,12 +162,12 @@ def models_figure(responses: Mapping[str, Response], *, rms_slope: float) -> Fig
 
 
 def _finish(figure: Figure) -> None:
-    """Add grids, and one legend when there is more than one line."""
+    """Add grids, and a legend in the first panel when there is more than one line."""
     for axes in figure.axes:
         axes.grid(alpha=0.3)
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    if len(labels) > 1:
-        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False)
+    first = figure.axes[0]
+    if len(first.get_lines()) > 1:
+        first.legend(frameon=False)
 
 
 def _patch_lines(axes: Any, patches: PatchGrid, colour: str) -> None:

@@ -92,8 +92,9 @@ def read_laws(path: Path) -> LawTable:
 
 
 def _law(group: Any) -> PatchLaw:
-    columns = {name: np.asarray(group[name][()]) for name in _COLUMNS}
-    return PatchLaw(**columns, **{name: float(group.attrs[name]) for name in _SCALARS})
+    content: dict[str, Any] = {name: np.asarray(group[name][()]) for name in _COLUMNS}
+    content.update({name: float(group.attrs[name]) for name in _SCALARS})
+    return PatchLaw(**content)
 
 
 def _group_name(patches: PatchGrid, index: int) -> str:

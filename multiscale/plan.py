@@ -41,7 +41,7 @@ def warnings(stage: Stage) -> Iterator[str]:
     if not stage.embedded:
         return
     fit = alignment(stage.shape, stage.patches)
-    if not fit.aligned:
+    if not fit:
         yield fit.sentence
     if max(stage.patches.size) > 0.5 * min(stage.shape.height, *stage.surface.lengths):
         yield (

@@ -42,7 +42,7 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "ranks": 1 if run.comm is None else run.comm.size,
         "threads": os.environ.get("OMP_NUM_THREADS"),
         "petsc_options": options,
-        "unknowns": None if run.pressed is None else run.pressed.block.unknowns,
+        "unknowns": run.unknowns,
         "seconds": history.seconds,
         "steps": len(history),
         "reasons": sorted(set(history.reason)) if len(history) else [],

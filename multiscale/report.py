@@ -63,10 +63,10 @@ def report_html(
 def curve_cells(history: History) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return header and formatted rows of the force–approach table, in µm, N, MPa and %."""
     header = (
-        "step", "approach [µm]", "force [N]", "mean pressure [MPa]", "contact area [%]",
-        "mean separation [µm]", "contacts", "Newton", "linear", "time [s]",
+        "step", "approach [µm]", "force [N]", "pressure [MPa]", "area [%]", "separation [µm]",
+        "contacts", "Newton", "linear", "time [s]",
     )  # fmt: skip
-    rows = [
+    rows: list[tuple[str, ...]] = [
         (
             str(step.step),
             f"{1e3 * step.approach_mm:.4g}",

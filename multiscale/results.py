@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from geometry.collective import on_root
 from multiscale import plan
 from multiscale.law_files import write_laws
 from multiscale.outputs import write_json, write_tables, write_text, write_whole
@@ -81,10 +82,28 @@ def _figures(run: Run) -> Iterator[tuple[str, str, Figure]]:
         yield "laws", "The patch laws.", figures.law_figure(run.table)
 
 
-def write_fields(folder: Path, run: Run) -> Path:
-    """Write displacement and patch pressure of the last load step for ParaView.
+def write_fields(folder: Path, run: Run) -> list[Path]:
+    """Write displacement and patch pressure of the last load step as XDMF, for ParaView.
+
+    Returns:
+        The files written; none when no finite elements took part.
 
     Note:
         Collective: every rank writes its part.
     """
-    raise NotImplementedError
+    state = getattr(run.coupling, "last", None)
+    if state is None or run.interface is None:
+        return []
+    from macro import write_fields as write_xdmf
+
+    # The XDMF file names its HDF5 file, so both are written under their names in a folder aside.
+    aside = folder / ".fields.partial"
+    on_root(run.comm, lambda: aside.mkdir(parents=True, exist_ok=True))
+    write_xdmf(aside / "fields.xdmf", run.interface, state)
+
+    def move() -> list[Path]:
+        files = [path.replace(folder / path.name) for path in sorted(aside.iterdir())]
+        aside.rmdir()
+        return files
+
+    return on_root(run.comm, move)

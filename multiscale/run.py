@@ -17,7 +17,7 @@ from multiscale.stage import Stage, make_stage
 from multiscale.tabulate import isolated_laws
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro.solvers import PressedBlock
+    from macro import Interface, PressedBlock
 
 
 class Run:
@@ -33,7 +33,9 @@ class Run:
         stage: The scene's ingredients, made at once: surface, summits, patches, micro model.
         seconds: Wall time of each phase so far [s].
         table: The patch laws, once made.
-        pressed: The block with the laws on its interface, once made.
+        unknowns: Degrees of freedom of the block, once made.
+        interface: The interface of the block, once made.
+        coupling: What makes the load steps, once made.
         steps: The load steps accepted so far.
     """
 
@@ -42,7 +44,9 @@ class Run:
         self.seconds: dict[str, float] = {}
         self.steps: list[LoadStep] = []
         self.table: LawTable | None = None
-        self.pressed: PressedBlock | None = None
+        self.unknowns: int | None = None
+        self.interface: Interface | None = None
+        self.coupling: Coupling | None = None
         with self._phase("surface"):
             self.stage: Stage = on_root(comm, lambda: make_stage(scene))
 
@@ -68,9 +72,9 @@ class Run:
         Raises:
             NotConverged: When a step fails for good; `history` holds those before it.
         """
-        coupling = self._coupling()
+        self.coupling = self._coupling()
         with self._phase("load steps"):
-            for step in coupling.load_steps(self.scene.approaches):
+            for step in self.coupling.load_steps(self.scene.approaches):
                 self.steps.append(step)
                 yield step
 
@@ -95,8 +99,8 @@ class Run:
             )
         table = self.make_laws()
         with self._phase("block"):
-            self.pressed = self._press_block(table)
-        return EmbeddedCoupling(pressed=self.pressed, table=table, tilt=tilt)
+            pressed = self._press_block(table)
+        return EmbeddedCoupling(pressed=pressed, table=table, tilt=tilt)
 
     def _press_block(self, table: LawTable) -> PressedBlock:
         """Mesh and assemble the block and put the laws on its interface."""
@@ -110,7 +114,8 @@ class Run:
             young_modulus=section.young_modulus, poisson_ratio=section.poisson_ratio
         )
         block = Block(mesh, material, sides=section.sides)
-        interface = Interface(block, self.stage.patches)
+        self.interface = interface = Interface(block, self.stage.patches)
+        self.unknowns = block.dofs
         laws = [ExtendedLaw(law) for law in table.laws]
         return PressedBlock(block, interface, laws, mode=self.scene.coupling.interface)
 

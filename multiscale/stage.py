@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -98,16 +99,7 @@ def make_stage(scene: Scene) -> Stage:
         ),
         patches=patches,
         mean_heights=patch_means(surface, patches),
-        shape=BlockShape(
-            interface=surface.lengths,
-            height=block.height,
-            cells=block.cells,
-            element=block.element,
-            grading=block.grading,
-            margin=block.margin,
-            margin_cells=block.margin_cells,
-            margin_grading=block.margin_grading,
-        ),
+        shape=_located(scene, "block", lambda: _block_shape(scene, surface)),
     )
 
 
@@ -118,15 +110,30 @@ def make_surface(scene: Scene) -> Surface:
         InputError: When it cannot be made or read; names file and key.
     """
     section = scene.surface
-    make: Callable[..., Surface]
+    extent: dict[str, Any] = {"grid": section.grid, "lengths": section.lengths}
     if section.spectrum is not None:
-        make, source, key = synthesise, section.spectrum.spectrum(), "surface.spectrum"
+        spectrum = section.spectrum.spectrum()
+        surface = _located(scene, "surface.spectrum", lambda: synthesise(spectrum, **extent))
     else:
-        make, source, key = read_surface, scene.surface_path, "surface.file"
-    surface = _located(scene, key, lambda: make(source, grid=section.grid, lengths=section.lengths))
+        path = scene.surface_path or Path()
+        surface = _located(scene, "surface.file", lambda: read_surface(path, **extent))
     if section.detrend == "none":
         return surface
     return surface.detrended(_DETREND_ORDER[section.detrend])
+
+
+def _block_shape(scene: Scene, surface: Surface) -> BlockShape:
+    block = scene.block
+    return BlockShape(
+        interface=surface.lengths,
+        height=block.height,
+        cells=block.cells,
+        element=block.element,
+        grading=block.grading,
+        margin=block.margin,
+        margin_cells=block.margin_cells if block.margin else 0,
+        margin_grading=block.margin_grading if block.margin else 1.0,
+    )
 
 
 def _check_patches(scene: Scene, surface: Surface) -> None:

@@ -41,7 +41,7 @@ def show_pairs(comm: Any, pairs: Sequence[tuple[str, str]], warnings: Sequence[s
     """Print topics with a sentence each, then warnings."""
     if not speaks(comm):
         return
-    console = Console(highlight=False)
+    console = _wide_console()
     table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
     for topic, sentence in pairs:
         table.add_row(f"[bold]{escape(topic)}[/]", escape(sentence))
@@ -58,31 +58,35 @@ def show_plan(comm: Any, stage: Stage) -> None:
 
 @contextmanager
 def progress(comm: Any, steps: int) -> Iterator[Callable[[LoadStep], None]]:
-    """Show a progress bar over load steps; yields the function to call with every step."""
-    bar = Progress(
+    """Follow load steps: by a bar, or under ``mpirun`` by a line each, fit for a log file.
+
+    Yields:
+        The function to call with every load step.
+    """
+    if comm is not None:
+        yield lambda step: say(comm, f"load step {step.step}/{steps}: {_in_short(step)}")
+        return
+    columns = (
         TextColumn("[bold]load steps"),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
         TextColumn("{task.description}"),
-        console=Console(),
-        disable=not speaks(comm),
     )
-    with bar:
+    with Progress(*columns) as bar:
         task = bar.add_task("preparing laws and block", total=steps)
+        yield lambda step: bar.update(task, advance=1, description=_in_short(step))
 
-        def advance(step: LoadStep) -> None:
-            text = f"{1e3 * step.approach_mm:.3g} µm, {step.force_N:.4g} N"
-            bar.update(task, advance=1, description=text)
 
-        yield advance
+def _in_short(step: LoadStep) -> str:
+    return f"{1e3 * step.approach_mm:.3g} µm, {step.force_N:.4g} N"
 
 
 def show_history(comm: Any, history: History) -> None:
     """Print the force–approach table and where the time went."""
     if not speaks(comm):
         return
-    console = Console(highlight=False)
+    console = _wide_console()
     header, rows = curve_cells(history)
     table = Table(box=None, padding=(0, 2, 0, 0))
     for name in header:
@@ -94,6 +98,13 @@ def show_history(comm: Any, history: History) -> None:
     console.print(f"wall time: {times}")
     for note in history.notes:
         console.print(f"note: {note}")
+
+
+def _wide_console() -> Console:
+    """Return a console of at least 100 columns, which is what the tables need in a log file."""
+    console = Console(highlight=False)
+    console.width = max(console.width, 100)
+    return console
 
 
 def show_files(comm: Any, files: Sequence[Path]) -> None:

@@ -56,7 +56,7 @@ def test_zero_before_touch():
 
 
 def test_beyond_the_table_raises_with_the_range():
-    with pytest.raises(InputError, match=r"0.0095: closure beyond .*up to 0.009 mm .first touch at"):
+    with pytest.raises(InputError, match=r"0.0095: closure beyond .*up to 0.009 mm .first touch"):
         law_of(hertz).at(9.5e-3)
 
 

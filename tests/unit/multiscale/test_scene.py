@@ -21,8 +21,14 @@ REFUSED = {
     "not finite": ("load.approach=nan", "load.approach = nan: is not finite"),
     "bool for a number": ("load.approach=true", "load.approach = True: is not a quantity"),
     "negative approach": ("load.approach=-1", "load.approach = -1: must be greater than 0"),
-    "poisson ratio 0.5": ("block.poisson_ratio=0.5", "block.poisson_ratio = 0.5: must be less than"),
-    "poisson ratio -1": ("block.poisson_ratio=-1", "block.poisson_ratio = -1: must be greater than"),
+    "poisson ratio 0.5": (
+        "block.poisson_ratio=0.5",
+        "block.poisson_ratio = 0.5: must be less than",
+    ),
+    "poisson ratio -1": (
+        "block.poisson_ratio=-1",
+        "block.poisson_ratio = -1: must be greater than",
+    ),
     "wrong type": ("load.steps='x'", "load.steps = 'x': must be a valid integer"),
     "fraction for an integer": ("load.steps=1.5", "load.steps = 1.5: must be a valid integer"),
     "no patches": ("patches.grid=[0, 4]", "patches.grid.0 = 0: must be greater than or equal to 1"),
@@ -42,7 +48,7 @@ def test_refusal_names_file_key_and_value(override, text):
 
 
 def test_override_needs_an_equals_sign():
-    with pytest.raises(InputError, match="'load.steps': is not an override .allowed: --set key=v"):
+    with pytest.raises(InputError, match=r"'load.steps': is not an override .allowed: --set key=v"):
         Scene.load(PAPER, ["load.steps"])
 
 
@@ -68,7 +74,7 @@ def test_unreadable_file(tmp_path, content, text):
 
 
 def test_missing_file(tmp_path):
-    with pytest.raises(InputError, match="nowhere.toml: cannot be read: No such file"):
+    with pytest.raises(InputError, match=r"nowhere.toml: cannot be read: No such file"):
         Scene.load(tmp_path / "nowhere.toml")
 
 

@@ -1,0 +1,132 @@
+"""The command line: exit codes, one message, nothing written when the input is wrong."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from multiscale.cli import main
+
+PAPER = str(Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml")
+SMALL = [
+    "surface.grid=[64, 64]", "block.cells=[8, 8, 4]", "patches.grid=[2, 2]", "load.steps=2",
+]  # fmt: skip
+
+
+def call(capsys, *words):
+    code = main(list(words))
+    shown = capsys.readouterr()
+    return code, shown.out, shown.err
+
+
+@pytest.fixture
+def heights(tmp_path):
+    """A scene that reads heights from a file, which the test writes."""
+    scene = tmp_path / "scan.toml"
+    text = Path(PAPER).read_text(encoding="utf-8").splitlines()
+    text = [line for line in text if not line.startswith(("spectrum", "grid = [256"))]
+    text.insert(text.index("[surface]") + 1, 'file = "heights.npy"')
+    scene.write_text("\n".join(text), encoding="utf-8")
+    return scene, tmp_path / "heights.npy"
+
+
+def test_run_writes_everything(capsys, tmp_path):
+    out = tmp_path / "out"
+    code, shown, err = call(capsys, "run", PAPER, "--out", str(out), "--set", *SMALL)
+    assert (code, err) == (0, "")
+    assert "results in" in shown
+    names = {path.name for path in out.iterdir()}
+    assert names == {
+        "history.csv", "patches.csv", "laws.h5", "provenance.json", "report.html",
+        "surface.png", "curves.png", "pressures.png", "laws.png",
+    }  # fmt: skip
+    with (out / "history.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["approach_mm"]) for row in rows] == [0.004, 0.008]
+    facts = json.loads((out / "provenance.json").read_text(encoding="utf-8"))
+    assert facts["scene"]["surface"]["spectrum"]["seed"] == 1
+    assert facts["steps"] == 2
+    report = (out / "report.html").read_text(encoding="utf-8")
+    assert report.count("data:image/png;base64,") == 4
+    assert "://" not in report  # it needs no network
+
+
+def test_nothing_unasked_is_written(capsys, tmp_path):
+    out = tmp_path / "out"
+    extra = ["coupling.kind=analytic", "output.figures=false", "output.report=false"]
+    code, _, _ = call(capsys, "run", PAPER, "--out", str(out), "--set", *SMALL, *extra)
+    assert code == 0
+    assert {path.name for path in out.iterdir()} == {
+        "history.csv",
+        "patches.csv",
+        "provenance.json",
+    }
+
+
+def test_plan_runs_and_writes_nothing(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, shown, _ = call(capsys, "plan", PAPER)
+    assert code == 0
+    for word in ("circular", "isolated", "4 × 4 patches", "40 × 40 × 25 hexahedra"):
+        assert word in " ".join(shown.split())
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("command", "file"), [("laws", "laws.h5"), ("surface", "surface.png")])
+def test_other_commands(capsys, tmp_path, command, file):
+    code, _, err = call(capsys, command, PAPER, "--out", str(tmp_path), "--set", *SMALL)
+    assert (code, err) == (0, "")
+    assert (tmp_path / file).stat().st_size > 0
+
+
+def test_schema_is_json(capsys):
+    code, shown, _ = call(capsys, "schema")
+    assert code == 0
+    assert "surface" in json.loads(shown)["properties"]
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (("run", "nowhere.toml"), "nowhere.toml: cannot be read"),
+        (("run", PAPER, "--set", "block.young=3"), "did you mean 'young_modulus'"),
+        (("run", PAPER, "--set", "patches.grid=[41, 2]"), "patches.grid = [41, 2]: more patches"),
+        (("run", PAPER, "--set", "surface.grid=[1, 256]"), "surface.spectrum"),
+        (("run", PAPER, "--set", "surface.spectrum.waves=[2, 200]"), "surface.spectrum"),
+        (("run", PAPER, "--out", PAPER), "is not a folder"),
+        (("fly",), "invalid choice: 'fly'"),
+        ((), "the following arguments are required: COMMAND"),
+    ],
+)
+def test_wrong_input_exits_2_with_one_message(capsys, tmp_path, monkeypatch, words, text):
+    monkeypatch.chdir(tmp_path)
+    code, shown, err = call(capsys, *words)
+    assert (code, shown) == (2, "")
+    assert err.startswith("patchlaw: ")
+    assert text in err
+    assert err.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("content", "text"),
+    [
+        (None, "heights.npy"),
+        (np.zeros((1, 64)), "at least 4 × 4"),
+        (np.where(np.eye(16) > 0, np.nan, 0.0), "not finite"),
+        (np.zeros((4, 4, 4)), "heights.npy"),
+    ],
+    ids=["missing", "one row", "NaN", "three-dimensional"],
+)
+def test_bad_heights_exit_2(capsys, heights, content, text):
+    scene, path = heights
+    if content is not None:
+        np.save(path, content)
+    out = path.parent / "out"
+    code, shown, err = call(capsys, "run", str(scene), "--out", str(out))
+    assert (code, shown) == (2, "")
+    assert text in err
+    assert "surface.file" in err
+    assert not out.exists()
