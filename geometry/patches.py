@@ -24,8 +24,8 @@ class PatchGrid:
         origin: Its lower corner [mm].
 
     Raises:
-        InputError: When a number of patches is not whole and positive, or a length not positive, or the
-            origin not finite.
+        InputError: When a number of patches is not whole and positive, a length not positive, or
+            the origin not finite.
     """
 
     grid: tuple[int, int]

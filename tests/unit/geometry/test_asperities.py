@@ -1,0 +1,167 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry import Asperities, InputError, Surface, find_asperities
+from geometry.maxima import grid_maxima
+
+
+def sampled(function, grid=(24, 30), lengths=(1.2, 1.5), periodic=False):
+    blank = Surface(heights=np.zeros(grid), lengths=lengths)
+    x, y = np.meshgrid(blank.x, blank.y, indexing="ij")
+    return Surface(heights=function(x, y), lengths=lengths, periodic=periodic)
+
+
+def paraboloid(x, y, *, place=(0.537, 0.811), radii=(0.8, 0.3), angle=0.7, top=2.0):
+    u = np.cos(angle) * (x - place[0]) + np.sin(angle) * (y - place[1])
+    v = -np.sin(angle) * (x - place[0]) + np.cos(angle) * (y - place[1])
+    return top - u**2 / (2.0 * radii[0]) - v**2 / (2.0 * radii[1])
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7, np.pi / 2, 2.0, 3.1])
+@pytest.mark.parametrize("slope", [(0.0, 0.0), (0.11, -0.07)])
+def test_tilted_elliptic_paraboloid(angle, slope):
+    surface = sampled(lambda x, y: paraboloid(x, y, angle=angle) + slope[0] * x + slope[1] * y)
+    asperities = find_asperities(surface)
+    # a plane moves the summit by R·slope along the principal directions and keeps the radii;
+    # the spline and the differences are exact for quadratics, so all is exact to rounding,
+    # which the Hessian amplifies by 1/dx² = 400
+    slope = np.array(slope)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    shift = turn @ (np.array([0.8, 0.3]) * (turn.T @ slope))
+    place = np.array([0.537, 0.811]) + shift
+    top = 2.0 + slope @ place - 0.5 * slope @ shift
+    assert len(asperities) == asperities.count == 1 and asperities.rejected == 0
+    assert [asperities.x[0], asperities.y[0]] == pytest.approx(place, abs=1e-11)
+    assert asperities.z[0] == pytest.approx(top, abs=1e-12)
+    assert asperities.radius_major[0] == pytest.approx(0.8, rel=1e-9)
+    assert asperities.radius_minor[0] == pytest.approx(0.3, rel=1e-9)
+    assert asperities.radius[0] == pytest.approx(np.sqrt(0.24), rel=1e-9)
+    turned = asperities.angle[0] - angle
+    assert np.sin(turned) == pytest.approx(0.0, abs=1e-9)  # a direction, modulo π
+    assert 0.0 <= asperities.angle[0] < np.pi
+    assert asperities.highest == pytest.approx(top, abs=1e-12)
+    assert asperities.mean_height == surface.mean_height
+
+
+def test_border_maxima_are_reported_and_not_used():
+    surface = sampled(lambda x, y: paraboloid(x, y, place=(-0.1, 0.8)))
+    asperities = find_asperities(surface)
+    assert len(asperities) == 0 and len(asperities.border_x) == 1
+    assert asperities.border_x[0] == surface.x[0]
+    column = surface.heights[0]
+    assert asperities.border_y[0] == surface.y[np.argmax(column)]
+    assert asperities.border_z[0] == column.max()
+
+
+def test_a_summit_in_the_first_inner_cell_keeps_its_differences_inside():
+    # the summit lies 1.2 cells from the border, the stencil needs one more cell on each side
+    place = (0.06, 0.8)
+    asperities = find_asperities(sampled(lambda x, y: paraboloid(x, y, place=place)))
+    assert [asperities.x[0], asperities.y[0]] == pytest.approx(place, abs=1e-11)
+    assert asperities.radius_minor[0] == pytest.approx(0.3, rel=1e-9)  # constant curvature
+
+
+def egg_box(x, y, shift=(0.0, 0.0)):
+    return np.cos(2 * np.pi * 2 * (x - shift[0])) * np.cos(2 * np.pi * 3 * (y - shift[1]))
+
+
+@pytest.mark.parametrize("shift", [(0.0, 0.0), (0.1234, 0.0777)])
+def test_egg_box_summits_are_found_across_a_periodic_border(shift):
+    surface = sampled(
+        lambda x, y: egg_box(x, y, shift), grid=(64, 64), lengths=(1.0, 1.0), periodic=True
+    )
+    asperities = find_asperities(surface)
+    assert len(asperities) == 12 and asperities.rejected == 0 and len(asperities.border_x) == 0
+    i, j = np.divmod(np.arange(24), 6)
+    i, j = i[(i + j) % 2 == 0], j[(i + j) % 2 == 0]
+    expected = np.mod(np.stack([shift[0] + i / 4, shift[1] + j / 6], axis=1), 1.0)
+    found = np.stack([asperities.x, asperities.y], axis=1)
+    distance = (found[:, None] - expected[None] + 0.5) % 1.0 - 0.5
+    # 21 samples per wave: a thousandth of a cell, which falls with the third power of its size
+    assert np.all(np.abs(distance).max(axis=2).min(axis=0) < 1e-3 / 64)
+    assert np.all((found >= 0.0) & (found < 1.0))
+    # central differences over one cell flatten a cosine by (Q dx)²/12 = 0.7 % at 21 samples
+    np.testing.assert_allclose(asperities.radius_minor, 1 / (6 * np.pi) ** 2, rtol=0.008)
+    np.testing.assert_allclose(asperities.radius_major, 1 / (4 * np.pi) ** 2, rtol=0.004)
+    np.testing.assert_allclose(np.abs(np.cos(asperities.angle)), 1.0, atol=1e-9)
+
+
+def test_a_periodic_surface_may_be_searched_without_its_neighbours():
+    surface = sampled(egg_box, grid=(64, 64), lengths=(1.0, 1.0), periodic=True)
+    inner = find_asperities(surface, periodic=False)
+    whole = find_asperities(surface)
+    assert len(whole) == 12
+    # summits at x = 0 or y = 0 are cut: only those inside remain
+    assert len(inner) == np.count_nonzero(
+        (whole.x % 1 > 0.02) & (whole.x % 1 < 0.98) & (whole.y % 1 > 0.02) & (whole.y % 1 < 0.98)
+    )
+    assert len(inner.border_x) > 0
+    with pytest.raises(InputError, match="periodic search for summits needs a periodic surface"):
+        find_asperities(replace(surface, periodic=False), periodic=True)
+
+
+def test_maxima_without_two_positive_radii_are_counted():
+    # a ridge has a plateau of equal cells along it and no curvature there
+    ridge = sampled(lambda x, y: -((x - 0.525) ** 2) + 0.0 * y, periodic=True)
+    asperities = find_asperities(ridge)
+    assert len(asperities) == 0 and asperities.rejected == 1
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+def test_flat_surfaces_have_no_asperities(periodic):
+    flat = sampled(lambda x, y: 0.0 * x, periodic=periodic)
+    assert len(find_asperities(flat)) == 0
+
+
+def test_refinement_stays_within_a_cell_and_does_not_descend():
+    heights = np.random.default_rng(0).normal(size=(60, 60))  # noise: Newton's worst case
+    surface = Surface(heights=heights, lengths=(60.0, 60.0), periodic=True)
+    maxima, asperities = grid_maxima(heights, periodic=True), find_asperities(surface)
+    assert len(asperities) + asperities.rejected == len(maxima.height)
+    found = np.stack([asperities.x, asperities.y], axis=1)
+    step = found[:, None] - (maxima.position + 0.5)
+    reach = np.abs((step + 30.0) % 60.0 - 30.0).max(axis=2) <= 1.0 + 1e-12
+    assert np.all(reach.any(axis=1))
+    lower = np.where(reach, maxima.height, np.inf).min(axis=1)
+    assert np.all(asperities.z >= lower - 1e-12)  # rounding of the spline at its samples
+
+
+def summits(**change):
+    fields = {
+        "x": [0.1, 0.2],
+        "y": [0.3, 0.4],
+        "z": [1.0, 2.0],
+        "radius_major": [2.0, 3.0],
+        "radius_minor": [1.0, 3.0],
+        "angle": [0.0, 1.0],
+    }
+    return Asperities(**{**fields, "lengths": (1, 1), "highest": 2.0, "mean_height": 0.0, **change})
+
+
+def test_subsets_keep_what_belongs_to_the_surface():
+    whole = summits(border_x=[0.0], border_y=[0.5], border_z=[0.7], rejected=3)
+    for mask in ([False, True], np.array([1])):
+        part = whole.subset(mask)
+        assert len(part) == 1 and part.z.tolist() == [2.0] and part.radius.tolist() == [3.0]
+        assert part.border_z.tolist() == [0.7] and part.rejected == 3 and part.highest == 2.0
+    assert len(whole.subset([False, False])) == 0
+    assert not whole.x.flags.writeable
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"x": [0.1]}, "arrays differ in shape"),
+        ({"border_x": [0.1]}, "arrays differ in shape"),
+        ({"angle": [[0.0], [1.0]]}, "arrays differ in shape"),
+        ({"radius_minor": [1.0, 4.0]}, "not R' ≥ R'' > 0"),
+        ({"radius_minor": [0.0, 1.0]}, "not R' ≥ R'' > 0"),
+        ({"radius_major": [np.nan, 4.0]}, "not R' ≥ R'' > 0"),
+        ({"lengths": (0.0, 1.0)}, "lengths of the asperities do not fit"),
+    ],
+)
+def test_asperities_that_make_no_sense_are_refused(change, message):
+    with pytest.raises(InputError, match=message):
+        summits(**change)
