@@ -209,7 +209,7 @@ class AsperityModel:
 
     @cached_property
     def _interaction(self) -> Interaction:
-        shape = self._contact(0.0).shape
+        shape = self._contact(0.0).factors
         return Interaction.among(self.asperities, shape, circular=not self.elliptic)
 
     def _lift(self, own: Array) -> Array | float:

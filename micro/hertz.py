@@ -80,10 +80,10 @@ class HertzContact:
             raise InputError(
                 "an indentation is negative or not a number", value=float(lowest), allowed="w ≥ 0"
             )
-        _ = self.shape  # checks the radii
+        _ = self.factors  # checks the radii
 
     @cached_property
-    def shape(self) -> ShapeFactors:
+    def factors(self) -> ShapeFactors:
         """Shape factors of the contact ellipses."""
         return shape_factors(self.radius_major, self.radius_minor)
 
@@ -95,28 +95,28 @@ class HertzContact:
     @property
     def semi_major(self) -> Array:
         """Major semi-axis a = (2 K F1/π) sqrt(R w) [mm]."""
-        return self.shape.axis * np.sqrt(self.radius * self._depth)
+        return self.factors.axis * np.sqrt(self.radius * self._depth)
 
     @property
     def semi_minor(self) -> Array:
         """Minor semi-axis b [mm]."""
-        return self.semi_major * np.sqrt(self.shape.axis_ratio_squared)
+        return self.semi_major * np.sqrt(self.factors.axis_ratio_squared)
 
     @property
     def force(self) -> Array:
         """Normal force P = 4/3 E* sqrt(R) F1 w^(3/2) [N]."""
-        stiffness = 4.0 / 3.0 * self.contact_modulus * np.sqrt(self.radius) * self.shape.force
+        stiffness = 4.0 / 3.0 * self.contact_modulus * np.sqrt(self.radius) * self.factors.force
         return stiffness * self._depth**1.5
 
     @property
     def area(self) -> Array:
         """Contact area A = π R A1 w = π a b [mm²]."""
-        return np.pi * self.radius * self.shape.area * self._depth
+        return np.pi * self.radius * self.factors.area * self._depth
 
     @property
     def peak_pressure(self) -> Array:
         """Pressure at the centre, p0 = 3 P/(2 A) = E* w/(b K) [MPa], 0 without contact."""
-        width = self.shape.axis * np.sqrt(self.shape.axis_ratio_squared) * self.shape.integral
+        width = self.factors.axis * np.sqrt(self.factors.axis_ratio_squared) * self.factors.integral
         return self.contact_modulus * np.sqrt(self._depth / self.radius) / width
 
     @property
@@ -149,12 +149,12 @@ class HertzContact:
         Source:
             Waddad et al. 2016, eq. 17, doi 10.1016/j.triboint.2015.12.023.
         """
-        size = self.radius * self.shape.axis**2
+        size = self.radius * self.factors.axis**2
         s = size * self._depth
         safe = np.where(s > 0.0, s, 1.0)
-        beta = self.shape.axis_ratio_squared
+        beta = self.factors.axis_ratio_squared
         field, _ = elliptic_field(np.square(x), np.square(y), safe, beta)
-        return np.where(s > 0.0, field / (size * self.shape.integral), 0.0)
+        return np.where(s > 0.0, field / (size * self.factors.integral), 0.0)
 
     @property
     def _depth(self) -> Array:

@@ -1,0 +1,194 @@
+"""The four models: names, single contacts, states, curves, refusals."""
+
+import numpy as np
+import pytest
+
+from geometry import InputError, PatchGrid
+from micro import MODELS, AsperityModel, HertzContact, asperity_model
+
+E_STAR = 4000.0
+ONE_PATCH = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
+PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
+every_model = pytest.mark.parametrize("name", MODELS)
+interacting = pytest.mark.parametrize("name", ["elliptic", "circular"])
+
+
+def respond(model, approaches, patches=PATCHES, **options):
+    heights = np.full(patches.count, model.asperities.mean_height)
+    return model.respond(approaches, patches=patches, mean_heights=heights, **options)
+
+
+@every_model
+def test_name_and_kind(cluster, name):
+    model = asperity_model(name, cluster, contact_modulus=E_STAR)
+    assert model.name == name
+    assert model.elliptic == name.startswith("elliptic")
+    assert model.interacting == (not name.endswith("independent"))
+
+
+@every_model
+def test_single_asperity_is_hertz(summits, name):
+    one = summits(0.3, 0.7, z=-1e-3, major=0.4, minor=0.1, highest=0.0)
+    state = asperity_model(name, one, contact_modulus=E_STAR).solve(5e-3)
+    radii = (0.4, 0.1) if name.startswith("elliptic") else (0.2, 0.2)
+    hertz = HertzContact(
+        contact_modulus=E_STAR, radius_major=radii[0], radius_minor=radii[1], indentation=4e-3
+    )
+    assert state.required == pytest.approx([4e-3])
+    assert state.displacement == pytest.approx([4e-3])
+    assert state.force == pytest.approx([hertz.force])
+    assert state.contact_area == pytest.approx([hertz.area])
+    assert state.peak_pressure == pytest.approx([hertz.peak_pressure])
+    assert state.semi_axes == pytest.approx(np.array([[hertz.semi_major, hertz.semi_minor]]))
+
+
+@pytest.mark.parametrize("name", ["elliptic-independent", "circular-independent"])
+def test_independent_models_are_sums(cluster, name):
+    state = asperity_model(name, cluster, contact_modulus=E_STAR).solve(3e-3)
+    assert state.displacement == pytest.approx(np.maximum(3e-3 + cluster.z, 0.0))
+    assert state.indentation == pytest.approx(state.displacement)
+    assert state.iterations == 0 and state.residual == 0.0
+
+
+@interacting
+def test_neighbours_share_the_load(cluster, name):
+    alone = asperity_model(f"{name}-independent", cluster, contact_modulus=E_STAR).solve(3e-3)
+    state = asperity_model(name, cluster, contact_modulus=E_STAR).solve(3e-3)
+    assert np.all(state.force <= alone.force)
+    assert state.force.sum() < 0.9 * alone.force.sum()
+    assert np.all(state.displacement >= state.required - 1e-10 * 3e-3)
+    assert np.all(state.displacement > state.indentation)  # the others press every summit
+
+
+@every_model
+def test_state_is_consistent(cluster, name):
+    state = asperity_model(name, cluster, contact_modulus=E_STAR).solve(4e-3)
+    on = state.in_contact
+    assert 0 < on.sum() and np.all(state.force[~on] == 0.0)
+    assert state.contact_area == pytest.approx(np.pi * state.semi_axes.prod(axis=1))
+    mean_pressure = state.force[on] / state.contact_area[on]
+    assert state.peak_pressure[on] == pytest.approx(1.5 * mean_pressure)
+
+
+@every_model
+@pytest.mark.parametrize("approach", [0.0, -1e-3])
+def test_before_touch(cluster, name, approach):
+    model = asperity_model(name, cluster, contact_modulus=E_STAR)
+    state = model.solve(approach)
+    assert not state.in_contact.any() and not state.displacement.any()
+    response = respond(model, [approach])
+    assert response.force == [0.0] and response.contacts == [0] and not response.patch_force.any()
+    assert response.mean_separation == pytest.approx([0.02 - approach])
+
+
+@every_model
+def test_no_asperities(summits, name):
+    none = summits([], [], highest=0.0)
+    model = asperity_model(name, none, contact_modulus=E_STAR)
+    assert len(model.solve(1e-3).force) == 0
+    assert respond(model, [1e-3, 2e-3]).force.tolist() == [0.0, 0.0]
+
+
+@interacting
+def test_warm_start(cluster, name):
+    model = asperity_model(name, cluster, contact_modulus=E_STAR)
+    near = model.solve(4.0e-3)
+    cold, warm = model.solve(4.1e-3), model.solve(4.1e-3, start=near)
+    assert warm.iterations < cold.iterations
+    assert warm.force == pytest.approx(cold.force, rel=1e-8)  # both stop at 1e-10 in displacement
+
+
+@every_model
+def test_curve_is_made_of_states(cluster, name):
+    model = asperity_model(name, cluster, contact_modulus=E_STAR)
+    approaches = np.array([4e-3, 0.0, 1e-3, 8e-3, 4e-3])  # any order, repeated
+    response = respond(model, approaches)
+    assert response.approach.tolist() == approaches.tolist()
+    owner = PATCHES.index_of(cluster.x, cluster.y)
+    for row, approach in enumerate(approaches):
+        state = model.solve(approach)
+        assert response.force[row] == pytest.approx(state.force.sum(), rel=1e-7, abs=1e-15)
+        assert response.contact_area[row] == pytest.approx(state.contact_area.sum(), rel=1e-7)
+        assert response.contacts[row] == state.in_contact.sum()
+        by_patch = np.bincount(owner, state.force, minlength=4)
+        assert response.patch_force[row] == pytest.approx(by_patch, rel=1e-7, abs=1e-12)
+
+
+@every_model
+def test_tilt(cluster, name):
+    model = asperity_model(name, cluster, contact_modulus=E_STAR)
+    tilt = (5e-3, -8e-3)
+    state = model.solve(3e-3, tilt=tilt)
+    # The same as asperities of other heights under a level plane.
+    raise_by = tilt[0] * (cluster.x - 0.5) + tilt[1] * (cluster.y - 0.5)
+    arrays = {key: getattr(cluster, key) for key in ("x", "y", "radius_major", "radius_minor")}
+    turned = type(cluster)(
+        **arrays,
+        angle=cluster.angle,
+        z=cluster.z + raise_by,
+        lengths=(1.0, 1.0),
+        highest=0.0,
+        mean_height=-0.02,
+    )
+    level = asperity_model(name, turned, contact_modulus=E_STAR).solve(3e-3)
+    assert state.force == pytest.approx(level.force, rel=1e-9)
+    response = respond(model, [3e-3], tilt=tilt)
+    assert response.force[0] == pytest.approx(state.force.sum(), rel=1e-9)
+    # The plane's mean approach is that of its centre, patch by patch that of the patch's centre.
+    local = 3e-3 + (PATCHES.centres - 0.5) @ np.array(tilt)
+    gap = 0.02 - local + response.patch_displacement[0]
+    assert response.patch_separation[0] == pytest.approx(gap)
+    assert response.mean_separation[0] == pytest.approx(gap.mean())
+
+
+@every_model
+def test_homogeneous_in_the_modulus(cluster, name):
+    soft, hard = (asperity_model(name, cluster, contact_modulus=E).solve(4e-3) for E in (1.0, 7e4))
+    assert hard.force == pytest.approx(7e4 * soft.force, rel=1e-12)  # rounding only
+    assert hard.contact_area == pytest.approx(soft.contact_area, rel=1e-12)
+    assert hard.displacement == pytest.approx(soft.displacement, rel=1e-12)
+
+
+def test_round_asperities_make_the_models_equal(summits):
+    rng = np.random.default_rng(5)
+    balls = summits(
+        *rng.random((2, 40)), z=-5e-3 * rng.random(40), major=0.02 + 0.1 * rng.random(40)
+    )
+    ellipse, circle = (
+        asperity_model(name, balls, contact_modulus=E_STAR).solve(8e-3)
+        for name in ("elliptic", "circular")
+    )
+    assert circle.in_contact.sum() > 10
+    # Kernels agree to 1e-13; both iterations take the same path to the same 1e-10.
+    assert ellipse.force == pytest.approx(circle.force, rel=1e-12)
+    assert ellipse.contact_area == pytest.approx(circle.contact_area, rel=1e-12)
+
+
+@interacting
+def test_surface_displacement(cluster, name):
+    model = asperity_model(name, cluster, contact_modulus=E_STAR)
+    state = model.solve(2e-4)  # small contacts: no kernel is continued
+    assert state.engulfed == 0
+    summits = model.surface_displacement(state, cluster.x, cluster.y)
+    assert summits == pytest.approx(state.displacement, rel=1e-12)
+    far = model.surface_displacement(state, 1e3, 0.0)
+    assert far == pytest.approx(state.force.sum() / (np.pi * E_STAR * 1e3), rel=1e-2)
+
+
+def test_refuses(cluster):
+    with pytest.raises(InputError, match="'flat': this micro model is unknown.*elliptic, circular"):
+        asperity_model("flat", cluster, contact_modulus=1.0)
+    with pytest.raises(InputError, match="'lemke': this solver is unknown.*truncated-newton"):
+        asperity_model("circular", cluster, contact_modulus=1.0, solver="lemke")
+    with pytest.raises(InputError, match="-1.0: the contact modulus must be positive"):
+        asperity_model("circular", cluster, contact_modulus=-1.0)
+    model = AsperityModel(asperities=cluster, contact_modulus=1.0, elliptic=True, interacting=True)
+    with pytest.raises(InputError, match="inf: the approach must be finite"):
+        model.solve(np.inf)
+    with pytest.raises(InputError, match=r"\(3,\): every patch needs one mean height"):
+        model.respond([1e-3], patches=PATCHES, mean_heights=np.zeros(3))
+    with pytest.raises(InputError, match="at least one approach"):
+        model.respond([], patches=ONE_PATCH, mean_heights=[0.0])
+    corner = PatchGrid(grid=(1, 1), lengths=(0.5, 0.5))
+    with pytest.raises(InputError, match="points lie outside the patches"):
+        model.respond([1e-3], patches=corner, mean_heights=[0.0])

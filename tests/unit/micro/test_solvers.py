@@ -1,0 +1,78 @@
+"""Both solvers of the complementarity problem: agreement, starts, rate, failure."""
+
+import numpy as np
+import pytest
+
+from geometry import NotConverged
+from micro import active_set as active_set_module
+from micro import truncated_newton as truncated_module
+from micro.active_set import active_set
+from micro.contact_problem import TOLERANCE, ContactProblem
+from micro.ellipse import shape_factors
+from micro.interaction import Interaction
+from micro.truncated_newton import truncated_newton
+
+
+def problem(asperities, approach):
+    shape = shape_factors(asperities.radius_major, asperities.radius_minor)
+    kernel = Interaction.among(asperities, shape, circular=False)
+    return ContactProblem(interaction=kernel, required=np.maximum(approach + asperities.z, 1e-9))
+
+
+both = pytest.mark.parametrize("method", [active_set, truncated_newton])
+
+
+@both
+@pytest.mark.parametrize("approach", [1e-4, 5e-3, 5e-2])
+def test_conditions_hold(cluster, method, approach):
+    case = problem(cluster, approach)
+    found = method(case, np.zeros(7))
+    assert np.all(found.indentation >= 0.0)
+    gap = found.displacement - case.required
+    slack = TOLERANCE * case.scale
+    assert np.all(gap >= -slack)
+    assert np.all((found.indentation == 0.0) | (np.abs(gap) <= slack))
+    assert found.residual <= TOLERANCE
+
+
+@pytest.mark.parametrize("approach", [1e-4, 5e-3, 5e-2])
+def test_solvers_agree_from_any_start(cluster, approach):
+    case = problem(cluster, approach)
+    reference = active_set(case, np.zeros(7)).indentation
+    rng = np.random.default_rng(1)
+    starts = [
+        case.required,
+        5 * approach * rng.random(7),
+        np.where(rng.random(7) < 0.5, approach, 0),
+    ]
+    for method in (active_set, truncated_newton):
+        for start in starts:
+            # Both stop at 1e-10 of the scale; the Jacobian's inverse is below 10 here.
+            found = method(case, start).indentation
+            assert found == pytest.approx(reference, abs=1e-9 * case.scale)
+
+
+@both
+def test_solution_is_its_own_start(cluster, method):
+    case = problem(cluster, 5e-3)
+    found = method(case, np.zeros(7))
+    assert method(case, found.indentation).iterations <= 1
+
+
+def test_newton_is_fast(cluster):
+    assert active_set(problem(cluster, 5e-3), np.zeros(7)).iterations <= 6
+
+
+@pytest.mark.parametrize(
+    ("module", "limit", "reason"),
+    [
+        (active_set_module, "_MOST_ITERATIONS", "MAX_ITERATIONS"),
+        (truncated_module, "_MOST_ITERATIONS", "MAX_ITERATIONS"),
+        (truncated_module, "_MOST_SETS", "CONTACTING_SET"),
+    ],
+)
+def test_running_out_is_an_error(cluster, monkeypatch, module, limit, reason):
+    monkeypatch.setattr(module, limit, 1)
+    method = active_set if module is active_set_module else truncated_newton
+    with pytest.raises(NotConverged, match=f"did not converge: {reason} after"):
+        method(problem(cluster, 5e-3), np.zeros(7))
