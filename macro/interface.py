@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal, Protocol, get_args
@@ -61,20 +61,26 @@ class Sampling:
     patch: NDArray[np.intp]
     count: int
 
-    def evaluate(self, laws: Sequence[ContactLaw], closure: Array) -> tuple[Array, Array]:
-        """Return pressures and stiffnesses at this rank's samples, each of shape (n,)."""
-        pressure, stiffness = np.zeros_like(closure), np.zeros_like(closure)
-        ends = np.searchsorted(self.patch, np.arange(self.count + 1))
-        for i in np.unique(self.patch):
-            part = slice(ends[i], ends[i + 1])
-            pressure[part] = laws[i].pressure(closure[part])
-            stiffness[part] = laws[i].stiffness(closure[part])
-        return pressure, stiffness
+    def pressure(self, laws: Sequence[ContactLaw], closure: Array) -> Array:
+        """Return the laws' pressures at this rank's samples, shape (n,) [MPa]."""
+        return self._by_patch([law.pressure for law in laws], closure)
+
+    def stiffness(self, laws: Sequence[ContactLaw], closure: Array) -> Array:
+        """Return the laws' stiffnesses dp/dc at this rank's samples, shape (n,) [MPa/mm]."""
+        return self._by_patch([law.stiffness for law in laws], closure)
 
     def patch_sums(self, values: Array) -> Array:
         """Return the integrals of sampled values over every patch, shape (N,); collective."""
         local = np.bincount(self.patch, weights=self.weight * values, minlength=self.count)
         return self.operator.comm.tompi4py().allreduce(local, op=MPI.SUM)
+
+    def _by_patch(self, functions: Sequence[Callable[[Array], Array]], closure: Array) -> Array:
+        values = np.empty_like(closure)
+        ends = np.searchsorted(self.patch, np.arange(self.count + 1))
+        for i in np.unique(self.patch):
+            part = slice(ends[i], ends[i + 1])
+            values[part] = functions[i](closure[part])
+        return values
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,34 +9,37 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from macro.interface import ContactLaw, Sampling
+from macro.equilibrium import Equilibrium
+from macro.interface import Sampling
 
 Array = NDArray[np.float64]
 
 _ROUNDING = 1e-7  # share of a new vector that must be new, or it only adds rounding
+_STEPS, _HALVINGS = 30, 10  # of Newton's method in the basis
 
 
 class DisplacementBasis:
     """Displacements that spanned earlier solutions, orthonormal in the block's energy.
 
-    The block is linear, so all its solutions lie in the space K⁻¹ range(B), of as many dimensions
-    as there are samples. Solving the contact problem by Galerkin's method in the span of what is
-    known already costs no linear solve and gives the best start in the energy norm; linear
-    extrapolation in the approach is among the candidates. Once the basis is as rich as the
-    patches, the start is the solution.
+    The block is linear, so every solution lies in the space K⁻¹ range(B), of as many dimensions
+    as there are samples. Galerkin's method in the span of the solutions known so far costs no
+    linear solve and gives the start of least error in the energy norm, extrapolation in the
+    approach included. Once the basis is as rich as the patches, the start is the solution.
 
     Args:
-        stiffness: Stiffness matrix K of the block.
-        sampling: Samples of the interface.
+        equilibrium: The equations that are being solved.
+        sampling: Their samples of the interface.
         size: Largest number of vectors kept; the oldest go first.
+
+    Note:
+        Collective.
     """
 
-    def __init__(self, stiffness: PETSc.Mat, sampling: Sampling, *, size: int = 32) -> None:
-        self._stiffness, self._sampling, self._size = stiffness, sampling, size
-        self._comm = stiffness.comm.tompi4py()
-        owned, samples = stiffness.getLocalSize()[0], len(sampling.weight)
-        self._vectors, self._forces = np.empty((2, 0, owned))  # W and K W, one row per vector
-        self._sampled = np.empty((0, samples))  # Wᵀ B of this rank's samples
+    def __init__(self, equilibrium: Equilibrium, sampling: Sampling, *, size: int = 32) -> None:
+        self._equilibrium, self._sampling, self._size = equilibrium, sampling, size
+        self._comm = equilibrium.block.mesh.comm
+        self._vectors, self._forces = np.empty((2, 0, equilibrium.block.owned_dofs))  # W, K W
+        self._sampled = np.empty((0, len(sampling.weight)))  # Wᵀ B of this rank's samples
 
     def __len__(self) -> int:
         return len(self._vectors)
@@ -45,7 +47,7 @@ class DisplacementBasis:
     def add(self, displacement: PETSc.Vec) -> None:
         """Add what is new in a displacement; collective."""
         work = displacement.duplicate()
-        self._stiffness.mult(displacement, work)
+        self._equilibrium.block.stiffness.mult(displacement, work)
         vector, force = displacement.array_r.copy(), work.array_r.copy()
         before = self._sum(vector @ force)
         for _ in range(2):  # once more for what rounding left
@@ -64,44 +66,38 @@ class DisplacementBasis:
         self._forces = np.vstack([self._forces, force])[first:]
         self._sampled = np.vstack([self._sampled, sampled.array_r])[first:]
 
-    def start(self, laws: Sequence[ContactLaw], approach: Array, into: PETSc.Vec) -> None:
-        """Write the state of least energy in the basis.
+    def start(self, into: PETSc.Vec) -> None:
+        """Write the state of least energy in the basis at the equilibrium's approach."""
+        into.array[:] = self._coefficients() @ self._vectors
 
-        Args:
-            laws: One law per patch.
-            approach: Rigid approach at this rank's samples, shape (n,) [mm].
-            into: Receives the displacement.
-
-        Note:
-            Collective.
-        """
-        into.array[:] = self._coefficients(laws, approach) @ self._vectors
-
-    def _coefficients(self, laws: Sequence[ContactLaw], approach: Array) -> Array:
-        """Solve y = Σ (Bᵀ W)ᵀ p(closure(y)) by damped Newton steps; a rough answer will do."""
-        size, weight, columns = len(self), self._sampling.weight, self._sampled
-
-        def residual(y: Array) -> tuple[Array, Array]:
-            closure = approach - (y @ columns) / weight
-            pressure, stiffness = self._sampling.evaluate(laws, closure)
-            parts = np.empty((size + 1, size))
-            parts[0] = -columns @ pressure
-            parts[1:] = (columns * (stiffness / weight)) @ columns.T
-            parts = self._sum(parts)
-            return y + parts[0], np.eye(size) + parts[1:]
-
-        y = np.zeros(size)
-        value, slope = residual(y)
-        for _ in range(30):
-            step, share = np.linalg.solve(slope, value), 1.0
-            trial = residual(y - step)
-            while np.linalg.norm(trial[0]) > np.linalg.norm(value) and share > 1e-3:
-                share *= 0.5
-                trial = residual(y - share * step)
-            if not np.linalg.norm(trial[0]) < np.linalg.norm(value):
+    def _coefficients(self) -> Array:
+        """Solve y = Wᵀ B p(closure(W y)) by damped Newton steps; a rough answer will do."""
+        y = np.zeros(len(self))
+        value, slope = self._projected(y)
+        first = float(np.linalg.norm(value))
+        for _ in range(_STEPS):
+            if np.linalg.norm(value) <= _ROUNDING**2 * first:
                 break
-            y, (value, slope) = y - share * step, trial
+            step = np.linalg.solve(slope, value)
+            for share in 0.5 ** np.arange(_HALVINGS):
+                trial = y - share * step
+                trial_value, trial_slope = self._projected(trial)
+                if np.linalg.norm(trial_value) < np.linalg.norm(value):
+                    break
+            else:
+                break
+            y, value, slope = trial, trial_value, trial_slope
         return y
+
+    def _projected(self, y: Array) -> tuple[Array, Array]:
+        """Return the equilibrium's residual and tangent in the basis."""
+        weight, columns = self._sampling.weight, self._sampled
+        closure = self._equilibrium.approach - (y @ columns) / weight
+        pressure = self._equilibrium.pressure(closure)
+        stiffness = self._equilibrium.stiffness(closure)
+        parts = np.vstack([-columns @ pressure, (columns * (stiffness / weight)) @ columns.T])
+        parts = self._sum(parts)
+        return y + parts[0], np.eye(len(y)) + parts[1:]
 
     def _sum(self, values: Any) -> Any:
         return self._comm.allreduce(values, op=MPI.SUM)

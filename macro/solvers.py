@@ -1,4 +1,4 @@
-"""PETSc solvers under one prefix: defaults that the user's options override."""
+"""PETSc's solvers under one prefix: defaults that the user's options override."""
 
 from __future__ import annotations
 
@@ -24,14 +24,6 @@ LINEAR_DEFAULTS: Mapping[str, object] = {
 }
 """Conjugate gradients and smoothed aggregation; Jacobi smooths on every release of PETSc."""
 
-NONLINEAR_DEFAULTS: Mapping[str, object] = {
-    "snes_type": "newtonls",
-    "snes_linesearch_type": "bt",
-    "snes_rtol": 1e-10,
-    "snes_max_it": 25,
-}
-"""Newton with backtracking; ``snes_rtol`` is relative to the current interface load."""
-
 
 @contextmanager
 def default_options(prefix: str, defaults: Mapping[str, object]) -> Iterator[None]:
@@ -40,6 +32,9 @@ def default_options(prefix: str, defaults: Mapping[str, object]) -> Iterator[Non
     Args:
         prefix: Prefix of the options; must not be empty, lest other solvers see the defaults.
         defaults: Option names without prefix, and values.
+
+    Raises:
+        ValueError: When the prefix is empty.
     """
     if not prefix:
         raise ValueError("PETSc options need a prefix")
@@ -52,11 +47,6 @@ def default_options(prefix: str, defaults: Mapping[str, object]) -> Iterator[Non
     finally:
         for name in added:
             database.delValue(name)
-
-
-def user_set(name: str, prefix: str = PREFIX) -> bool:
-    """Tell whether the user gave an option (outside of :func:`default_options`)."""
-    return PETSc.Options(prefix).hasName(name)
 
 
 def linear_solver(matrix: PETSc.Mat, prefix: str = PREFIX) -> PETSc.KSP:
@@ -79,6 +69,9 @@ def solve_linear(solver: PETSc.KSP, load: PETSc.Vec, solution: PETSc.Vec) -> int
 
     Raises:
         NotConverged: With the name of PETSc's reason.
+
+    Note:
+        Collective.
     """
     solver.solve(load, solution)
     if solver.reason < 0:
@@ -86,7 +79,7 @@ def solve_linear(solver: PETSc.KSP, load: PETSc.Vec, solution: PETSc.Vec) -> int
             "the linear solve of the block",
             reason=reason_name(PETSc.KSP.ConvergedReason, solver.reason),
             iterations=solver.its,
-            remedy="see the PETSc options under -patchlaw_ksp_ and -patchlaw_pc_",
+            remedy=f"see PETSc's options -{PREFIX}ksp_* and -{PREFIX}pc_*",
         )
     return int(solver.its)
 
@@ -94,5 +87,5 @@ def solve_linear(solver: PETSc.KSP, load: PETSc.Vec, solution: PETSc.Vec) -> int
 def reason_name(reasons: type, code: int) -> str:
     """Return the name of a PETSc converged reason, such as ``DIVERGED_LINE_SEARCH``."""
     names = [name for name, value in vars(reasons).items() if value == code and name.isupper()]
-    # aliases without a prefix exist (MAX_IT): the longest name is the one PETSc documents
+    # short aliases such as MAX_IT exist: the longest name is the one that PETSc documents
     return max(names, key=len, default=f"reason {code}")
