@@ -2,26 +2,25 @@
 
 By reciprocity the mean over patch i of the displacement by a contact is the contact's force times
 the mean of L_i over its pressure, divided by π E* A_i, with L_i the Love integral of the patch.
-That mean is taken with a cubature for the semi-ellipsoidal pressure, 7 points, exact to degree 5.
-L_i is smooth except on the patch's border, where its slope is logarithmic. So the mean over all
-patches is good to 1e-9; a contact of radius a across a border of a patch of side s misplaces up to
-0.02 a/s of that patch's displacement between the two sides (a point force up to 0.2 a/s).
+That mean is taken with a cubature for the semi-ellipsoidal pressure: 2 radii by 7 angles, exact to
+degree 6. L_i is smooth except on the patch's border, where its slope is logarithmic. So the mean
+over all patches is good to 1e-9; a contact of radius a across a border of a patch of side s
+misplaces up to 0.015 a/s of that patch's displacement between the two sides (a point force 0.17).
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import roots_jacobi
 
 from geometry import PatchGrid
 from micro.love import corner_integral
 
 Array = NDArray[np.float64]
 
-# Moments of the pressure over the unit disc: <r²> = 2/5, <r⁴> = 8/35.
-_RING_RADIUS = np.sqrt(4.0 / 7.0)
-_RING_WEIGHT = 0.7
-_RING_POINTS = 6
+_NODES, _SHARES = roots_jacobi(2, 0.5, 0.0)  # t = r² weighs as (1 − t)^½
+_ANGLES = 7
 
 
 def patch_displacements(
@@ -53,12 +52,13 @@ def patch_displacements(
 
 
 def _cubature(position: Array, semi_axes: Array, angle: Array) -> tuple[Array, Array]:
-    """Return points, shape (7 m, 2), and the 7 weights of every contact's mean."""
-    ring = np.arange(_RING_POINTS) * 2.0 * np.pi / _RING_POINTS
-    u = np.append(0.0, _RING_RADIUS * np.cos(ring)) * semi_axes[:, :1]
-    v = np.append(0.0, _RING_RADIUS * np.sin(ring)) * semi_axes[:, 1:]
+    """Return points, shape (14 m, 2), and the 14 weights of every contact's mean."""
+    radius = np.sqrt(0.5 * (1.0 + _NODES))[:, None]
+    around = 2.0 * np.pi / _ANGLES * (np.arange(_ANGLES) + np.array([[0.0], [0.5]]))
+    u = (radius * np.cos(around)).ravel() * semi_axes[:, :1]
+    v = (radius * np.sin(around)).ravel() * semi_axes[:, 1:]
     cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
     x = position[:, :1] + cos * u - sin * v
     y = position[:, 1:] + sin * u + cos * v
-    weight = np.append(1.0 - _RING_WEIGHT, np.full(_RING_POINTS, _RING_WEIGHT / _RING_POINTS))
+    weight = np.repeat(_SHARES / (_SHARES.sum() * _ANGLES), _ANGLES)
     return np.stack([x.ravel(), y.ravel()], axis=1), weight

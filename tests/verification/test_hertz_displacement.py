@@ -1,5 +1,7 @@
 """Pressure and displacement of Hertz contacts against direct integration of the pressure."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -52,7 +54,7 @@ def integrated_displacement(contact, x, y):
     edges = [*directions, directions[0] + 2 * np.pi] if directions else [0.0, 2 * np.pi]
     total = sum(
         quad(along_ray, lo, hi, epsrel=1e-8, epsabs=1e-12, limit=200)[0]
-        for lo, hi in zip(edges[:-1], edges[1:], strict=True)
+        for lo, hi in pairwise(edges)
     )
     return float(contact.peak_pressure) * total / (np.pi * E_STAR)
 

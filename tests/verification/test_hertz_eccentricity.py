@@ -1,5 +1,7 @@
 """The contact ellipse's axis ratio against a brute-force root of the defining integrals."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -18,7 +20,7 @@ def complete_integrals(beta):
     # The integrand of K varies over cos φ ~ √β: break the interval there.
     edge = np.pi / 2 - 3 * np.sqrt(beta)
     edges = [0.0, edge, np.pi / 2] if edge > 0 else [0.0, np.pi / 2]
-    pieces = list(zip(edges[:-1], edges[1:], strict=True))
+    pieces = list(pairwise(edges))
     K = sum(quad(lambda phi: 1 / root(phi), lo, hi, **options)[0] for lo, hi in pieces)
     E = sum(quad(root, lo, hi, **options)[0] for lo, hi in pieces)
     return K, E

@@ -176,11 +176,13 @@ def test_surface_displacement(cluster, name):
 
 
 def test_refuses(cluster):
-    with pytest.raises(InputError, match="'flat': this micro model is unknown.*elliptic, circular"):
+    with pytest.raises(
+        InputError, match=r"'flat': this micro model is unknown.*elliptic, circular"
+    ):
         asperity_model("flat", cluster, contact_modulus=1.0)
-    with pytest.raises(InputError, match="'lemke': this solver is unknown.*truncated-newton"):
+    with pytest.raises(InputError, match=r"'lemke': this solver is unknown.*truncated-newton"):
         asperity_model("circular", cluster, contact_modulus=1.0, solver="lemke")
-    with pytest.raises(InputError, match="-1.0: the contact modulus must be positive"):
+    with pytest.raises(InputError, match=r"-1\.0: the contact modulus must be positive"):
         asperity_model("circular", cluster, contact_modulus=-1.0)
     model = AsperityModel(asperities=cluster, contact_modulus=1.0, elliptic=True, interacting=True)
     with pytest.raises(InputError, match="inf: the approach must be finite"):

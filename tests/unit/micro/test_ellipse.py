@@ -76,7 +76,7 @@ def test_papers_approximation(ratio, error):
     "radii", [(1.0, 2.0), (1.0, 0.0), (-1.0, -2.0), (np.inf, 1.0), (np.nan, 1)]
 )
 def test_refuses_radii(radii):
-    with pytest.raises(InputError, match="do not describe a summit.*finite R' ≥ R'' > 0"):
+    with pytest.raises(InputError, match=r"do not describe a summit.*finite R' ≥ R'' > 0"):
         eccentricity(*radii)
 
 

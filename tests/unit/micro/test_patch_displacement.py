@@ -39,12 +39,12 @@ def test_average_of_the_hertz_field(angle):
     turned = (x + 1j * y) * np.exp(-1j * angle)
     field = ball.displacement(turned.real, turned.imag)
     average = field.reshape(4, n, 2, n).mean(axis=(1, 3)).ravel()
-    # Midpoint rule with cells of 1 µm; measured 2e-7.
-    assert got == pytest.approx(average, rel=2e-6)
+    # Midpoint rule with cells of 1 µm, an error of 1.9e-6 that falls with the cells.
+    assert got == pytest.approx(average, rel=4e-6)
 
 
 def test_contact_across_a_border():
-    # 0.02 a/s of the patch's own displacement, as the module says; a/s = 0.08 here.
+    # 0.015 a/s of the patch's own displacement, as the module says; a/s = 0.08 here.
     ball = HertzContact(contact_modulus=3.0, radius_major=0.1, radius_minor=0.1, indentation=4e-3)
     a = float(ball.semi_major)
     position = (0.25 + 0.3 * a, 0.16)
@@ -53,7 +53,7 @@ def test_contact_across_a_border():
     x = (np.arange(4 * n) + 0.5)[:, None] / (4 * n) - position[0]
     y = (np.arange(2 * n) + 0.5) * 0.6 / (2 * n) - position[1]
     average = ball.displacement(x, y).reshape(4, n, 2, n).mean(axis=(1, 3)).ravel()
-    assert got == pytest.approx(average, abs=0.02 * a / 0.25 * average.max())
+    assert got == pytest.approx(average, abs=0.015 * a / 0.25 * average.max())
     assert got.sum() == pytest.approx(average.sum(), rel=1e-5)  # the whole is exact
 
 

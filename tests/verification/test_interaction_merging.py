@@ -1,0 +1,93 @@
+"""Contacts that grow together: force continuous and increasing, nothing lost, all reported."""
+
+import numpy as np
+import pytest
+from interaction_cases import E_STAR, PATCHES, summits
+
+from micro import asperity_model
+
+ANGLES = np.arange(6) * np.pi / 3
+
+
+def scattered(seed, count, width):
+    """Return asperities of random height, size and direction in a square."""
+    rng = np.random.default_rng(seed)
+    minor = 0.02 * np.exp(rng.normal(0.0, 0.7, count))
+    return summits(
+        *(0.5 + width * (rng.random((2, count)) - 0.5)),
+        z=-rng.exponential(0.01, count),
+        major=minor * (1.0 + rng.exponential(1.0, count)),
+        minor=minor,
+        angle=np.pi * rng.random(count),
+    )
+
+
+CASES = {
+    "two equal": summits([0.48, 0.52], 0.5),
+    "two unequal": summits([0.48, 0.52], 0.5, z=[0, -5e-3], major=[0.1, 0.03]),
+    "two ellipses": summits([0.48, 0.52], 0.5, major=0.2, minor=0.05, angle=[0.3, 1.4]),
+    "three in a line": summits([0.47, 0.5, 0.53], 0.5),
+    "five in a line": summits(0.5 + 0.03 * np.arange(-2, 3), 0.5),
+    "hexagon": summits(
+        np.append(0.5, 0.5 + 0.03 * np.cos(ANGLES)), np.append(0.5, 0.5 + 0.03 * np.sin(ANGLES))
+    ),
+    "coincident": summits([0.5, 0.5, 0.5], 0.5, z=[0, 0, -1e-3], major=[0.1, 0.1, 0.05]),
+    "tight cluster": scattered(0, 30, 0.03),
+    "cluster": scattered(1, 30, 0.1),
+    "field": scattered(2, 30, 0.3),
+}
+every_case = pytest.mark.parametrize("case", CASES)
+both_shapes = pytest.mark.parametrize("name", ["circular", "elliptic"])
+
+
+def curve(case, name, approaches):
+    model = asperity_model(name, CASES[case], contact_modulus=E_STAR)
+    return model.respond(approaches, patches=PATCHES, mean_heights=np.zeros(16))
+
+
+@both_shapes
+@every_case
+def test_force_grows_without_a_jump(case, name):
+    approaches = np.linspace(0.0, 0.1, 401)
+    response = curve(case, name, approaches)
+    assert response.engulfed[-1] > 0 and response.residual.max() <= 1e-10
+    increments = np.diff(response.force)
+    assert np.all(increments[response.force[1:] > 0.0] > 0.0)
+    # A jump would make one increment stand out from its neighbours for any step: halve the step
+    # around the roughest place and see every increment shrink with it.
+    rough = np.abs(np.diff(increments)) / np.maximum(increments[1:], 1e-3 * increments.max())
+    at = np.argmax(rough) + 1
+    fine = curve(case, name, np.linspace(approaches[at - 1], approaches[at + 1], 65))
+    assert np.diff(fine.force).max() < 2.5 / 32 * increments[at - 1 : at + 1].max()
+
+
+@both_shapes
+@every_case
+def test_result_does_not_depend_on_the_path(case, name):
+    # One solution per approach: from nothing, from below and from far above.
+    model = asperity_model(name, CASES[case], contact_modulus=E_STAR)
+    for approach in (0.01, 0.04):
+        cold = model.solve(approach)
+        above = model.solve(approach, start=model.solve(0.1))
+        assert above.force == pytest.approx(cold.force, rel=1e-7, abs=1e-7 * cold.force.max())
+
+
+@both_shapes
+def test_coincident_twins_carry_the_force_of_one(name):
+    twins, one = summits([0.5, 0.5], 0.5), summits(0.5, 0.5)
+    both, alone = (
+        asperity_model(name, case, contact_modulus=E_STAR).solve(0.02) for case in (twins, one)
+    )
+    assert both.force.sum() == pytest.approx(alone.force[0], rel=1e-9)
+    assert both.engulfed == 2
+
+
+@both_shapes
+def test_kernel_is_exact_before_merging(name):
+    # Circles of radius a, r apart, are within reach of each other's summit from a = 0.797 r on.
+    model = asperity_model(name, CASES["two equal"], contact_modulus=E_STAR)
+    states = [model.solve(approach) for approach in np.linspace(1e-3, 0.03, 200)]
+    reach = np.array([state.semi_axes[0, 0] for state in states]) / 0.04
+    engulfed = np.array([state.engulfed for state in states])
+    assert np.all(engulfed[reach < 0.796] == 0) and np.all(engulfed[reach > 0.798] == 2)
+    assert 0.5 < reach.min() + 0.4 and reach.max() > 0.85  # the sweep passes the place

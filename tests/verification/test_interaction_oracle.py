@@ -1,0 +1,78 @@
+"""Few interacting asperities against independence, brute force and by shielding."""
+
+import numpy as np
+import pytest
+from interaction_cases import E_STAR, oracle, summits
+
+from micro import SOLVERS, asperity_model
+
+CASES = {
+    "equal spheres": (summits([0.47, 0.53], 0.5, major=0.1), 4e-3, [0, 1]),
+    "unequal spheres": (summits([0.46, 0.53], 0.5, z=[-1e-3, 0], major=[0.05, 0.2]), 4e-3, [0, 1]),
+    "ellipsoids across": (
+        summits([0.45, 0.55], [0.5, 0.52], major=[0.3, 0.2], minor=0.05, angle=[1.2, 0.3]),
+        5e-3,
+        [0, 1],
+    ),
+    "three, one shielded": (
+        summits([0.45, 0.5, 0.55], 0.5, z=[0, -2.5e-3, 0], major=[0.2, 0.05, 0.1], minor=0.05),
+        3e-3,
+        [0, 2],
+    ),
+    "five": (
+        summits(
+            [0.4, 0.5, 0.6, 0.45, 0.6],
+            [0.4, 0.5, 0.42, 0.62, 0.6],
+            z=[0, -1e-3, -5e-4, 0, -1.5e-3],
+            major=[0.2, 0.05, 0.1, 0.3, 0.08],
+            minor=0.05,
+            angle=[0, 1, 2, 3, 0.5],
+        ),
+        4e-3,
+        [0, 1, 2, 3, 4],
+    ),
+}
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("case", CASES)
+def test_against_brute_force(case, solver):
+    asperities, approach, contacting = CASES[case]
+    force, displacement = oracle(asperities, approach, contacting)
+    model = asperity_model("elliptic", asperities, contact_modulus=E_STAR, solver=solver)
+    state = model.solve(approach)
+    assert np.flatnonzero(state.in_contact).tolist() == contacting
+    assert state.engulfed == 0  # the oracle has the exact kernel
+    # The oracle's quadratures are good to 1e-10 at these distances, the solver stops at 1e-10.
+    assert state.force == pytest.approx(E_STAR * force, rel=1e-7, abs=1e-12)
+    assert state.displacement == pytest.approx(displacement, rel=1e-8)
+
+
+def test_shielded_summit_is_in_the_inequality():
+    asperities, approach, _ = CASES["three, one shielded"]
+    state = asperity_model("elliptic", asperities, contact_modulus=E_STAR).solve(approach)
+    assert state.required[1] == pytest.approx(5e-4)  # it would touch if it were alone
+    assert state.displacement[1] > 1.5 * state.required[1]  # the others push it further
+    assert state.force[1] == 0.0
+    alone = asperity_model("elliptic-independent", asperities, contact_modulus=E_STAR)
+    assert alone.solve(approach).force[1] > 0.0
+
+
+@pytest.mark.parametrize("name", ["elliptic", "circular"])
+def test_far_apart_is_independent(name):
+    # The other's displacement is P/(π E* r), 4/(3π) sqrt(R w)/r of the own one.
+    for radius in (1e-6, 1e-8):
+        pair = summits([0.1, 0.9], 0.5, major=2 * radius, minor=radius)
+        approach = 0.01 * radius
+        state = asperity_model(name, pair, contact_modulus=E_STAR).solve(approach)
+        alone = asperity_model(f"{name}-independent", pair, contact_modulus=E_STAR).solve(approach)
+        lost = 1 - state.force / alone.force
+        expected = 1.5 * alone.force / (np.pi * E_STAR * 0.8 * approach)
+        assert lost == pytest.approx(expected, rel=1e-3)  # next order: the loss itself, 1e-7
+        assert np.all(lost < 0.2 * radius)
+
+
+def test_symmetric_pair_shares_equally():
+    pair = summits([0.46, 0.54], [0.47, 0.53], major=0.2, minor=0.1, angle=0.8)
+    state = asperity_model("elliptic", pair, contact_modulus=E_STAR).solve(6e-3)
+    assert state.force[0] == pytest.approx(state.force[1], rel=1e-13)
