@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import RectBivariateSpline
+from scipy.interpolate import BivariateSpline, RectBivariateSpline
 from scipy.optimize import minimize
 
 from geometry.errors import InputError
@@ -43,6 +42,7 @@ class Interpolant:
             centres.append((np.arange(-padding, count + padding) + 0.5) * step)
             box += [min(0.0, centres[-1][0]), max(length, centres[-1][-1])]
         self._spline = RectBivariateSpline(*centres, samples, bbox=box, kx=3, ky=3, s=0)
+        self._derivatives: dict[tuple[int, int], BivariateSpline] = {(0, 0): self._spline}
 
     def __call__(self, x: ArrayLike, y: ArrayLike, *, dx: int = 0, dy: int = 0) -> Array:
         """Evaluate the spline or one of its derivatives.
@@ -60,7 +60,7 @@ class Interpolant:
             InputError: When a point lies outside and the samples are not periodic.
         """
         x, y = np.broadcast_arrays(self._inside(x, 0), self._inside(y, 1))
-        return np.asarray(self._spline.ev(x, y, dx=dx, dy=dy), dtype=np.float64)
+        return np.asarray(self._derivative(dx, dy)(x, y, grid=False), dtype=np.float64)
 
     def maximum(self) -> tuple[float, float, float]:
         """Return (x, y, z) of the highest point over the closed rectangle [mm].
@@ -73,6 +73,12 @@ class Interpolant:
         refined = [self._climb(*start) for start in zip(x, y, strict=True)]
         best = int(np.argmax(z))
         return max([(float(x[best]), float(y[best]), float(z[best])), *refined], key=lambda p: p[2])
+
+    def _derivative(self, dx: int, dy: int) -> BivariateSpline:
+        """Return a derivative as a spline of its own, made once: evaluation would remake it."""
+        if (dx, dy) not in self._derivatives:
+            self._derivatives[dx, dy] = self._spline.partial_derivative(dx, dy)
+        return self._derivatives[dx, dy]
 
     def _inside(self, coordinate: ArrayLike, axis: int) -> Array:
         value = np.asarray(coordinate, dtype=np.float64)
@@ -100,7 +106,7 @@ class Interpolant:
         u, v = (part.ravel() for part in np.mgrid[0.0:1.0:5j, 0.0:1.0:5j])
         px = x[ix, :1] + u * np.diff(x[ix])
         py = y[iy, :1] + v * np.diff(y[iy])
-        z = self._spline.ev(px, py)
+        z = self._spline(px, py, grid=False)
         inner = np.argmax(z, axis=1)
         rows = np.argsort(z.max(axis=1))[-_MOST_STARTS:]
         return px[rows, inner[rows]], py[rows, inner[rows]], z[rows, inner[rows]]
@@ -113,8 +119,9 @@ class Interpolant:
     def _span_bounds(self) -> Array:
         """Return an upper bound of the spline on every span, −inf on those outside [mm]."""
         shape = [len(knots) - 4 for knots in self._spline.get_knots()]
-        windows = sliding_window_view(self._spline.get_coeffs().reshape(shape), (4, 4))
-        bound = windows.max(axis=(2, 3))
+        rows = self._spline.get_coeffs().reshape(shape)
+        strips = np.maximum.reduce([rows[k : shape[0] - 3 + k] for k in range(4)])
+        bound = np.maximum.reduce([strips[:, k : shape[1] - 3 + k] for k in range(4)])
         for axis in range(2):
             empty = np.diff(self._edges(axis))[:, 0] <= 0.0
             bound[(empty, slice(None)) if axis == 0 else (slice(None), empty)] = -np.inf
@@ -123,12 +130,13 @@ class Interpolant:
     def _climb(self, x: float, y: float) -> tuple[float, float, float]:
         """Return the local maximum reached from (x, y) without leaving the rectangle."""
         origin, (dx, dy) = np.array([x, y]), self._spacing
+        along_x, along_y = self._derivative(1, 0), self._derivative(0, 1)
         height = float(np.ptp(self._spline.get_coeffs())) or 1.0
 
         def depth(step: Array) -> tuple[float, Array]:
             px, py = origin + step * (dx, dy)
-            slope = [dx * self._spline.ev(px, py, dx=1), dy * self._spline.ev(px, py, dy=1)]
-            return -float(self._spline.ev(px, py)) / height, -np.array(slope) / height
+            slope = [dx * along_x(px, py, grid=False), dy * along_y(px, py, grid=False)]
+            return -float(self._spline(px, py, grid=False)) / height, -np.array(slope) / height
 
         limits: list[tuple[float, float]] = [
             (float(-origin[i] / size), float((self.lengths[i] - origin[i]) / size))
@@ -137,4 +145,4 @@ class Interpolant:
         options = {"ftol": 1e-16, "gtol": 1e-12}
         found = minimize(depth, np.zeros(2), jac=True, bounds=limits, options=options)
         px, py = np.clip(origin + found.x * (dx, dy), 0.0, self.lengths)
-        return float(px), float(py), float(self._spline.ev(px, py))
+        return float(px), float(py), float(self._spline(px, py, grid=False))

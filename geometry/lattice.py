@@ -115,13 +115,7 @@ def mesh_lattice(gmsh: Any, axes: Axes, *, hexahedra: bool) -> dict[str, list[in
         geo.mesh.setTransfiniteVolume(volumes[-1])
     geo.synchronize()
     gmsh.model.mesh.generate(3)
-    groups = {"volumes": volumes}
-    for k, letter in enumerate("xyz"):
-        groups[letter + "-"] = [tag for (n, at), tag in faces.items() if n == k and at[k] == 0]
-        groups[letter + "+"] = [
-            tag for (n, at), tag in faces.items() if n == k and at[k] == shape[k]
-        ]
-    return groups
+    return {"volumes": volumes, **_outer_faces(shape, faces)}
 
 
 Place = tuple[int, ...]
@@ -166,6 +160,14 @@ def _add_faces(
             geo.mesh.setRecombine(2, tag)
         faces[k, place] = tag
     return faces
+
+
+def _outer_faces(shape: Sequence[int], faces: dict[tuple[int, Place], int]) -> dict[str, list[int]]:
+    outer: dict[str, list[int]] = {}
+    for (k, place), tag in faces.items():
+        if place[k] in (0, shape[k]):
+            outer.setdefault("xyz"[k] + ("-" if place[k] == 0 else "+"), []).append(tag)
+    return outer
 
 
 def _is_initialised(gmsh: Any) -> bool:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.fft
@@ -15,6 +16,7 @@ from geometry.surface import Surface
 
 Array = NDArray[np.float64]
 
+_BANDS = ("waves", "waves_x", "waves_y")
 _AMPLITUDES = ("rms_slope", "rms_height", "s0")
 _ROUNDING = 1.0 + 1e-12  # waves that lie on the border of a band belong to it
 
@@ -59,36 +61,34 @@ class Spectrum:
             raise InputError(
                 "the Hurst exponent is out of range", value=self.hurst, allowed="0 … 1"
             )
-        ring, box = self.waves is not None, (self.waves_x is not None, self.waves_y is not None)
-        if (ring and any(box)) or not (ring or all(box)):
-            raise InputError(
-                "a spectrum needs exactly one band",
-                value=[name for name in ("waves", "waves_x", "waves_y") if getattr(self, name)],
-                allowed="waves, or waves_x and waves_y together",
-            )
-        for name in ("waves", "waves_x", "waves_y"):
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, _checked_band(getattr(self, name), name))
-        given = [name for name in _AMPLITUDES if getattr(self, name) is not None]
-        if len(given) != 1:
-            raise InputError(
-                "a spectrum needs exactly one amplitude",
-                value=given,
-                allowed="one of " + ", ".join(_AMPLITUDES),
-            )
-        amplitude = getattr(self, given[0])
-        if not (math.isfinite(amplitude) and amplitude > 0.0):
-            raise InputError(f"{given[0]} must be positive", value=amplitude, allowed="> 0")
         if not isinstance(self.seed, int | np.integer) or self.seed < 0:
             raise InputError("the seed does not fit", value=self.seed, allowed="a whole number ≥ 0")
+        bands = self._given(_BANDS)
+        if bands not in (["waves"], ["waves_x", "waves_y"]):
+            raise InputError(
+                "a spectrum needs exactly one band",
+                value=bands,
+                allowed="waves, or waves_x and waves_y together",
+            )
+        for name in bands:
+            object.__setattr__(self, name, _checked_band(getattr(self, name), name))
+        amplitudes = self._given(_AMPLITUDES)
+        if len(amplitudes) != 1:
+            raise InputError(
+                "a spectrum needs exactly one amplitude",
+                value=amplitudes,
+                allowed="one of " + ", ".join(_AMPLITUDES),
+            )
+        size = getattr(self, amplitudes[0])
+        if not (math.isfinite(size) and size > 0.0):
+            raise InputError(f"{amplitudes[0]} must be positive", value=size, allowed="> 0")
 
     def __str__(self) -> str:
-        parts = [
-            f"{item.name} {getattr(self, item.name)}"
-            for item in fields(self)
-            if getattr(self, item.name) is not None
-        ]
-        return "spectrum with " + ", ".join(parts)
+        given = self._given(("hurst", *_BANDS, *_AMPLITUDES, "seed"))
+        return "spectrum with " + ", ".join(f"{name} {getattr(self, name)}" for name in given)
+
+    def _given(self, names: Sequence[str]) -> list[str]:
+        return [name for name in names if getattr(self, name) is not None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -132,16 +132,7 @@ def random_waves(spectrum: Spectrum, lengths: tuple[float, float]) -> Waves:
     if not inside.any():
         raise InputError("no wave lies in the band of the spectrum", value=str(spectrum))
     kx, ky, phase = kx[inside], ky[inside], phase[inside]
-    squared = kx**2 + (ky * (lengths[0] / lengths[1])) ** 2
-    shape = squared ** (-0.5 * (spectrum.hurst + 1.0))
-    if spectrum.s0 is not None:
-        factor = 2.0 * np.pi * math.sqrt(spectrum.s0 / (lengths[0] * lengths[1]))
-    elif spectrum.rms_height is not None:
-        factor = spectrum.rms_height / math.sqrt(2.0 * np.sum(shape**2))
-    else:
-        slope = 2.0 * np.pi / lengths[0] * math.sqrt(2.0 * np.sum(shape**2 * squared))
-        factor = (spectrum.rms_slope or 0.0) / slope
-    return Waves(kx=kx, ky=ky, amplitude=factor * shape, phase=phase)
+    return Waves(kx=kx, ky=ky, amplitude=_amplitudes(spectrum, lengths, kx, ky), phase=phase)
 
 
 def synthesise(
@@ -210,6 +201,30 @@ def _half_plane(reach: tuple[int, int]) -> tuple[NDArray[np.int64], NDArray[np.i
     return kx[kept][order], ky[kept][order]
 
 
+def _amplitudes(
+    spectrum: Spectrum,
+    lengths: tuple[float, float],
+    kx: NDArray[np.int64],
+    ky: NDArray[np.int64],
+) -> Array:
+    squared = _squared_waves(lengths, kx, ky)
+    shape = squared ** (-0.5 * (spectrum.hurst + 1.0))
+    if spectrum.s0 is not None:
+        return 2.0 * np.pi * math.sqrt(spectrum.s0 / (lengths[0] * lengths[1])) * shape
+    if spectrum.rms_height is not None:
+        return spectrum.rms_height / math.sqrt(2.0 * np.sum(shape**2)) * shape
+    assert spectrum.rms_slope is not None
+    slope = 2.0 * np.pi / lengths[0] * math.sqrt(2.0 * np.sum(shape**2 * squared))
+    return spectrum.rms_slope / slope * shape
+
+
+def _squared_waves(
+    lengths: tuple[float, float], kx: NDArray[np.int64], ky: NDArray[np.int64]
+) -> Array:
+    """Return |k|² = (Lx |q| / 2π)² in waves per Lx."""
+    return kx**2 + (ky * (lengths[0] / lengths[1])) ** 2
+
+
 def _in_band(
     spectrum: Spectrum,
     lengths: tuple[float, float],
@@ -218,7 +233,7 @@ def _in_band(
 ) -> NDArray[np.bool_]:
     if spectrum.waves is not None:
         lo, hi = spectrum.waves
-        squared = kx**2 + (ky * (lengths[0] / lengths[1])) ** 2
+        squared = _squared_waves(lengths, kx, ky)
         return (squared * _ROUNDING >= lo**2) & (squared <= hi**2 * _ROUNDING)
     assert spectrum.waves_x is not None and spectrum.waves_y is not None
     inner = np.zeros(kx.shape)
