@@ -1,0 +1,43 @@
+"""What several folders of tests share: starting a command under MPI."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+MPI_ENVIRONMENT = {
+    "OMP_NUM_THREADS": "1",
+    # containers run tests as root, and with fewer cores than ranks
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    "OMPI_MCA_rmaps_base_oversubscribe": "1",
+    "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
+    "OMPI_MCA_btl": "^tcp",
+}
+
+
+@pytest.fixture(scope="session")
+def root():
+    """Folder of the project."""
+    return Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="session")
+def mpirun(root):
+    """Return a function that runs Python with some words on a number of ranks."""
+
+    def start(ranks, *words, timeout=240):
+        command = ["mpirun", "-n", str(ranks), sys.executable, *map(str, words)]
+        return subprocess.run(
+            command,
+            cwd=root,
+            env=os.environ | MPI_ENVIRONMENT,
+            capture_output=True,
+            text=True,
+            timeout=timeout,  # a hang is a failure, not a wait
+            check=False,
+        )
+
+    return start

@@ -1,0 +1,82 @@
+"""The whole chain on 1, 2 and 3 ranks: same numbers, same refusals, no hang."""
+
+import csv
+
+import numpy as np
+import pytest
+
+PAPER = "demos/scenes/paper.toml"
+SMALL = ["surface.grid=[64, 64]", "load.steps=3", "output.figures=false", "output.report=false"]
+SCENES = {
+    "cube, patchwise": ["block.cells=[8, 8, 5]", "patches.grid=[4, 2]"],
+    "cube, pointwise": [
+        "block.cells=[8, 8, 5]", "patches.grid=[4, 2]", "coupling.interface=pointwise",
+    ],
+    # most of the block lies beside the interface: a rank of three owns none of it
+    "wide block, tilted": [
+        "block.cells=[4, 4, 4]", "block.margin=4 mm", "block.margin_cells=6",
+        "load.tilt=['2 um/mm', '-1 um/mm']",
+    ],
+    "micro model alone": ["coupling.kind=analytic"],
+}  # fmt: skip
+NUMBERS = (
+    "force_N",
+    "mean_pressure_MPa",
+    "contact_area_fraction",
+    "mean_separation_mm",
+    "contacts",
+)
+
+
+def table(path, names):
+    with path.open(encoding="utf-8") as file:
+        return np.array([[float(row[name]) for name in names] for row in csv.DictReader(file)])
+
+
+@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
+def test_same_numbers_on_any_number_of_ranks(mpirun, tmp_path, scene):
+    results = {}
+    for ranks in (1, 2, 3):
+        out = tmp_path / str(ranks)
+        words = ("-m", "multiscale", "run", PAPER, "--out", out, "--set", *SMALL, *scene)
+        done = mpirun(ranks, *words)
+        assert done.returncode == 0, done.stderr
+        results[ranks] = (
+            table(out / "history.csv", NUMBERS),
+            table(out / "patches.csv", ("closure_mm", "pressure_MPa", "contact_area_fraction")),
+        )
+    for ranks in (2, 3):
+        for one, more in zip(results[1], results[ranks], strict=True):
+            # residuals are driven to 1e-10 of the load; closures and pressures follow linearly
+            np.testing.assert_allclose(more, one, rtol=1e-8, atol=1e-8 * np.abs(one).max(axis=0))
+
+
+def test_a_rank_may_own_nothing_of_the_interface(mpirun):
+    """The premise of the wide block above: see that it holds."""
+    code = (
+        "from mpi4py import MPI; from multiscale import Run, Scene;"
+        f"scene = Scene.load('{PAPER}', {SMALL + SCENES['wide block, tilted']});"
+        "run = Run(scene, MPI.COMM_WORLD); list(run.load_steps());"
+        "counts = MPI.COMM_WORLD.gather(len(run.interface.quadrature.x));"
+        "print('facet points', counts) if counts else None"
+    )
+    done = mpirun(3, "-c", code)
+    assert "facet points" in done.stdout, done.stderr
+    assert ", 0" in done.stdout or "[0" in done.stdout, done.stdout
+
+
+@pytest.mark.parametrize(
+    ("override", "text"),
+    [
+        ("block.young=3", "block.young: unknown key; did you mean 'young_modulus'?"),
+        ("patches.grid=[50, 4]", "patches.grid = [50, 4]: more patches than cells"),
+        ("surface.spectrum.waves=[2, 200]", "the grid is too coarse"),
+    ],
+)
+def test_wrong_input_ends_all_ranks_with_one_message(mpirun, tmp_path, override, text):
+    out = tmp_path / "out"
+    done = mpirun(2, "-m", "multiscale", "run", PAPER, "--out", out, "--set", override, timeout=60)
+    assert done.returncode == 2
+    assert done.stderr.count("patchlaw: ") == 1
+    assert text in done.stderr
+    assert not out.exists()
