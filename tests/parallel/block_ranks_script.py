@@ -1,0 +1,109 @@
+"""Run all cases on all ranks and print what rank 0 found as JSON; for test_block_ranks.py."""
+
+import json
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "verification"))
+
+from block_cases import PowerLaw, block_of, interface_of, uneven_laws
+
+import macro.mesh
+from geometry.errors import InputError, NotConverged
+from geometry.meshes import BlockShape
+from macro import PressedBlock, block_mesh
+
+COMM = MPI.COMM_WORLD
+SHAPES = {
+    "whole": ({"cells": (6, 6, 4)}, (4, 4)),
+    "tets": ({"cells": (5, 4, 3), "element": "P2", "sides": "roller"}, (2, 3)),
+    # a single facet on the interface: only one rank owns any of it
+    "one facet": (
+        {"interface": (0.2, 0.2), "cells": (1, 1, 5), "margin": 0.4, "margin_cells": 3},
+        (2, 2),
+    ),
+}
+
+
+def run(case, mode):
+    """Press a block and return what must not depend on the number of ranks."""
+    shape, grid = SHAPES[case]
+    interface = interface_of(block_of(comm=COMM, **shape), grid)
+    pressed = PressedBlock(interface.block, interface, uneven_laws(np.prod(grid)), mode)
+    states = [pressed.press(approach, tilt=(1e-3, 5e-4)) for approach in (4e-3, 8e-3)]
+    numbers = {
+        "force": [state.force for state in states],
+        "closure": states[-1].closure.tolist(),
+        "pressure": states[-1].pressure.tolist(),
+    }
+    reaction = [state.reaction for state in states]
+    everyone = COMM.allgather((numbers, reaction))
+    assert all(other == everyone[0] for other in everyone), "ranks disagree"
+    points = COMM.allgather(np.bincount(interface.quadrature.patch, minlength=np.prod(grid)))
+    return {
+        "numbers": numbers,
+        "reaction": reaction,
+        "points_of_ranks": [int(count.sum()) for count in points],
+        "patches_missing_on_ranks": [int((count == 0).sum()) for count in points],
+    }
+
+
+def fail_in_gmsh():
+    """Return the error that every rank meets when meshing fails on rank 0."""
+
+    @contextmanager
+    def broken(_shape):
+        raise InputError("gmsh gave up", value=3, allowed="better luck")
+        yield
+
+    macro.mesh.flat_block = broken
+    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(2, 2, 2))
+    return error_of(lambda: block_mesh(shape, COMM))
+
+
+class RefusingLaw(PowerLaw):
+    """A law that one rank alone gets to evaluate."""
+
+    def pressure(self, closure):
+        if closure.size:
+            raise InputError("closure beyond the table", value=0.25)
+        return closure
+
+
+def fail_in_law(mode):
+    """Return the error that every rank meets when a law refuses on the rank that has it."""
+    shape, grid = SHAPES["one facet"]
+    interface = interface_of(block_of(comm=COMM, **shape), grid)
+    laws = [*uneven_laws(3), RefusingLaw(1.0)]
+    return error_of(lambda: PressedBlock(interface.block, interface, laws, mode).press(1e-3))
+
+
+def fail_to_converge():
+    """Return the error that every rank meets when Newton's method may take one step only."""
+    interface = interface_of(block_of(comm=COMM), (2, 2))
+    pressed = PressedBlock(interface.block, interface, uneven_laws(4))
+    pressed.newton.snes.setTolerances(max_it=1)
+    return error_of(lambda: pressed.press(8e-3))
+
+
+def error_of(action):
+    """Return type and text of the error that an action raises on every rank."""
+    try:
+        action()
+        found = "none"
+    except (InputError, NotConverged) as error:
+        found = f"{type(error).__name__}: {error}"
+    return COMM.allgather(found)
+
+
+if __name__ == "__main__":
+    modes = ("patchwise", "pointwise")
+    result = {f"{case}, {mode}": run(case, mode) for case in SHAPES for mode in modes}
+    result |= {f"law, {mode}": fail_in_law(mode) for mode in modes}
+    result |= {"newton": fail_to_converge(), "gmsh": fail_in_gmsh()}
+    if COMM.rank == 0:
+        print(json.dumps(result))

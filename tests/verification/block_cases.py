@@ -1,0 +1,44 @@
+"""Small blocks and closed-form laws that the tests of the block share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+
+from geometry.meshes import BlockShape
+from geometry.patches import PatchGrid
+from macro import Block, Interface, Material, block_mesh
+
+
+@dataclass(frozen=True)
+class PowerLaw:
+    """p = k <c − c0>^1.5, as of one Hertzian asperity."""
+
+    k: float
+    touch: float = 0.0
+
+    def pressure(self, closure):
+        return self.k * np.maximum(closure - self.touch, 0.0) ** 1.5
+
+    def stiffness(self, closure):
+        return 1.5 * self.k * np.maximum(closure - self.touch, 0.0) ** 0.5
+
+
+def uneven_laws(count, k=3e4):
+    """Laws of different stiffness and height, some of which stay open at first."""
+    random = np.random.default_rng(7)
+    return [PowerLaw(k * random.uniform(0.2, 2.0), random.uniform(0.0, 6e-3)) for _ in range(count)]
+
+
+def block_of(sides="free", young_modulus=4000.0, poisson_ratio=0.15, comm=MPI.COMM_SELF, **shape):
+    """Mesh a block; the paper's material unless told otherwise."""
+    shape = {"interface": (1.0, 1.0), "height": 1.0, "cells": (6, 6, 4)} | shape
+    material = Material(young_modulus=young_modulus, poisson_ratio=poisson_ratio)
+    return Block(block_mesh(BlockShape(**shape), comm), material, sides=sides)
+
+
+def interface_of(block, grid):
+    """Put patches over the whole interface of a block."""
+    return Interface(block, PatchGrid(grid=grid, lengths=block.mesh.shape.interface))
