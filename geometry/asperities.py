@@ -168,8 +168,7 @@ def _refined(surface: Surface, start: Array) -> Array:
         moved = point - np.where(strayed[:, None], 0.0, step / safe[:, None])
         strayed |= np.any(np.abs(moved - start) > cell, axis=1)
         point = np.where(strayed[:, None], start, moved)
-    strayed |= h(*point.T) < h(*start.T)
-    return np.where(strayed[:, None], start, point)
+    return point
 
 
 def _hessians(surface: Surface, point: Array) -> Array:

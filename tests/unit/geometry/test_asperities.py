@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from geometry import Asperities, InputError, Surface, find_asperities
 from geometry.maxima import grid_maxima
@@ -63,6 +64,19 @@ def test_a_summit_in_the_first_inner_cell_keeps_its_differences_inside():
     assert asperities.radius_minor[0] == pytest.approx(0.3, rel=1e-9)  # constant curvature
 
 
+def test_differences_stay_inside_where_a_ridge_ends_at_the_border():
+    # the highest sample of a narrow oblique ridge is an inner one, the summit 0.8 cells from
+    # the border: the stencil moves inwards, which a constant curvature does not feel
+    place = (0.0393549, 0.7619685)
+    ridge = sampled(
+        lambda x, y: paraboloid(x, y, place=place, radii=(0.8, 0.0314726), angle=0.2639)
+    )
+    asperities = find_asperities(ridge)
+    assert [asperities.x[0], asperities.y[0]] == pytest.approx(place, abs=1e-10)
+    assert asperities.radius_major[0] == pytest.approx(0.8, rel=1e-8)
+    assert asperities.radius_minor[0] == pytest.approx(0.0314726, rel=1e-8)
+
+
 def egg_box(x, y, shift=(0.0, 0.0)):
     return np.cos(2 * np.pi * 2 * (x - shift[0])) * np.cos(2 * np.pi * 3 * (y - shift[1]))
 
@@ -115,17 +129,18 @@ def test_flat_surfaces_have_no_asperities(periodic):
     assert len(find_asperities(flat)) == 0
 
 
-def test_refinement_stays_within_a_cell_and_does_not_descend():
-    heights = np.random.default_rng(0).normal(size=(60, 60))  # noise: Newton's worst case
-    surface = Surface(heights=heights, lengths=(60.0, 60.0), periodic=True)
+def test_refinement_stays_within_a_cell_of_its_own_maximum():
+    # on white noise, Newton's worst case, 7 % of the iterations leave the concave neighbourhood
+    # and a few go further than a cell
+    heights = np.random.default_rng(2).normal(size=(150, 150))
+    surface = Surface(heights=heights, lengths=(150.0, 150.0), periodic=True)
     maxima, asperities = grid_maxima(heights, periodic=True), find_asperities(surface)
     assert len(asperities) + asperities.rejected == len(maxima.height)
+    tree = cKDTree(np.mod(maxima.position + 0.5, 150.0), boxsize=150.0)
     found = np.stack([asperities.x, asperities.y], axis=1)
-    step = found[:, None] - (maxima.position + 0.5)
-    reach = np.abs((step + 30.0) % 60.0 - 30.0).max(axis=2) <= 1.0 + 1e-12
-    assert np.all(reach.any(axis=1))
-    lower = np.where(reach, maxima.height, np.inf).min(axis=1)
-    assert np.all(asperities.z >= lower - 1e-12)  # rounding of the spline at its samples
+    distance, own = tree.query(found, p=np.inf)
+    assert np.all(distance <= 1.0 + 1e-12) and len(np.unique(own)) == len(own)
+    assert np.all(asperities.z >= maxima.height[own] - 1e-12)  # rounding of the spline
 
 
 def summits(**change):
