@@ -23,7 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import elliprd, elliprf
 
+from micro.hertz_far_field import NEAREST, far_field
+
 Array = NDArray[np.float64]
+
+_MANY = 512  # from this many points on the far field's series is faster than Carlson's integrals
 
 
 def elliptic_field(
@@ -39,12 +43,13 @@ def elliptic_field(
         v_min: Lower bound on v; 0 for the exact field.
     """
     v = np.maximum(confocal_parameter(x_squared / s, y_squared / s, beta), v_min)
-    p, q = 1.0 + v, beta + v
-    slope = elliprf(p, q, v)
-    # At v = 0 (inside) RD keeps two positive arguments and stays finite.
-    along = x_squared * elliprd(q, v, p)
-    across = y_squared * elliprd(p, v, q)
-    return s * slope - (along + across) / 3.0, slope
+    if v.size < _MANY:
+        return _carlson(x_squared, y_squared, s, beta, v)
+    field, slope = far_field(x_squared, y_squared, s, beta, v)
+    near = v < NEAREST
+    arguments = np.broadcast_arrays(x_squared, y_squared, s, beta, v)
+    field[near], slope[near] = _carlson(*(part[near] for part in arguments))
+    return field, slope
 
 
 def circular_field(r_squared: Array, s: Array, sine_max: float = 1.0) -> tuple[Array, Array]:
@@ -75,6 +80,17 @@ def confocal_parameter(x_squared: Array, y_squared: Array, beta: Array) -> Array
     gap = 1.0 - beta
     half = 0.5 * (x_squared + y_squared - gap)
     return np.maximum(half + np.sqrt(half**2 + gap * y_squared) - beta, 0.0)
+
+
+def _carlson(
+    x_squared: Array, y_squared: Array, s: Array, beta: Array, v: Array
+) -> tuple[Array, Array]:
+    p, q = 1.0 + v, beta + v
+    slope = elliprf(p, q, v)
+    # At v = 0 (inside) RD keeps two positive arguments and stays finite.
+    along = x_squared * elliprd(q, v, p)
+    across = y_squared * elliprd(p, v, q)
+    return s * slope - (along + across) / 3.0, slope
 
 
 def _angle_minus_sine(angle: Array) -> Array:

@@ -65,7 +65,7 @@ def test_continuation_is_smooth(summits, circular):
     merged = np.array([lift.engulfed for lift in lifts]) > 0
     first = np.flatnonzero(merged)[0]
     assert 0 < first < 4000 and np.all(merged[first:])
-    assert np.all(np.diff(slope) >= -1e-15) and np.all(slope[merged] == slope[-1])
+    assert np.all(np.diff(slope) >= -1e-15) and np.all(np.abs(slope[merged] - slope[-1]) < 1e-15)
     # C¹: the slope jumps nowhere by more than its own growth over a step of 0.23 % in depth …
     assert np.diff(slope).max() < 3e-3
     # … and integrates to the displacement (trapezoidal rule, error ~ (step)² U''').
