@@ -1,0 +1,117 @@
+"""Tables of isolated laws against the micro model that they stand for."""
+
+import numpy as np
+import pytest
+
+from geometry import PatchGrid, Spectrum, find_asperities, patch_means, synthesise
+from micro import asperity_model
+from micro.love import love_centre, love_mean
+from multiscale.tabulate import IsolatedPatch, _shares, isolated_laws
+
+MODULUS = 4000.0
+TOLERANCE = 1e-4
+
+
+@pytest.fixture(scope="module")
+def surface():
+    spectrum = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=3)
+    return synthesise(spectrum, grid=(128, 128), lengths=(1.0, 1.0))
+
+
+@pytest.fixture(scope="module")
+def model(surface):
+    asperities = find_asperities(surface, periodic=False)
+    return asperity_model("circular", asperities, contact_modulus=MODULUS)
+
+
+@pytest.fixture(scope="module")
+def whole(surface, model):
+    grid = PatchGrid(grid=(1, 1), lengths=surface.lengths)
+    return IsolatedPatch(model=model, patch=grid, mean_height=surface.mean_height)
+
+
+@pytest.mark.parametrize(("love", "factor"), [("mean", love_mean), ("centre", love_centre)])
+def test_rows_are_the_micro_model_and_love(surface, model, whole, love, factor):
+    patch = IsolatedPatch(
+        model=model, patch=whole.patch, mean_height=whole.mean_height, love=love
+    )
+    law = patch.law(10e-3, TOLERANCE)
+    response = model.respond(
+        law.approach, patches=whole.patch, mean_heights=np.array([whole.mean_height])
+    )
+    # the same solver from another start: its tolerance of 1e-10
+    np.testing.assert_allclose(law.pressure, response.mean_pressure, rtol=1e-8, atol=1e-12)
+    correction = factor(0.5, 0.5) * law.pressure / (np.pi * MODULUS)  # eq. 31
+    np.testing.assert_allclose(law.closure, law.approach - correction, rtol=1e-12)
+    np.testing.assert_array_equal(law.contacts[1:], response.contacts[1:])
+
+
+def test_interpolation_error_is_what_the_law_says(whole, model):
+    law = whole.law(10e-3, TOLERANCE)
+    approach = np.random.default_rng(1).uniform(law.approach[0], law.approach[-1], 300)
+    _, closure, pressure, _, _ = whole.rows(np.sort(approach)).T
+    error = np.abs(law.at(closure)[0] - pressure).max() / law.pressure[-1]
+    assert law.interpolation_error <= TOLERANCE
+    # the law's own figure is measured half-way between rows; elsewhere it may be a little more
+    assert error <= 1.5 * TOLERANCE
+
+
+def test_tighter_tolerance_gives_more_rows_and_less_error(whole):
+    loose, tight = whole.law(10e-3, 1e-2), whole.law(10e-3, 1e-5)
+    assert len(tight.closure) > len(loose.closure)
+    assert tight.interpolation_error < 1e-5
+
+
+def test_table_reaches_the_closure_asked_for(whole):
+    for end in (1e-3, 5e-3, 12e-3):
+        assert end <= whole.law(end, TOLERANCE).range[1] < 1.3 * end
+
+
+def test_patch_is_open_when_out_of_reach(surface, model, whole):
+    low = model.asperities.z < model.asperities.highest - 5e-3
+    assert low.any()
+    model = asperity_model("circular", model.asperities.subset(low), contact_modulus=MODULUS)
+    patch = IsolatedPatch(model=model, patch=whole.patch, mean_height=0.0)
+    law = patch.law(4e-3, TOLERANCE)
+    assert law.is_open
+    assert law.touch == pytest.approx(patch.touch, rel=1e-15)  # the same number
+    assert not patch.law(1.5 * patch.touch, TOLERANCE).is_open
+
+
+def test_stiff_patch_ends_where_closure_stops_to_grow(surface, model):
+    """Many asperities in a patch without interaction: dp/dδ outgrows the patch's own stiffness."""
+    model = asperity_model("circular-independent", model.asperities, contact_modulus=MODULUS)
+    patch = IsolatedPatch(
+        model=model,
+        patch=PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)),
+        mean_height=surface.mean_height,
+    )
+    law = patch.law(60e-3, TOLERANCE)
+    assert law.range[1] < 60e-3
+    assert np.all(np.diff(law.closure) > 0)
+
+
+def test_all_laws_of_a_grid(surface, model):
+    patches = PatchGrid(grid=(3, 2), lengths=surface.lengths)
+    table = isolated_laws(
+        model,
+        patches,
+        mean_heights=patch_means(surface, patches),
+        closure_ends=np.full(6, 10e-3),
+        love="centre",
+    )
+    assert table.made_by["love"] == "centre"
+    owner = patches.index_of(model.asperities.x, model.asperities.y)
+    for index, law in enumerate(table.laws):
+        own = model.asperities.z[owner == index]
+        touch = model.asperities.highest - own.max() if own.size else np.inf
+        assert law.touch == pytest.approx(touch, rel=1e-12, abs=1e-15)  # the same subtraction
+        assert law.is_open == (touch >= 10e-3)
+
+
+def test_work_is_dealt_once_and_evenly():
+    work = np.array([0, 9, 1, 1, 8, 0, 2])
+    shares = _shares(work, 3)
+    assert sorted(job for share in shares for job in share) == list(range(7))
+    assert [share[0] for share in shares[:2]] == [1, 4]
+    assert len(shares[2]) >= 3

@@ -1,0 +1,89 @@
+"""The whole chain against what it must tend to: the micro model alone on a half-space."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from multiscale import Scene, run
+
+PAPER = Path(__file__).parents[2] / "demos" / "scenes" / "paper.toml"
+ONE_PATCH = ["patches.grid=[1, 1]", "load.steps=2", "surface.grid=[128, 128]"]
+
+
+def force(*overrides):
+    return run(Scene.load(PAPER, [*ONE_PATCH, *overrides])).force_N
+
+
+def block_of(ratio, cells=8):
+    """A cube `ratio` times larger than the interface of 1 mm, graded away from it."""
+    return [
+        f"block.height={ratio} mm",
+        f"block.margin={(ratio - 1) / 2} mm",
+        f"block.cells=[{cells}, {cells}, 12]",
+        f"block.grading={4 * ratio}",
+        f"block.margin_grading={2 * ratio}",
+    ]
+
+
+@pytest.fixture(scope="module")
+def half_space():
+    return force("coupling.kind=analytic")
+
+
+@pytest.mark.parametrize("interface", ["patchwise", "pointwise"])
+def test_one_patch_on_a_large_block_is_the_half_space(half_space, interface):
+    errors = [
+        np.abs(force(*block_of(ratio), f"coupling.interface={interface}") / half_space - 1)
+        for ratio in (2, 4, 8)
+    ]
+    # a clamped bottom at distance H takes ~ 1/H off the displacement
+    assert np.all(np.diff(errors, axis=0) < 0)
+    # what is left at 8 times: the block's size and eight linear cells across the patch
+    assert errors[-1].max() < 1e-2
+
+
+def test_finer_interface_comes_closer(half_space):
+    coarse, fine = (abs(force(*block_of(8, cells))[-1] / half_space[-1] - 1) for cells in (4, 12))
+    assert fine < 0.8 * coarse
+
+
+def test_love_mean_is_the_consistent_choice(half_space):
+    """The law made with the centre's displacement is too soft in its own compliance."""
+    mean, centre = (force(*block_of(8), f"coupling.love={love}")[-1] for love in ("mean", "centre"))
+    assert abs(mean / half_space[-1] - 1) < 7e-3  # as above
+    assert centre / half_space[-1] - 1 > 0.02
+
+
+def test_paper_scene_in_small():
+    scene = Scene.load(PAPER, ["block.cells=[16, 16, 10]", "load.steps=4"])
+    history = run(scene)
+    assert history.newton_iterations.max() <= 6
+    assert np.all(np.diff(history.force_N) > 0)
+    assert np.all(np.diff(history.mean_separation_mm) < 0)
+    # the same sum, but for the areas: facets of the mesh there, the partition here
+    patch_area = history.patches.area
+    total = history.patch_pressure_MPa.sum(axis=1) * patch_area
+    np.testing.assert_allclose(total, history.force_N, rtol=1e-10)
+
+
+def test_scale_invariance():
+    """A scene with all lengths doubled carries four times the force (linear elasticity)."""
+    small = ["block.cells=[8, 8, 5]", "load.steps=2", "surface.grid=[64, 64]"]
+    double = [
+        "surface.lengths=['2 mm', '2 mm']",
+        "surface.spectrum.rms_slope=0.215",
+        "block.height='2 mm'",
+        "load.approach='16 um'",
+    ]
+    one = run(Scene.load(PAPER, small)).force_N
+    two = run(Scene.load(PAPER, [*small, *double])).force_N
+    np.testing.assert_allclose(two, 4 * one, rtol=1e-8)  # residuals to 1e-10 of the load
+
+
+def test_steps_do_not_change_the_path():
+    """The contact is elastic: the force at an approach does not depend on how one came there."""
+    small = ["block.cells=[8, 8, 5]", "surface.grid=[64, 64]"]
+    few = run(Scene.load(PAPER, [*small, "load.steps=1"])).force_N[-1]
+    many = run(Scene.load(PAPER, [*small, "load.steps=7"])).force_N[-1]
+    assert few == pytest.approx(many, rel=1e-8)  # residuals to 1e-10 of the load
