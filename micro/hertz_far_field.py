@@ -4,7 +4,7 @@ With τ = t + (1+β)/3 the product under the root of the underlying integrals be
 (1+t)(β+t)t = τ³ (1 + e2/τ² + e3/τ³). Expanded in 1/τ and integrated term by term, U and its slope
 are √x times polynomials in x = 1/τ(v) whose coefficients depend on β alone. The ratio of their
 terms is below 2/(3τ): nine terms are exact to rounding from τ = 30 on, some 5.5 major semi-axes
-away, at a tenth of the cost of Carlson's integrals on large arrays.
+away, at less than a tenth of the cost of Carlson's integrals on large arrays.
 """
 
 from __future__ import annotations

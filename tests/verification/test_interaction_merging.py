@@ -73,13 +73,16 @@ def test_result_does_not_depend_on_the_path(case, name):
 
 
 @both_shapes
-def test_coincident_twins_carry_the_force_of_one(name):
-    twins, one = summits([0.5, 0.5], 0.5), summits(0.5, 0.5)
-    both, alone = (
-        asperity_model(name, case, contact_modulus=E_STAR).solve(0.02) for case in (twins, one)
+@pytest.mark.parametrize(("count", "share"), [(2, 1.0), (3, 0.935), (5, 0.815)])
+def test_coincident_summits_share_the_force_of_one(name, count, share):
+    same, one = summits(np.full(count, 0.5), 0.5), summits(0.5, 0.5)
+    all_of_them, alone = (
+        asperity_model(name, case, contact_modulus=E_STAR).solve(0.02) for case in (same, one)
     )
-    assert both.force.sum() == pytest.approx(alone.force[0], rel=1e-9)
-    assert both.engulfed == 2
+    # n (1 + (n − 1) c*)^(−3/2): exactly 1 for two by the choice of c*, three digits given else.
+    tolerance = 1e-9 if count == 2 else 1e-3
+    assert all_of_them.force.sum() / alone.force[0] == pytest.approx(share, rel=tolerance)
+    assert all_of_them.engulfed == count * (count - 1)
 
 
 @both_shapes
