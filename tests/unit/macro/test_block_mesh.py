@@ -1,0 +1,58 @@
+"""The distributed mesh of a block."""
+
+import numpy as np
+import pytest
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+
+from geometry.errors import InputError
+from geometry.meshes import BlockShape
+from macro import BOTTOM, SIDES, TOP, block_mesh, compat
+from macro import mesh as module
+
+
+@pytest.mark.parametrize("element", ["Q1", "P2"])
+def test_faces_are_marked_and_complete(element):
+    shape = BlockShape(
+        interface=(1.0, 2.0), height=0.5, cells=(2, 3, 2), element=element,
+        margin=0.3, margin_cells=1,
+    )  # fmt: skip
+    block = block_mesh(shape, MPI.COMM_SELF)
+    assert block.mesh.topology.index_map(3).size_global == shape.cell_count
+    per_quad = 1 if element == "Q1" else 2
+    counts = {BOTTOM: 4 * 5, TOP: 4 * 5, SIDES: 2 * 2 * (4 + 5)}
+    for marker, count in counts.items():
+        assert len(block.facet_tags.find(marker)) == count * per_quad
+    for marker, height in ((BOTTOM, -0.5), (TOP, 0.0)):
+        middle = dmesh.compute_midpoints(block.mesh, 2, block.facet_tags.find(marker))
+        np.testing.assert_allclose(middle[:, 2], height, atol=1e-10)  # gmsh places nodes to 1e-11
+    outermost = dmesh.compute_midpoints(block.mesh, 2, block.facet_tags.find(SIDES))
+    across = np.abs(outermost[:, :2] - [0.5, 1.0]) - [0.8, 1.3]
+    np.testing.assert_allclose(across.max(axis=1), 0.0, atol=1e-10)
+
+
+def test_error_of_gmsh_is_passed_on(monkeypatch):
+    def broken(_shape):
+        raise InputError("gmsh gave up")
+
+    monkeypatch.setattr(module, "flat_block", broken)
+    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(1, 1, 1))
+    with pytest.raises(InputError, match="gmsh gave up"):
+        block_mesh(shape, MPI.COMM_SELF)
+
+
+@pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2"])
+def test_tables_of_a_mesh_fit_its_space(element):
+    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(2, 2, 2), element=element)
+    mesh = block_mesh(shape, MPI.COMM_SELF).mesh
+    space = compat.vector_space(mesh, shape.degree)
+    nodes = {"Q1": 8, "Q2": 27, "P1": 4, "P2": 10}[element]
+    assert compat.cell_nodes(space).shape == (shape.cell_count, nodes)
+    corners = {"Q": 8, "P": 4}[element[0]]
+    table = compat.cell_vertices(mesh)
+    assert table.shape == (shape.cell_count, corners)
+    # the first nodes of a cell are its vertices, in the same order
+    places = space.tabulate_dof_coordinates()[compat.cell_nodes(space)[:, :corners]]
+    np.testing.assert_allclose(places, mesh.geometry.x[table], atol=1e-14)  # round-off
+    assert isinstance(fem.Function(space).x.array, np.ndarray)

@@ -1,0 +1,49 @@
+"""What the rest of macro expects from every dolfinx release."""
+
+import logging
+
+import numpy as np
+import pytest
+
+from macro import compat
+
+
+@pytest.mark.parametrize("cell", ["hexahedron", "tetrahedron"])
+@pytest.mark.parametrize("degree", [1, 2])
+def test_basis_is_nodal_and_sums_to_one(cell, degree):
+    points = np.random.default_rng(0).uniform(0.0, 0.3, (7, 3))
+    values = compat.lagrange_values(cell, degree, points)
+    vertices, _ = compat.reference_facets(cell)
+    np.testing.assert_allclose(values.sum(axis=1), 1.0, atol=1e-14)  # round-off
+    at_vertices = compat.lagrange_values(cell, degree, vertices)[:, : len(vertices)]
+    np.testing.assert_allclose(at_vertices, np.eye(len(vertices)), atol=1e-14)
+
+
+def test_basis_on_no_points_is_empty():
+    assert compat.lagrange_values("hexahedron", 2, np.empty((0, 3))).shape == (0, 27)
+
+
+@pytest.mark.parametrize("degree", [1, 2, 4, 8])
+def test_triangle_rule_is_exact_to_its_degree(degree):
+    (x, y), weights = compat.triangle_rule(degree)[0].T, compat.triangle_rule(degree)[1]
+    for i in range(degree + 1):
+        # ∫ xⁱ y^(d−i) over the unit triangle = i! (d−i)! / (d+2)!
+        factorial = np.vectorize(lambda n: float(np.prod(np.arange(1, n + 1))))
+        exact = factorial(i) * factorial(degree - i) / factorial(degree + 2)
+        assert weights @ (x**i * y ** (degree - i)) == pytest.approx(exact, rel=1e-12)
+
+
+def test_facets_of_a_hexahedron_are_affine_squares():
+    vertices, facets = compat.reference_facets("hexahedron")
+    corners = vertices[facets]
+    # vertices 0 and 3 are opposite: what the cutting of facets relies on
+    np.testing.assert_array_equal(corners[:, 0] + corners[:, 3], corners[:, 1] + corners[:, 2])
+
+
+def test_compiling_leaves_logging_as_it_was():
+    root = logging.getLogger()
+    before = root.level, root.manager.disable, list(root.handlers)
+    with compat._quiet_compiler():
+        root.setLevel(logging.DEBUG)
+        assert not logging.getLogger("any").isEnabledFor(logging.INFO)
+    assert (root.level, root.manager.disable, list(root.handlers)) == before

@@ -1,0 +1,63 @@
+"""Quadrature on the top, cut along the borders of patches."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from geometry.meshes import BlockShape
+from geometry.patches import PatchGrid
+from macro import block_mesh, compat
+from macro.facets import _areas, _cut, facet_quadrature
+
+
+def points_on(patches, degree=2, **changes):
+    shape = {"interface": (2.0, 1.0), "height": 0.4, "cells": (4, 3, 1)} | changes
+    mesh = block_mesh(BlockShape(**shape), MPI.COMM_SELF)
+    space = compat.vector_space(mesh.mesh, mesh.shape.degree)
+    return facet_quadrature(mesh, space, patches, degree=degree), space
+
+
+@pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2"])
+@pytest.mark.parametrize("grid", [(2, 3), (5, 2), (7, 7), (1, 1)])
+def test_polynomials_are_integrated_exactly_over_every_patch(element, grid):
+    patches = PatchGrid(grid=grid, lengths=(2.0, 1.0))
+    points, _ = points_on(patches, element=element, margin=0.5, margin_cells=2)
+    values = points.weight * points.x * (1.0 + points.y)
+    sums = np.bincount(points.patch, weights=values, minlength=patches.count)
+    (x0, x1), (y0, y1) = np.transpose([patches.bounds(i) for i in range(patches.count)], (1, 2, 0))
+    exact = 0.5 * (x1**2 - x0**2) * ((y1 - y0) + 0.5 * (y1**2 - y0**2))
+    np.testing.assert_allclose(sums, exact, rtol=1e-10)  # gmsh places nodes to 1e-11
+    assert (np.diff(points.patch) >= 0).all()
+
+
+@pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2"])
+def test_basis_interpolates_positions(element):
+    points, space = points_on(PatchGrid(grid=(3, 2), lengths=(2.0, 1.0)), element=element)
+    places = space.tabulate_dof_coordinates()[points.nodes]
+    found = np.einsum("nk,nkj->nj", points.values, places)
+    expected = np.column_stack([points.x, points.y, np.zeros_like(points.x)])
+    np.testing.assert_allclose(found, expected, atol=1e-12)  # round-off
+
+
+def test_patches_may_cover_a_part():
+    patches = PatchGrid(grid=(1, 2), lengths=(0.7, 0.3), origin=(0.9, 0.2))
+    points, _ = points_on(patches)
+    areas = np.bincount(points.patch, weights=points.weight)
+    np.testing.assert_allclose(areas, patches.area, rtol=1e-10)  # as above
+    assert points.x.min() > 0.9
+    assert points.y.max() < 0.5
+
+
+@pytest.mark.parametrize("border", [-1.0, 0.0, 0.3, 0.5, 1.0, 2.0])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_cutting_keeps_the_area_and_separates_the_sides(border, axis):
+    random = np.random.default_rng(2)
+    triangles = np.concatenate(
+        [random.uniform(0.0, 1.0, (200, 3, 2)), [[[0, 0], [1, 1], [0.5, 0.5 + 0.25]]]]
+    )
+    facet = np.arange(201)
+    pieces, owner = _cut(triangles, facet, axis, border, 1e-12)
+    areas = np.bincount(owner, weights=_areas(pieces))
+    np.testing.assert_allclose(areas, _areas(triangles), rtol=1e-9, atol=1e-15)  # round-off
+    height = pieces[:, :, axis] - border
+    assert ((height > -1e-12).all(axis=1) | (height < 1e-12).all(axis=1)).all()

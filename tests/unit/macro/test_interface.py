@@ -1,0 +1,86 @@
+"""Samples, loads and means of the interface."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from geometry.errors import InputError
+from geometry.meshes import BlockShape
+from geometry.patches import PatchGrid
+from macro import Block, Interface, Material, block_mesh
+
+NODES = 1e-10  # gmsh places nodes to about 1e-11
+
+
+def make(grid=(2, 3), lengths=(2.0, 1.0), origin=(0.0, 0.0), **changes):
+    shape = {"interface": (2.0, 1.0), "height": 1.0, "cells": (4, 3, 2)} | changes
+    mesh = block_mesh(BlockShape(**shape), MPI.COMM_SELF)
+    block = Block(mesh, Material(young_modulus=1.0, poisson_ratio=0.3))
+    return Interface(block, PatchGrid(grid=grid, lengths=lengths, origin=origin))
+
+
+@pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2"])
+@pytest.mark.parametrize("grid", [(2, 3), (3, 2)])
+def test_linear_displacements_have_exact_means(element, grid):
+    interface = make(grid, element=element, margin=0.5, margin_cells=1)
+    displacement = interface.block.stiffness.createVecRight()
+    x, y, _ = interface.block.space.tabulate_dof_coordinates().T
+    displacement.array[2::3] = -(0.5 + 0.4 * x - 0.3 * y)  # downward
+    expected = 0.5 + interface.patches.centres @ [0.4, -0.3]
+    np.testing.assert_allclose(interface.patch_displacements(displacement), expected, rtol=NODES)
+    for mode in ("patchwise", "pointwise"):
+        sampling = interface.sampling(mode)
+        sampled = sampling.operator.createVecRight()
+        sampling.operator.multTranspose(displacement, sampled)
+        exact = 0.5 + 0.4 * sampling.x - 0.3 * sampling.y
+        np.testing.assert_allclose(sampled.array / sampling.weight, exact, rtol=NODES)
+
+
+def test_load_has_the_force_and_moment_of_the_pressures():
+    interface = make((3, 2))
+    pressures = np.array([1.0, 0.0, 2.5, -1.0, 4.0, 3.0])
+    load = interface.load(pressures).array.reshape(-1, 3)
+    forces = pressures * interface.patches.area
+    places = interface.block.space.tabulate_dof_coordinates()[:, :2]
+    assert np.abs(load[:, :2]).max() == 0.0
+    assert -load[:, 2].sum() == pytest.approx(forces.sum(), rel=NODES)
+    np.testing.assert_allclose(-load[:, 2] @ places, forces @ interface.patches.centres, rtol=NODES)
+
+
+def test_margin_is_free_of_traction():
+    interface = make((1, 1), margin=1.0, margin_cells=3)
+    load = interface.load(np.ones(1)).array.reshape(-1, 3)
+    x, y, _ = interface.block.space.tabulate_dof_coordinates()[load[:, 2] != 0.0].T
+    assert (x.min(), x.max(), y.min(), y.max()) == pytest.approx((0, 2, 0, 1), abs=1e-12)
+
+
+def test_laws_see_the_samples_of_their_own_patch():
+    class Constant:
+        def __init__(self, value):
+            self.value = value
+
+        def pressure(self, closure):
+            return np.full_like(closure, self.value)
+
+        def stiffness(self, closure):
+            return 10.0 * self.pressure(closure)
+
+    interface = make((3, 2))
+    laws = [Constant(float(i)) for i in range(6)]
+    for mode in ("patchwise", "pointwise"):
+        sampling = interface.sampling(mode)
+        closure = np.zeros(len(sampling.weight))
+        np.testing.assert_array_equal(sampling.pressure(laws, closure), sampling.patch)
+        np.testing.assert_array_equal(sampling.stiffness(laws, closure), 10 * sampling.patch)
+        expected = np.arange(6) * interface.patches.area
+        np.testing.assert_allclose(sampling.patch_sums(sampling.patch * 1.0), expected, rtol=NODES)
+
+
+def test_patches_beyond_the_top_are_refused():
+    with pytest.raises(InputError, match=r"patches reach beyond .* inside the interface \(2\.0, "):
+        make(lengths=(2.5, 1.0))
+
+
+def test_unknown_mode_is_refused():
+    with pytest.raises(InputError, match=r"'cellwise': .* \(allowed: patchwise, pointwise\)"):
+        make().sampling("cellwise")

@@ -1,0 +1,136 @@
+"""The pressed block's bookkeeping: errors, tilt, restoring after failure, options, files."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from geometry.errors import InputError, NotConverged
+from geometry.meshes import BlockShape
+from geometry.patches import PatchGrid
+from macro import Block, Interface, Material, PressedBlock, block_mesh, write_fields
+from macro.prediction import DisplacementBasis
+
+
+@dataclass
+class Spring:
+    """p = k <c − c0>."""
+
+    k: float = 1e3
+    touch: float = 0.0
+
+    def pressure(self, closure):
+        return self.k * np.maximum(closure - self.touch, 0.0)
+
+    def stiffness(self, closure):
+        return self.k * (closure > self.touch)
+
+
+@dataclass
+class Broken(Spring):
+    """A law without a solution that Newton's method could find."""
+
+    def pressure(self, closure):
+        return np.full_like(closure, np.nan)
+
+
+@pytest.fixture
+def interface():
+    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(4, 4, 2), element="Q2")
+    block = Block(
+        block_mesh(shape, MPI.COMM_SELF), Material(young_modulus=4000.0, poisson_ratio=0.15)
+    )
+    return Interface(block, PatchGrid(grid=(2, 2), lengths=(1.0, 1.0)))
+
+
+def test_every_patch_needs_a_law(interface):
+    with pytest.raises(InputError, match=r"3: every patch needs a law \(allowed: 4\)"):
+        PressedBlock(interface.block, interface, [Spring()] * 3)
+
+
+def test_open_interface_is_solved_at_once(interface):
+    state = PressedBlock(interface.block, interface, [Spring(touch=1.0)] * 4).press(5e-3)
+    assert (state.newton_iterations, state.force, state.reaction) == (0, 0.0, 0.0)
+    assert np.abs(state.displacement).max() == 0.0
+    np.testing.assert_allclose(state.closure, 5e-3, rtol=1e-14)
+    assert state.reason == "CONVERGED_FNORM_RELATIVE"
+
+
+@pytest.mark.parametrize("mode", ["patchwise", "pointwise"])
+def test_linear_laws_take_one_newton_step(interface, mode):
+    pressed = PressedBlock(interface.block, interface, [Spring()] * 4, mode)
+    pressed.newton.snes.ksp.setTolerances(rtol=1e-12)
+    pressed.newton._forcing = False
+    assert pressed.press(5e-3).newton_iterations == 1
+
+
+def test_tilt_is_about_the_middle(interface):
+    press = PressedBlock(interface.block, interface, [Spring()] * 4).press
+    level, tilted = press(5e-3), press(5e-3, tilt=(2e-3, 0.0))
+    assert tilted.force == pytest.approx(level.force, rel=1e-7)  # exact for linear laws
+    np.testing.assert_array_equal(tilted.pressure > level.pressure, [False, False, True, True])
+
+
+def test_failure_is_named_and_keeps_what_was_known(interface):
+    laws = [Spring(k=1e3 * (i + 1), touch=1e-3 * i) for i in range(4)]
+    pressed = PressedBlock(interface.block, interface, laws)
+    before = pressed.press(2e-3)
+    known = len(pressed._basis)
+    pressed.newton.snes.setTolerances(max_it=1)
+    with pytest.raises(NotConverged, match=r"approach of 0\.008 mm .* DIVERGED_MAX_IT after 1"):
+        pressed.press(8e-3)
+    assert len(pressed._basis) == known
+    pressed.newton.snes.setTolerances(max_it=20)
+    assert pressed.press(2e-3).force == pytest.approx(before.force, rel=1e-9)
+
+
+def test_pressure_without_value_is_a_failure(interface):
+    with pytest.raises(NotConverged, match="DIVERGED_F"):
+        PressedBlock(interface.block, interface, [Broken()] * 4).press(1e-3)
+
+
+def test_the_users_tolerances_win(interface):
+    options = PETSc.Options("patchlaw_")
+    options["snes_rtol"], options["ksp_rtol"] = 1e-4, 1e-3
+    try:
+        pressed = PressedBlock(interface.block, interface, [Spring()] * 4)
+        state = pressed.press(5e-3)
+    finally:
+        options.delValue("snes_rtol"), options.delValue("ksp_rtol")
+    assert 1e-10 < state.residuals[-1] <= 1e-4
+    assert pressed.newton.snes.ksp.getTolerances()[0] == 1e-3
+
+
+def test_basis_is_orthonormal_limited_and_ignores_what_it_knows(interface):
+    pressed = PressedBlock(interface.block, interface, [Spring()] * 4)
+    basis = DisplacementBasis(pressed.equilibrium, interface.patchwise, size=3)
+    loads = [interface.load(pressures) for pressures in np.eye(4)]
+    for load in (*loads, loads[-1]):
+        load.array[:] = interface.block.solve(load.copy()).x.array
+        basis.add(load)
+        overlap = basis._vectors @ basis._forces.T
+        np.testing.assert_allclose(overlap, np.eye(len(basis)), atol=1e-9)  # two passes
+    assert len(basis) == 3
+
+
+@pytest.mark.parametrize("element", ["Q1", "P2"])
+def test_fields_are_written_for_paraview(element, tmp_path):
+    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(2, 2, 2), element=element)
+    block = Block(
+        block_mesh(shape, MPI.COMM_SELF), Material(young_modulus=4000.0, poisson_ratio=0.15)
+    )
+    interface = Interface(block, PatchGrid(grid=(2, 1), lengths=(1.0, 1.0)))
+    state = PressedBlock(block, interface, [Spring(), Spring(k=5e3)]).press(1e-3)
+    write_fields(tmp_path / "fields.xdmf", interface, state)
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "fields.h5") as file:
+        found = file["Function/pressure/0"][...].ravel()
+        displacement = file["Function/displacement/0"][...]
+    assert set(found.round(12)) == {0.0, *state.pressure.round(12)}
+    assert displacement.shape[1] == 3
+    # vertices carry the same displacements in both degrees
+    assert displacement[:, 2].min() == pytest.approx(
+        state.displacement.reshape(-1, 3)[:, 2].min(), rel=0.2 if element == "P2" else 1e-12
+    )
