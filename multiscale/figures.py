@@ -23,40 +23,31 @@ _COLOURS = ("#0b3c5d", "#d1495b", "#1b998b", "#edae49", "#6a4c93")
 def surface_figure(surface: Surface, asperities: Asperities, patches: PatchGrid) -> Figure:
     """Draw heights over the mean plane with summits, border maxima and patch borders."""
     figure = Figure(figsize=(6.4, 5.4), layout="constrained")
-    axes = figure.add_subplot()
+    draw_surface(figure, figure.add_subplot(), surface, asperities, patches)
+    return figure
+
+
+def draw_surface(
+    figure: Figure, axes: Any, surface: Surface, asperities: Asperities, patches: PatchGrid
+) -> None:
+    """Draw one surface into given axes; see `surface_figure`."""
     heights = 1e3 * (surface.heights - surface.mean_height).T
-    image = axes.imshow(
-        heights,
-        origin="lower",
-        extent=(0, surface.lengths[0], 0, surface.lengths[1]),
-        cmap="cividis",
-    )
+    extent = (0, surface.lengths[0], 0, surface.lengths[1])
+    image = axes.imshow(heights, origin="lower", extent=extent, cmap="cividis")
     figure.colorbar(image, ax=axes, label="height over the mean plane [µm]")
     _patch_lines(axes, patches, colour="white")
-    axes.plot(
-        asperities.x,
-        asperities.y,
-        "o",
-        ms=5,
-        mfc="#d1495b",
-        mec="white",
-        label="summits",
-        clip_on=False,
-    )
-    if asperities.border_x.size:
-        axes.plot(
-            asperities.border_x,
-            asperities.border_y,
-            "x",
-            ms=6,
-            color="black",
-            label="border maxima (unused)",
-            clip_on=False,
-        )
+    summits: dict[str, Any] = {"marker": "o", "ms": 5, "mfc": "#d1495b", "mec": "white"}
+    cut: dict[str, Any] = {"marker": "x", "ms": 6, "color": "black"}
+    for x, y, look, label in (
+        (asperities.x, asperities.y, summits, "summits"),
+        (asperities.border_x, asperities.border_y, cut, "border maxima (unused)"),
+    ):
+        if x.size:
+            axes.plot(x, y, ls="none", label=label, clip_on=False, **look)
     axes.set(xlabel="x [mm]", ylabel="y [mm]")
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=2, frameon=False)
-    axes.set_title(f"{asperities.count} summits, {patches.grid[0]} × {patches.grid[1]} patches")
-    return figure
+    axes.set_title(f"{len(asperities)} summits, {patches.grid[0]} × {patches.grid[1]} patches")
+    if len(asperities) or asperities.border_x.size:
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncol=2, frameon=False)
 
 
 def history_figure(histories: Mapping[str, History]) -> Figure:
