@@ -32,9 +32,7 @@ def whole(surface, model):
 
 @pytest.mark.parametrize(("love", "factor"), [("mean", love_mean), ("centre", love_centre)])
 def test_rows_are_the_micro_model_and_love(surface, model, whole, love, factor):
-    patch = IsolatedPatch(
-        model=model, patch=whole.patch, mean_height=whole.mean_height, love=love
-    )
+    patch = IsolatedPatch(model=model, patch=whole.patch, mean_height=whole.mean_height, love=love)
     law = patch.law(10e-3, TOLERANCE)
     response = model.respond(
         law.approach, patches=whole.patch, mean_heights=np.array([whole.mean_height])
