@@ -43,10 +43,11 @@ class Equilibrium:
         self.scale = 0.0
         stiffness = block.stiffness
         self._load = stiffness.createVecLeft()
-        self._samples, self._slope, self._stretch = (
-            sampling.operator.createVecRight() for _ in range(3)
+        self._samples = sampling.operator.createVecRight()
+        self._action = _TangentAction(stiffness, sampling)
+        self.tangent = PETSc.Mat().createPython(
+            stiffness.getSizes(), self._action, comm=stiffness.comm
         )
-        self.tangent = PETSc.Mat().createPython(stiffness.getSizes(), self, comm=stiffness.comm)
         self.tangent.setUp()
 
     def closure(self, displacement: PETSc.Vec) -> Array:
@@ -77,13 +78,25 @@ class Equilibrium:
     def update_tangent(self, displacement: PETSc.Vec) -> None:
         """Move the tangent to a displacement."""
         stiffness = self.stiffness(self.closure(displacement))
-        self._slope.array[:] = stiffness / self._sampling.weight
+        self._action.slope.array[:] = stiffness / self._sampling.weight
+
+
+class _TangentAction:
+    """What PETSc calls to multiply by the tangent.
+
+    Apart from :class:`Equilibrium`, because a matrix whose context holds the matrix is never freed.
+    """
+
+    def __init__(self, stiffness: PETSc.Mat, sampling: Sampling) -> None:
+        self._stiffness, self._operator = stiffness, sampling.operator
+        self.slope = sampling.operator.createVecRight()  # p'/w
+        self._stretch = self.slope.duplicate()
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Multiply by the tangent; called by PETSc."""
-        self.block.stiffness.mult(x, y)
-        self._sampling.operator.multTranspose(x, self._stretch)
-        self._stretch.pointwiseMult(self._stretch, self._slope)
-        self._sampling.operator.multAdd(self._stretch, y, y)
+        """Write K x + B diag(p'/w) Bᵀ x."""
+        self._stiffness.mult(x, y)
+        self._operator.multTranspose(x, self._stretch)
+        self._stretch.pointwiseMult(self._stretch, self.slope)
+        self._operator.multAdd(self._stretch, y, y)
 
     multTranspose = mult
