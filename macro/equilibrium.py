@@ -39,7 +39,7 @@ class Equilibrium:
 
     def __init__(self, block: Block, sampling: Sampling, laws: Sequence[ContactLaw]) -> None:
         self.block, self._sampling, self._laws = block, sampling, laws
-        self.approach = np.zeros(len(sampling.weight))
+        self.approach: Array = np.zeros(len(sampling.weight))
         self.scale = 0.0
         stiffness = block.stiffness
         self._load = stiffness.createVecLeft()

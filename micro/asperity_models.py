@@ -167,7 +167,7 @@ class AsperityModel:
             contact_modulus=self.contact_modulus,
         )
         rows: dict[int, dict[str, Any]] = {}
-        own = np.zeros(len(self.asperities))
+        own: Array = np.zeros(len(self.asperities))
         for index in np.argsort(given, kind="stable"):
             plane = RigidPlane.above(self.asperities, given[index], tilt)
             found = self._solution(plane.required(self.asperities), own)

@@ -80,7 +80,7 @@ class Response:
     @property
     def mean_pressure(self) -> Array:
         """Force per nominal area, shape (n,) [MPa]."""
-        return self.force / self.nominal_area
+        return np.divide(self.force, self.nominal_area)
 
     @property
     def patch_pressure(self) -> Array:
@@ -90,7 +90,7 @@ class Response:
     @property
     def contact_area_fraction(self) -> Array:
         """Real over nominal contact area A/A0, shape (n,)."""
-        return self.contact_area / self.nominal_area
+        return np.divide(self.contact_area, self.nominal_area)
 
     def kappa(self, rms_slope: float) -> Array:
         """Return κ of A/A0 = κ p/(rms slope · E*), shape (n,); NaN where nothing touches.

@@ -82,7 +82,8 @@ class IsolatedPatch:
         """
         if self.touch >= closure_end:
             return _law(np.empty((0, 5)), self.touch, self.reach, 0.0)
-        rows = self.rows(np.linspace(self.touch, self._approach_at(closure_end), _FIRST_ROWS))
+        end = self._approach_at(closure_end)
+        rows = self.rows(np.linspace(self.touch, end, _FIRST_ROWS, dtype=np.float64))
         rows[0, 1:] = self.touch, 0.0, 0.0, 0.0  # whatever round-off makes of first touch
         rows, error = self._refined(_increasing(rows), tolerance)
         return _law(rows, self.touch, self.reach, error)
