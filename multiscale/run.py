@@ -84,6 +84,8 @@ class Run:
         if self.table is not None:
             error = max(law.interpolation_error for law in self.table.laws)
             notes.append(f"interpolation error of the laws: {error:.1e} of their largest pressure")
+            imbalance = max((abs(step.imbalance) for step in self.steps), default=0.0)
+            notes.append(f"force against the support's reaction: equal to {imbalance:.1e}")
         return History(
             steps=tuple(self.steps),
             patches=self.stage.patches,
