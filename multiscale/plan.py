@@ -35,8 +35,9 @@ def warnings(stage: Stage) -> Iterator[str]:
     """Yield what a user should know about the validity of the scene."""
     if stage.reached_at_border:
         yield (
-            f"maxima on the surface's border within the largest approach: {stage.reached_at_border}; "
-            "an 8-neighbour search cannot confirm them, and they carry no load here"
+            f"maxima on the surface's border within the largest approach: "
+            f"{stage.reached_at_border}; an 8-neighbour search cannot confirm them, and they carry "
+            "no load here"
         )
     if not stage.embedded:
         return
