@@ -67,7 +67,12 @@ class Equilibrium:
         return together(self.block.mesh.comm, lambda: self._sampling.stiffness(self._laws, closure))
 
     def residual(self, displacement: PETSc.Vec, residual: PETSc.Vec) -> None:
-        """Write K u − B p [N]."""
+        """Write the residual K u − B p(closure(u)) at a displacement u.
+
+        Args:
+            displacement: u [mm].
+            residual: Receives the residual [N].
+        """
         pressure = self.pressure(self.closure(displacement))
         self._samples.array[:] = pressure
         self._sampling.operator.mult(self._samples, self._load)
