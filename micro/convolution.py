@@ -1,0 +1,56 @@
+"""Convolution with an even kernel by real fast Fourier transforms in work arrays of its own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+Field = NDArray[Any]
+
+_CHUNK = 2**15
+"""Numbers in a block of rows that is transformed at a time: temporaries stay in the cache."""
+
+
+class Convolution:
+    """Multiplication by a real spectrum, in the precision of that spectrum.
+
+    Rows are transformed block by block into one complex array, in which everything else happens in
+    place: no large array is allocated per call. Rows of the padding are never transformed.
+
+    Args:
+        spectrum: Real half spectrum of the kernel, shape (mx, my // 2 + 1).
+        grid: Cells (nx, ny) of the fields.
+        padded: Cells (mx, my) of the grid on which the convolution is circular.
+    """
+
+    def __init__(self, spectrum: Field, grid: tuple[int, int], padded: tuple[int, int]) -> None:
+        self.grid, self.padded = grid, padded
+        self._factors = np.repeat(spectrum, 2, axis=1)  # of real and imaginary parts
+        self._work = np.zeros(spectrum.shape, np.result_type(spectrum.dtype, np.complex64))
+        rows = max(1, _CHUNK // padded[1])
+        self._blocks = [slice(i, min(i + rows, grid[0])) for i in range(0, grid[0], rows)]
+
+    def __call__(self, field: Field, out: Field) -> Field:
+        """Convolve a field.
+
+        Args:
+            field: Values on the cells, shape (nx, ny).
+            out: Array for the result, shape (nx, ny); may be ``field``.
+
+        Returns:
+            ``out``.
+        """
+        for rows in self._blocks:
+            self._work[rows] = fft.rfft(field[rows], n=self.padded[1], axis=1)
+        self._work[self.grid[0] :] = 0.0
+        work = fft.fft(self._work, axis=0, overwrite_x=True)
+        parts = work.view(self._factors.dtype)
+        np.multiply(parts, self._factors, out=parts)
+        self._work = fft.ifft(work, axis=0, overwrite_x=True)
+        for rows in self._blocks:
+            back = fft.irfft(self._work[rows], n=self.padded[1], axis=1)
+            out[rows] = back[:, : self.grid[1]]
+        return out
