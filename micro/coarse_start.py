@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 _FEW_CELLS = 32
 """Cells per side on which a solution from nothing costs nothing."""
-_ROUGH = 1e-2
+_ROUGH = 2e-2
 """Residual on the coarse grids; their discretisation errs by more."""
 
 

@@ -32,6 +32,11 @@ class ContactCells:
     punch: Array | None
 
     @classmethod
+    def none(cls, grid: ElasticGrid) -> ContactCells:
+        """Return the empty set."""
+        return cls(grid=grid, cells=np.empty(0, np.intp), punch=None)
+
+    @classmethod
     def among(cls, grid: ElasticGrid, cells: Cells, *, force_given: bool) -> ContactCells:
         """Prepare a set of cells."""
         punch = grid.resist(cells, np.ones(cells.size)) if force_given else None

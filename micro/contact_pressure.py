@@ -20,8 +20,8 @@ Array = NDArray[np.float64]
 _MOST_PASSES = 200
 _MOST_ITERATIONS = 100
 """Iterations in a pass; an exact solution of a wrong set is of no use."""
-_FORCING = 0.1
-"""Part of the present error that a pass leaves of the gaps in its set."""
+_FORCING = (0.2, 0.01)
+"""Parts of the present error that a pass leaves of the gaps in a new set and in a set kept."""
 
 
 class Pressures(NamedTuple):
@@ -29,7 +29,6 @@ class Pressures(NamedTuple):
 
     Attributes:
         pressure: Pressures / E*, shape (nx, ny).
-        displacement: Displacements of the cells, shape (nx, ny) [mm].
         approach: Approach of the body counted from where ``required`` was 0 [mm]; 0 when given.
         residual: Largest violation of the contact conditions over the largest displacement that
             the body asks for.
@@ -38,7 +37,6 @@ class Pressures(NamedTuple):
     """
 
     pressure: Array
-    displacement: Array
     approach: float
     residual: float
     iterations: int
@@ -82,7 +80,6 @@ def contact_pressure(
         if search.residual <= tolerance:
             return Pressures(
                 search.pressure,
-                search.displacement,
                 search.approach,
                 search.residual,
                 grid.products - used,
@@ -102,31 +99,34 @@ class _Search:
 
     def __init__(self, grid: ElasticGrid, required: Array, total: float | None) -> None:
         self.grid, self.required, self.total = grid, required, total
-        self.energy = np.inf
+        self.highest = float(required.max())
+        self.contact = ContactCells.none(grid)
 
     def accept(self, pressure: Array) -> None:
         """Evaluate pressures, all ≥ 0 and with the total asked for."""
-        self.pressure = pressure
-        self.displacement = self.grid.displacement(pressure)
-        gap = self.displacement - self.required
-        weight = pressure.sum()
-        given = self.total is None
-        self.approach = 0.0 if given else float(np.vdot(pressure, gap)) / weight
-        self.gap = gap if given else gap - self.approach
-        touching = pressure > 0.0
-        violation = np.where(touching, np.abs(self.gap), -self.gap).max()
-        scale = float(self.required.max()) + self.approach
-        self.residual = max(float(violation), 0.0) / scale if scale > 0.0 else 0.0
-        self.scale = scale
-        self.energy = float(np.vdot(pressure, self.displacement - 2.0 * self.required))
+        self.pressure, self.touching = pressure, pressure > 0.0
+        gap = self.grid.displacement(pressure)
+        work = float(np.vdot(pressure, gap))
+        asked = float(np.vdot(pressure, self.required))
+        self.energy = work - 2.0 * asked  # twice the elastic less the external one
+        self.approach = 0.0 if self.total is None else (work - asked) / self.total
+        gap -= self.required
+        gap -= self.approach
+        self.gap = gap  # within the memory of the displacement
+        self.scale = self.highest + self.approach
+        worst = max(-float(gap.min()), float(gap[self.touching].max(initial=0.0)))
+        self.residual = max(worst, 0.0) / self.scale if self.scale > 0.0 else 0.0
 
     def step(self, tolerance: float) -> None:
         """Solve on the present set and accept what it gives, shortened when that is no gain."""
-        cells = np.flatnonzero((self.pressure > 0.0) | (self.gap < 0.0))
-        contact = ContactCells.among(self.grid, cells, force_given=self.total is not None)
-        change = contact.close(
+        cells = np.flatnonzero(self.touching | (self.gap < 0.0))
+        kept = np.array_equal(cells, self.contact.cells)
+        if not kept:
+            given = self.total is not None
+            self.contact = ContactCells.among(self.grid, cells, force_given=given)
+        change = self.contact.close(
             self.gap.ravel()[cells],
-            stop=max(_FORCING * self.residual, 0.25 * tolerance) * self.scale,
+            stop=max(_FORCING[kept] * self.residual, 0.25 * tolerance) * self.scale,
             limit=_MOST_ITERATIONS,
         )
         old, residual, energy = self.pressure, self.residual, self.energy

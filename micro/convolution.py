@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
@@ -24,12 +23,14 @@ class Convolution:
         spectrum: Real half spectrum of the kernel, shape (mx, my // 2 + 1).
         grid: Cells (nx, ny) of the fields.
         padded: Cells (mx, my) of the grid on which the convolution is circular.
+        work: Complex array of the spectrum's shape and precision; overwritten by every call.
     """
 
-    def __init__(self, spectrum: Field, grid: tuple[int, int], padded: tuple[int, int]) -> None:
+    def __init__(
+        self, spectrum: Field, grid: tuple[int, int], padded: tuple[int, int], work: Field
+    ) -> None:
         self.grid, self.padded = grid, padded
-        self._factors = np.repeat(spectrum, 2, axis=1)  # of real and imaginary parts
-        self._work = np.zeros(spectrum.shape, np.result_type(spectrum.dtype, np.complex64))
+        self._spectrum, self._work = spectrum, work
         rows = max(1, _CHUNK // padded[1])
         self._blocks = [slice(i, min(i + rows, grid[0])) for i in range(0, grid[0], rows)]
 
@@ -47,10 +48,10 @@ class Convolution:
             self._work[rows] = fft.rfft(field[rows], n=self.padded[1], axis=1)
         self._work[self.grid[0] :] = 0.0
         work = fft.fft(self._work, axis=0, overwrite_x=True)
-        parts = work.view(self._factors.dtype)
-        np.multiply(parts, self._factors, out=parts)
-        self._work = fft.ifft(work, axis=0, overwrite_x=True)
+        work.real *= self._spectrum
+        work.imag *= self._spectrum
+        work = fft.ifft(work, axis=0, overwrite_x=True)
         for rows in self._blocks:
-            back = fft.irfft(self._work[rows], n=self.padded[1], axis=1)
+            back = fft.irfft(work[rows], n=self.padded[1], axis=1)
             out[rows] = back[:, : self.grid[1]]
         return out

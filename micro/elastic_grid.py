@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
@@ -39,10 +41,12 @@ class ElasticGrid:
         else:
             padded = tuple(fft.next_fast_len(2 * n - 1, real=True) for n in grid)
             spectrum = padded_spectrum(padded, spacing)
-        self._compliance = Convolution(spectrum, grid, padded)
-        self._stiffness = Convolution(_inverse(spectrum), grid, padded)
-        self._field = np.zeros(grid)
-        self._single = np.zeros(grid, np.float32)
+        work, self._field = np.empty(spectrum.shape, complex), np.empty(grid)
+        # The two products never run at the same time: one borrows the other's arrays.
+        self._single = _leading(self._field, np.float32)
+        self._compliance = Convolution(spectrum, grid, padded, work)
+        stiffness = _inverse(spectrum)
+        self._stiffness = Convolution(stiffness, grid, padded, _leading(work, np.complex64))
         self.products = 0
 
     def displacement(self, pressure: Array) -> Array:
@@ -68,6 +72,11 @@ class ElasticGrid:
         self._single.ravel()[cells] = displacement
         found = self._stiffness(self._single, self._single).ravel()[cells]
         return found.astype(np.float64)
+
+
+def _leading(array: NDArray[Any], kind: type) -> NDArray[Any]:
+    """Return the first half of an array's memory as an array in single precision."""
+    return array.ravel().view(kind)[: array.size].reshape(array.shape)
 
 
 def _inverse(spectrum: Array) -> NDArray[np.float32]:

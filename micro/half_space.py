@@ -119,7 +119,7 @@ class HalfSpaceModel:
         known = None
         if start is not None and start.force > 0.0:
             pressure = start.pressure / self.contact_modulus
-            known = Pressures(pressure, pressure, start.approach, 0.0, 0, 0)
+            known = Pressures(pressure, start.approach, 0.0, 0, 0)
         total = force / (self.contact_modulus * dx * dy)
         found = self._pressing.by_force(level, total, known)
         return self._state(self._plane(found.approach, tilt), level + found.approach, found)

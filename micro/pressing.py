@@ -40,8 +40,7 @@ class Pressing:
     def by_approach(self, required: Array, start: Array | None) -> Pressures:
         """Solve with given displacements d, as `contact_pressure`; pressures on all cells."""
         if required.max() <= 0.0:
-            zero = np.zeros(required.shape)
-            return Pressures(zero, zero, 0.0, 0.0, 0, 0)
+            return Pressures(np.zeros(required.shape), 0.0, 0.0, 0, 0)
         return self._on(self._box(required), required, start, None)
 
     def by_force(self, required: Array, total: float, start: Pressures | None) -> Pressures:
