@@ -20,6 +20,9 @@ Array = NDArray[np.float64]
 _MOST_PASSES = 200
 _MOST_ITERATIONS = 100
 """Iterations in a pass; an exact solution of a wrong set is of no use."""
+_TRUSTING_PASSES = 20
+"""Passes in which a step may raise the energy when it lowers the residual."""
+_MOST_HALVINGS = 12
 _FORCING = (0.2, 0.01)
 """Parts of the present error that a pass leaves of the gaps in a new set and in a set kept."""
 
@@ -85,7 +88,7 @@ def contact_pressure(
                 grid.products - used,
                 passes,
             )
-        search.step(tolerance)
+        search.step(tolerance, cautious=passes >= _TRUSTING_PASSES)
     raise NotConverged(
         f"the contact pressure (residual {search.residual:.1e}, asked {tolerance:.1e})",
         reason="set of cells in contact not found",
@@ -117,8 +120,13 @@ class _Search:
         worst = max(-float(gap.min()), float(gap[self.touching].max(initial=0.0)))
         self.residual = max(worst, 0.0) / self.scale if self.scale > 0.0 else 0.0
 
-    def step(self, tolerance: float) -> None:
-        """Solve on the present set and accept what it gives, shortened when that is no gain."""
+    def step(self, tolerance: float, *, cautious: bool) -> None:
+        """Solve on the present set and accept what it gives, shortened while that is no gain.
+
+        Steps that lower the energy cannot return to where they were: a cautious search takes no
+        others. It is needed where cells of very different sides meet the periodic kernel, whose
+        inverse is then far from an M-matrix, for which the sets are known to converge.
+        """
         cells = np.flatnonzero(self.touching | (self.gap < 0.0))
         kept = np.array_equal(cells, self.contact.cells)
         if not kept:
@@ -130,9 +138,10 @@ class _Search:
             limit=_MOST_ITERATIONS,
         )
         old, residual, energy = self.pressure, self.residual, self.energy
-        for halving in range(10):
+        for halving in range(_MOST_HALVINGS):
             self.accept(self._moved(old, cells, 0.5**halving * change))
-            if self.residual < residual or self.energy < energy:
+            gain = self.energy < energy or (self.residual < residual and not cautious)
+            if gain or self.residual <= tolerance:
                 return
 
     def _moved(self, old: Array, cells: NDArray[np.intp], change: Array) -> Array:

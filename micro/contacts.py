@@ -74,9 +74,10 @@ def find_contacts(pressure: Array, spacing: tuple[float, float], *, periodic: bo
 def true_area(contact: NDArray[np.bool_], *, periodic: bool) -> Array:
     """Return the part of every cell that is in contact, corrected for the jagged perimeter.
 
-    A cell counts as soon as a part of it touches. Each edge between a cell in contact and one
-    that is not takes (π − 1 + ln 2)/24 of the cell's area off, which makes circles right on
-    average. Borders where a surface ends are no edges.
+    Cells that the true perimeter crosses carry a pressure as wholes, too many of them on average.
+    Each edge between a cell in contact and one that is not takes (π − 1 + ln 2)/24 of the cell's
+    area off; on cells that are not square too, where the source has squares. Borders where a
+    surface ends are no edges.
 
     Args:
         contact: Cells in contact, shape (nx, ny).
