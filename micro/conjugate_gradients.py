@@ -22,7 +22,7 @@ class ContactCells:
 
     Args:
         grid: The elastic half-space.
-        cells: Flat indices of the cells in contact, shape (n,).
+        cells: The n cells in contact.
         punch: With a given force, roughly the pressures by a uniform displacement of the cells,
             shape (n,); None with a given approach.
     """
@@ -32,14 +32,9 @@ class ContactCells:
     punch: Array | None
 
     @classmethod
-    def none(cls, grid: ElasticGrid) -> ContactCells:
-        """Return the empty set."""
-        return cls(grid=grid, cells=np.empty(0, np.intp), punch=None)
-
-    @classmethod
     def among(cls, grid: ElasticGrid, cells: Cells, *, force_given: bool) -> ContactCells:
         """Prepare a set of cells."""
-        punch = grid.resist(cells, np.ones(cells.size)) if force_given else None
+        punch = grid.resist(cells, np.ones(cells.flat.size)) if force_given else None
         return cls(grid=grid, cells=cells, punch=punch)
 
     def balanced(self, gap: Array) -> Array:

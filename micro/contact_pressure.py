@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from geometry.errors import NotConverged
 from micro.conjugate_gradients import ContactCells
-from micro.elastic_grid import ElasticGrid
+from micro.elastic_grid import Cells, ElasticGrid
 
 Array = NDArray[np.float64]
 
@@ -103,7 +103,7 @@ class _Search:
     def __init__(self, grid: ElasticGrid, required: Array, total: float | None) -> None:
         self.grid, self.required, self.total = grid, required, total
         self.highest = float(required.max())
-        self.contact = ContactCells.none(grid)
+        self.mask: NDArray[np.bool_] = np.zeros(required.shape, bool)
 
     def accept(self, pressure: Array) -> None:
         """Evaluate pressures, all ≥ 0 and with the total asked for."""
@@ -127,11 +127,13 @@ class _Search:
         others. It is needed where cells of very different sides meet the periodic kernel, whose
         inverse is then far from an M-matrix, for which the sets are known to converge.
         """
-        cells = np.flatnonzero(self.touching | (self.gap < 0.0))
-        kept = np.array_equal(cells, self.contact.cells)
+        mask = self.touching | (self.gap < 0.0)
+        kept = np.array_equal(mask, self.mask)
         if not kept:
             given = self.total is not None
-            self.contact = ContactCells.among(self.grid, cells, force_given=given)
+            self.mask = mask
+            self.contact = ContactCells.among(self.grid, Cells.where(mask), force_given=given)
+        cells = self.contact.cells.flat
         change = self.contact.close(
             self.gap.ravel()[cells],
             stop=max(_FORCING[kept] * self.residual, 0.25 * tolerance) * self.scale,

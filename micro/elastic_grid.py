@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,18 +12,41 @@ from micro.convolution import Convolution
 from micro.kernels import padded_spectrum, periodic_spectrum
 
 Array = NDArray[np.float64]
-Cells = NDArray[np.intp]
+Indices = NDArray[np.intp]
 
 _MOST_GRIDS = 16
 """Grids kept: two or three sizes of box with their coarse grids."""
 
 
+class Cells(NamedTuple):
+    """Some cells of a grid.
+
+    Attributes:
+        flat: Their flat indices, rising, shape (n,).
+        rows: The rows that they lie in, shape (r,).
+        place: Their flat indices in an array of these rows alone, shape (n,).
+    """
+
+    flat: Indices
+    rows: Indices
+    place: Indices
+
+    @classmethod
+    def where(cls, mask: NDArray[np.bool_]) -> Self:
+        """Return the cells that a mask of shape (nx, ny) marks."""
+        rows = np.flatnonzero(mask.any(axis=1))
+        return cls(np.flatnonzero(mask), rows, np.flatnonzero(mask[rows]))
+
+
 class ElasticGrid:
     """Compliance of nx × ny cells under pressures that are uniform on each, for E* = 1.
 
-    Beside the compliance it holds an approximate inverse, the inverse of the kernel on the padded
-    grid in single precision: cut down to the cells in contact it preconditions conjugate gradients
-    (van 't Wout et al. 2014), where no more than its sign and size matter.
+    Displacements are evaluated in double precision. Corrections, which only have to reduce an
+    error that is then evaluated anew, are made of products in single precision at half the time:
+    with the compliance, and with an approximate inverse. That is the inverse of the kernel on a
+    period as large as the grid; cut down to the cells in contact it preconditions conjugate
+    gradients (van 't Wout, Van Gijzen, Ditzel, Van der Ploeg & Vuik 2010,
+    doi 10.1016/j.procs.2010.04.034).
 
     Args:
         grid: Numbers of cells (nx, ny).
@@ -36,52 +59,58 @@ class ElasticGrid:
         self, grid: tuple[int, int], spacing: tuple[float, float], *, periodic: bool
     ) -> None:
         self.grid, self.spacing, self.periodic = grid, spacing, periodic
+        nx, ny = grid
         if periodic:
             padded, spectrum = grid, periodic_spectrum(grid, spacing)
         else:
-            padded = tuple(fft.next_fast_len(2 * n - 1, real=True) for n in grid)
+            padded = _good(2 * nx - 1), _good(2 * ny - 1)
             spectrum = padded_spectrum(padded, spacing)
-        work, self._field = np.empty(spectrum.shape, complex), np.empty(grid)
-        # The two products never run at the same time: one borrows the other's arrays.
-        self._single = _leading(self._field, np.float32)
+        rough = spectrum.astype(np.float32)
+        period = grid if periodic else (_good(nx), _good(ny))
+        inverse = _inverse(spectrum if periodic else periodic_spectrum(period, spacing))
+        work = np.empty(spectrum.shape, complex)  # one for all: they take turns
+        single = work.ravel().view(np.complex64)
         self._compliance = Convolution(spectrum, grid, padded, work)
-        stiffness = _inverse(spectrum)
-        self._stiffness = Convolution(stiffness, grid, padded, _leading(work, np.complex64))
+        self._compliance_of_cells = Convolution(rough, grid, padded, _part(single, rough.shape))
+        self._stiffness = Convolution(inverse, grid, period, _part(single, inverse.shape))
         self.products = 0
 
     def displacement(self, pressure: Array) -> Array:
         """Return the displacement by pressures on all cells, shape (nx, ny) [mm]."""
         self.products += 1
-        return self._compliance(pressure, np.empty(self.grid))
+        return self._compliance(pressure.copy())
 
     def comply(self, cells: Cells, pressure: Array) -> Array:
-        """Return the displacements of some cells by pressures on the same cells [mm].
-
-        Args:
-            cells: Flat indices, shape (n,).
-            pressure: Pressures / E*, shape (n,).
-        """
+        """Return roughly the displacements of some cells by pressures on them, shape (n,) [mm]."""
         self.products += 1
-        self._field[...] = 0.0
-        self._field.ravel()[cells] = pressure
-        return self._compliance(self._field, self._field).ravel()[cells]
+        return _among(cells, pressure, self._compliance_of_cells)
 
     def resist(self, cells: Cells, displacement: Array) -> Array:
-        """Return roughly the pressures on some cells that displace them so, shape (n,)."""
-        self._single[...] = 0.0
-        self._single.ravel()[cells] = displacement
-        found = self._stiffness(self._single, self._single).ravel()[cells]
-        return found.astype(np.float64)
+        """Return very roughly the pressures on some cells that displace them so, shape (n,)."""
+        return _among(cells, displacement, self._stiffness)
 
 
-def _leading(array: NDArray[Any], kind: type) -> NDArray[Any]:
-    """Return the first half of an array's memory as an array in single precision."""
-    return array.ravel().view(kind)[: array.size].reshape(array.shape)
+def _among(cells: Cells, values: Array, convolution: Convolution) -> Array:
+    scale = float(np.abs(values).max(initial=0.0)) or 1.0  # single precision ends at 1e-38
+    field = np.zeros((len(cells.rows), convolution.grid[1]), np.float32)
+    field.ravel()[cells.place] = values / scale
+    found = convolution(field, cells.rows).ravel()[cells.place]
+    return found.astype(np.float64) * scale
+
+
+def _good(count: int) -> int:
+    """Return the next number of cells with a fast transform."""
+    return int(fft.next_fast_len(count, real=True))
+
+
+def _part(memory: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+    """Return the beginning of some memory as an array."""
+    return memory[: shape[0] * shape[1]].reshape(shape)
 
 
 def _inverse(spectrum: Array) -> NDArray[np.float32]:
-    """Invert a spectrum; where it vanishes, the mean of a period, as its largest value."""
-    floor = np.where(spectrum > 0.0, spectrum, spectrum.max())
+    """Invert a spectrum; where it vanishes, at the mean of a period, as its largest value."""
+    floor = np.where(spectrum > 0.0, spectrum, spectrum.max() or 1.0)
     return (1.0 / floor).astype(np.float32)
 
 

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 _MARGIN = 1.1
 """Factor on an estimated approach, so that the cells in its reach hold the contact."""
-_FEW_CELLS = 64
+_FEW_CELLS = 32
 """Cells per side on which the approach is estimated."""
 
 
