@@ -1,11 +1,13 @@
 """Contact of a rough surface with a rigid plane on the scale of its asperities.
 
-Asperities and a contact modulus make an `AsperityModel`; solved along approaches it gives a
-`Response` of the surface and its patches; `love` tells how patches of pressure move the half-space.
+Asperities and a contact modulus make an `AsperityModel`, a surface and a contact modulus a
+`HalfSpaceModel`; solved along approaches both give a `Response` of the surface and its patches.
+`love` tells how patches of pressure move the half-space.
 """
 
 from micro.asperity_models import MODELS, SOLVERS, AsperityModel, ModelKind, asperity_model
 from micro.asperity_state import AsperityState
+from micro.contacts import Contacts, find_contacts
 from micro.ellipse import (
     area_factor,
     axis_factor,
@@ -14,6 +16,8 @@ from micro.ellipse import (
     eccentricity_approximate,
     force_factor,
 )
+from micro.half_space import HalfSpaceModel
+from micro.half_space_state import HalfSpaceState
 from micro.hertz import HertzContact, contact_modulus
 from micro.love import love_centre, love_integral, love_mean, love_mutual
 from micro.response import Response
@@ -23,6 +27,9 @@ __all__ = [
     "SOLVERS",
     "AsperityModel",
     "AsperityState",
+    "Contacts",
+    "HalfSpaceModel",
+    "HalfSpaceState",
     "HertzContact",
     "ModelKind",
     "Response",
@@ -33,6 +40,7 @@ __all__ = [
     "contact_modulus",
     "eccentricity",
     "eccentricity_approximate",
+    "find_contacts",
     "force_factor",
     "love_centre",
     "love_integral",

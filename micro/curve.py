@@ -85,15 +85,7 @@ class PatchSums:
 
     def response(self, name: str, rows: Sequence[dict[str, Any]]) -> Response:
         """Put rows together, in their order."""
-        if not rows:
-            raise InputError("a response needs at least one approach", value=[])
-        columns = {key: np.array([row[key] for row in rows]) for key in rows[0]}
-        return Response(
-            model=name,
-            contact_modulus=self.contact_modulus,
-            nominal_area=self.patches.area * self.patches.count,
-            **columns,
-        )
+        return Response.of(rows, name, self.contact_modulus, self.patches)
 
     def _summed(self, on: NDArray[np.intp], values: Array | None) -> NDArray[Any]:
         return np.bincount(self.owner[on], values, minlength=self.patches.count)

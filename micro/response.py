@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry import PatchGrid
 from geometry.errors import InputError
 
 Array = NDArray[np.float64]
@@ -76,6 +79,21 @@ class Response:
                     value=value.shape,
                     allowed=f"shape {expected}",
                 )
+
+    @classmethod
+    def of(
+        cls, rows: Sequence[dict[str, Any]], model: str, contact_modulus: float, patches: PatchGrid
+    ) -> Self:
+        """Put together the fields at single approaches, in their order."""
+        if not rows:
+            raise InputError("a response needs at least one approach", value=[])
+        columns = {key: np.array([row[key] for row in rows]) for key in rows[0]}
+        return cls(
+            model=model,
+            contact_modulus=contact_modulus,
+            nominal_area=patches.area * patches.count,
+            **columns,
+        )
 
     @property
     def mean_pressure(self) -> Array:
