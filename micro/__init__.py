@@ -1,7 +1,8 @@
 """Contact of a rough surface with a rigid plane on the scale of its asperities.
 
-Asperities and a contact modulus make an `AsperityModel`; solved along approaches it gives a
-`Response` of the surface and its patches; `love` tells how patches of pressure move the half-space.
+Asperities and a contact modulus make an `AsperityModel`, a surface and a contact modulus an
+`IslandModel`; solved along approaches each gives a `Response` of the surface and its patches;
+`love` tells how patches of pressure move the half-space.
 """
 
 from micro.asperity_models import MODELS, SOLVERS, AsperityModel, ModelKind, asperity_model
@@ -15,6 +16,8 @@ from micro.ellipse import (
     force_factor,
 )
 from micro.hertz import HertzContact, contact_modulus
+from micro.island_state import IslandState
+from micro.islands import IslandModel
 from micro.love import love_centre, love_integral, love_mean, love_mutual
 from micro.response import Response
 
@@ -24,6 +27,8 @@ __all__ = [
     "AsperityModel",
     "AsperityState",
     "HertzContact",
+    "IslandModel",
+    "IslandState",
     "ModelKind",
     "Response",
     "area_factor",

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from geometry import Asperities, PatchGrid
 from geometry.errors import InputError
@@ -45,13 +45,8 @@ class PatchSums:
     contact_modulus: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mean_heights", np.asarray(self.mean_heights, float))
-        if self.mean_heights.shape != (self.patches.count,):
-            raise InputError(
-                "every patch needs one mean height",
-                value=self.mean_heights.shape,
-                allowed=f"shape ({self.patches.count},)",
-            )
+        means = checked_means(self.mean_heights, self.patches)
+        object.__setattr__(self, "mean_heights", means)
         _ = self.owner  # refuses summits outside
 
     @cached_property
@@ -85,15 +80,7 @@ class PatchSums:
 
     def response(self, name: str, rows: Sequence[dict[str, Any]]) -> Response:
         """Put rows together, in their order."""
-        if not rows:
-            raise InputError("a response needs at least one approach", value=[])
-        columns = {key: np.array([row[key] for row in rows]) for key in rows[0]}
-        return Response(
-            model=name,
-            contact_modulus=self.contact_modulus,
-            nominal_area=self.patches.area * self.patches.count,
-            **columns,
-        )
+        return collected(rows, model=name, patches=self.patches, modulus=self.contact_modulus)
 
     def _summed(self, on: NDArray[np.intp], values: Array | None) -> NDArray[Any]:
         return np.bincount(self.owner[on], values, minlength=self.patches.count)
@@ -108,3 +95,51 @@ class PatchSums:
             force,
             self.contact_modulus,
         )
+
+
+def checked_means(mean_heights: ArrayLike, patches: PatchGrid) -> Array:
+    """Return the mean heights of patches as an array.
+
+    Raises:
+        InputError: When there is not one for every patch.
+    """
+    means = np.asarray(mean_heights, float)
+    if means.shape != (patches.count,):
+        raise InputError(
+            "every patch needs one mean height",
+            value=means.shape,
+            allowed=f"shape ({patches.count},)",
+        )
+    return means
+
+
+def collected(
+    rows: Sequence[dict[str, Any]],
+    *,
+    model: str,
+    patches: PatchGrid,
+    modulus: float,
+    warnings: Sequence[str] = (),
+) -> Response:
+    """Put the rows of single approaches together to a response.
+
+    Args:
+        rows: Fields of the response that have one entry for each approach.
+        model: Name of the micro model.
+        patches: The patches.
+        modulus: E* [MPa].
+        warnings: Sentences about the approaches outside the model's range of validity.
+
+    Raises:
+        InputError: When there is no row.
+    """
+    if not rows:
+        raise InputError("a response needs at least one approach", value=[])
+    columns = {key: np.array([row[key] for row in rows]) for key in rows[0]}
+    return Response(
+        model=model,
+        contact_modulus=modulus,
+        nominal_area=patches.area * patches.count,
+        warnings=tuple(warnings),
+        **columns,
+    )

@@ -40,6 +40,7 @@ class Response:
         patch_contacts: Their number, shape (n, N).
         patch_displacement: Mean normal displacement of the patch by all contacts, (n, N) [mm].
         patch_separation: Average gap of the patch, shape (n, N) [mm].
+        warnings: A sentence for each approach that lies outside the model's range of validity.
 
     Raises:
         InputError: When the arrays do not fit each other.
@@ -61,6 +62,7 @@ class Response:
     patch_contacts: Counts
     patch_displacement: Array
     patch_separation: Array
+    warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.approach)
