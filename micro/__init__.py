@@ -1,8 +1,8 @@
 """Contact of a rough surface with a rigid plane on the scale of its asperities.
 
-Asperities and a contact modulus make an `AsperityModel`, a surface and a contact modulus a
-`HalfSpaceModel`; solved along approaches both give a `Response` of the surface and its patches.
-`love` tells how patches of pressure move the half-space.
+Asperities and a contact modulus make an `AsperityModel`, a surface and a contact modulus an
+`IslandModel` or a `HalfSpaceModel`; solved along approaches each gives a `Response` of the surface
+and its patches; `love` tells how patches of pressure move the half-space.
 """
 
 from micro.asperity_models import MODELS, SOLVERS, AsperityModel, ModelKind, asperity_model
@@ -19,6 +19,8 @@ from micro.ellipse import (
 from micro.half_space import HalfSpaceModel
 from micro.half_space_state import HalfSpaceState
 from micro.hertz import HertzContact, contact_modulus
+from micro.island_state import IslandState
+from micro.islands import IslandModel
 from micro.love import love_centre, love_integral, love_mean, love_mutual
 from micro.response import Response
 
@@ -31,6 +33,8 @@ __all__ = [
     "HalfSpaceModel",
     "HalfSpaceState",
     "HertzContact",
+    "IslandModel",
+    "IslandState",
     "ModelKind",
     "Response",
     "area_factor",

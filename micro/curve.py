@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from geometry import Asperities, PatchGrid
 from geometry.errors import InputError
@@ -45,13 +45,8 @@ class PatchSums:
     contact_modulus: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mean_heights", np.asarray(self.mean_heights, float))
-        if self.mean_heights.shape != (self.patches.count,):
-            raise InputError(
-                "every patch needs one mean height",
-                value=self.mean_heights.shape,
-                allowed=f"shape ({self.patches.count},)",
-            )
+        means = checked_means(self.mean_heights, self.patches)
+        object.__setattr__(self, "mean_heights", means)
         _ = self.owner  # refuses summits outside
 
     @cached_property
@@ -100,3 +95,19 @@ class PatchSums:
             force,
             self.contact_modulus,
         )
+
+
+def checked_means(mean_heights: ArrayLike, patches: PatchGrid) -> Array:
+    """Return the mean heights of patches as an array.
+
+    Raises:
+        InputError: When there is not one for every patch.
+    """
+    means = np.asarray(mean_heights, float)
+    if means.shape != (patches.count,):
+        raise InputError(
+            "every patch needs one mean height",
+            value=means.shape,
+            allowed=f"shape ({patches.count},)",
+        )
+    return means

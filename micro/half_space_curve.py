@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import PatchGrid, Surface, patch_means
-from geometry.errors import InputError
 from micro.contacts import true_area
+from micro.curve import checked_means
 from micro.half_space_state import HalfSpaceState
 from micro.plane import RigidPlane
 
@@ -38,12 +38,7 @@ class CellSums:
     mean_heights: Array
 
     def __post_init__(self) -> None:
-        if self.mean_heights.shape != (self.patches.count,):
-            raise InputError(
-                "every patch needs one mean height",
-                value=self.mean_heights.shape,
-                allowed=f"shape ({self.patches.count},)",
-            )
+        object.__setattr__(self, "mean_heights", checked_means(self.mean_heights, self.patches))
 
     def row(self, plane: RigidPlane, state: HalfSpaceState) -> dict[str, Any]:
         """Return the fields of a response for one approach."""

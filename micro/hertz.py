@@ -43,6 +43,20 @@ def contact_modulus(E1: float, nu1: float, E2: float = np.inf, nu2: float = 0.0)
     return float(1.0 / compliance)
 
 
+def checked_modulus(contact_modulus: float) -> None:
+    """Refuse a contact modulus that is not positive and finite.
+
+    Raises:
+        InputError: When it is not.
+    """
+    if not (contact_modulus > 0.0 and np.isfinite(contact_modulus)):
+        raise InputError(
+            "the contact modulus must be positive",
+            value=contact_modulus,
+            allowed="finite E* > 0 MPa",
+        )
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HertzContact:
     """Frictionless elliptic contacts of paraboloids, each alone on the half-space.
@@ -69,12 +83,7 @@ class HertzContact:
     indentation: ArrayLike
 
     def __post_init__(self) -> None:
-        if not (self.contact_modulus > 0.0 and np.isfinite(self.contact_modulus)):
-            raise InputError(
-                "the contact modulus must be positive",
-                value=self.contact_modulus,
-                allowed="finite E* > 0 MPa",
-            )
+        checked_modulus(self.contact_modulus)
         lowest = np.min(np.asarray(self.indentation, float), initial=0.0)
         if not lowest >= 0.0:  # also NaN
             raise InputError(

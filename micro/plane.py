@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Asperities
+from geometry import Asperities, Surface
 from geometry.errors import InputError
 
 Array = NDArray[np.float64]
@@ -40,10 +40,10 @@ class RigidPlane:
 
     @classmethod
     def above(
-        cls, asperities: Asperities, approach: float, tilt: tuple[float, float]
+        cls, rough: Asperities | Surface, approach: float, tilt: tuple[float, float]
     ) -> RigidPlane:
-        """Return the plane that turns about the centre of the asperities' rectangle."""
-        lx, ly = asperities.lengths
+        """Return the plane that turns about the centre of a surface's rectangle."""
+        lx, ly = rough.lengths
         return cls(approach=float(approach), tilt=tilt, centre=(0.5 * lx, 0.5 * ly))
 
     def at(self, x: Array, y: Array) -> Array:

@@ -43,6 +43,7 @@ class Response:
         patch_contacts: Their number, shape (n, N).
         patch_displacement: Mean normal displacement of the patch by all contacts, (n, N) [mm].
         patch_separation: Average gap of the patch, shape (n, N) [mm].
+        warnings: A sentence for each approach that lies outside the model's range of validity.
 
     Raises:
         InputError: When the arrays do not fit each other.
@@ -64,6 +65,7 @@ class Response:
     patch_contacts: Counts
     patch_displacement: Array
     patch_separation: Array
+    warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.approach)
@@ -82,9 +84,25 @@ class Response:
 
     @classmethod
     def of(
-        cls, rows: Sequence[dict[str, Any]], model: str, contact_modulus: float, patches: PatchGrid
+        cls,
+        rows: Sequence[dict[str, Any]],
+        model: str,
+        contact_modulus: float,
+        patches: PatchGrid,
+        warnings: Sequence[str] = (),
     ) -> Self:
-        """Put together the fields at single approaches, in their order."""
+        """Put together the fields at single approaches, in their order.
+
+        Args:
+            rows: For each approach the fields that have one entry per approach.
+            model: Name of the micro model.
+            contact_modulus: E* [MPa].
+            patches: The patches.
+            warnings: Sentences about approaches outside the model's range of validity.
+
+        Raises:
+            InputError: When there is no row.
+        """
         if not rows:
             raise InputError("a response needs at least one approach", value=[])
         columns = {key: np.array([row[key] for row in rows]) for key in rows[0]}
@@ -92,6 +110,7 @@ class Response:
             model=model,
             contact_modulus=contact_modulus,
             nominal_area=patches.area * patches.count,
+            warnings=tuple(warnings),
             **columns,
         )
 

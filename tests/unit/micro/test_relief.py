@@ -1,0 +1,135 @@
+"""Catchments, passes and caps against cell-by-cell computations."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import label
+
+from geometry import Spectrum, Surface, synthesise
+from micro.catchments import catchments, passes_between, sampled
+from micro.relief import Relief
+
+EIGHT = np.ones((3, 3))
+
+
+@pytest.fixture(scope="module")
+def surface():
+    spectrum = Spectrum(hurst=0.5, waves=(1, 7), rms_slope=0.2, seed=3)
+    return synthesise(spectrum, grid=(48, 40), lengths=(1.2, 1.0))
+
+
+@pytest.fixture(scope="module")
+def relief(surface):
+    return Relief.of(surface)
+
+
+def climb(heights, cell):
+    """Walk to the highest neighbour until there is none."""
+    while True:
+        ix, iy = cell
+        around = [
+            (i, j)
+            for i in range(max(ix - 1, 0), min(ix + 2, heights.shape[0]))
+            for j in range(max(iy - 1, 0), min(iy + 2, heights.shape[1]))
+        ]
+        best = max(around, key=lambda c: (heights[c], c))
+        if best == cell:
+            return cell
+        cell = best
+
+
+@pytest.mark.parametrize("levels", [0, 3])  # 3: whole numbers, full of ties
+def test_catchments(levels):
+    heights = np.random.default_rng(1).random((13, 9))
+    heights = np.floor(levels * heights) if levels else heights
+    owner, peak = catchments(heights)
+    for flat, cell in enumerate(np.ndindex(heights.shape)):
+        assert np.unravel_index(peak[owner[flat]], heights.shape) == climb(heights, cell)
+
+
+def test_flat_surface_has_one_catchment():
+    owner, peak = catchments(np.zeros((5, 7)))
+    assert peak.tolist() == [34] and not owner.any()
+
+
+@pytest.mark.parametrize("levels", [0, 4])
+def test_regions_are_those_of_an_image(levels):
+    heights = np.random.default_rng(2).random((21, 17))
+    heights = np.floor(levels * heights) if levels else heights
+    owner, peak = catchments(heights)
+    passes = passes_between(heights, owner.reshape(heights.shape))
+    assert np.all(passes.first < passes.second)
+    pairs = set(zip(passes.first.tolist(), passes.second.tolist(), strict=True))
+    assert len(pairs) == len(passes.height)  # each once
+    for level in (0.2, 0.5, 0.8, 1.5):
+        image, count = label(heights > level, structure=EIGHT)
+        linked = passes.height > level
+        up = heights.flat[peak] > level
+        group = np.arange(len(peak))
+        for first, second in zip(passes.first[linked], passes.second[linked], strict=True):
+            group[group == group[second]] = group[first]
+        assert len(set(group[up])) == count
+        cells = heights.ravel() > level
+        both = set(zip(group[owner[cells]], image.ravel()[cells], strict=True))
+        assert len(both) == count
+
+
+def test_sampling_divides_cells(surface):
+    fine = sampled(surface)
+    assert fine.shape == (8 * 48, 8 * 40)
+    x, y = (np.arange(384) + 0.5) * 1.2 / 384, (np.arange(320) + 0.5) / 320
+    assert fine == pytest.approx(surface.height_at(x[:, None], y), abs=1e-15)
+    large = Surface(heights=np.zeros((512, 600)), lengths=(1.0, 1.0))
+    assert sampled(large) is large.heights
+
+
+def test_caps_are_sums_over_cells(surface, relief):
+    heights, rng = sampled(surface), np.random.default_rng(4)
+    owner, _ = catchments(heights)
+    x = np.stack(np.meshgrid(*((np.arange(n) + 0.5) / n for n in heights.shape), indexing="ij"))
+    x = x.reshape(2, -1) * np.array([[1.2], [1.0]])
+    height = rng.uniform(0.3, 1.0, len(relief)) * np.ptp(heights)
+    caps = relief.caps(height)
+    for k in range(len(relief)):
+        volume = np.where(owner == k, heights.ravel() - (relief.z[k] - height[k]), 0.0)
+        volume = np.maximum(volume, 0.0) * 1.2 / heights.size
+        dx, dy = x[0] - relief.x[k], x[1] - relief.y[k]
+        powers = (np.ones_like(dx), dx, dy, dx**2, dx * dy, dy**2)
+        slow = [np.sum(volume * power) for power in powers]
+        # Differences of sums over all catchments lose some digits.
+        assert caps[:, k] == pytest.approx(slow, rel=1e-9, abs=1e-12 * slow[0])
+
+
+def test_small_caps_shrink_as_paraboloids(relief):
+    few = relief.caps(np.full(len(relief), 1e-9))
+    fewer = relief.caps(np.full(len(relief), 1e-11))
+    for power, order in zip(range(6), (2.0, 2.5, 2.5, 3.0, 3.0, 3.0), strict=True):
+        assert fewer[power] == pytest.approx(few[power] * 1e-2**order, rel=1e-9)
+    assert np.all(relief.caps(np.zeros(len(relief))) == 0.0)
+
+
+def test_caps_are_continuous(relief):
+    height = relief._least_height
+    below, above = relief.caps(height * (1 - 1e-9)), relief.caps(height * (1 + 1e-9))
+    assert np.all(height > 0.0)
+    assert above == pytest.approx(below, rel=1e-6, abs=1e-6 * below[3].max())
+
+
+def test_peaks_are_maxima_of_the_interpolant(surface, relief):
+    assert relief.z.max() == pytest.approx(surface.highest, abs=1e-12)
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        px = np.clip(relief.x + 1e-4 * rng.normal(size=len(relief)), 0.0, 1.2)
+        py = np.clip(relief.y + 1e-4 * rng.normal(size=len(relief)), 0.0, 1.0)
+        assert np.all(surface.height_at(px, py) <= relief.z + 1e-12)
+
+
+def test_floor_keeps_what_rises_above(surface, relief):
+    floor = float(np.quantile(surface.heights, 0.8))
+    cut = Relief.of(surface, floor=floor)
+    level = np.full(len(relief), floor)
+    height = np.maximum(relief.z - level, 0.0)
+    big = height > 2.0 * relief._least_height
+    assert big.sum() > 5
+    whole, kept = relief.caps(height)[:, big], cut.caps(np.maximum(cut.z - floor, 0.0))[:, big]
+    assert kept == pytest.approx(whole, rel=1e-9, abs=1e-12 * whole[0].max())
+    assert np.sum(cut.open_passes(level)) == np.sum(relief.open_passes(level)) > 0
