@@ -22,10 +22,12 @@ from micro.hertz import HertzContact, contact_modulus
 from micro.island_state import IslandState
 from micro.islands import IslandModel
 from micro.love import love_centre, love_integral, love_mean, love_mutual
+from micro.models import MODEL_NAMES, MicroModel, micro_model
 from micro.response import Response
 
 __all__ = [
     "MODELS",
+    "MODEL_NAMES",
     "SOLVERS",
     "AsperityModel",
     "AsperityState",
@@ -35,6 +37,7 @@ __all__ = [
     "HertzContact",
     "IslandModel",
     "IslandState",
+    "MicroModel",
     "ModelKind",
     "Response",
     "area_factor",
@@ -50,4 +53,5 @@ __all__ = [
     "love_integral",
     "love_mean",
     "love_mutual",
+    "micro_model",
 ]

@@ -8,10 +8,10 @@ interaction the displacements by all contacts add up to w_k (`micro.contact_prob
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -96,6 +96,30 @@ class AsperityModel:
         """Name of the model in `MODELS`."""
         kind = ModelKind(self.elliptic, self.interacting)
         return next(name for name, value in MODELS.items() if value == kind)
+
+    @property
+    def datum(self) -> float:
+        """Height z_M that the approach counts from [mm]."""
+        return self.asperities.highest
+
+    @property
+    def first_touch(self) -> float:
+        """Approach of a level plane at first contact [mm]; infinite without asperities."""
+        heights = self.asperities.z
+        return float(self.datum - heights.max()) if heights.size else np.inf
+
+    def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
+        """Return the model of one patch on its own half-space: of the summits that it holds.
+
+        Args:
+            patches: Patches of the surface.
+            index: Flat index of the patch.
+
+        Returns:
+            The model, whose approach counts from the whole surface's highest point, and its patch.
+        """
+        own = patches.index_of(self.asperities.x, self.asperities.y) == index
+        return replace(self, asperities=self.asperities.subset(own)), patches.single(index)
 
     def solve(
         self,

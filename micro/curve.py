@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry import Asperities, PatchGrid
+from geometry import Asperities, PatchGrid, Surface
 from geometry.errors import InputError
 from micro.asperity_state import HertzCoefficients
 from micro.contact_problem import Solution
@@ -95,6 +95,11 @@ class PatchSums:
             force,
             self.contact_modulus,
         )
+
+
+def whole_patch(surface: Surface) -> PatchGrid:
+    """Return the single patch that a surface's rectangle is."""
+    return PatchGrid(grid=(1, 1), lengths=surface.lengths)
 
 
 def checked_means(mean_heights: ArrayLike, patches: PatchGrid) -> Array:

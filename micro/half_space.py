@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from geometry import PatchGrid, Surface
 from geometry.errors import InputError
 from micro.contact_pressure import Pressures
+from micro.curve import whole_patch
 from micro.elastic_grid import ElasticGrids
 from micro.half_space_curve import CellSums
 from micro.half_space_state import HalfSpaceState
@@ -37,6 +39,7 @@ class HalfSpaceModel:
             a periodic half-space is not determined: displacements, and so the approach, count
             from the mean of the displaced surface.
         tolerance: Largest residual of a solution (see `HalfSpaceState`).
+        highest: Height z_M that the approach counts from [mm]; the surface's own when not given.
 
     Raises:
         InputError: When the modulus or the tolerance is not positive, or a periodic model is
@@ -50,6 +53,7 @@ class HalfSpaceModel:
     contact_modulus: float
     periodic: bool = False
     tolerance: float = 1e-8
+    highest: float | None = None
 
     def __post_init__(self) -> None:
         for what in ("contact_modulus", "tolerance"):
@@ -66,6 +70,31 @@ class HalfSpaceModel:
     def name(self) -> str:
         """Name of the model in a response."""
         return "half-space-periodic" if self.periodic else "half-space"
+
+    @property
+    def datum(self) -> float:
+        """Height z_M that the approach counts from [mm]."""
+        return self.surface.highest if self.highest is None else self.highest
+
+    @property
+    def first_touch(self) -> float:
+        """Approach of a level plane at first contact of a cell's centre [mm]."""
+        return float(self.datum - self.surface.heights.max())
+
+    def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
+        """Return the model of one patch on its own half-space, cut out along whole cells.
+
+        Args:
+            patches: Patches of the surface.
+            index: Flat index of the patch.
+
+        Returns:
+            The model, whose approach counts from the whole surface's highest point, and its patch.
+        """
+        x, y = patches.bounds(index)
+        piece = self.surface.cropped(x=x, y=y)
+        alone = replace(self, surface=piece, highest=self.datum, periodic=False)
+        return alone, whole_patch(piece)
 
     def solve(
         self,
@@ -150,7 +179,10 @@ class HalfSpaceModel:
             NotConverged: When the contact conditions cannot be met to the tolerance.
         """
         sums = CellSums(
-            surface=self.surface, patches=patches, mean_heights=np.asarray(mean_heights, float)
+            surface=self.surface,
+            patches=patches,
+            mean_heights=np.asarray(mean_heights, float),
+            highest=self.datum,
         )
         given = np.atleast_1d(np.asarray(approaches, float))
         order = np.argsort(given, kind="stable")
@@ -194,7 +226,7 @@ class HalfSpaceModel:
 
     def _required(self, plane: RigidPlane) -> Array:
         surface = self.surface
-        below = surface.highest - surface.heights
+        below = self.datum - surface.heights
         return plane.at(surface.x[:, None], surface.y) - below
 
     def _state(self, plane: RigidPlane, required: Array, found: Pressures) -> HalfSpaceState:

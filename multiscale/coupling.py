@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
-from micro.asperity_models import AsperityModel
+from micro import MicroModel
 from multiscale.history import LoadStep, PatchState
 from multiscale.law_files import LawTable
 
@@ -39,7 +39,7 @@ class Coupling(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AnalyticCoupling:
-    """The micro model alone: the surface's asperities on one elastic half-space.
+    """The micro model alone: the whole surface on one elastic half-space.
 
     Attributes:
         model: Micro model of the whole surface.
@@ -48,7 +48,7 @@ class AnalyticCoupling:
         tilt: Slopes of the plane's approach along x and y.
     """
 
-    model: AsperityModel
+    model: MicroModel
     patches: PatchGrid
     mean_heights: Array
     tilt: tuple[float, float] = (0.0, 0.0)

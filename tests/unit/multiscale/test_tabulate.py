@@ -6,7 +6,7 @@ import pytest
 from geometry import PatchGrid, Spectrum, find_asperities, patch_means, synthesise
 from micro import asperity_model
 from micro.love import love_centre, love_mean
-from multiscale.tabulate import IsolatedPatch, _shares, isolated_laws
+from multiscale.tabulate import IsolatedPatch, isolated_laws
 
 MODULUS = 4000.0
 TOLERANCE = 1e-4
@@ -105,11 +105,3 @@ def test_all_laws_of_a_grid(surface, model):
         touch = model.asperities.highest - own.max() if own.size else np.inf
         assert law.touch == pytest.approx(touch, rel=1e-12, abs=1e-15)  # the same subtraction
         assert law.is_open == (touch >= 10e-3)
-
-
-def test_work_is_dealt_once_and_evenly():
-    work = np.array([0, 9, 1, 1, 8, 0, 2])
-    shares = _shares(work, 3)
-    assert sorted(job for share in shares for job in share) == list(range(7))
-    assert [share[0] for share in shares[:2]] == [1, 4]
-    assert len(shares[2]) >= 3
