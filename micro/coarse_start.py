@@ -1,4 +1,9 @@
-"""Start on a grid from the solution on a grid half as fine, and so on down to a small one."""
+"""Start on a grid from the solution on a grid half as fine, and so on down to a small one.
+
+The set of cells in contact is then found on the coarse grids, where that costs little, and only
+its edge is left to the fine one (full multigrid: Zhao, Vollebregt & Oosterlee 2014,
+doi 10.3846/13926292.2014.909899).
+"""
 
 from __future__ import annotations
 

@@ -118,7 +118,7 @@ class _Search:
         self.gap = gap  # within the memory of the displacement
         self.scale = self.highest + self.approach
         worst = max(-float(gap.min()), float(gap[self.touching].max(initial=0.0)))
-        self.residual = max(worst, 0.0) / self.scale if self.scale > 0.0 else 0.0
+        self.residual = max(0.0, worst) / self.scale if self.scale > 0.0 else 0.0
 
     def step(self, tolerance: float, *, cautious: bool) -> None:
         """Solve on the present set and accept what it gives, shortened while that is no gain.

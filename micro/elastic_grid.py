@@ -42,11 +42,11 @@ class ElasticGrid:
     """Compliance of nx × ny cells under pressures that are uniform on each, for E* = 1.
 
     Displacements are evaluated in double precision. Corrections, which only have to reduce an
-    error that is then evaluated anew, are made of products in single precision at half the time:
-    with the compliance, and with an approximate inverse. That is the inverse of the kernel on a
-    period as large as the grid; cut down to the cells in contact it preconditions conjugate
-    gradients (van 't Wout, Van Gijzen, Ditzel, Van der Ploeg & Vuik 2010,
-    doi 10.1016/j.procs.2010.04.034).
+    error that is then evaluated anew, are made of products in single precision: with the
+    compliance, and with an approximate inverse. That is the inverse of the kernel on a period as
+    large as the grid; cut down to the cells in contact it preconditions conjugate gradients, as
+    the inverse by transforms of Zhao, Vollebregt & Oosterlee 2014 (Numer. Linear Algebra Appl.
+    21, 256-274) smooths their multigrid.
 
     Args:
         grid: Numbers of cells (nx, ny).

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from geometry import PatchGrid, Surface
 from geometry.errors import InputError
 from micro.contact_pressure import Pressures
-from micro.curve import whole_patch
 from micro.elastic_grid import ElasticGrids
 from micro.half_space_curve import CellSums
 from micro.half_space_state import HalfSpaceState
@@ -24,6 +23,8 @@ from micro.response import Response
 Array = NDArray[np.float64]
 
 _LEVEL = (0.0, 0.0)
+_OUT_OF_REACH = 1e3
+"""Sides of the surface by which cells are lowered that may not touch."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,11 +40,12 @@ class HalfSpaceModel:
             a periodic half-space is not determined: displacements, and so the approach, count
             from the mean of the displaced surface.
         tolerance: Largest residual of a solution (see `HalfSpaceState`).
-        highest: Height z_M that the approach counts from [mm]; the surface's own when not given.
+        within: Patches that hold the centres of all cells that may touch; all cells when not
+            given.
 
     Raises:
-        InputError: When the modulus or the tolerance is not positive, or a periodic model is
-            asked of a surface that is not.
+        InputError: When the modulus or the tolerance is not positive, a periodic model is asked
+            of a surface that is not, or no cell may touch.
 
     Source:
         Polonsky & Keer 1999, doi 10.1016/S0043-1648(99)00113-1.
@@ -53,7 +55,7 @@ class HalfSpaceModel:
     contact_modulus: float
     periodic: bool = False
     tolerance: float = 1e-8
-    highest: float | None = None
+    within: PatchGrid | None = None
 
     def __post_init__(self) -> None:
         for what in ("contact_modulus", "tolerance"):
@@ -65,6 +67,12 @@ class HalfSpaceModel:
             raise InputError(
                 "a periodic half-space needs a periodic surface", value=self.surface.source
             )
+        if self._free is not None and self._free.all():
+            raise InputError(
+                "no cell has its centre in the patches that may touch",
+                value=self.within,
+                allowed=f"patches within {self.surface.lengths} mm",
+            )
 
     @property
     def name(self) -> str:
@@ -74,27 +82,22 @@ class HalfSpaceModel:
     @property
     def datum(self) -> float:
         """Height z_M that the approach counts from [mm]."""
-        return self.surface.highest if self.highest is None else self.highest
+        return self.surface.highest
 
     @property
     def first_touch(self) -> float:
         """Approach of a level plane at first contact of a cell's centre [mm]."""
-        return float(self.datum - self.surface.heights.max())
+        return -float(self._required(self._plane(0.0, _LEVEL)).max())
 
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
-        """Return the model of one patch on its own half-space, cut out along whole cells.
+        """Return the model of one patch on its own half-space: only its cells may touch.
 
         Args:
             patches: Patches of the surface.
             index: Flat index of the patch.
-
-        Returns:
-            The model, whose approach counts from the whole surface's highest point, and its patch.
         """
-        x, y = patches.bounds(index)
-        piece = self.surface.cropped(x=x, y=y)
-        alone = replace(self, surface=piece, highest=self.datum, periodic=False)
-        return alone, whole_patch(piece)
+        patch = patches.single(index)
+        return replace(self, within=patch, periodic=False), patch
 
     def solve(
         self,
@@ -115,7 +118,7 @@ class HalfSpaceModel:
                 pressed to full contact or by a tilted plane.
             NotConverged: When the contact conditions cannot be met to the tolerance.
         """
-        first = None if start is None else start.pressure / self.contact_modulus
+        first = None if start is None else self._started(start)
         return self._pressed(self._plane(approach, tilt), first)
 
     def solve_force(
@@ -147,8 +150,7 @@ class HalfSpaceModel:
         dx, dy = self.surface.spacing
         known = None
         if start is not None and start.force > 0.0:
-            pressure = start.pressure / self.contact_modulus
-            known = Pressures(pressure, start.approach, 0.0, 0, 0)
+            known = Pressures(self._started(start), start.approach, 0.0, 0, 0)
         total = force / (self.contact_modulus * dx * dy)
         found = self._pressing.by_force(level, total, known)
         return self._state(self._plane(found.approach, tilt), level + found.approach, found)
@@ -179,10 +181,7 @@ class HalfSpaceModel:
             NotConverged: When the contact conditions cannot be met to the tolerance.
         """
         sums = CellSums(
-            surface=self.surface,
-            patches=patches,
-            mean_heights=np.asarray(mean_heights, float),
-            highest=self.datum,
+            surface=self.surface, patches=patches, mean_heights=np.asarray(mean_heights, float)
         )
         given = np.atleast_1d(np.asarray(approaches, float))
         order = np.argsort(given, kind="stable")
@@ -205,6 +204,15 @@ class HalfSpaceModel:
             before, last = last, self._pressed(plane, first)
             yield plane, last
 
+    def _started(self, start: HalfSpaceState) -> Array:
+        if start.pressure.shape != self.surface.grid:
+            raise InputError(
+                "the solution to start from is of another grid",
+                value=start.pressure.shape,
+                allowed=f"{self.surface.grid}",
+            )
+        return start.pressure / self.contact_modulus
+
     def _pressed(self, plane: RigidPlane, start: Array | None) -> HalfSpaceState:
         required = self._required(plane)
         if self.periodic and required.mean() >= 0.0:
@@ -226,8 +234,23 @@ class HalfSpaceModel:
 
     def _required(self, plane: RigidPlane) -> Array:
         surface = self.surface
-        below = self.datum - surface.heights
-        return plane.at(surface.x[:, None], surface.y) - below
+        below = surface.highest - surface.heights
+        required = plane.at(surface.x[:, None], surface.y) - below
+        if self._free is not None:
+            required[self._free] -= _OUT_OF_REACH * max(surface.lengths)
+        return required
+
+    @cached_property
+    def _free(self) -> NDArray[np.bool_] | None:
+        """Cells that may not touch, shape (nx, ny)."""
+        if self.within is None:
+            return None
+        edges = self.within.borders_x, self.within.borders_y
+        x, y = (
+            (centres >= border[0]) & (centres < border[-1])
+            for centres, border in zip((self.surface.x, self.surface.y), edges, strict=True)
+        )
+        return ~(x[:, None] & y)
 
     def _state(self, plane: RigidPlane, required: Array, found: Pressures) -> HalfSpaceState:
         return HalfSpaceState(

@@ -28,7 +28,6 @@ class CellSums:
         surface: The surface.
         patches: The N patches, within the surface's rectangle.
         mean_heights: Mean heights of the patches, shape (N,) [mm].
-        highest: Height z_M that the approach counts from [mm].
 
     Raises:
         InputError: When not every patch has a mean height.
@@ -37,7 +36,6 @@ class CellSums:
     surface: Surface
     patches: PatchGrid
     mean_heights: Array
-    highest: float
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mean_heights", checked_means(self.mean_heights, self.patches))
@@ -45,7 +43,7 @@ class CellSums:
     def row(self, plane: RigidPlane, state: HalfSpaceState) -> dict[str, Any]:
         """Return the fields of a response for one approach."""
         displacement = self._means(state.displacement)
-        below = self.highest - plane.at(*self.patches.centres.T)
+        below = self.surface.highest - plane.at(*self.patches.centres.T)
         separation = below - self.mean_heights + displacement
         area = true_area(state.in_contact, periodic=state.periodic)
         contacts = state.contacts

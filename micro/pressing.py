@@ -45,16 +45,18 @@ class Pressing:
 
     def by_force(self, required: Array, total: float, start: Pressures | None) -> Pressures:
         """Solve with a given sum of pressures / E*; ``required`` holds up to a constant."""
+        top = float(required.max())
+        level = required - top  # from here on the approach counts from first touch of a cell
         first, reach = None, np.inf
         if start is not None:
-            first, reach = start.pressure, _MARGIN * start.approach
+            first, reach = start.pressure, _MARGIN * (start.approach + top)
         elif not self.grids.periodic:
-            reach = _MARGIN * self._estimate(required, total)
+            reach = _MARGIN * self._estimate(level, total)
         while True:
-            box = self._box(required + reach)
-            found = self._on(box, required, first, total)
+            box = self._box(level + max(reach, float(np.finfo(float).tiny)))
+            found = self._on(box, level, first, total)
             if found.approach <= reach or box.shape == required.shape:
-                return found
+                return found._replace(approach=found.approach - top)
             first, reach = found.pressure, _MARGIN * found.approach
 
     def _estimate(self, required: Array, total: float) -> float:

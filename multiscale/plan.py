@@ -35,10 +35,8 @@ def warnings(stage: Stage) -> Iterator[str]:
         )
     if not stage.embedded:
         return
-    if not stage.by_summits and any(
-        cells % patches
-        for cells, patches in zip(stage.surface.grid, stage.patches.grid, strict=True)
-    ):
+    grids = zip(stage.surface.grid, stage.patches.grid, strict=True)
+    if stage.model.name == "islands" and any(cells % patches for cells, patches in grids):
         yield (
             "patch borders cut cells of the surface: every patch is taken alone along whole cells; "
             "a grid that is a multiple of the patches would fit"

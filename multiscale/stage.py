@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -107,10 +107,19 @@ def make_stage(scene: Scene) -> Stage:
     patches = PatchGrid(grid=scene.patches.grid, lengths=surface.lengths)
     _check_patches(scene, surface)
     block = scene.block
+    asperities = find_asperities(surface, periodic=False)  # the block's sides are free
+    if scene.micro.model in MODELS and not len(asperities):
+        raise InputError(
+            "the surface has no summit that could carry load",
+            key="micro.model",
+            value=scene.micro.model,
+            allowed="half-space, islands",
+            file=scene.file,
+        )
     return Stage(
         scene=scene,
         surface=surface,
-        asperities=find_asperities(surface, periodic=False),  # the block's sides are free
+        asperities=asperities,
         model=micro_model(
             scene.micro.model,
             surface,
@@ -158,9 +167,10 @@ def _block_shape(scene: Scene, surface: Surface) -> BlockShape:
 
 def _check_patches(scene: Scene, surface: Surface) -> None:
     """Refuse patches that no element or no height can resolve."""
-    least = 1 if scene.micro.model in MODELS or scene.coupling.kind == "analytic" else 4
-    what = "heights of the surface" if least == 1 else "fourths of the surface's heights"
-    limits = [(what, (surface.grid[0] // least, surface.grid[1] // least))]
+    limits: list[tuple[str, Sequence[int]]] = [("heights of the surface", surface.grid)]
+    if scene.micro.model == "islands":  # cuts patches out, and a surface has at least 4 × 4 heights
+        fourths = (surface.grid[0] // 4, surface.grid[1] // 4)
+        limits = [("fourths of the surface's heights", fourths)]
     if scene.coupling.kind != "analytic":
         limits.append(("cells of the interface (block.cells)", scene.block.cells[:2]))
     for what, limit in limits:

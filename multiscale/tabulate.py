@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from geometry.collective import together
+from geometry.errors import NotConverged
 from geometry.patches import PatchGrid
 from micro import MicroModel
 from micro.love import love_centre, love_mean
@@ -80,13 +81,24 @@ class IsolatedPatch:
 
         Returns:
             The law; open when first touch lies beyond `closure_end`.
+
+        Raises:
+            NotConverged: When the pressure is a function of closure nowhere.
         """
         if self.touch >= closure_end:
             return _law(np.empty((0, 5)), self.touch, self.reach, 0.0)
         end = self._approach_at(closure_end)
         rows = self.rows(np.linspace(self.touch, end, _FIRST_ROWS, dtype=np.float64))
         rows[0, 1:] = self.touch, 0.0, 0.0, 0.0  # whatever round-off makes of first touch
-        rows, error = self._refined(_increasing(rows), tolerance)
+        rows = _increasing(rows)
+        if len(rows) < 2:
+            raise NotConverged(
+                f"the law of the patch at {self.patch.origin} mm",
+                reason="STIFFER_THAN_ITS_HALF_SPACE",
+                iterations=_FIRST_ROWS,
+                remedy="choose another micro.model or larger patches (patches.grid)",
+            )
+        rows, error = self._refined(rows, tolerance)
         return _law(rows, self.touch, self.reach, error)
 
     def _approach_at(self, closure: float) -> float:

@@ -8,9 +8,10 @@ from scipy.integrate import trapezoid
 from geometry import Spectrum, Surface, synthesise
 from micro import HalfSpaceModel
 
-SQUARE_PUNCH = 0.36678954 * np.pi
-"""Force / (E* δ side) of a rigid square punch: π times the capacitance of the square plate
-(Read 1997, doi 10.1006/jcph.1997.5665), as both are the same problem."""
+SQUARE_PUNCH = 0.36679 * np.pi
+"""Force / (E* δ side) of a rigid square punch: π times the capacitance of the unit square plate
+over 4π ε0, the same problem (Mukhopadhyay & Majumdar 2007, arXiv 0704.1563, collect values of the
+capacitance that agree to these digits)."""
 
 
 def punch(n):

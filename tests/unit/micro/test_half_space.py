@@ -1,6 +1,7 @@
 """The half-space model: its calls, its states and its refusals."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -115,6 +116,35 @@ def test_tilt_turns_the_plane_about_the_centre():
     assert same.force == pytest.approx(state.force, rel=1e-7)
 
 
+@pytest.mark.parametrize("force", [1e-12, 1e-3, 1e4])
+@pytest.mark.parametrize("tilt", [(0.0, 0.0), (0.1, 0.05)])
+def test_any_force_and_tilt(force, tilt):
+    model = HalfSpaceModel(surface=rough(), contact_modulus=E_STAR)
+    state = model.solve_force(force, tilt=tilt)
+    assert state.force == pytest.approx(force, rel=1e-12)  # met by scaling
+    assert state.residual <= model.tolerance
+    # with this tilt a cell touches before the approach at the centre is 0
+    assert (state.approach < 0.0) == (tilt != (0.0, 0.0) and force < 1.0)
+
+
+def test_within_patches_only_they_touch():
+    surface = rough()
+    half = PatchGrid(grid=(1, 1), lengths=(0.48, 1.0))  # 23 rows of cells
+    low = np.where(surface.x[:, None] < 0.48, surface.heights, surface.heights.min() - 1.0)
+    model = HalfSpaceModel(surface=surface, contact_modulus=E_STAR, within=half)
+    state = model.solve(9e-3)
+    assert state.in_contact.any() and not state.in_contact[23:].any()
+    other = HalfSpaceModel(surface=Surface(heights=low, lengths=(1.0, 1.0)), contact_modulus=E_STAR)
+    same = other.solve(9e-3 + other.surface.highest - surface.highest)
+    assert state.force == pytest.approx(same.force, rel=1e-7)
+    by_force = model.solve_force(state.force)
+    assert by_force.approach == pytest.approx(9e-3, rel=3e-8)
+    response = model.respond([9e-3], patches=half, mean_heights=patch_means(surface, half))
+    assert response.force == pytest.approx(state.force, rel=1e-7)
+    with pytest.raises(InputError, match="no cell has its centre in the patches"):
+        replace(model, within=PatchGrid(grid=(1, 1), lengths=(0.1, 0.1), origin=(2.0, 0.0)))
+
+
 def test_no_contact():
     model = HalfSpaceModel(surface=rough(), contact_modulus=E_STAR)
     for state in (model.solve(0.0), model.solve(-1e-3), model.solve_force(0.0)):
@@ -145,6 +175,9 @@ def test_refusals(surface):
         free.respond([], patches=PATCHES, mean_heights=np.zeros(6))
     with pytest.raises(InputError, match="every patch needs one mean height"):
         free.respond([1e-3], patches=PATCHES, mean_heights=np.zeros(5))
+    other = HalfSpaceModel(surface=rough((24, 48)), contact_modulus=1.0).solve(0.0)
+    with pytest.raises(InputError, match=r"\(24, 48\): the solution to start from is of another"):
+        free.solve(1e-3, start=other)
     periodic = HalfSpaceModel(surface=surface, contact_modulus=1.0, periodic=True)
     with pytest.raises(InputError, match="a tilted plane does not continue periodically"):
         periodic.solve(1e-3, tilt=(1e-3, 0.0))
