@@ -22,12 +22,14 @@ from micro.hertz import HertzContact, contact_modulus
 from micro.island_state import IslandState
 from micro.islands import IslandModel
 from micro.love import love_centre, love_integral, love_mean, love_mutual
+from micro.many_summits import PAIR_SUMS
 from micro.models import MODEL_NAMES, MicroModel, micro_model
 from micro.response import Response
 
 __all__ = [
     "MODELS",
     "MODEL_NAMES",
+    "PAIR_SUMS",
     "SOLVERS",
     "AsperityModel",
     "AsperityState",

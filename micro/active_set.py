@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 _MOST_ITERATIONS = 40
 
 
-def active_set(problem: ContactProblem, start: Array) -> Solution:
+def active_set(problem: ContactProblem[Lift], start: Array) -> Solution:
     """Solve a contact problem by damped Newton steps on the normal map.
 
     Args:

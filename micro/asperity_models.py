@@ -7,7 +7,7 @@ interaction the displacements by all contacts add up to w_k (`micro.contact_prob
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -24,11 +24,13 @@ from micro.contact_problem import ContactProblem, Method, Solution, solve
 from micro.curve import PatchSums
 from micro.hertz import HertzContact
 from micro.interaction import Interaction
+from micro.many_summits import PAIR_SUMS, ManySummits, pair_sum
 from micro.plane import RigidPlane
 from micro.response import Response
 from micro.truncated_newton import truncated_newton
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 _LEVEL = (0.0, 0.0)
 
@@ -65,7 +67,9 @@ SOLVERS: Mapping[str, Method] = MappingProxyType(
 class AsperityModel:
     """One of the four discrete models on given asperities.
 
-    Matrices are dense: time and memory grow with the square of the number of summits in reach.
+    How the interaction is summed over pairs follows from the number of summits in reach
+    (`micro.many_summits`): exactly up to 2000, through a mesh above. The truncated Newton method
+    sums every pair directly; its time and memory grow with the square of their number.
 
     Args:
         asperities: The n summits, with the highest point z_M that the approach counts from.
@@ -73,9 +77,11 @@ class AsperityModel:
         elliptic: Whether contacts are ellipses; circles of radius sqrt(R' R'') otherwise.
         interacting: Whether contacts displace each other's summits.
         solver: Solver of the models with interaction, a name in `SOLVERS`.
+        pairs: How to sum over pairs, a name in `PAIR_SUMS`, or ``"auto"`` by their number.
 
     Raises:
-        InputError: When the modulus is not positive or the solver unknown.
+        InputError: When the modulus is not positive, the solver or the sum unknown, or the
+            truncated Newton method shall use another sum than the direct one.
 
     Source:
         Waddad et al. 2016, section 1.2, doi 10.1016/j.triboint.2015.12.023.
@@ -86,9 +92,12 @@ class AsperityModel:
     elliptic: bool
     interacting: bool
     solver: str = "active-set"
+    pairs: str = "auto"
 
     def __post_init__(self) -> None:
         _known(self.solver, SOLVERS, "solver")
+        allowed = ("auto", *PAIR_SUMS) if self.solver == "active-set" else ("auto", "direct")
+        _known(self.pairs, allowed, f"sum over pairs with the solver {self.solver}")
         _ = self._hertz  # checks the modulus
 
     @property
@@ -192,10 +201,13 @@ class AsperityModel:
         )
         rows: dict[int, dict[str, Any]] = {}
         own: Array = np.zeros(len(self.asperities))
+        before = own
         for index in np.argsort(given, kind="stable"):
             plane = RigidPlane.above(self.asperities, given[index], tilt)
-            found = self._solution(plane.required(self.asperities), own)
-            own = found.indentation
+            # Going on as before is right to second order when the steps are equal.
+            start = np.maximum(2.0 * own - before, 0.0)
+            found = self._solution(plane.required(self.asperities), start)
+            own, before = found.indentation, own
             rows[int(index)] = sums.row(plane, found)
         return sums.response(self.name, [rows[index] for index in range(len(given))])
 
@@ -237,7 +249,11 @@ class AsperityModel:
         return Interaction.among(self.asperities, shape, circular=not self.elliptic)
 
     def _lift(self, own: Array) -> Array | float:
-        return self._interaction.lift(own).displacement if self.interacting else 0.0
+        if not self.interacting:
+            return 0.0
+        if pair_sum(len(own)) == "mesh":
+            return self._many.lift(own)
+        return self._interaction.lift(own).displacement
 
     def _solution(self, required: Array, start: Array) -> Solution:
         """Solve for the summits in reach; the displacement of the others is left at 0."""
@@ -247,12 +263,22 @@ class AsperityModel:
         own, displacement = np.zeros_like(required), np.zeros_like(required)
         if reached.size == 0:
             return Solution(own, displacement, 0, 0.0, 0)
-        problem = ContactProblem(
-            interaction=self._interaction.subset(reached), required=required[reached]
-        )
-        found = solve(problem, SOLVERS[self.solver], start[reached])
+        found = self._solution_among(reached, required[reached], start[reached])
         own[reached], displacement[reached] = found.indentation, found.displacement
         return found._replace(indentation=own, displacement=displacement)
+
+    def _solution_among(self, reached: Indices, required: Array, start: Array) -> Solution:
+        way = pair_sum(len(reached)) if self.pairs == "auto" else self.pairs
+        if way == "direct" or self.solver != "active-set":
+            problem = ContactProblem(
+                interaction=self._interaction.subset(reached), required=required
+            )
+            return solve(problem, SOLVERS[self.solver], start)
+        return self._many.solve(way, reached, required, start)
+
+    @cached_property
+    def _many(self) -> ManySummits:
+        return ManySummits(interaction=self._interaction)
 
 
 def asperity_model(
@@ -278,6 +304,6 @@ def asperity_model(
     )
 
 
-def _known(name: str, table: Mapping[str, Any], what: str) -> None:
+def _known(name: str, table: Collection[str], what: str) -> None:
     if name not in table:
         raise InputError(f"this {what} is unknown", value=name, allowed=", ".join(table))

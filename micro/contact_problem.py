@@ -11,13 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import NotConverged
-from micro.interaction import Interaction, Lift
 
 Array = NDArray[np.float64]
 
@@ -27,8 +26,31 @@ TOLERANCE = 1e-10
 _SMALLEST_LOAD_STEP = 1.0 / 256.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ContactProblem:
+class Displacements(Protocol):
+    """What n contacts do to each other's summits, however it was computed."""
+
+    @property
+    def displacement(self) -> Array:
+        """Displacement of every summit by the others, shape (n,) [mm]."""
+
+    @property
+    def engulfed(self) -> int:
+        """Number of ordered pairs whose slope has reached c*."""
+
+
+Lifts = TypeVar("Lifts", bound=Displacements)
+Lifts_co = TypeVar("Lifts_co", bound=Displacements, covariant=True)
+
+
+class Interacting(Protocol[Lifts_co]):
+    """Asperities that displace each other's summits."""
+
+    def lift(self, indentation: Array, /) -> Lifts_co:
+        """Return the displacements by given own indentations, shape (n,) [mm]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ContactProblem(Generic[Lifts]):
     """Displacements that a rigid plane requires of the summits it could touch.
 
     Args:
@@ -36,7 +58,7 @@ class ContactProblem:
         required: d_k > 0, shape (n,) [mm].
     """
 
-    interaction: Interaction
+    interaction: Interacting[Lifts]
     required: Array
 
     @property
@@ -44,7 +66,7 @@ class ContactProblem:
         """Largest required displacement [mm]."""
         return float(self.required.max())
 
-    def residual(self, indentation: Array, lift: Lift) -> float:
+    def residual(self, indentation: Array, lift: Displacements) -> float:
         """Return max |min(t_k, w_k − d_k)| relative to the largest d_k.
 
         Args:
@@ -74,18 +96,20 @@ class Solution(NamedTuple):
     engulfed: int
 
 
-Method = Callable[[ContactProblem, Array], Solution]
+Method = Callable[[ContactProblem[Any], Array], Solution]
 """Takes the problem and a start (n,) [mm]; raises NotConverged."""
 
 
-def solution(problem: ContactProblem, indentation: Array, lift: Lift, iterations: int) -> Solution:
+def solution(
+    problem: ContactProblem[Lifts], indentation: Array, lift: Lifts, iterations: int
+) -> Solution:
     """Put a solution together from its indentations, negative ones cut to 0, and their lift."""
     own = np.maximum(indentation, 0.0)
     residual = problem.residual(own, lift)
     return Solution(own, own + lift.displacement, iterations, residual, lift.engulfed)
 
 
-def solve(problem: ContactProblem, method: Method, start: Array) -> Solution:
+def solve(problem: ContactProblem[Any], method: Method, start: Array) -> Solution:
     """Solve directly from a start and, where this fails, along growing required displacements.
 
     Args:
@@ -102,7 +126,7 @@ def solve(problem: ContactProblem, method: Method, start: Array) -> Solution:
         return _continued(problem, method, failure.iterations)
 
 
-def _continued(problem: ContactProblem, method: Method, spent: int) -> Solution:
+def _continued(problem: ContactProblem[Any], method: Method, spent: int) -> Solution:
     """Scale all d_k from 0 to 1 in steps that are halved on failure and doubled on success."""
     load, step = 0.0, 0.5
     indentation = np.zeros_like(problem.required)
@@ -121,7 +145,7 @@ def _continued(problem: ContactProblem, method: Method, spent: int) -> Solution:
         load, step, indentation = trial, 2.0 * step, found.indentation
 
 
-def _lost(problem: ContactProblem, spent: int, load: float, reason: str) -> NotConverged:
+def _lost(problem: ContactProblem[Any], spent: int, load: float, reason: str) -> NotConverged:
     return NotConverged(
         f"the contact of {len(problem.required)} interacting asperities"
         f" (largest required displacement {problem.scale:.4g} mm, reached {load:.1%} of it)",

@@ -33,7 +33,9 @@ Array = NDArray[np.float64]
 MERGING_SLOPE = 2.0 ** (2.0 / 3.0) - 1.0
 """Largest relative stiffness c* of one contact at another's summit."""
 
-_SINE_MERGED = float(np.sin(0.5 * np.pi * MERGING_SLOPE))
+SINE_MERGED = float(np.sin(0.5 * np.pi * MERGING_SLOPE))
+"""a/r of a circular contact whose slope at distance r is c*."""
+
 _ARRAYS = ("x", "y", "angle", "beta", "integral", "size", "v_merged")
 _NEWTON_STEPS = 30
 
@@ -119,19 +121,30 @@ class Interaction:
         slope[own] = 0.0
         return Lift(active, field @ (1.0 / (self.size * self.integral)[active]), slope)
 
+    def local(self, dx: Array, dy: Array, index: NDArray[np.intp] | slice) -> tuple[Array, Array]:
+        """Return differences of position along and across the axes of contacts [mm].
+
+        Args:
+            dx: Differences along x; those to one contact in the last axis [mm].
+            dy: Differences along y [mm].
+            index: The contacts.
+        """
+        if self.circular:
+            return dx, dy
+        cos, sin = np.cos(self.angle[index]), np.sin(self.angle[index])
+        return cos * dx + sin * dy, cos * dy - sin * dx
+
     @cached_property
     def _squared_distances(self) -> tuple[Array, Array]:
         """Squared distances along and across the axes of contact i (column) [mm²]."""
         dx, dy = self.x[:, None] - self.x, self.y[:, None] - self.y
-        if not self.circular:
-            cos, sin = np.cos(self.angle), np.sin(self.angle)
-            dx, dy = cos * dx + sin * dy, cos * dy - sin * dx
-        return dx**2, dy**2
+        along, across = self.local(dx, dy, slice(None))
+        return along**2, across**2
 
     def _fields(self, active: NDArray[np.intp], s: Array) -> tuple[Array, Array]:
         x_squared, y_squared = (part[:, active] for part in self._squared_distances)
         if self.circular:
-            return circular_field(x_squared + y_squared, s, _SINE_MERGED)
+            return circular_field(x_squared + y_squared, s, SINE_MERGED)
         return elliptic_field(x_squared, y_squared, s, self.beta[active], self.v_merged[active])
 
 

@@ -8,24 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import NotConverged
-from micro.interaction import Lift
+from micro.contact_problem import Lifts
 
 Array = NDArray[np.float64]
-
-Evaluate = Callable[[Array], tuple[Lift, Array]]
-"""Takes the indentations; returns the lift that they cause and the error to bring to 0."""
 
 _SHORTEST_STEP = 2.0**-10
 _LEAST_DECREASE = 1e-4
 
 
 def damped_step(
-    evaluate: Evaluate, point: Array, step: Array, norm: float
-) -> tuple[Array, Lift, Array]:
+    evaluate: Callable[[Array], tuple[Lifts, Array]], point: Array, step: Array, norm: float
+) -> tuple[Array, Lifts, Array]:
     """Return the first of point + step, point + step/2, … whose error is smaller, with it.
 
     Args:
-        evaluate: The lift and the error at a point.
+        evaluate: Takes the indentations; returns the lift that they cause and the error to bring
+            to 0.
         point: Where the step starts, shape (n,).
         step: The full Newton step, shape (n,).
         norm: Euclidean norm of the error at ``point``.

@@ -26,7 +26,7 @@ _MOST_SETS = 200
 _BLOCK_CHANGES = 5
 
 
-def truncated_newton(problem: ContactProblem, start: Array) -> Solution:
+def truncated_newton(problem: ContactProblem[Lift], start: Array) -> Solution:
     """Solve a contact problem by the paper's minimisation, with its set of contacts updated.
 
     All summits that violate a condition change sides together; when their number has not shrunk
@@ -59,7 +59,9 @@ def truncated_newton(problem: ContactProblem, start: Array) -> Solution:
     raise _failure("CONTACTING_SET", spent)
 
 
-def _minimise(problem: ContactProblem, contacting: Mask, start: Array) -> tuple[Array, Lift, int]:
+def _minimise(
+    problem: ContactProblem[Lift], contacting: Mask, start: Array
+) -> tuple[Array, Lift, int]:
     """Bring w − d to 0 over the contacting set; a negative t acts on nobody else."""
     rows, goal = np.flatnonzero(contacting), 0.1 * TOLERANCE * problem.scale
 
@@ -85,7 +87,7 @@ def _inner_solve(lift: Lift, rows: NDArray[np.intp], error: Array, *, forcing: f
     return lsqr(jacobian, -error, atol=0.0, btol=forcing, conlim=0.0, iter_lim=4 * len(rows))[0]
 
 
-def _violations(problem: ContactProblem, contacting: Mask, t: Array, lift: Lift) -> Mask:
+def _violations(problem: ContactProblem[Lift], contacting: Mask, t: Array, lift: Lift) -> Mask:
     slack = 0.1 * TOLERANCE * problem.scale
     pulled = contacting & (t < 0.0)
     penetrated = ~contacting & (lift.displacement < problem.required - slack)
