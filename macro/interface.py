@@ -68,7 +68,7 @@ class Sampling:
             laws: One law per patch.
             closure: Closures of the samples, shape (n,) [mm].
         """
-        return self._by_patch([law.pressure for law in laws], closure)
+        return self.by_patch([law.pressure for law in laws], closure)
 
     def stiffness(self, laws: Sequence[ContactLaw], closure: Array) -> Array:
         """Return the laws' stiffnesses dp/dc at this rank's samples, shape (n,) [MPa/mm].
@@ -77,14 +77,20 @@ class Sampling:
             laws: One law per patch.
             closure: Closures of the samples, shape (n,) [mm].
         """
-        return self._by_patch([law.stiffness for law in laws], closure)
+        return self.by_patch([law.stiffness for law in laws], closure)
 
     def patch_sums(self, values: Array) -> Array:
         """Return the integrals of sampled values over every patch, shape (N,); collective."""
         local = np.bincount(self.patch, weights=self.weight * values, minlength=self.count)
         return self.operator.comm.tompi4py().allreduce(local, op=MPI.SUM)
 
-    def _by_patch(self, functions: Sequence[Callable[[Array], Array]], closure: Array) -> Array:
+    def by_patch(self, functions: Sequence[Callable[[Array], Array]], closure: Array) -> Array:
+        """Return functions of closure, one per patch, at this rank's samples, shape (n,).
+
+        Args:
+            functions: One function per patch.
+            closure: Closures of the samples, shape (n,) [mm].
+        """
         values = np.empty_like(closure)
         ends = np.searchsorted(self.patch, np.arange(self.count + 1))
         for i in np.unique(self.patch):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from geometry.collective import together
 from geometry.errors import InputError
 from macro.block import Block
 from macro.equilibrium import Equilibrium
@@ -89,6 +90,7 @@ class PressedBlock:
         self.equilibrium = Equilibrium(block, self._sampling, laws)
         self.newton = NewtonSolver(self.equilibrium, block.solver)
         self._basis = DisplacementBasis(self.equilibrium, self._sampling)
+        self._closure: Array = np.zeros(len(self._sampling.weight))
 
     def press(self, approach: float, tilt: tuple[float, float] = (0.0, 0.0)) -> PressState:
         """Find the equilibrium at an approach.
@@ -116,6 +118,25 @@ class PressedBlock:
         seconds = comm.allreduce(time.perf_counter() - began, op=MPI.MAX)
         return self._state(approach, solution, report, seconds)
 
+    def patch_means(self, functions: Sequence[Callable[[Array], Array]]) -> Array:
+        """Average functions of closure over the patches, at the latest equilibrium.
+
+        Args:
+            functions: One function of closures (n,) [mm] per patch.
+
+        Returns:
+            The means over the samples of each patch, shape (N,).
+
+        Raises:
+            Exception: What a function raises on one rank, on every rank.
+
+        Note:
+            Collective.
+        """
+        comm, sampling = self.equilibrium.block.mesh.comm, self._sampling
+        values = together(comm, lambda: sampling.by_patch(functions, self._closure))
+        return sampling.patch_sums(values) / self._interface.areas
+
     def _rigid_approach(self, approach: float, tilt: tuple[float, float]) -> Array:
         """Return the plane's approach at this rank's samples, shape (n,) [mm]."""
         patches, sampling = self._interface.patches, self._sampling
@@ -125,7 +146,7 @@ class PressedBlock:
     def _state(
         self, approach: float, solution: PETSc.Vec, report: NewtonReport, wall_s: float
     ) -> PressState:
-        closure = self.equilibrium.closure(solution)
+        self._closure = closure = self.equilibrium.closure(solution)
         forces = self._sampling.patch_sums(self.equilibrium.pressure(closure))
         areas = self._interface.areas
         return PressState(

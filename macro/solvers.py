@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 from petsc4py import PETSc
 
-from geometry.errors import NotConverged
+from geometry.errors import InputError, NotConverged
 
 PREFIX = "patchlaw_"
 """Prefix of every PETSc option: ``-patchlaw_ksp_rtol 1e-6`` on the command line wins."""
@@ -44,6 +44,10 @@ def default_options(prefix: str, defaults: Mapping[str, object]) -> Iterator[Non
         database.setValue(name, defaults[name])
     try:
         yield
+    except PETSc.Error as error:
+        raise InputError(
+            f"PETSc refuses the solver's options: {str(error).splitlines()[-1]}", key="command line"
+        ) from None
     finally:
         for name in added:
             database.delValue(name)

@@ -45,6 +45,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except PatchlawError as error:
         terminal.complain(comm, error)
         return error.exit_code
+    except BrokenPipeError:  # whoever read our output has enough
+        sys.stderr.close()
+        return 0
     except Exception:
         traceback.print_exc()
         if comm is not None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 from pathlib import Path
 from typing import Any
 
 from geometry.collective import on_root
-from geometry.errors import InputError
+from geometry.errors import InputError, NotConverged
 from geometry.statistics import roughness
 from multiscale import plan, terminal
 from multiscale.law_files import write_laws
@@ -30,18 +31,21 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
     scene, folder = _scene_and_folder(choice, comm)
     run = Run(scene, comm)
     terminal.show_plan(comm, run.stage)
-    try:
-        with terminal.progress(comm, len(scene.approaches)) as advance:
+    failure = None
+    with terminal.progress(comm, len(scene.approaches)) as advance:
+        try:
             for step in run.load_steps():
                 advance(step)
-    finally:
-        # A step that fails for good keeps what was accepted before it; an earlier error, nothing.
-        if run.steps:
-            terminal.show_history(comm, run.history())
-            files = on_root(comm, lambda: write_results(folder, run, options=options))
-            if scene.output.fields:
-                files += write_fields(folder, run)
-            terminal.show_files(comm, files)
+        except NotConverged as error:  # on all ranks; what was accepted before it is kept
+            failure = error
+    if run.steps:
+        terminal.show_history(comm, run.history())
+        files = on_root(comm, lambda: write_results(folder, run, options=options))
+        if scene.output.fields:
+            files += write_fields(folder, run)
+        terminal.show_files(comm, files)
+    if failure is not None:
+        raise failure
 
 
 def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -129,8 +133,16 @@ def _scene_and_folder(choice: argparse.Namespace, comm: Any) -> tuple[Scene, Pat
     def read() -> tuple[Scene, Path]:
         scene = Scene.load(choice.scene, choice.set)
         folder = choice.out or Path("results") / scene.name
-        if folder.exists() and not folder.is_dir():
-            raise InputError("is not a folder", key="--out", value=str(folder))
+        _check_folder(folder)
         return scene, folder
 
     return on_root(comm, read)
+
+
+def _check_folder(folder: Path) -> None:
+    """Refuse a folder that could not be written to, before anything is computed."""
+    nearest = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not nearest.is_dir():
+        raise InputError(f"{nearest} is not a folder", key="--out", value=str(folder))
+    if not os.access(nearest, os.W_OK | os.X_OK):
+        raise InputError(f"{nearest} cannot be written to", key="--out", value=str(folder))

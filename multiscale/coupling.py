@@ -140,13 +140,14 @@ class EmbeddedCoupling:
 
     def _load_step(self, number: int, press: PressState, newton: int, linear: int) -> LoadStep:
         """Read area, contacts and separation off the laws at the converged closures."""
-        laws, closure = self.table.laws, press.closure
+        laws = self.table.laws
         try:
-            area = np.array([law.area_fraction_at(c) for law, c in zip(laws, closure, strict=True)])
+            area = self.pressed.patch_means([law.area_fraction_at for law in laws])
+            gaps = self.pressed.patch_means([law.separation_at for law in laws])
         except InputError as error:
             raise _beyond_law(number, press.approach, error) from error
-        contacts = sum(int(law.contacts_at(c)) for law, c in zip(laws, closure, strict=True))
-        gaps = [law.separation_at(c) for law, c in zip(laws, closure, strict=True)]
+        mean_closures = zip(laws, press.closure, strict=True)
+        contacts = sum(int(law.contacts_at(c, extend=True)) for law, c in mean_closures)
         nominal = self.table.patches.area * self.table.patches.count
         return LoadStep(
             step=number,
@@ -161,7 +162,7 @@ class EmbeddedCoupling:
             wall_s=press.wall_s,
             reason=press.reason,
             patches=PatchState(
-                closure_mm=closure, pressure_MPa=press.pressure, contact_area_fraction=area
+                closure_mm=press.closure, pressure_MPa=press.pressure, contact_area_fraction=area
             ),
             imbalance=(press.force - press.reaction) / press.force if press.force else 0.0,
             residuals=tuple(map(float, press.residuals)),
@@ -185,7 +186,7 @@ def _failed_step(number: int, approach: float, error: NotConverged) -> NotConver
         f"load step {number} (approach {approach:.6g} mm)",
         reason=error.reason,
         iterations=error.iterations,
-        remedy=f"it was halved {_MOST_HALVINGS} times; raise load.steps, or see {error.remedy}",
+        remedy=f"it was halved {_MOST_HALVINGS} times; raise load.steps or lower load.approach",
     )
 
 

@@ -20,6 +20,7 @@ _COLUMNS = {
     "pressure": "MPa",
     "contact_area_fraction": "1",
     "contacts": "1",
+    "relief": "mm",
 }
 _SCALARS = {"touch": "mm", "reach": "mm", "interpolation_error": "1"}
 

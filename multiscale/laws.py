@@ -31,10 +31,12 @@ class PatchLaw:
         approach: Local rigid approaches that the rows were computed at, shape (n,) [mm].
         contact_area_fraction: Real over nominal contact area, shape (n,).
         contacts: Number of asperities in contact, shape (n,).
+        relief: Mean displacement of the patch by its contacts beyond that by their mean pressure,
+            shape (n,) [mm]: what the mean gap is wider than the closure alone tells.
         touch: Closure at first touch [mm]: the table's first, where an open patch would be touched
             first, or infinite when it has no asperity.
-        reach: Rigid plane's height over the patch's mean plane at zero approach [mm], so that
-            reach − c is the mean separation.
+        reach: Rigid plane's height over the patch's mean plane at zero approach [mm]; the mean
+            separation is reach − c + relief.
         interpolation_error: Largest error of the interpolated pressure against the micro model
             between the table points, relative to the largest pressure of the table.
     """
@@ -44,12 +46,15 @@ class PatchLaw:
     approach: Array
     contact_area_fraction: Array
     contacts: NDArray[np.int64]
+    relief: Array
     touch: float
     reach: float
     interpolation_error: float = 0.0
 
     def __post_init__(self) -> None:
-        columns = (self.pressure, self.approach, self.contact_area_fraction, self.contacts)
+        columns = (
+            self.pressure, self.approach, self.contact_area_fraction, self.contacts, self.relief,
+        )  # fmt: skip
         if any(column.shape != self.closure.shape for column in columns):
             raise InputError("a patch law needs columns of one length")
         if self.closure.size == 1:
@@ -79,6 +84,10 @@ class PatchLaw:
     @cached_property
     def _area(self) -> PchipInterpolator:
         return _with_tangent(PchipInterpolator(self.closure, self.contact_area_fraction))
+
+    @cached_property
+    def _lift(self) -> PchipInterpolator:
+        return _with_tangent(PchipInterpolator(self.closure, self.relief))
 
     def at(self, closure: ArrayLike, *, extend: bool = False) -> tuple[Array, Array]:
         """Return pressure and stiffness, the exact derivative of the same interpolant.
@@ -130,9 +139,21 @@ class PatchLaw:
         row = np.searchsorted(self.closure, closures, side="right") - 1
         return np.where(row >= 0, np.append(self.contacts, 0)[row], 0)
 
-    def separation_at(self, closure: ArrayLike) -> Array:
-        """Return the mean gap between the plane and the patch's surface [mm]."""
-        return self.reach - np.asarray(closure, dtype=float)
+    def separation_at(self, closure: ArrayLike, *, extend: bool = False) -> Array:
+        """Return the mean gap between the plane and the patch's displaced surface [mm].
+
+        Args:
+            closure: Closures of any shape [mm].
+            extend: Go on beyond the table instead of raising.
+
+        Raises:
+            InputError: When a closure lies beyond the table and `extend` is false.
+        """
+        closures = self._checked(closure, extend)
+        if self.is_open:
+            return self.reach - closures
+        inside = np.maximum(closures, self.closure[0])
+        return np.asarray(self.reach - closures + self._lift(inside))
 
     def _checked(self, closure: ArrayLike, extend: bool) -> Array:
         closures = np.asarray(closure, dtype=float)

@@ -27,6 +27,16 @@ def statements(stage: Stage) -> Iterator[tuple[str, str]]:
 
 def warnings(stage: Stage) -> Iterator[str]:
     """Yield what a user should know about the validity of the scene."""
+    excess = stage.surface.highest - stage.surface.heights.max()
+    if excess > 0.1 * stage.scene.loading.approach:
+        x, y = stage.surface.highest_point
+        yield (
+            f"the approach counts from the interpolant's highest point, {1e3 * excess:.3g} µm "
+            f"above the highest of the given heights, at x = {x:.4g} mm, y = {y:.4g} mm: the "
+            "heights are too coarse or too noisy there"
+        )
+    if not stage.reached_patches:
+        yield "nothing lies within the largest approach: no force will act"
     if stage.by_summits and stage.reached_at_border:
         yield (
             f"maxima on the surface's border within the largest approach: "
@@ -41,10 +51,17 @@ def warnings(stage: Stage) -> Iterator[str]:
             "patch borders cut cells of the surface: every patch is taken alone along whole cells; "
             "a grid that is a multiple of the patches would fit"
         )
+    cells = min(c / n for c, n in zip(stage.shape.cells[:2], stage.patches.grid, strict=True))
+    if cells * stage.shape.degree < 4:
+        yield (
+            f"{cells:.3g} cells along a patch: fewer than four linear (two quadratic) ones make "
+            "the block stiffer by several per cent under a patch's pressure; refine block.cells"
+        )
     fit = alignment(stage.shape, stage.patches)
     if not fit:
         yield fit.sentence
-    if max(stage.patches.size) > 0.5 * min(stage.shape.height, *stage.surface.lengths):
+    widths = [length + 2.0 * stage.shape.margin for length in stage.surface.lengths]
+    if max(stage.patches.size) > 0.5 * min(stage.shape.height, *widths):
         yield (
             "the patches are not small against the block: the half-space correction (Love) inside "
             "their laws is an approximation there"
@@ -91,9 +108,12 @@ def _coupling(stage: Stage) -> str:
 def _block(stage: Stage) -> str:
     shape, block = stage.shape, stage.scene.block
     nx, ny, nz = shape.cells
+    margin = (
+        f"{shape.margin:g} mm beyond it in {shape.margin_cells} cells, " if shape.margin else ""
+    )
     kind = "hexahedra" if shape.element.startswith("Q") else "hexahedra split into tetrahedra"
     return (
         f"{nx} × {ny} × {nz} {kind} ({shape.element}) under the interface, grading "
-        f"{shape.grading:g}, {block.sides} sides, contact modulus "
+        f"{shape.grading:g}, {margin}{block.sides} sides, contact modulus "
         f"{stage.model.contact_modulus:.6g} MPa"
     )

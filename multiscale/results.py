@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +18,11 @@ from multiscale.run import Run
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_FILES = (
+    "history.csv", "patches.csv", "laws.h5", "provenance.json", "report.html", "surface.png",
+    "curves.png", "pressures.png", "laws.png", "fields.xdmf", "fields.h5",
+)  # fmt: skip
+
 
 def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
     """Write the files of a run, finished or stopped; call it on one rank.
@@ -30,6 +36,7 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
         The files written.
     """
     history = run.history()
+    _remove_older(folder)
     files = write_tables(folder, history)
     table = run.table
     if table is not None:
@@ -51,6 +58,12 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
         )
         files.append(write_text(folder / "report.html", page))
     return files
+
+
+def _remove_older(folder: Path) -> None:
+    """Remove an earlier run's files, lest this run's tables stand beside another scene's laws."""
+    for name in _FILES:
+        (folder / name).unlink(missing_ok=True)
 
 
 def write_figure(path: Path, figure: Figure) -> Path:
@@ -107,7 +120,12 @@ def write_fields(folder: Path, run: Run) -> list[Path]:
 
     # The XDMF file names its HDF5 file, so both are written under their names in a folder aside.
     aside = folder / ".fields.partial"
-    on_root(run.comm, lambda: aside.mkdir(parents=True, exist_ok=True))
+
+    def empty() -> None:
+        shutil.rmtree(aside, ignore_errors=True)  # a crash may have left one
+        aside.mkdir(parents=True)
+
+    on_root(run.comm, empty)
     write_xdmf(aside / "fields.xdmf", run.interface, state)
 
     def move() -> list[Path]:

@@ -7,17 +7,27 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from geometry.errors import InputError
 from geometry.spectrum import Spectrum
 from multiscale.quantities import Length, Pressure, Slope, SpectralAmplitude
 from multiscale.refusals import first_refusal
 
+
+def _number(value: Any) -> Any:
+    """Refuse what pydantic would turn into a number: truth values and text."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError("is not a number (allowed: a number without quotes)")
+    return value
+
+
+Number = Annotated[float, BeforeValidator(_number)]
+Flag = Annotated[bool, Field(strict=True)]
 PositiveLength = Annotated[Length, Field(gt=0)]
 Count = Annotated[int, Field(ge=1, strict=True)]
 Pair = Annotated[tuple[Count, Count], Field(description="x, y")]
-Band = Annotated[tuple[float, float], Field(description="lower, upper number of waves per side")]
+Band = Annotated[tuple[Number, Number], Field(description="lower, upper number of waves per side")]
 
 
 class _Section(BaseModel):
@@ -27,7 +37,7 @@ class _Section(BaseModel):
 class SpectrumSection(_Section):
     """A synthesised self-affine surface; see `geometry.Spectrum` for the meaning of each key."""
 
-    hurst: Annotated[float, Field(gt=0, le=1)]
+    hurst: Annotated[Number, Field(gt=0, le=1)]
     waves: Band | None = None
     waves_x: Band | None = None
     waves_y: Band | None = None
@@ -69,7 +79,7 @@ class BlockSection(_Section):
 
     height: PositiveLength = 1.0
     young_modulus: Annotated[Pressure, Field(gt=0)]
-    poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)]
+    poisson_ratio: Annotated[Number, Field(gt=-1, lt=0.5)]
     sides: Literal["free", "roller"] = "free"
     cells: Annotated[tuple[Count, Count, Count], Field(description="cells in x, y, z")] = (
         40,
@@ -77,10 +87,10 @@ class BlockSection(_Section):
         25,
     )
     element: Literal["Q1", "Q2", "P1", "P2"] = "Q1"
-    grading: Annotated[float, Field(ge=1, description="bottom to top layer height")] = 1.0
+    grading: Annotated[Number, Field(ge=1, description="bottom to top layer height")] = 1.0
     margin: Annotated[Length, Field(ge=0, description="block beyond the interface")] = 0.0
     margin_cells: Count = 8
-    margin_grading: Annotated[float, Field(ge=1)] = 8.0
+    margin_grading: Annotated[Number, Field(ge=1)] = 8.0
 
 
 class PatchesSection(_Section):
@@ -109,7 +119,7 @@ class CouplingSection(_Section):
     kind: Literal["isolated", "analytic"] = "isolated"
     love: Literal["mean", "centre"] = "mean"
     interface: Literal["patchwise", "pointwise"] = "patchwise"
-    table_tolerance: Annotated[float, Field(gt=0, lt=0.1)] = 1e-4
+    table_tolerance: Annotated[Number, Field(gt=0, lt=0.1)] = 1e-4
 
 
 class LoadSection(_Section):
@@ -126,9 +136,9 @@ class LoadSection(_Section):
 class OutputSection(_Section):
     """What is written beside the tables; nothing else is computed."""
 
-    figures: bool = True
-    report: bool = True
-    fields: bool = False
+    figures: Flag = True
+    report: Flag = True
+    fields: Flag = False
 
 
 class Scene(_Section):

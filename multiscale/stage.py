@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +22,15 @@ from geometry.surface import Surface
 from micro import MODELS, MicroModel, contact_modulus, micro_model
 from multiscale.coupling import tilted_approaches
 from multiscale.scene import Scene
+
+BYTES_PER_HEIGHT = 100
+"""Memory that surface, spline and spectrum take per height, roughly [B]."""
+
+BYTES_PER_CELL = 5000
+"""Memory that mesh, stiffness and multigrid take per cell, roughly [B]."""
+
+CLOSURE_RESERVE = 0.15
+"""Closure beyond the largest approach that laws are made for, relative to load.approach."""
 
 _DETREND_ORDER = {"mean": 0, "plane": 1, "quadratic": 2}
 
@@ -58,9 +69,16 @@ class Stage:
 
     @property
     def closure_ends(self) -> NDArray[np.float64]:
-        """Largest approach, and so closure, that each patch can see, shape (N,) [mm]."""
-        loading = self.scene.loading
-        return tilted_approaches(self.patches, loading.approach, loading.tilt)
+        """Largest closure that each patch's law is made for, shape (N,) [mm].
+
+        It is the largest approach there, and a reserve: the surface of a bent block may rise
+        between its loads. Laws that hold at points see the approach at the patch's corners.
+        """
+        loading, size = self.scene.loading, self.patches.size
+        ends = tilted_approaches(self.patches, loading.approach, loading.tilt)
+        if self.scene.coupling.interface == "pointwise":
+            ends = ends + 0.5 * float(np.abs(np.multiply(size, loading.tilt)).sum())
+        return ends + CLOSURE_RESERVE * loading.approach
 
     @property
     def reached(self) -> NDArray[np.bool_]:
@@ -81,14 +99,13 @@ class Stage:
 
     @property
     def reached_patches(self) -> int:
-        """Number of patches that hold anything within the largest approach."""
+        """Number of patches with anything that the largest closure of their laws can touch."""
+        x, y = (part.ravel() for part in np.meshgrid(self.surface.x, self.surface.y, indexing="ij"))
+        z = self.surface.heights.ravel()
         if self.by_summits:
-            summits, reached = self.asperities, self.reached
-            owners = self.patches.index_of(summits.x, summits.y)[reached]
-        else:
-            x, y = np.meshgrid(self.surface.x, self.surface.y, indexing="ij")
-            owners = self.patches.index_of(x.ravel(), y.ravel())[self.reached_cells]
-        return int(np.unique(owners).size)
+            x, y, z = self.asperities.x, self.asperities.y, self.asperities.z
+        owner = self.patches.index_of(x, y)
+        return int(np.unique(owner[self.closure_ends[owner] > self.surface.highest - z]).size)
 
     def _within(self, x: NDArray, y: NDArray, z: NDArray) -> NDArray[np.bool_]:
         loading = self.scene.loading
@@ -103,6 +120,7 @@ def make_stage(scene: Scene) -> Stage:
     Raises:
         InputError: When something cannot be made or does not fit; names file, key and value.
     """
+    _check_size(scene)
     surface = make_surface(scene)
     patches = PatchGrid(grid=scene.patches.grid, lengths=surface.lengths)
     _check_patches(scene, surface)
@@ -163,6 +181,26 @@ def _block_shape(scene: Scene, surface: Surface) -> BlockShape:
         margin_cells=block.margin_cells if block.margin else 0,
         margin_grading=block.margin_grading if block.margin else 1.0,
     )
+
+
+def _check_size(scene: Scene) -> None:
+    """Refuse what could never fit into this machine's memory, before anything is allocated."""
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    sizes: list[tuple[str, Sequence[int] | None, int]] = [
+        ("surface.grid", scene.surface.grid, BYTES_PER_HEIGHT),
+        ("patches.grid", scene.patches.grid, BYTES_PER_HEIGHT),
+    ]
+    if scene.coupling.kind != "analytic":
+        sizes.append(("block.cells", scene.block.cells, BYTES_PER_CELL))
+    for key, counts, each in sizes:
+        if counts is not None and math.prod(counts) * each > memory:
+            raise InputError(
+                f"needs about {math.prod(counts) * each / 1e9:.3g} GB of memory",
+                key=key,
+                value=list(counts),
+                allowed=f"what fits into {memory / 1e9:.3g} GB",
+                file=scene.file,
+            )
 
 
 def _check_patches(scene: Scene, surface: Surface) -> None:

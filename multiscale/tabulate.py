@@ -59,14 +59,17 @@ class IsolatedPatch:
         return float(self.model.datum - self.mean_height)
 
     def rows(self, approaches: Array) -> Array:
-        """Return rows (approach, closure, pressure, area fraction, contacts), shape (n, 5)."""
+        """Return rows: approach, closure, pressure, area fraction, contacts, relief; (n, 6)."""
         response = self.model.respond(
             approaches, patches=self.patch, mean_heights=np.array([self.mean_height])
         )
         pressure = response.mean_pressure
         closure = approaches - self.compliance * pressure  # eq. 31
         area = response.contact_area_fraction
-        return np.column_stack((approaches, closure, pressure, area, response.contacts))
+        # the block's closure is a mean over the patch, whichever displacement made the law's
+        mean = love_mean(*self.patch.half_sizes) / (np.pi * self.model.contact_modulus)
+        relief = response.patch_displacement[:, 0] - mean * pressure
+        return np.column_stack((approaches, closure, pressure, area, response.contacts, relief))
 
     def law(self, closure_end: float, tolerance: float) -> PatchLaw:
         """Tabulate the law from first touch to a closure.
@@ -86,10 +89,10 @@ class IsolatedPatch:
             NotConverged: When the pressure is a function of closure nowhere.
         """
         if self.touch >= closure_end:
-            return _law(np.empty((0, 5)), self.touch, self.reach, 0.0)
+            return _law(np.empty((0, 6)), self.touch, self.reach, 0.0)
         end = self._approach_at(closure_end)
         rows = self.rows(np.linspace(self.touch, end, _FIRST_ROWS, dtype=np.float64))
-        rows[0, 1:] = self.touch, 0.0, 0.0, 0.0  # whatever round-off makes of first touch
+        rows[0, 1:] = self.touch, 0.0, 0.0, 0.0, 0.0  # whatever round-off makes of first touch
         rows = _increasing(rows)
         if len(rows) < 2:
             raise NotConverged(
@@ -160,6 +163,7 @@ def _law(rows: Array, touch: float, reach: float, error: float) -> PatchLaw:
         pressure=rows[:, 2],
         contact_area_fraction=rows[:, 3],
         contacts=rows[:, 4].astype(np.int64),
+        relief=rows[:, 5],
         touch=touch,
         reach=reach,
         interpolation_error=error,

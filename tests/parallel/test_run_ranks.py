@@ -72,6 +72,10 @@ def test_a_rank_may_own_nothing_of_the_interface(mpirun):
         ("block.young=3", "block.young: unknown key; did you mean 'young_modulus'?"),
         ("patches.grid=[50, 4]", "patches.grid = [50, 4]: more patches than cells"),
         ("surface.spectrum.waves=[2, 200]", "the grid is too coarse"),
+        ("block.young_modulus='-4 GPa'", "block.young_modulus = '-4 GPa': must be greater than 0"),
+        ("block.poisson_ratio=0.5", "block.poisson_ratio = 0.5: must be less than 0.5"),
+        ("load.approach='8 kg'", "load.approach = '8 kg': has the wrong unit"),
+        ("surface.grid=[1, 256]", "surface.spectrum"),
     ],
 )
 def test_wrong_input_ends_all_ranks_with_one_message(mpirun, tmp_path, override, text):
@@ -81,3 +85,36 @@ def test_wrong_input_ends_all_ranks_with_one_message(mpirun, tmp_path, override,
     assert done.stderr.count("patchlaw: ") == 1
     assert text in done.stderr
     assert not out.exists()
+
+
+@pytest.mark.parametrize("content", [None, np.zeros((1, 64)), np.full((8, 8), np.nan)])
+def test_bad_heights_end_all_ranks(mpirun, root, tmp_path, content):
+    text = (root / PAPER).read_text(encoding="utf-8").replace("spectrum = {", 'file = "h.npy" # {')
+    (tmp_path / "scene.toml").write_text(text.replace("grid = [256, 256]", ""), encoding="utf-8")
+    if content is not None:
+        np.save(tmp_path / "h.npy", content)
+    out = tmp_path / "out"
+    done = mpirun(2, "-m", "multiscale", "run", tmp_path / "scene.toml", "--out", out, timeout=60)
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.count("patchlaw: ") == 1
+    assert "h.npy" in done.stderr
+    assert not out.exists()
+
+
+def test_bug_on_one_rank_ends_all(mpirun, tmp_path):
+    """An error that only one rank meets must not leave the others waiting."""
+    code = (
+        "import sys; from mpi4py import MPI; from multiscale import Run;"
+        "steps = Run.load_steps\n"
+        "def broken(self):\n"
+        "    for step in steps(self):\n"
+        "        yield step\n"
+        "        if MPI.COMM_WORLD.rank == 1: raise RuntimeError('one rank')\n"
+        "Run.load_steps = broken\n"
+        "from multiscale.cli import main\n"
+        f"sys.exit(main(['run', '{PAPER}', '--out', '{tmp_path / 'out'}', '--set', "
+        "'surface.grid=[64, 64]', 'block.cells=[8, 8, 4]', 'load.steps=3']))"
+    )
+    done = mpirun(2, "-c", code, timeout=60)
+    assert done.returncode != 0
+    assert "RuntimeError: one rank" in done.stderr

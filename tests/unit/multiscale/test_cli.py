@@ -65,6 +65,46 @@ def test_nothing_unasked_is_written(capsys, tmp_path):
     }
 
 
+def test_files_of_an_earlier_scene_do_not_stay(capsys, tmp_path):
+    words = ("run", PAPER, "--out", str(tmp_path), "--set", *SMALL, "output.figures=false")
+    assert call(capsys, *words, "output.fields=true")[0] == 0
+    assert {"laws.h5", "fields.xdmf", "fields.h5"} <= {path.name for path in tmp_path.iterdir()}
+    assert call(capsys, *words, "coupling.kind=analytic", "output.report=false")[0] == 0
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"history.csv", "patches.csv", "provenance.json"}
+
+
+@pytest.mark.parametrize(
+    ("overrides", "text"),
+    [
+        (["block.cells=[4, 4, 3]"], "2 cells along a patch"),
+        (["patches.grid=[3, 3]", "block.cells=[16, 16, 3]"], "patch borders cut elements"),
+        (["patches.grid=[1, 1]"], "the patches are not small against the block"),
+        (["patches.grid=[4, 4]"], "maxima on the surface's border"),
+        (["block.margin='3 mm'"], "3 mm beyond it in 8 cells"),
+    ],
+)
+def test_plan_says_what_is_doubtful(capsys, overrides, text):
+    code, shown, _ = call(capsys, "plan", PAPER, "--set", *SMALL, *overrides)
+    assert code == 0
+    assert text in " ".join(shown.split())
+
+
+def test_large_block_is_no_reason_for_a_warning(capsys):
+    extra = ["block.margin='3 mm'", "block.height='8 mm'"]
+    _, shown, _ = call(capsys, "plan", PAPER, "--set", *SMALL, *extra)
+    assert "not small against the block" not in shown
+
+
+def test_noisy_border_is_said(capsys, heights):
+    scene, path = heights
+    np.save(path, 1e-3 * np.random.default_rng(3).normal(size=(16, 16)))
+    _, shown, _ = call(capsys, "plan", str(scene), "--set", "load.approach='0.2 um'")
+    shown = " ".join(shown.split())
+    assert "above the highest of the given heights" in shown
+    assert "nothing lies within the largest approach" in shown
+
+
 def test_plan_runs_and_writes_nothing(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     code, shown, _ = call(capsys, "plan", PAPER)
@@ -96,6 +136,9 @@ def test_schema_is_json(capsys):
         (("run", PAPER, "--set", "surface.grid=[1, 256]"), "surface.spectrum"),
         (("run", PAPER, "--set", "surface.spectrum.waves=[2, 200]"), "surface.spectrum"),
         (("run", PAPER, "--out", PAPER), "is not a folder"),
+        (("run", PAPER, "--out", PAPER + "/x"), "is not a folder"),
+        (("run", PAPER, "--set", "surface.grid=[1000000, 1000000]"), "GB of memory"),
+        (("run", PAPER, "--set", "block.cells=[10000, 10000, 1000]"), "GB of memory"),
         (("fly",), "invalid choice: 'fly'"),
         ((), "the following arguments are required: COMMAND"),
     ],

@@ -22,6 +22,7 @@ def law(end=1.0):
         approach=closure,
         contact_area_fraction=0.1 * closure,
         contacts=np.arange(11),
+        relief=0.01 * closure,
         touch=0.0,
         reach=2.0,
     )
@@ -53,6 +54,9 @@ class ShyBlock:
             wall_s=0.0,
         )
 
+    def patch_means(self, functions):
+        return np.array([function(np.array([self.last]))[0] for function in functions])
+
 
 def embedded(block, *laws):
     table = LawTable(patches=PATCHES, laws=laws or (law(), law()), made_by={})
@@ -63,7 +67,7 @@ def test_steps_read_the_laws_at_their_closures():
     (step,) = embedded(ShyBlock(1.0)).load_steps([0.45])
     assert step.contacts == 8
     assert step.contact_area_fraction == pytest.approx(0.045, rel=1e-12)  # a straight line
-    assert step.mean_separation_mm == pytest.approx(1.55, rel=1e-12)  # the same subtraction
+    assert step.mean_separation_mm == pytest.approx(1.5545, rel=1e-12)  # reach − c + relief
     assert step.mean_pressure_MPa == pytest.approx(0.45**1.5, rel=1e-12)  # force over area
 
 

@@ -9,7 +9,7 @@ from geometry.patches import PatchGrid
 from multiscale.law_files import LawTable, read_laws, write_laws
 from multiscale.laws import PatchLaw
 
-COLUMNS = ("closure", "pressure", "approach", "contact_area_fraction", "contacts")
+COLUMNS = ("closure", "pressure", "approach", "contact_area_fraction", "contacts", "relief")
 
 
 @pytest.fixture
@@ -17,7 +17,7 @@ def table():
     random = np.random.default_rng(5)
 
     def law(rows):
-        rising = np.sort(random.random((4, rows)), axis=1)
+        rising = np.sort(random.random((5, rows)), axis=1)
         rising[1, :1] = 0.0
         return PatchLaw(
             closure=rising[0],
@@ -25,6 +25,7 @@ def table():
             approach=rising[2],
             contact_area_fraction=rising[3],
             contacts=np.arange(rows),
+            relief=rising[4],
             touch=rising[0, 0] if rows else np.inf,
             reach=random.random(),
             interpolation_error=1 / 3,

@@ -59,6 +59,13 @@ def test_misspelt_option_is_named_at_the_end(patchlaw):
     assert "-patchlaw_ksp_tpye" in shown.stdout
 
 
+def test_impossible_option_is_wrong_input(patchlaw):
+    done = patchlaw("-pc_type", "foo")
+    assert done.returncode == 2
+    assert "patchlaw: command line: PETSc refuses the solver's options" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
 def test_failure_exits_3_and_names_step_and_remedy(patchlaw, tmp_path):
     done = patchlaw("-snes_max_it", "1", "-snes_rtol", "1e-14")
     assert done.returncode == 3
