@@ -38,7 +38,8 @@ class PatchLaw:
         reach: Rigid plane's height over the patch's mean plane at zero approach [mm]; the mean
             separation is reach − c + relief.
         interpolation_error: Largest error of the interpolated pressure against the micro model
-            between the table points, relative to the largest pressure of the table.
+            half-way between rows, relative to the pressure there, or to a hundredth of the
+            table's largest where that is more.
     """
 
     closure: Array

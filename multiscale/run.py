@@ -64,7 +64,7 @@ class Run:
                     mean_heights=self.stage.mean_heights,
                     closure_ends=self.stage.closure_ends,
                     love=coupling.love,
-                    tolerance=coupling.table_tolerance,
+                    tolerance=self.stage.table_tolerance,
                     comm=self.comm,
                 )
         return self.table
@@ -86,7 +86,9 @@ class Run:
         notes = []
         if self.table is not None:
             error = max(law.interpolation_error for law in self.table.laws)
-            notes.append(f"interpolation error of the laws: {error:.1e} of their largest pressure")
+            notes.append(
+                f"interpolation error of the laws half-way between their rows: {error:.1e}"
+            )
             imbalance = max((abs(step.imbalance) for step in self.steps), default=0.0)
             notes.append(f"force against the support's reaction: equal to {imbalance:.1e}")
         area = max((step.contact_area_fraction for step in self.steps), default=0.0)

@@ -119,7 +119,7 @@ class CouplingSection(_Section):
     kind: Literal["isolated", "analytic"] = "isolated"
     love: Literal["mean", "centre"] = "mean"
     interface: Literal["patchwise", "pointwise"] = "patchwise"
-    table_tolerance: Annotated[Number, Field(gt=0, lt=0.1)] = 1e-4
+    table_tolerance: Annotated[Number, Field(gt=0, lt=0.1)] | None = None
 
 
 class LoadSection(_Section):

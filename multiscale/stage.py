@@ -68,6 +68,14 @@ class Stage:
         return self.scene.micro.model in MODELS
 
     @property
+    def table_tolerance(self) -> float:
+        """Interpolation error that laws are tabulated to.
+
+        By default 1e-4, and 1e-3 for models that see cells, whose steps finer tables would trace.
+        """
+        return self.scene.coupling.table_tolerance or (1e-4 if self.by_summits else 1e-3)
+
+    @property
     def closure_ends(self) -> NDArray[np.float64]:
         """Largest closure that each patch's law is made for, shape (N,) [mm].
 

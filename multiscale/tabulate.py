@@ -20,6 +20,7 @@ from multiscale.laws import PatchLaw
 Array = NDArray[np.float64]
 _FIRST_ROWS = 9
 _MOST_ROWS = 400  # solutions of the micro model spent on one law
+_LEAST_SCALE = 0.01  # of the largest pressure: below it an error counts as one of this much
 _MOST_TRIALS = 40  # in search of the approach that gives a closure
 _LOVE = {"mean": love_mean, "centre": love_centre}
 
@@ -80,7 +81,8 @@ class IsolatedPatch:
 
         Args:
             closure_end: Largest closure that will be asked for [mm].
-            tolerance: Error of the interpolated pressure relative to the table's largest one.
+            tolerance: Error of the interpolated pressure half-way between rows, relative to the
+                pressure there, or to a hundredth of the table's largest where that is more.
 
         Returns:
             The law; open when first touch lies beyond `closure_end`.
@@ -126,7 +128,8 @@ class IsolatedPatch:
             new = self.rows(halfway)
             spent += len(new)
             root = PchipInterpolator(rows[:, 1], rows[:, 2] ** (2 / 3))
-            error = np.abs(np.maximum(root(new[:, 1]), 0.0) ** 1.5 - new[:, 2]) / rows[-1, 2]
+            scale = np.maximum(new[:, 2], _LEAST_SCALE * rows[-1, 2])
+            error = np.abs(np.maximum(root(new[:, 1]), 0.0) ** 1.5 - new[:, 2]) / scale
             bad = error > tolerance
             worst = max(worst, float(error[~bad].max(initial=0.0)))
             missed = float(error.max())
@@ -188,7 +191,7 @@ def isolated_laws(
         mean_heights: Mean height of the surface over each patch, shape (N,) [mm].
         closure_ends: Largest closure each law will be asked for, shape (N,) [mm].
         love: Displacement in the closure, ``mean`` or ``centre``.
-        tolerance: Interpolation error of the pressure, relative to each law's largest pressure.
+        tolerance: Interpolation error of the pressure, see `IsolatedPatch.law`.
         comm: MPI communicator; the patches are dealt to its ranks.
 
     Returns:

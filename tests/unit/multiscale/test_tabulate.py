@@ -54,10 +54,11 @@ def test_interpolation_error_is_what_the_law_says(whole, model):
     law = whole.law(10e-3, TOLERANCE)
     approach = np.random.default_rng(1).uniform(law.approach[0], law.approach[-1], 300)
     _, closure, pressure, _, _, _ = whole.rows(np.sort(approach)).T
-    error = np.abs(law.at(closure)[0] - pressure).max() / law.pressure[-1]
+    scale = np.maximum(pressure, 0.01 * law.pressure[-1])
+    error = (np.abs(law.at(closure)[0] - pressure) / scale).max()
     assert law.interpolation_error <= TOLERANCE
     # the law's own figure is measured half-way between rows; elsewhere it may be a little more
-    assert error <= 1.5 * TOLERANCE
+    assert error <= 3 * TOLERANCE
 
 
 def test_tighter_tolerance_gives_more_rows_and_less_error(whole):
