@@ -1,7 +1,8 @@
 """Contact of a rough surface with a rigid plane on the scale of its asperities.
 
-Asperities and a contact modulus make an `AsperityModel`, a surface and a contact modulus an
-`IslandModel`; solved along approaches each gives a `Response` of the surface and its patches;
+Asperities and a contact modulus make an `AsperityModel`, a surface and a contact modulus a
+`ScaledModel`, whose asperities follow the load, or an `IslandModel`; solved along approaches each
+gives a `Response` of the surface and its patches;
 `love` tells how patches of pressure move the half-space.
 """
 
@@ -21,8 +22,11 @@ from micro.islands import IslandModel
 from micro.love import love_centre, love_integral, love_mean, love_mutual
 from micro.many_summits import PAIR_SUMS
 from micro.response import Response
+from micro.scaled_model import BORDERS, CURVATURES, ScaledModel
 
 __all__ = [
+    "BORDERS",
+    "CURVATURES",
     "MODELS",
     "PAIR_SUMS",
     "SOLVERS",
@@ -33,6 +37,7 @@ __all__ = [
     "IslandState",
     "ModelKind",
     "Response",
+    "ScaledModel",
     "area_factor",
     "asperity_model",
     "axis_factor",
