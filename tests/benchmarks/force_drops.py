@@ -37,7 +37,7 @@ def study(surfaces):
             start = time.perf_counter()
             response = model.respond(APPROACHES, patches=PATCHES, mean_heights=[0.0])
             spent = (time.perf_counter() - start) / len(APPROACHES)
-            fall = -np.diff(response.force) / response.force[1:]
+            fall = -np.diff(response.force) / np.maximum(response.force[1:], 1e-12)
             worst = int(np.argmax(fall))
             row = (fall[worst], response.contact_area_fraction[worst + 1], spent)
             found.setdefault(name, []).append(row)
