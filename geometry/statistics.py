@@ -146,7 +146,7 @@ def power_spectrum(surface: Surface, *, window: str | None = None) -> PowerSpect
     cell = 4.0 * np.pi**2 / surface.area
     return PowerSpectrum(
         wavenumber=np.bincount(ring, weights=size.ravel())[kept] / count,
-        density=np.bincount(ring, weights=power.ravel())[kept] / count / cell,
+        density=np.divide(np.bincount(ring, weights=power.ravel())[kept], count * cell),
         waves=count,
         cell=cell,
     )

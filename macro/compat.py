@@ -57,7 +57,12 @@ def mesh_from_gmsh(model: Any, comm: Any) -> tuple[Any, Any]:
 
 @_quiet_compiler()
 def vector_space(mesh: Any, degree: int) -> Any:
-    """Return the continuous Lagrange space of displacements, three components per node."""
+    """Return the continuous Lagrange space of displacements, three components per node.
+
+    Args:
+        mesh: dolfinx mesh.
+        degree: Polynomial degree.
+    """
     if hasattr(fem, "functionspace"):
         return fem.functionspace(mesh, ("Lagrange", degree, (3,)))
     return fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
@@ -93,7 +98,13 @@ def _as_table(table: Any, mesh: Any) -> NDArray[np.int32]:
 
 
 def lagrange_values(cell_name: str, degree: int, points: NDArray[np.float64]) -> NDArray:
-    """Tabulate the scalar Lagrange basis on the reference cell, shape (points, nodes)."""
+    """Tabulate the scalar Lagrange basis on the reference cell, shape (points, nodes).
+
+    Args:
+        cell_name: Name of the cell, such as ``hexahedron``.
+        degree: Polynomial degree.
+        points: Reference coordinates, shape (points, dimension).
+    """
     element = basix.create_element(
         basix.ElementFamily.P, _CELLS[cell_name], degree, basix.LagrangeVariant.equispaced
     )
@@ -124,7 +135,15 @@ def compile_form(form: Any) -> Any:
 
 
 def assemble_matrix(form: Any, conditions: Sequence[Any]) -> PETSc.Mat:
-    """Assemble a compiled bilinear form, with ones on the diagonal of the constrained rows."""
+    """Assemble a compiled bilinear form, with ones on the diagonal of the constrained rows.
+
+    Args:
+        form: Compiled form.
+        conditions: Dirichlet conditions.
+
+    Note:
+        Collective.
+    """
     matrix = fem_petsc.create_matrix(form)
     fem_petsc.assemble_matrix(matrix, form, list(conditions), 1.0)
     matrix.assemble()
@@ -145,6 +164,11 @@ def petsc_vector(function: Any) -> PETSc.Vec:
 
 def write_xdmf(path: str, mesh: Any, functions: Sequence[Any]) -> None:
     """Write a mesh and functions of its degree, or constant on cells, as XDMF with HDF5.
+
+    Args:
+        path: File to write, ending in ``.xdmf``.
+        mesh: dolfinx mesh.
+        functions: Functions on the mesh.
 
     Note:
         Collective.

@@ -77,6 +77,11 @@ def stiffness_form(space: Any, material: Material, quadrature_degree: int) -> An
     """Return the bilinear form a(u, v) = ∫ σ(u) : ε(v) dV as UFL.
 
     Lamé's constants enter as UFL constants, so that one compiled form serves every material.
+
+    Args:
+        space: Vector space of the displacements.
+        material: Elastic constants [MPa].
+        quadrature_degree: Polynomial degree that is integrated exactly.
     """
     first, shear = (fem.Constant(space.mesh, PETSc.ScalarType(value)) for value in material.lame)
     trial, test = ufl.TrialFunction(space), ufl.TestFunction(space)

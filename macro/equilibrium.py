@@ -39,14 +39,15 @@ class Equilibrium:
 
     def __init__(self, block: Block, sampling: Sampling, laws: Sequence[ContactLaw]) -> None:
         self.block, self._sampling, self._laws = block, sampling, laws
-        self.approach = np.zeros(len(sampling.weight))
+        self.approach: Array = np.zeros(len(sampling.weight))
         self.scale = 0.0
         stiffness = block.stiffness
         self._load = stiffness.createVecLeft()
-        self._samples, self._slope, self._stretch = (
-            sampling.operator.createVecRight() for _ in range(3)
+        self._samples = sampling.operator.createVecRight()
+        self._action = _TangentAction(stiffness, sampling)
+        self.tangent = PETSc.Mat().createPython(
+            stiffness.getSizes(), self._action, comm=stiffness.comm
         )
-        self.tangent = PETSc.Mat().createPython(stiffness.getSizes(), self, comm=stiffness.comm)
         self.tangent.setUp()
 
     def closure(self, displacement: PETSc.Vec) -> Array:
@@ -66,7 +67,12 @@ class Equilibrium:
         return together(self.block.mesh.comm, lambda: self._sampling.stiffness(self._laws, closure))
 
     def residual(self, displacement: PETSc.Vec, residual: PETSc.Vec) -> None:
-        """Write K u − B p [N]."""
+        """Write the residual K u − B p(closure(u)) at a displacement u.
+
+        Args:
+            displacement: u [mm].
+            residual: Receives the residual [N].
+        """
         pressure = self.pressure(self.closure(displacement))
         self._samples.array[:] = pressure
         self._sampling.operator.mult(self._samples, self._load)
@@ -77,13 +83,25 @@ class Equilibrium:
     def update_tangent(self, displacement: PETSc.Vec) -> None:
         """Move the tangent to a displacement."""
         stiffness = self.stiffness(self.closure(displacement))
-        self._slope.array[:] = stiffness / self._sampling.weight
+        self._action.slope.array[:] = stiffness / self._sampling.weight
+
+
+class _TangentAction:
+    """What PETSc calls to multiply by the tangent.
+
+    Apart from :class:`Equilibrium`, because a matrix whose context holds the matrix is never freed.
+    """
+
+    def __init__(self, stiffness: PETSc.Mat, sampling: Sampling) -> None:
+        self._stiffness, self._operator = stiffness, sampling.operator
+        self.slope = sampling.operator.createVecRight()  # p'/w
+        self._stretch = self.slope.duplicate()
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Multiply by the tangent; called by PETSc."""
-        self.block.stiffness.mult(x, y)
-        self._sampling.operator.multTranspose(x, self._stretch)
-        self._stretch.pointwiseMult(self._stretch, self._slope)
-        self._sampling.operator.multAdd(self._stretch, y, y)
+        """Write K x + B diag(p'/w) Bᵀ x."""
+        self._stiffness.mult(x, y)
+        self._operator.multTranspose(x, self._stretch)
+        self._stretch.pointwiseMult(self._stretch, self.slope)
+        self._operator.multAdd(self._stretch, y, y)
 
     multTranspose = mult

@@ -83,7 +83,7 @@ def facet_quadrature(
     return FacetQuadrature(
         x=positions[:, 0],
         y=positions[:, 1],
-        weight=np.outer(2.0 * _areas(triangles), weights).ravel(),
+        weight=np.multiply.outer(2.0 * _areas(triangles), weights).ravel(),
         patch=patch,
         cell=facets.cell[facet],
         nodes=compat.cell_nodes(space)[facets.cell[facet]],

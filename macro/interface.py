@@ -62,11 +62,21 @@ class Sampling:
     count: int
 
     def pressure(self, laws: Sequence[ContactLaw], closure: Array) -> Array:
-        """Return the laws' pressures at this rank's samples, shape (n,) [MPa]."""
+        """Return the laws' pressures at this rank's samples, shape (n,) [MPa].
+
+        Args:
+            laws: One law per patch.
+            closure: Closures of the samples, shape (n,) [mm].
+        """
         return self._by_patch([law.pressure for law in laws], closure)
 
     def stiffness(self, laws: Sequence[ContactLaw], closure: Array) -> Array:
-        """Return the laws' stiffnesses dp/dc at this rank's samples, shape (n,) [MPa/mm]."""
+        """Return the laws' stiffnesses dp/dc at this rank's samples, shape (n,) [MPa/mm].
+
+        Args:
+            laws: One law per patch.
+            closure: Closures of the samples, shape (n,) [mm].
+        """
         return self._by_patch([law.stiffness for law in laws], closure)
 
     def patch_sums(self, values: Array) -> Array:

@@ -38,8 +38,9 @@ class DisplacementBasis:
     def __init__(self, equilibrium: Equilibrium, sampling: Sampling, *, size: int = 32) -> None:
         self._equilibrium, self._sampling, self._size = equilibrium, sampling, size
         self._comm = equilibrium.block.mesh.comm
-        self._vectors, self._forces = np.empty((2, 0, equilibrium.block.owned_dofs))  # W, K W
-        self._sampled = np.empty((0, len(sampling.weight)))  # Wᵀ B of this rank's samples
+        self._vectors: Array = np.empty((0, equilibrium.block.owned_dofs))  # W
+        self._forces: Array = np.empty_like(self._vectors)  # K W
+        self._sampled: Array = np.empty((0, len(sampling.weight)))  # Wᵀ B of this rank's samples
 
     def __len__(self) -> int:
         return len(self._vectors)

@@ -52,6 +52,10 @@ def default_options(prefix: str, defaults: Mapping[str, object]) -> Iterator[Non
 def linear_solver(matrix: PETSc.Mat, prefix: str = PREFIX) -> PETSc.KSP:
     """Return a solver for a symmetric positive definite matrix, its preconditioner set up.
 
+    Args:
+        matrix: The matrix, with its near-nullspace attached.
+        prefix: Prefix of its PETSc options.
+
     Note:
         Collective.
     """
@@ -66,6 +70,11 @@ def linear_solver(matrix: PETSc.Mat, prefix: str = PREFIX) -> PETSc.KSP:
 
 def solve_linear(solver: PETSc.KSP, load: PETSc.Vec, solution: PETSc.Vec) -> int:
     """Solve and return the number of iterations.
+
+    Args:
+        solver: The solver.
+        load: Right-hand side.
+        solution: Receives the solution.
 
     Raises:
         NotConverged: With the name of PETSc's reason.
@@ -85,7 +94,12 @@ def solve_linear(solver: PETSc.KSP, load: PETSc.Vec, solution: PETSc.Vec) -> int
 
 
 def reason_name(reasons: type, code: int) -> str:
-    """Return the name of a PETSc converged reason, such as ``DIVERGED_LINE_SEARCH``."""
+    """Return the name of a PETSc converged reason, such as ``DIVERGED_LINE_SEARCH``.
+
+    Args:
+        reasons: PETSc's class of reasons.
+        code: The number that a solver reports.
+    """
     names = [name for name, value in vars(reasons).items() if value == code and name.isupper()]
     # short aliases such as MAX_IT exist: the longest name is the one that PETSc documents
     return max(names, key=len, default=f"reason {code}")

@@ -1,13 +1,14 @@
 """Contact of a rough surface with a rigid plane on the scale of its asperities.
 
-Asperities and a contact modulus make an `AsperityModel`, a surface and a contact modulus a
-`ScaledModel`, whose asperities follow the load, or an `IslandModel`; solved along approaches each
-gives a `Response` of the surface and its patches;
-`love` tells how patches of pressure move the half-space.
+Asperities and a contact modulus make an `AsperityModel`; a surface and a contact modulus make a
+`ScaledModel`, whose asperities follow the load, an `IslandModel` or a `HalfSpaceModel`. Solved
+along approaches each gives a `Response` of the surface and its patches; `love` tells how patches
+of pressure move the half-space.
 """
 
 from micro.asperity_models import MODELS, SOLVERS, AsperityModel, ModelKind, asperity_model
 from micro.asperity_state import AsperityState
+from micro.contacts import Contacts, find_contacts
 from micro.ellipse import (
     area_factor,
     axis_factor,
@@ -16,11 +17,14 @@ from micro.ellipse import (
     eccentricity_approximate,
     force_factor,
 )
+from micro.half_space import HalfSpaceModel
+from micro.half_space_state import HalfSpaceState
 from micro.hertz import HertzContact, contact_modulus
 from micro.island_state import IslandState
 from micro.islands import IslandModel
 from micro.love import love_centre, love_integral, love_mean, love_mutual
 from micro.many_summits import PAIR_SUMS
+from micro.models import MODEL_NAMES, MicroModel, micro_model
 from micro.response import Response
 from micro.scaled_model import BORDERS, CURVATURES, ScaledModel
 
@@ -28,13 +32,18 @@ __all__ = [
     "BORDERS",
     "CURVATURES",
     "MODELS",
+    "MODEL_NAMES",
     "PAIR_SUMS",
     "SOLVERS",
     "AsperityModel",
     "AsperityState",
+    "Contacts",
+    "HalfSpaceModel",
+    "HalfSpaceState",
     "HertzContact",
     "IslandModel",
     "IslandState",
+    "MicroModel",
     "ModelKind",
     "Response",
     "ScaledModel",
@@ -45,9 +54,11 @@ __all__ = [
     "contact_modulus",
     "eccentricity",
     "eccentricity_approximate",
+    "find_contacts",
     "force_factor",
     "love_centre",
     "love_integral",
     "love_mean",
     "love_mutual",
+    "micro_model",
 ]

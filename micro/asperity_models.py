@@ -8,10 +8,10 @@ interaction the displacements by all contacts add up to w_k (`micro.contact_prob
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -106,6 +106,30 @@ class AsperityModel:
         kind = ModelKind(self.elliptic, self.interacting)
         return next(name for name, value in MODELS.items() if value == kind)
 
+    @property
+    def datum(self) -> float:
+        """Height z_M that the approach counts from [mm]."""
+        return self.asperities.highest
+
+    @property
+    def first_touch(self) -> float:
+        """Approach of a level plane at first contact [mm]; infinite without asperities."""
+        heights = self.asperities.z
+        return float(self.datum - heights.max()) if heights.size else np.inf
+
+    def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
+        """Return the model of one patch on its own half-space: of the summits that it holds.
+
+        Args:
+            patches: Patches of the surface.
+            index: Flat index of the patch.
+
+        Returns:
+            The model, whose approach counts from the whole surface's highest point, and its patch.
+        """
+        own = patches.index_of(self.asperities.x, self.asperities.y) == index
+        return replace(self, asperities=self.asperities.subset(own)), patches.single(index)
+
     def solve(
         self,
         approach: float,
@@ -173,7 +197,8 @@ class AsperityModel:
         given = np.atleast_1d(np.asarray(approaches, float))
         sums = self.sums(patches, mean_heights)
         rows: dict[int, dict[str, Any]] = {}
-        own = before = np.zeros(len(self.asperities))
+        own: Array = np.zeros(len(self.asperities))
+        before = own
         for index in np.argsort(given, kind="stable"):
             plane = RigidPlane.above(self.asperities, given[index], tilt)
             # Going on as before is right to second order when the steps are equal.
@@ -227,18 +252,22 @@ class AsperityModel:
             return self._many.lift(own)
         return self._interaction.lift(own).displacement
 
-    def sums(self, patches: PatchGrid, mean_heights: ArrayLike) -> PatchSums:
+    def sums(
+        self, patches: PatchGrid, mean_heights: ArrayLike, home: Asperities | None = None
+    ) -> PatchSums:
         """Return what sums the results of this model over patches.
 
         Args:
             patches: Patches; every asperity lies in one.
             mean_heights: Mean heights of the surface on the patches, shape (N,) [mm].
+            home: The summits, where they are not the centres of the contacts.
 
         Raises:
             InputError: When a summit lies outside the patches, or the mean heights do not fit.
         """
         return PatchSums(
             asperities=self.asperities,
+            home=self.asperities if home is None else home,
             patches=patches,
             mean_heights=np.asarray(mean_heights, float),
             hertz=self._hertz,

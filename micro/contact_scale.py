@@ -96,6 +96,19 @@ class ScaledAsperities:
         )
         return replace(whole, summits=whole.at(np.zeros(len(whole.catchment))))
 
+    def subset(self, mask: NDArray[np.bool_]) -> ScaledAsperities:
+        """Return some of the asperities.
+
+        Args:
+            mask: Which, shape (n,).
+        """
+        return replace(
+            self,
+            summits=self.summits.subset(mask),
+            catchment=self.catchment[mask],
+            fitted=self.fitted[mask],
+        )
+
     def at(self, indentation: Array) -> Asperities:
         """Return the asperities with the curvature at the scale of contacts.
 

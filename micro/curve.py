@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry import Asperities, PatchGrid
+from geometry import Asperities, PatchGrid, Surface
 from geometry.errors import InputError
 from micro.asperity_state import HertzCoefficients
 from micro.contact_problem import Solution
@@ -29,6 +29,7 @@ class PatchSums:
 
     Args:
         asperities: The n asperities.
+        home: The same at their summits, which tell the patch.
         patches: The N patches; every summit lies in one.
         mean_heights: Mean heights of the patches, shape (N,) [mm].
         hertz: Coefficients of the asperities.
@@ -39,6 +40,7 @@ class PatchSums:
     """
 
     asperities: Asperities
+    home: Asperities
     patches: PatchGrid
     mean_heights: Array
     hertz: HertzCoefficients
@@ -52,7 +54,7 @@ class PatchSums:
     @cached_property
     def owner(self) -> NDArray[np.intp]:
         """Flat index of the patch that holds each summit, shape (n,)."""
-        return self.patches.index_of(self.asperities.x, self.asperities.y)
+        return self.patches.index_of(self.home.x, self.home.y)
 
     def row(self, plane: RigidPlane, solution: Solution) -> dict[str, Any]:
         """Return the fields of a response for one approach."""
@@ -80,7 +82,7 @@ class PatchSums:
 
     def response(self, name: str, rows: Sequence[dict[str, Any]]) -> Response:
         """Put rows together, in their order."""
-        return collected(rows, model=name, patches=self.patches, modulus=self.contact_modulus)
+        return Response.of(rows, name, self.contact_modulus, self.patches)
 
     def _summed(self, on: NDArray[np.intp], values: Array | None) -> NDArray[Any]:
         return np.bincount(self.owner[on], values, minlength=self.patches.count)
@@ -97,6 +99,11 @@ class PatchSums:
         )
 
 
+def whole_patch(surface: Surface) -> PatchGrid:
+    """Return the single patch that a surface's rectangle is."""
+    return PatchGrid(grid=(1, 1), lengths=surface.lengths)
+
+
 def checked_means(mean_heights: ArrayLike, patches: PatchGrid) -> Array:
     """Return the mean heights of patches as an array.
 
@@ -111,35 +118,3 @@ def checked_means(mean_heights: ArrayLike, patches: PatchGrid) -> Array:
             allowed=f"shape ({patches.count},)",
         )
     return means
-
-
-def collected(
-    rows: Sequence[dict[str, Any]],
-    *,
-    model: str,
-    patches: PatchGrid,
-    modulus: float,
-    warnings: Sequence[str] = (),
-) -> Response:
-    """Put the rows of single approaches together to a response.
-
-    Args:
-        rows: Fields of the response that have one entry for each approach.
-        model: Name of the micro model.
-        patches: The patches.
-        modulus: E* [MPa].
-        warnings: Sentences about the approaches outside the model's range of validity.
-
-    Raises:
-        InputError: When there is no row.
-    """
-    if not rows:
-        raise InputError("a response needs at least one approach", value=[])
-    columns = {key: np.array([row[key] for row in rows]) for key in rows[0]}
-    return Response(
-        model=model,
-        contact_modulus=modulus,
-        nominal_area=patches.area * patches.count,
-        warnings=tuple(warnings),
-        **columns,
-    )

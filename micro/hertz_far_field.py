@@ -67,7 +67,7 @@ def _divided(power: list[Array], offset: Array) -> list[Array]:
     quotient = [power[0]]
     for term in power[1:]:
         quotient.append(term - offset * quotient[-1])
-    return [term / (3.0 + 2.0 * n) for n, term in enumerate(quotient)]
+    return [np.divide(term, 3.0 + 2.0 * n) for n, term in enumerate(quotient)]
 
 
 def _polynomial(coefficients: list[Array], x: Array) -> Array:

@@ -18,12 +18,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geometry import PatchGrid, Surface
-from micro.curve import checked_means, collected
+from micro.curve import checked_means, whole_patch
 from micro.hertz import checked_modulus
 from micro.island_passes import Settled, settle
 from micro.island_state import IslandState
@@ -49,6 +50,7 @@ class IslandModel:
     Args:
         surface: The surface.
         contact_modulus: E* [MPa].
+        highest: Height z_M that the approach counts from [mm]; the surface's own when not given.
 
     Raises:
         InputError: When the modulus is not positive.
@@ -56,6 +58,7 @@ class IslandModel:
 
     surface: Surface
     contact_modulus: float
+    highest: float | None = None
 
     def __post_init__(self) -> None:
         checked_modulus(self.contact_modulus)
@@ -64,6 +67,30 @@ class IslandModel:
     def name(self) -> str:
         """Name of the model."""
         return "islands"
+
+    @property
+    def datum(self) -> float:
+        """Height z_M that the approach counts from [mm]."""
+        return self.surface.highest if self.highest is None else self.highest
+
+    @property
+    def first_touch(self) -> float:
+        """Approach of a level plane at first contact [mm]."""
+        return self.datum - self.surface.highest
+
+    def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
+        """Return the model of one patch on its own half-space, cut out along whole cells.
+
+        Args:
+            patches: Patches of the surface.
+            index: Flat index of the patch.
+
+        Returns:
+            The model, whose approach counts from the whole surface's highest point, and its patch.
+        """
+        x, y = patches.bounds(index)
+        piece = self.surface.cropped(x=x, y=y)
+        return replace(self, surface=piece, highest=self.datum), whole_patch(piece)
 
     def solve(self, approach: float, *, tilt: tuple[float, float] = _LEVEL) -> IslandState:
         """Solve the contact at one approach of the plane.
@@ -115,11 +142,11 @@ class IslandModel:
         ]
         means = checked_means(mean_heights, patches)
         if not planes:
-            return collected([], model=self.name, patches=patches, modulus=self.contact_modulus)
+            return Response.of([], self.name, self.contact_modulus, patches)
         sums = IslandSums(
             relief=self._relief(max(planes, key=lambda plane: plane.approach)),
             lengths=self.surface.lengths,
-            highest=self.surface.highest,
+            highest=self.datum,
             patches=patches,
             mean_heights=means,
             contact_modulus=self.contact_modulus,
@@ -130,16 +157,10 @@ class IslandModel:
             state = self._state(plane, settled)
             rows.append(sums.row(plane, settled, state))
             warnings += [state.warning] if state.warning else []
-        return collected(
-            rows,
-            model=self.name,
-            patches=patches,
-            modulus=self.contact_modulus,
-            warnings=warnings,
-        )
+        return Response.of(rows, self.name, self.contact_modulus, patches, warnings)
 
     def _settled(self, relief: Relief, plane: RigidPlane) -> Settled:
-        return settle(relief, self.surface.highest - plane.approach)
+        return settle(relief, self.datum - plane.approach)
 
     def _relief(self, plane: RigidPlane) -> Relief:
         """Return the catchments that a plane and all above it need."""
@@ -149,7 +170,7 @@ class IslandModel:
         if plane.tilt != _LEVEL:
             lean = plane.at(surface.x[:, None], surface.y) - plane.approach
             surface = replace(surface, heights=surface.heights + lean, periodic=False)
-        floor = self.surface.highest - _MARGIN * max(plane.approach, 0.0)
+        floor = self.datum - _MARGIN * max(plane.approach, 0.0)
         return Relief.of(surface, floor=-np.inf if small else floor)
 
     @cached_property

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry import PatchGrid
 from geometry.errors import InputError
 
 Array = NDArray[np.float64]
@@ -79,10 +82,42 @@ class Response:
                     allowed=f"shape {expected}",
                 )
 
+    @classmethod
+    def of(
+        cls,
+        rows: Sequence[dict[str, Any]],
+        model: str,
+        contact_modulus: float,
+        patches: PatchGrid,
+        warnings: Sequence[str] = (),
+    ) -> Self:
+        """Put together the fields at single approaches, in their order.
+
+        Args:
+            rows: For each approach the fields that have one entry per approach.
+            model: Name of the micro model.
+            contact_modulus: E* [MPa].
+            patches: The patches.
+            warnings: Sentences about approaches outside the model's range of validity.
+
+        Raises:
+            InputError: When there is no row.
+        """
+        if not rows:
+            raise InputError("a response needs at least one approach", value=[])
+        columns = {key: np.array([row[key] for row in rows]) for key in rows[0]}
+        return cls(
+            model=model,
+            contact_modulus=contact_modulus,
+            nominal_area=patches.area * patches.count,
+            warnings=tuple(warnings),
+            **columns,
+        )
+
     @property
     def mean_pressure(self) -> Array:
         """Force per nominal area, shape (n,) [MPa]."""
-        return self.force / self.nominal_area
+        return np.divide(self.force, self.nominal_area)
 
     @property
     def patch_pressure(self) -> Array:
@@ -92,7 +127,7 @@ class Response:
     @property
     def contact_area_fraction(self) -> Array:
         """Real over nominal contact area A/A0, shape (n,)."""
-        return self.contact_area / self.nominal_area
+        return np.divide(self.contact_area, self.nominal_area)
 
     def kappa(self, rms_slope: float) -> Array:
         """Return κ of A/A0 = κ p/(rms slope · E*), shape (n,); NaN where nothing touches.

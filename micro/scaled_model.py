@@ -10,9 +10,9 @@ from 0.3 to 10 % of contact area, and within 7 % in area; with the fitted curvat
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,7 +23,7 @@ from micro.asperity_models import MODELS, AsperityModel, asperity_model
 from micro.asperity_state import AsperityState
 from micro.contact_problem import Solution
 from micro.contact_scale import ScaledAsperities
-from micro.curve import checked_means, collected
+from micro.curve import checked_means
 from micro.plane import RigidPlane
 from micro.relaxation import Relaxation
 from micro.response import Response
@@ -60,6 +60,8 @@ class ScaledModel:
         border: A name in `BORDERS`. The radii of border asperities are always fitted.
         solver: Solver of the models with interaction.
         pairs: How to sum over pairs.
+        within: Patches and the flat index of the one whose summits alone there are; all when not
+            given.
 
     Raises:
         InputError: When a name is unknown or the modulus not positive.
@@ -72,6 +74,7 @@ class ScaledModel:
     border: str = "include"
     solver: str = "active-set"
     pairs: str = "auto"
+    within: tuple[PatchGrid, int] | None = None
 
     def __post_init__(self) -> None:
         for what, value, table in (
@@ -87,6 +90,29 @@ class ScaledModel:
     def name(self) -> str:
         """Name of the model with its options."""
         return f"{self.kind}, curvature {self.curvature}, border {self.border}"
+
+    @property
+    def datum(self) -> float:
+        """Height z_M that the approach counts from [mm]."""
+        return self.surface.highest
+
+    @property
+    def first_touch(self) -> float:
+        """Approach of a level plane at first contact [mm]; infinite without asperities."""
+        heights = self.asperities.z
+        return float(self.datum - heights.max()) if heights.size else np.inf
+
+    def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
+        """Return the model of one patch on its own half-space: of the summits that it holds.
+
+        Args:
+            patches: Patches of the surface.
+            index: Flat index of the patch.
+
+        Returns:
+            The model, whose approach counts from the whole surface's highest point, and its patch.
+        """
+        return replace(self, within=(patches, index)), patches.single(index)
 
     @cached_property
     def asperities(self) -> Asperities:
@@ -154,14 +180,10 @@ class ScaledModel:
         for index in np.argsort([plane.approach for plane in planes], kind="stable"):
             fitted = self._fitted(scaled, planes[index], own)
             own = fitted.solution.indentation
-            sums = fitted.model.sums(patches, means)
+            sums = fitted.model.sums(patches, means, home=scaled.summits)
             rows[int(index)] = sums.row(planes[index], fitted.solution)
-        return collected(
-            [rows[index] for index in range(len(planes))],
-            model=self.name,
-            patches=patches,
-            modulus=self.contact_modulus,
-        )
+        ordered = [rows[index] for index in range(len(planes))]
+        return Response.of(ordered, self.name, self.contact_modulus, patches)
 
     def _fitted(self, scaled: ScaledAsperities, plane: RigidPlane, own: Array | None) -> _Fitted:
         """Fit the curvatures to the contacts and solve for the contacts until both agree."""
@@ -197,14 +219,20 @@ class ScaledModel:
     def _scaled(self, approach: float) -> ScaledAsperities:
         if self.surface.heights.size <= _MOST_KEPT:
             return self._whole
-        floor = self.surface.highest - _MARGIN * max(approach, 0.0)
-        return ScaledAsperities.of(
-            self.surface, curvature=self.curvature, border=self.border, floor=floor
-        )
+        return self._found(self.surface.highest - _MARGIN * max(approach, 0.0))
 
     @cached_property
     def _whole(self) -> ScaledAsperities:
-        return ScaledAsperities.of(self.surface, curvature=self.curvature, border=self.border)
+        return self._found(-np.inf)
+
+    def _found(self, floor: float) -> ScaledAsperities:
+        found = ScaledAsperities.of(
+            self.surface, curvature=self.curvature, border=self.border, floor=floor
+        )
+        if self.within is None:
+            return found
+        patches, index = self.within
+        return found.subset(patches.index_of(found.summits.x, found.summits.y) == index)
 
     @property
     def _nothing(self) -> Asperities:

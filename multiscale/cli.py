@@ -66,7 +66,7 @@ def _parser() -> argparse.ArgumentParser:
         "laws": commands.tabulate_scene,
         "surface": commands.describe_surface,
     }.items():
-        sub = subparsers.add_parser(name, help=command.__doc__, description=command.__doc__)
+        sub = subparsers.add_parser(name, help=_summary(command), description=_summary(command))
         sub.set_defaults(command=command)
         sub.add_argument("scene", type=Path, help="scene file (TOML)")
         sub.add_argument("--out", type=Path, metavar="DIR", help="folder of the results")
@@ -78,9 +78,14 @@ def _parser() -> argparse.ArgumentParser:
             metavar="KEY=VALUE",
             help="change keys of the scene, such as load.approach='4 um'",
         )
-    schema = subparsers.add_parser("schema", help=commands.print_schema.__doc__)
+    schema = subparsers.add_parser("schema", help=_summary(commands.print_schema))
     schema.set_defaults(command=commands.print_schema)
     return parser
+
+
+def _summary(command: Any) -> str:
+    """Return the first line of a command's docstring."""
+    return command.__doc__.partition("\n")[0]
 
 
 def _world() -> Any:
@@ -99,5 +104,6 @@ def _given_to_petsc(options: list[str]) -> list[str]:
     prefixed = [
         f"-patchlaw_{word[1:]}" if word.startswith(_SOLVER_OPTIONS) else word for word in options
     ]
-    petsc4py.init(["patchlaw", *prefixed])
+    # a misspelt option is no error for PETSc; at the end it names those that nobody asked for
+    petsc4py.init(["patchlaw", *prefixed, "-options_left"])
     return prefixed

@@ -20,7 +20,13 @@ from multiscale.stage import make_stage
 
 
 def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
-    """Run a scene; write history, laws, figures and report."""
+    """Run a scene; write history, laws, figures and report.
+
+    Args:
+        choice: Parsed words of the command line.
+        options: PETSc options given by the user.
+        comm: MPI communicator; None for a process on its own.
+    """
     scene, folder = _scene_and_folder(choice, comm)
     run = Run(scene, comm)
     terminal.show_plan(comm, run.stage)
@@ -39,13 +45,25 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
 
 
 def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
-    """Say what a run would do, and why; run nothing expensive."""
+    """Say what a run would do, and why; run nothing expensive.
+
+    Args:
+        choice: Parsed words of the command line.
+        options: PETSc options given by the user.
+        comm: MPI communicator; None for a process on its own.
+    """
     scene, _ = _scene_and_folder(choice, comm)
     terminal.show_plan(comm, on_root(comm, lambda: make_stage(scene)))
 
 
 def tabulate_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
-    """Tabulate the patch laws of a scene; write and draw them."""
+    """Tabulate the patch laws of a scene; write and draw them.
+
+    Args:
+        choice: Parsed words of the command line.
+        options: PETSc options given by the user.
+        comm: MPI communicator; None for a process on its own.
+    """
     scene, folder = _scene_and_folder(choice, comm)
     run = Run(scene, comm)
     terminal.show_plan(comm, run.stage)
@@ -63,7 +81,13 @@ def tabulate_scene(choice: argparse.Namespace, options: list[str], comm: Any) ->
 
 
 def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
-    """Describe and draw the surface of a scene."""
+    """Describe and draw the surface of a scene.
+
+    Args:
+        choice: Parsed words of the command line.
+        options: PETSc options given by the user.
+        comm: MPI communicator; None for a process on its own.
+    """
     scene, folder = _scene_and_folder(choice, comm)
     stage = on_root(comm, lambda: make_stage(scene))
     rough = roughness(stage.surface)
@@ -88,7 +112,13 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
 
 
 def print_schema(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
-    """Print the JSON Schema of scene files."""
+    """Print the JSON Schema of scene files.
+
+    Args:
+        choice: Parsed words of the command line.
+        options: PETSc options given by the user.
+        comm: MPI communicator; None for a process on its own.
+    """
     if terminal.speaks(comm):
         print(json.dumps(Scene.model_json_schema(by_alias=True), indent=2))
 

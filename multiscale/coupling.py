@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
-from micro.asperity_models import AsperityModel
+from micro import MicroModel
 from multiscale.history import LoadStep, PatchState
 from multiscale.law_files import LawTable
 
@@ -27,7 +27,10 @@ class Coupling(Protocol):
     """Anything that turns approaches into load steps."""
 
     def load_steps(self, approaches: Sequence[float]) -> Iterator[LoadStep]:
-        """Yield one accepted load step per approach [mm], in order.
+        """Yield one accepted load step per approach, in order.
+
+        Args:
+            approaches: Approaches of the plane at the middle of the interface [mm].
 
         Raises:
             NotConverged: When a step fails for good; the steps yielded before stay valid.
@@ -36,7 +39,7 @@ class Coupling(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AnalyticCoupling:
-    """The micro model alone: the surface's asperities on one elastic half-space.
+    """The micro model alone: the whole surface on one elastic half-space.
 
     Attributes:
         model: Micro model of the whole surface.
@@ -45,13 +48,13 @@ class AnalyticCoupling:
         tilt: Slopes of the plane's approach along x and y.
     """
 
-    model: AsperityModel
+    model: MicroModel
     patches: PatchGrid
     mean_heights: Array
     tilt: tuple[float, float] = (0.0, 0.0)
 
     def load_steps(self, approaches: Sequence[float]) -> Iterator[LoadStep]:
-        """Yield one load step per approach [mm]."""
+        """Yield one load step per approach; see `Coupling.load_steps`."""
         lean = tilted_approaches(self.patches, 0.0, self.tilt)
         for number, approach in enumerate(approaches, start=1):
             start = time.perf_counter()
@@ -100,7 +103,7 @@ class EmbeddedCoupling:
     last: PressState | None = None
 
     def load_steps(self, approaches: Sequence[float]) -> Iterator[LoadStep]:
-        """Yield one load step per approach [mm]; a step that fails is halved.
+        """Yield one load step per approach; a step that fails is halved.
 
         Raises:
             NotConverged: When a step fails at the smallest increment too, or a patch is closed
@@ -160,14 +163,18 @@ class EmbeddedCoupling:
             patches=PatchState(
                 closure_mm=closure, pressure_MPa=press.pressure, contact_area_fraction=area
             ),
-            residuals=tuple(press.residuals),
+            imbalance=(press.force - press.reaction) / press.force if press.force else 0.0,
+            residuals=tuple(map(float, press.residuals)),
         )
 
 
 def tilted_approaches(patches: PatchGrid, approach: float, tilt: tuple[float, float]) -> Array:
     """Return the plane's mean approach at every patch, shape (N,) [mm].
 
-    The approach varies linearly about the interface's centre.
+    Args:
+        patches: The partition.
+        approach: Approach at the middle of the interface [mm].
+        tilt: Slopes of the approach along x and y, about the middle.
     """
     centre = np.asarray(patches.origin) + 0.5 * np.asarray(patches.lengths)
     return approach + (patches.centres - centre) @ np.asarray(tilt)

@@ -21,7 +21,13 @@ _COLOURS = ("#0b3c5d", "#d1495b", "#1b998b", "#edae49", "#6a4c93")
 
 
 def surface_figure(surface: Surface, asperities: Asperities, patches: PatchGrid) -> Figure:
-    """Draw heights over the mean plane with summits, border maxima and patch borders."""
+    """Draw heights over the mean plane with summits, border maxima and patch borders.
+
+    Args:
+        surface: The heights.
+        asperities: Its summits.
+        patches: The partition.
+    """
     figure = Figure(figsize=(6.4, 5.4), layout="constrained")
     draw_surface(figure, figure.add_subplot(), surface, asperities, patches)
     return figure
@@ -30,7 +36,15 @@ def surface_figure(surface: Surface, asperities: Asperities, patches: PatchGrid)
 def draw_surface(
     figure: Figure, axes: Any, surface: Surface, asperities: Asperities, patches: PatchGrid
 ) -> None:
-    """Draw one surface into given axes; see `surface_figure`."""
+    """Draw one surface into given axes.
+
+    Args:
+        figure: Owner of the axes; gets a colour bar.
+        axes: Where to draw.
+        surface: The heights.
+        asperities: Its summits.
+        patches: The partition.
+    """
     heights = 1e3 * (surface.heights - surface.mean_height).T
     extent = (0, surface.lengths[0], 0, surface.lengths[1])
     image = axes.imshow(heights, origin="lower", extent=extent, cmap="cividis")
@@ -91,7 +105,14 @@ def pressure_figure(history: History) -> Figure:
 def draw_pressures(
     figure: Figure, axes: Any, patches: PatchGrid, pressure: NDArray[np.float64]
 ) -> None:
-    """Draw one map of patch pressures [MPa] into given axes."""
+    """Draw one map of patch pressures into given axes.
+
+    Args:
+        figure: Owner of the axes; gets a colour bar.
+        axes: Where to draw.
+        patches: The partition.
+        pressure: Mean pressure of each patch, shape (N,) [MPa].
+    """
     values = pressure.reshape(patches.grid)
     image = axes.pcolormesh(
         patches.borders_x, patches.borders_y, values.T, cmap="magma_r", vmin=0.0

@@ -60,6 +60,8 @@ class LoadStep:
         wall_s: Wall time of the step [s].
         reason: Name of the reason for which the iteration stopped.
         patches: The state of every patch.
+        imbalance: Force on the plane minus reaction of the support, relative to the force; zero
+            where no support takes part.
         residuals: Norms of the residual over the Newton steps, relative to the interface load.
     """
 
@@ -75,6 +77,7 @@ class LoadStep:
     wall_s: float
     reason: str
     patches: PatchState
+    imbalance: float = 0.0
     residuals: tuple[float, ...] = ()
 
 

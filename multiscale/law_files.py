@@ -47,7 +47,12 @@ class LawTable:
 
 
 def write_laws(path: Path, table: LawTable) -> None:
-    """Write all laws to one HDF5 file: a group ``patch_IX_IY`` per patch, a dataset per column."""
+    """Write all laws to one HDF5 file: a group ``patch_IX_IY`` per patch, a dataset per column.
+
+    Args:
+        path: File to write; one that exists is replaced.
+        table: The laws.
+    """
     with h5py.File(path, "w") as file:
         file.attrs["format"] = "patchlaw laws 1"
         file.attrs["patch_grid"] = table.patches.grid

@@ -102,14 +102,30 @@ class PatchLaw:
         return root**1.5, 1.5 * np.sqrt(root) * slope
 
     def area_fraction_at(self, closure: ArrayLike, *, extend: bool = False) -> Array:
-        """Return the real contact area over the nominal one at closures of any shape [mm]."""
+        """Return the real contact area over the nominal one.
+
+        Args:
+            closure: Closures of any shape [mm].
+            extend: Go on beyond the table instead of raising.
+
+        Raises:
+            InputError: When a closure lies beyond the table and `extend` is false.
+        """
         closures = self._checked(closure, extend)
         if self.is_open:
             return np.zeros_like(closures)
         return np.asarray(np.clip(self._area(np.maximum(closures, self.closure[0])), 0.0, 1.0))
 
     def contacts_at(self, closure: ArrayLike, *, extend: bool = False) -> NDArray[np.int64]:
-        """Return the number of contacts of the table row at or before each closure [mm]."""
+        """Return the number of contacts of the table row at or before each closure.
+
+        Args:
+            closure: Closures of any shape [mm].
+            extend: Keep the last row's number beyond the table instead of raising.
+
+        Raises:
+            InputError: When a closure lies beyond the table and `extend` is false.
+        """
         closures = self._checked(closure, extend)
         row = np.searchsorted(self.closure, closures, side="right") - 1
         return np.where(row >= 0, np.append(self.contacts, 0)[row], 0)

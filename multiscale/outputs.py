@@ -33,7 +33,15 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> Path:
 
 
 def write_tables(folder: Path, history: History) -> list[Path]:
-    """Write ``history.csv`` and ``patches.csv``."""
+    """Write ``history.csv`` and ``patches.csv``.
+
+    Args:
+        folder: Where to; made when missing.
+        history: The load steps.
+
+    Returns:
+        The two files.
+    """
     return [
         _write_csv(folder / "history.csv", COLUMNS, history.rows()),
         _write_csv(folder / "patches.csv", PATCH_COLUMNS, history.patch_rows()),
@@ -41,13 +49,23 @@ def write_tables(folder: Path, history: History) -> list[Path]:
 
 
 def write_json(path: Path, content: dict[str, Any]) -> Path:
-    """Write a dictionary as indented JSON."""
+    """Write a dictionary as indented JSON.
+
+    Args:
+        path: File to write.
+        content: What JSON can hold; everything else is written as its text.
+    """
     text = json.dumps(content, indent=2, default=str) + "\n"
     return write_whole(path, lambda partial: _write_text(partial, text))
 
 
 def write_text(path: Path, text: str) -> Path:
-    """Write a text as UTF-8."""
+    """Write a text as UTF-8.
+
+    Args:
+        path: File to write.
+        text: Its content.
+    """
     return write_whole(path, lambda partial: _write_text(partial, text))
 
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from geometry.meshes import alignment
 from geometry.statistics import roughness
 from multiscale.stage import Stage
@@ -15,12 +13,8 @@ def statements(stage: Stage) -> Iterator[tuple[str, str]]:
     """Yield pairs of topic and sentence that say what will be done and why."""
     scene = stage.scene
     yield "surface", _surface(stage)
-    yield (
-        "summits",
-        f"{stage.asperities.count} found, {int(stage.reached.sum())} within the largest approach; "
-        "the others cost nothing",
-    )
-    yield "micro model", f"{scene.micro.model}, solved by {scene.micro.solver}"
+    yield "contact", _contact(stage)
+    yield "micro model", _model(stage)
     yield "coupling", _coupling(stage)
     if stage.embedded:
         yield "block", _block(stage)
@@ -33,13 +27,20 @@ def statements(stage: Stage) -> Iterator[tuple[str, str]]:
 
 def warnings(stage: Stage) -> Iterator[str]:
     """Yield what a user should know about the validity of the scene."""
-    if stage.reached_at_border:
+    if stage.by_summits and stage.reached_at_border:
         yield (
-            f"{stage.reached_at_border} maxima on the surface's border lie within the largest "
-            "approach: an 8-neighbour search cannot confirm them, and they carry no load here"
+            f"maxima on the surface's border within the largest approach: "
+            f"{stage.reached_at_border}; an 8-neighbour search cannot confirm them, and they carry "
+            "no load here"
         )
     if not stage.embedded:
         return
+    grids = zip(stage.surface.grid, stage.patches.grid, strict=True)
+    if stage.model.name == "islands" and any(cells % patches for cells, patches in grids):
+        yield (
+            "patch borders cut cells of the surface: every patch is taken alone along whole cells; "
+            "a grid that is a multiple of the patches would fit"
+        )
     fit = alignment(stage.shape, stage.patches)
     if not fit:
         yield fit.sentence
@@ -59,11 +60,27 @@ def _surface(stage: Stage) -> str:
     )
 
 
+def _contact(stage: Stage) -> str:
+    if stage.by_summits:
+        return (
+            f"{len(stage.asperities)} summits, {int(stage.reached.sum())} within the largest "
+            "approach; the others cost nothing"
+        )
+    reached = stage.reached_cells
+    return f"{reached.size} cells, {int(reached.sum())} within the largest approach"
+
+
+def _model(stage: Stage) -> str:
+    micro = stage.scene.micro
+    solver = f", solved by {micro.solver}" if micro.model in ("elliptic", "circular") else ""
+    return stage.model.name + solver
+
+
 def _coupling(stage: Stage) -> str:
-    coupling, patches, summits = stage.scene.coupling, stage.patches, stage.asperities
+    coupling, patches = stage.scene.coupling, stage.patches
     if not stage.embedded:
         return "analytic: the micro model alone on a half-space, no finite elements"
-    reached = np.unique(patches.index_of(summits.x, summits.y)[stage.reached]).size
+    reached = stage.reached_patches
     return (
         f"{coupling.kind}: {patches.grid[0]} × {patches.grid[1]} patches, {reached} get a law, "
         f"{patches.count - reached} stay open; Love's {coupling.love} displacement, "

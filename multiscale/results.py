@@ -54,7 +54,12 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
 
 
 def write_figure(path: Path, figure: Figure) -> Path:
-    """Write a figure as PNG."""
+    """Write a figure as PNG.
+
+    Args:
+        path: File to write.
+        figure: A matplotlib figure.
+    """
     return write_whole(path, lambda partial: figure.savefig(partial, dpi=130))
 
 
@@ -84,6 +89,10 @@ def _figures(run: Run) -> Iterator[tuple[str, str, Figure]]:
 
 def write_fields(folder: Path, run: Run) -> list[Path]:
     """Write displacement and patch pressure of the last load step as XDMF, for ParaView.
+
+    Args:
+        folder: Where to; made when missing.
+        run: The run.
 
     Returns:
         The files written; none when no finite elements took part.

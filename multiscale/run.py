@@ -16,6 +16,9 @@ from multiscale.scene import Scene
 from multiscale.stage import Stage, make_stage
 from multiscale.tabulate import isolated_laws
 
+LARGEST_SUMMIT_AREA = 0.1
+"""Contact area fraction up to which asperity models are meant (they are 10 % off well before)."""
+
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import Interface, PressedBlock
 
@@ -84,6 +87,14 @@ class Run:
         if self.table is not None:
             error = max(law.interpolation_error for law in self.table.laws)
             notes.append(f"interpolation error of the laws: {error:.1e} of their largest pressure")
+            imbalance = max((abs(step.imbalance) for step in self.steps), default=0.0)
+            notes.append(f"force against the support's reaction: equal to {imbalance:.1e}")
+        area = max((step.contact_area_fraction for step in self.steps), default=0.0)
+        if self.stage.by_summits and area > LARGEST_SUMMIT_AREA:
+            notes.append(
+                f"contact area fraction {area:.2g}: contacts of separate summits do not stand for "
+                "this surface any more; micro.model = 'half-space' does"
+            )
         return History(
             steps=tuple(self.steps),
             patches=self.stage.patches,

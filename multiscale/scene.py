@@ -92,9 +92,14 @@ class PatchesSection(_Section):
 class MicroSection(_Section):
     """The micro model that gives the laws."""
 
-    model: Literal["elliptic", "circular", "elliptic-independent", "circular-independent"] = (
-        "elliptic"
-    )
+    model: Literal[
+        "elliptic",
+        "circular",
+        "elliptic-independent",
+        "circular-independent",
+        "islands",
+        "half-space",
+    ] = "elliptic"
     solver: Literal["active-set", "truncated-newton"] = "active-set"
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,8 +17,7 @@ from geometry.meshes import BlockShape
 from geometry.patches import PatchGrid, patch_means
 from geometry.spectrum import synthesise
 from geometry.surface import Surface
-from micro.asperity_models import AsperityModel, asperity_model
-from micro.hertz import contact_modulus
+from micro import MODELS, MicroModel, contact_modulus, micro_model
 from multiscale.coupling import tilted_approaches
 from multiscale.scene import Scene
 
@@ -42,7 +41,7 @@ class Stage:
     scene: Scene
     surface: Surface
     asperities: Asperities
-    model: AsperityModel
+    model: MicroModel
     patches: PatchGrid
     mean_heights: NDArray[np.float64]
     shape: BlockShape
@@ -51,6 +50,11 @@ class Stage:
     def embedded(self) -> bool:
         """Whether finite elements take part."""
         return self.scene.coupling.kind != "analytic"
+
+    @property
+    def by_summits(self) -> bool:
+        """Whether the micro model sees summits rather than the whole surface."""
+        return self.scene.micro.model in MODELS
 
     @property
     def closure_ends(self) -> NDArray[np.float64]:
@@ -69,11 +73,28 @@ class Stage:
         cut = self.asperities
         return int(np.sum(self._within(cut.border_x, cut.border_y, cut.border_z)))
 
+    @property
+    def reached_cells(self) -> NDArray[np.bool_]:
+        """Which cells of the surface lie within the largest approach, shape (nx ny,)."""
+        x, y = np.meshgrid(self.surface.x, self.surface.y, indexing="ij")
+        return self._within(x.ravel(), y.ravel(), self.surface.heights.ravel())
+
+    @property
+    def reached_patches(self) -> int:
+        """Number of patches that hold anything within the largest approach."""
+        if self.by_summits:
+            summits, reached = self.asperities, self.reached
+            owners = self.patches.index_of(summits.x, summits.y)[reached]
+        else:
+            x, y = np.meshgrid(self.surface.x, self.surface.y, indexing="ij")
+            owners = self.patches.index_of(x.ravel(), y.ravel())[self.reached_cells]
+        return int(np.unique(owners).size)
+
     def _within(self, x: NDArray, y: NDArray, z: NDArray) -> NDArray[np.bool_]:
         loading = self.scene.loading
         from_centre = np.column_stack((x, y)) - 0.5 * np.asarray(self.surface.lengths)
         approach = loading.approach + from_centre @ np.asarray(loading.tilt)
-        return np.asarray(approach > self.asperities.highest - z)
+        return np.asarray(approach > self.surface.highest - z)
 
 
 def make_stage(scene: Scene) -> Stage:
@@ -87,13 +108,21 @@ def make_stage(scene: Scene) -> Stage:
     _check_patches(scene, surface)
     block = scene.block
     asperities = find_asperities(surface, periodic=False)  # the block's sides are free
+    if scene.micro.model in MODELS and not len(asperities):
+        raise InputError(
+            "the surface has no summit that could carry load",
+            key="micro.model",
+            value=scene.micro.model,
+            allowed="half-space, islands",
+            file=scene.file,
+        )
     return Stage(
         scene=scene,
         surface=surface,
         asperities=asperities,
-        model=asperity_model(
+        model=micro_model(
             scene.micro.model,
-            asperities,
+            surface,
             contact_modulus=contact_modulus(block.young_modulus, block.poisson_ratio),
             solver=scene.micro.solver,
         ),
@@ -138,7 +167,10 @@ def _block_shape(scene: Scene, surface: Surface) -> BlockShape:
 
 def _check_patches(scene: Scene, surface: Surface) -> None:
     """Refuse patches that no element or no height can resolve."""
-    limits = [("heights of the surface", surface.grid)]
+    limits: list[tuple[str, Sequence[int]]] = [("heights of the surface", surface.grid)]
+    if scene.micro.model == "islands":  # cuts patches out, and a surface has at least 4 × 4 heights
+        fourths = (surface.grid[0] // 4, surface.grid[1] // 4)
+        limits = [("fourths of the surface's heights", fourths)]
     if scene.coupling.kind != "analytic":
         limits.append(("cells of the interface (block.cells)", scene.block.cells[:2]))
     for what, limit in limits:

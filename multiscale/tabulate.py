@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,31 +10,34 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from geometry.collective import together
+from geometry.errors import NotConverged
 from geometry.patches import PatchGrid
-from micro.asperity_models import AsperityModel
+from micro import MicroModel
 from micro.love import love_centre, love_mean
 from multiscale.law_files import LawTable
 from multiscale.laws import PatchLaw
 
 Array = NDArray[np.float64]
 _FIRST_ROWS = 9
-_MOST_ROWS = 500
+_MOST_ROWS = 400  # solutions of the micro model spent on one law
+_MOST_TRIALS = 40  # in search of the approach that gives a closure
 _LOVE = {"mean": love_mean, "centre": love_centre}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IsolatedPatch:
-    """One patch of an asperity model, pressed alone by a rigid plane on its own half-space.
+    """One patch of a rough surface, pressed alone by a rigid plane on its own half-space.
 
     Attributes:
-        model: Asperity model of the patch's own asperities.
+        model: Micro model of the patch alone; its approach counts from the highest point of the
+            whole surface.
         patch: The patch as a grid of one.
         mean_height: Mean height of the surface over the patch [mm].
         love: Which displacement of the patch's surface enters the closure: its ``mean``, or the
             one at its ``centre`` (Waddad et al. 2016, eq. 30 at x = y = 0).
     """
 
-    model: AsperityModel
+    model: MicroModel
     patch: PatchGrid
     mean_height: float
     love: str = "mean"
@@ -47,14 +50,13 @@ class IsolatedPatch:
 
     @property
     def touch(self) -> float:
-        """Approach, and closure, at first touch [mm]; infinite without asperities."""
-        heights = self.model.asperities.z
-        return float(self.model.asperities.highest - heights.max()) if heights.size else np.inf
+        """Approach, and closure, at first touch [mm]; infinite when nothing can touch."""
+        return self.model.first_touch
 
     @property
     def reach(self) -> float:
         """Height of the plane over the patch's mean plane at zero approach [mm]."""
-        return float(self.model.asperities.highest - self.mean_height)
+        return float(self.model.datum - self.mean_height)
 
     def rows(self, approaches: Array) -> Array:
         """Return rows (approach, closure, pressure, area fraction, contacts), shape (n, 5)."""
@@ -79,31 +81,47 @@ class IsolatedPatch:
 
         Returns:
             The law; open when first touch lies beyond `closure_end`.
+
+        Raises:
+            NotConverged: When the pressure is a function of closure nowhere.
         """
         if self.touch >= closure_end:
             return _law(np.empty((0, 5)), self.touch, self.reach, 0.0)
-        rows = self.rows(np.linspace(self.touch, self._approach_at(closure_end), _FIRST_ROWS))
+        end = self._approach_at(closure_end)
+        rows = self.rows(np.linspace(self.touch, end, _FIRST_ROWS, dtype=np.float64))
         rows[0, 1:] = self.touch, 0.0, 0.0, 0.0  # whatever round-off makes of first touch
-        rows, error = self._refined(_increasing(rows), tolerance)
+        rows = _increasing(rows)
+        if len(rows) < 2:
+            raise NotConverged(
+                f"the law of the patch at {self.patch.origin} mm",
+                reason="STIFFER_THAN_ITS_HALF_SPACE",
+                iterations=_FIRST_ROWS,
+                remedy="choose another micro.model or larger patches (patches.grid)",
+            )
+        rows, error = self._refined(rows, tolerance)
         return _law(rows, self.touch, self.reach, error)
 
     def _approach_at(self, closure: float) -> float:
-        """Find the approach that closes the patch by at least `closure`, where there is one."""
-        approach, reached = closure, -np.inf
-        for _ in range(60):
-            row = self.rows(np.array([approach]))[0]
-            if row[1] >= closure or row[1] <= reached:
+        """Find the approach that closes the patch by `closure`, or by as much as it can be."""
+        approach = closure
+        for _ in range(_MOST_TRIALS):
+            reached = self.rows(np.array([approach]))[0, 1]
+            if reached >= closure:
+                return float(approach)
+            if reached <= self.touch:
                 break
-            reached = row[1]
             approach += 1.05 * (closure - reached) + 1e-3 * closure
-        return float(approach)
+        trials = self.rows(np.linspace(self.touch, closure, _MOST_TRIALS, dtype=np.float64))
+        return float(trials[np.argmax(trials[:, 1]), 0])
 
     def _refined(self, rows: Array, tolerance: float) -> tuple[Array, float]:
         """Halve intervals until the pressure half-way is met within the tolerance."""
         halfway = 0.5 * (rows[:-1, 0] + rows[1:, 0])
         worst = missed = 0.0
-        while halfway.size and len(rows) < _MOST_ROWS:
+        spent = len(rows)
+        while halfway.size and spent < _MOST_ROWS:
             new = self.rows(halfway)
+            spent += len(new)
             root = PchipInterpolator(rows[:, 1], rows[:, 2] ** (2 / 3))
             error = np.abs(np.maximum(root(new[:, 1]), 0.0) ** 1.5 - new[:, 2]) / rows[-1, 2]
             bad = error > tolerance
@@ -115,10 +133,15 @@ class IsolatedPatch:
 
 
 def _increasing(rows: Array) -> Array:
-    """Sort rows by approach and cut them where closure or pressure stops to increase."""
+    """Sort rows by approach and keep those that exceed all before in closure and pressure.
+
+    Where closure falls for good, the patch's stiffness has outgrown its own half-space and the
+    table ends; a single row below those before is an unevenness of the micro model.
+    """
     rows = rows[np.argsort(rows[:, 0])]
-    falls = np.flatnonzero(np.any(np.diff(rows[:, 1:3], axis=0) <= 0, axis=1))
-    return rows[: falls[0] + 1] if falls.size else rows
+    highest = np.maximum.accumulate(rows[:, 1:3], axis=0)
+    keep = np.all(highest[1:] > highest[:-1], axis=1)
+    return rows[np.concatenate(([True], keep))]
 
 
 def _around(points: Array, centres: Array) -> Array:
@@ -144,7 +167,7 @@ def _law(rows: Array, touch: float, reach: float, error: float) -> PatchLaw:
 
 
 def isolated_laws(
-    model: AsperityModel,
+    model: MicroModel,
     patches: PatchGrid,
     *,
     mean_heights: Array,
@@ -157,12 +180,12 @@ def isolated_laws(
 
     Args:
         model: Micro model of the whole surface.
-        patches: Partition of the surface; each asperity belongs to the patch of its summit.
+        patches: Partition of the surface.
         mean_heights: Mean height of the surface over each patch, shape (N,) [mm].
         closure_ends: Largest closure each law will be asked for, shape (N,) [mm].
         love: Displacement in the closure, ``mean`` or ``centre``.
         tolerance: Interpolation error of the pressure, relative to each law's largest pressure.
-        comm: MPI communicator; the patches are shared over its ranks by number of summits.
+        comm: MPI communicator; the patches are dealt to its ranks.
 
     Returns:
         All laws, on every rank.
@@ -173,36 +196,27 @@ def isolated_laws(
     Source:
         Waddad et al. 2016, section 3.2, eq. 29-31, doi 10.1016/j.triboint.2015.12.023.
     """
-    owner = patches.index_of(model.asperities.x, model.asperities.y)
-    work = np.bincount(owner, minlength=patches.count)
 
     def make(index: int) -> PatchLaw:
-        patch = IsolatedPatch(
-            model=replace(model, asperities=model.asperities.subset(owner == index)),
-            patch=patches.single(index),
-            mean_height=float(mean_heights[index]),
-            love=love,
+        alone, patch = model.of_patch(patches, index)
+        isolated = IsolatedPatch(
+            model=alone, patch=patch, mean_height=float(mean_heights[index]), love=love
         )
-        return patch.law(float(closure_ends[index]), tolerance)
+        return isolated.law(float(closure_ends[index]), tolerance)
 
     rank, size = (0, 1) if comm is None else (comm.rank, comm.size)
-    mine = _shares(work, size)[rank]
+    # dealt in turn: neighbours, which tend to be as high as each other, go to different ranks
+    mine = range(rank, patches.count, size)
     made = together(comm, lambda: {index: make(index) for index in mine})
     parts = [made] if comm is None else comm.allgather(made)
     laws = {index: law for part in parts for index, law in part.items()}
     return LawTable(
         patches=patches,
         laws=tuple(laws[index] for index in range(patches.count)),
-        made_by={"coupling": "isolated", "love": love, "tolerance": f"{tolerance:g}"},
+        made_by={
+            "coupling": "isolated",
+            "model": model.name,
+            "love": love,
+            "tolerance": f"{tolerance:g}",
+        },
     )
-
-
-def _shares(work: NDArray[np.int64], size: int) -> list[list[int]]:
-    """Deal jobs to ranks, the largest first, each to the rank with the least work so far."""
-    shares: list[list[int]] = [[] for _ in range(size)]
-    loads = np.zeros(size)
-    for job in np.argsort(-work, kind="stable"):
-        rank = int(np.argmin(loads))
-        shares[rank].append(int(job))
-        loads[rank] += work[job] ** 2 + 1  # a dense interaction matrix per solution
-    return shares

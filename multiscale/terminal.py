@@ -25,20 +25,36 @@ def speaks(comm: Any) -> bool:
 
 
 def complain(comm: Any, error: PatchlawError) -> None:
-    """Print one error message on the error stream."""
+    """Print one error message on the error stream.
+
+    Args:
+        comm: MPI communicator, or None.
+        error: What to say.
+    """
     if speaks(comm):
         # Long lines stay whole: a message may be searched for, or cut and pasted.
         Console(stderr=True, soft_wrap=True).print(f"[bold red]patchlaw:[/] {escape(str(error))}")
 
 
 def say(comm: Any, text: str) -> None:
-    """Print one line."""
+    """Print one line.
+
+    Args:
+        comm: MPI communicator, or None.
+        text: The line.
+    """
     if speaks(comm):
         Console(soft_wrap=True, highlight=False).print(escape(text))
 
 
 def show_pairs(comm: Any, pairs: Sequence[tuple[str, str]], warnings: Sequence[str] = ()) -> None:
-    """Print topics with a sentence each, then warnings."""
+    """Print topics with a sentence each, then warnings.
+
+    Args:
+        comm: MPI communicator, or None.
+        pairs: Topics and sentences.
+        warnings: Sentences that a user should not miss.
+    """
     if not speaks(comm):
         return
     console = _wide_console()
@@ -51,7 +67,12 @@ def show_pairs(comm: Any, pairs: Sequence[tuple[str, str]], warnings: Sequence[s
 
 
 def show_plan(comm: Any, stage: Stage) -> None:
-    """Print what a run will do, and why."""
+    """Print what a run will do, and why.
+
+    Args:
+        comm: MPI communicator, or None.
+        stage: The scene's ingredients.
+    """
     if speaks(comm):
         show_pairs(comm, list(plan.statements(stage)), list(plan.warnings(stage)))
 
@@ -59,6 +80,10 @@ def show_plan(comm: Any, stage: Stage) -> None:
 @contextmanager
 def progress(comm: Any, steps: int) -> Iterator[Callable[[LoadStep], None]]:
     """Follow load steps: by a bar, or under ``mpirun`` by a line each, fit for a log file.
+
+    Args:
+        comm: MPI communicator, or None.
+        steps: Number of load steps to come.
 
     Yields:
         The function to call with every load step.
@@ -83,7 +108,12 @@ def _in_short(step: LoadStep) -> str:
 
 
 def show_history(comm: Any, history: History) -> None:
-    """Print the force–approach table and where the time went."""
+    """Print the force–approach table and where the time went.
+
+    Args:
+        comm: MPI communicator, or None.
+        history: The load steps.
+    """
     if not speaks(comm):
         return
     console = _wide_console()
@@ -108,7 +138,12 @@ def _wide_console() -> Console:
 
 
 def show_files(comm: Any, files: Sequence[Path]) -> None:
-    """Print where results are."""
+    """Print where results are.
+
+    Args:
+        comm: MPI communicator, or None.
+        files: The files written, all in one folder.
+    """
     if speaks(comm) and files:
         folder = files[0].parent
         names = ", ".join(path.name for path in files)

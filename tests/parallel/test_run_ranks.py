@@ -18,6 +18,7 @@ SCENES = {
         "load.tilt=['2 um/mm', '-1 um/mm']",
     ],
     "micro model alone": ["coupling.kind=analytic"],
+    "laws of the half-space": ["block.cells=[8, 8, 5]", "micro.model=half-space"],
 }  # fmt: skip
 NUMBERS = (
     "force_N",

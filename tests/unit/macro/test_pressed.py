@@ -1,5 +1,7 @@
 """The pressed block's bookkeeping: errors, tilt, restoring after failure, options, files."""
 
+import gc
+import weakref
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,6 +86,15 @@ def test_failure_is_named_and_keeps_what_was_known(interface):
     assert len(pressed._basis) == known
     pressed.newton.snes.setTolerances(max_it=20)
     assert pressed.press(2e-3).force == pytest.approx(before.force, rel=1e-9)
+
+
+def test_a_pressed_block_is_freed(interface):
+    pressed = PressedBlock(interface.block, interface, [Spring()] * 4)
+    pressed.press(1e-3)
+    gone = [weakref.ref(part) for part in (pressed, pressed.equilibrium, pressed.newton)]
+    del pressed
+    gc.collect()
+    assert [reference() for reference in gone] == [None] * 3
 
 
 def test_pressure_without_value_is_a_failure(interface):

@@ -12,7 +12,7 @@ from geometry import (
     patch_means,
     synthesise,
 )
-from micro import BORDERS, CURVATURES, MODELS, ScaledModel, asperity_model
+from micro import BORDERS, CURVATURES, MODELS, ScaledModel, asperity_model, micro_model
 
 E_STAR = 4000.0
 PATCHES = PatchGrid(grid=(3, 2), lengths=(1.0, 1.0))
@@ -134,6 +134,28 @@ def test_homogeneous_in_the_modulus(surface):
     soft = ScaledModel(kind="elliptic", surface=surface, contact_modulus=1.0).solve(8e-3)
     hard = scaled(surface).solve(8e-3)
     assert hard.force == pytest.approx(4000.0 * soft.force, rel=1e-9)
+
+
+def test_models_by_name(surface):
+    plain = micro_model("circular", surface, contact_modulus=1.0)
+    assert plain.name == "circular"
+    model = micro_model("circular", surface, contact_modulus=1.0, border="include")
+    assert model.name == "circular, curvature summit, border include"
+    assert model.datum == surface.highest
+
+
+def test_patches_alone_hold_all_asperities(surface):
+    model = scaled(surface)
+    count = 0
+    for index in range(PATCHES.count):
+        alone, patch = model.of_patch(PATCHES, index)
+        count += len(alone.asperities)
+        assert alone.first_touch >= model.first_touch - 1e-12
+        curve = alone.respond([2e-3, 1e-2], patches=patch, mean_heights=[0.0])
+        beside = model.respond([2e-3, 1e-2], patches=PATCHES, mean_heights=np.zeros(6))
+        # Without neighbours that press its summits down a patch carries more.
+        assert np.all(curve.force >= beside.patch_force[:, index] * (1.0 - 1e-3))
+    assert count == len(model.asperities)
 
 
 def test_flat_surface():

@@ -110,6 +110,24 @@ def test_wrong_input_exits_2_with_one_message(capsys, tmp_path, monkeypatch, wor
     assert not list(tmp_path.iterdir())
 
 
+def test_surface_without_summit_needs_another_model(capsys, heights):
+    scene, path = heights
+    np.save(path, np.zeros((16, 16)))
+    code, shown, err = call(capsys, "run", str(scene), "--out", str(path.parent / "out"))
+    assert (code, shown) == (2, "")
+    assert "micro.model = 'circular': the surface has no summit" in err
+    words = ("--set", "micro.model=half-space", "coupling.kind=analytic", "load.steps=1")
+    code, shown, _ = call(capsys, "run", str(scene), "--out", str(path.parent / "out"), *words)
+    assert code == 0
+    assert " 100 " in shown  # full contact, in per cent
+
+
+def test_areas_beyond_the_asperity_models_are_said(capsys, tmp_path):
+    extra = ["coupling.kind=analytic", "load.approach=40 um", "output.figures=false"]
+    _, shown, _ = call(capsys, "run", PAPER, "--out", str(tmp_path), "--set", *SMALL, *extra)
+    assert "contacts of separate summits do not stand" in " ".join(shown.split())
+
+
 @pytest.mark.parametrize(
     ("content", "text"),
     [

@@ -1,12 +1,15 @@
 """Tables of isolated laws against the micro model that they stand for."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from geometry import PatchGrid, Spectrum, find_asperities, patch_means, synthesise
-from micro import asperity_model
+from geometry.errors import NotConverged
+from micro import asperity_model, micro_model
 from micro.love import love_centre, love_mean
-from multiscale.tabulate import IsolatedPatch, _shares, isolated_laws
+from multiscale.tabulate import IsolatedPatch, isolated_laws
 
 MODULUS = 4000.0
 TOLERANCE = 1e-4
@@ -32,9 +35,7 @@ def whole(surface, model):
 
 @pytest.mark.parametrize(("love", "factor"), [("mean", love_mean), ("centre", love_centre)])
 def test_rows_are_the_micro_model_and_love(surface, model, whole, love, factor):
-    patch = IsolatedPatch(
-        model=model, patch=whole.patch, mean_height=whole.mean_height, love=love
-    )
+    patch = IsolatedPatch(model=model, patch=whole.patch, mean_height=whole.mean_height, love=love)
     law = patch.law(10e-3, TOLERANCE)
     response = model.respond(
         law.approach, patches=whole.patch, mean_heights=np.array([whole.mean_height])
@@ -91,6 +92,45 @@ def test_stiff_patch_ends_where_closure_stops_to_grow(surface, model):
     assert np.all(np.diff(law.closure) > 0)
 
 
+@pytest.mark.parametrize("name", ["half-space", "islands"])
+def test_surface_models_make_laws_too(surface, name):
+    """Laws of a model that knows no summits: the whole patch is the surface itself."""
+    model = micro_model(name, surface, contact_modulus=MODULUS)
+    patches = PatchGrid(grid=(1, 1), lengths=surface.lengths)
+    alone, patch = model.of_patch(patches, 0)
+    law = IsolatedPatch(model=alone, patch=patch, mean_height=surface.mean_height).law(8e-3, 1e-3)
+    response = model.respond(
+        law.approach[1:], patches=patches, mean_heights=np.array([surface.mean_height])
+    )
+    # the same solver from other starts: its tolerance of 1e-8 (half-space), 1e-6 (islands)
+    np.testing.assert_allclose(law.pressure[1:], response.mean_pressure, rtol=1e-5)
+
+
+def test_patches_of_the_half_space_press_alone(surface):
+    """Without neighbours a patch carries more than it does within the whole surface."""
+    model = micro_model("half-space", surface, contact_modulus=MODULUS)
+    patches = PatchGrid(grid=(3, 2), lengths=surface.lengths)
+    means = patch_means(surface, patches)
+    whole = model.respond([10e-3], patches=patches, mean_heights=means).patch_force[0]
+    alone = []
+    for index in range(6):
+        piece, patch = model.of_patch(patches, index)
+        assert piece.datum == model.datum
+        response = piece.respond([10e-3], patches=patch, mean_heights=means[index : index + 1])
+        alone.append(response.force[0])
+    assert np.sum(alone) > np.sum(whole)
+    np.testing.assert_array_less(whole, np.array(alone) * 1.001 + 1e-12)
+
+
+def test_law_that_is_nowhere_a_function_is_refused(surface):
+    """A flat surface is in full contact at once: pressure grows, closure does not."""
+    flat = replace(surface, heights=np.zeros((16, 16)))
+    model = micro_model("half-space", flat, contact_modulus=MODULUS)
+    patch = PatchGrid(grid=(1, 1), lengths=flat.lengths)
+    with pytest.raises(NotConverged, match="STIFFER_THAN_ITS_HALF_SPACE"):
+        IsolatedPatch(model=model, patch=patch, mean_height=0.0).law(1e-3, TOLERANCE)
+
+
 def test_all_laws_of_a_grid(surface, model):
     patches = PatchGrid(grid=(3, 2), lengths=surface.lengths)
     table = isolated_laws(
@@ -107,11 +147,3 @@ def test_all_laws_of_a_grid(surface, model):
         touch = model.asperities.highest - own.max() if own.size else np.inf
         assert law.touch == pytest.approx(touch, rel=1e-12, abs=1e-15)  # the same subtraction
         assert law.is_open == (touch >= 10e-3)
-
-
-def test_work_is_dealt_once_and_evenly():
-    work = np.array([0, 9, 1, 1, 8, 0, 2])
-    shares = _shares(work, 3)
-    assert sorted(job for share in shares for job in share) == list(range(7))
-    assert [share[0] for share in shares[:2]] == [1, 4]
-    assert len(shares[2]) >= 3

@@ -1,0 +1,271 @@
+"""The half-space model: a rough surface cell by cell, without assumptions on its asperities."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from geometry import PatchGrid, Surface
+from geometry.errors import InputError
+from micro.contact_pressure import Pressures
+from micro.elastic_grid import ElasticGrids
+from micro.half_space_curve import CellSums
+from micro.half_space_state import HalfSpaceState
+from micro.plane import RigidPlane
+from micro.pressing import Pressing
+from micro.response import Response
+
+Array = NDArray[np.float64]
+
+_LEVEL = (0.0, 0.0)
+_OUT_OF_REACH = 1e3
+"""Sides of the surface by which cells are lowered that may not touch."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HalfSpaceModel:
+    """A surface on an elastic half-space, pressed by a rigid plane.
+
+    Pressure is uniform on every cell; contact conditions hold at the cell centres.
+
+    Args:
+        surface: The surface; the approach counts from the highest point of its interpolant.
+        contact_modulus: E* [MPa].
+        periodic: Whether surface and pressures continue periodically. The mean displacement of
+            a periodic half-space is not determined: displacements, and so the approach, count
+            from the mean of the displaced surface.
+        tolerance: Largest residual of a solution (see `HalfSpaceState`).
+        within: Patches that hold the centres of all cells that may touch; all cells when not
+            given.
+
+    Raises:
+        InputError: When the modulus or the tolerance is not positive, a periodic model is asked
+            of a surface that is not, or no cell may touch.
+
+    Source:
+        Polonsky & Keer 1999, doi 10.1016/S0043-1648(99)00113-1.
+    """
+
+    surface: Surface
+    contact_modulus: float
+    periodic: bool = False
+    tolerance: float = 1e-8
+    within: PatchGrid | None = None
+
+    def __post_init__(self) -> None:
+        for what in ("contact_modulus", "tolerance"):
+            value = getattr(self, what)
+            if not (np.isfinite(value) and value > 0.0):
+                problem = f"the {what.replace('_', ' ')} must be positive and finite"
+                raise InputError(problem, value=value, allowed="> 0")
+        if self.periodic and not self.surface.periodic:
+            raise InputError(
+                "a periodic half-space needs a periodic surface", value=self.surface.source
+            )
+        if self._free is not None and self._free.all():
+            raise InputError(
+                "no cell has its centre in the patches that may touch",
+                value=self.within,
+                allowed=f"patches within {self.surface.lengths} mm",
+            )
+
+    @property
+    def name(self) -> str:
+        """Name of the model in a response."""
+        return "half-space-periodic" if self.periodic else "half-space"
+
+    @property
+    def datum(self) -> float:
+        """Height z_M that the approach counts from [mm]."""
+        return self.surface.highest
+
+    @property
+    def first_touch(self) -> float:
+        """Approach of a level plane at first contact of a cell's centre [mm]."""
+        return -float(self._required(self._plane(0.0, _LEVEL)).max())
+
+    def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
+        """Return the model of one patch on its own half-space: only its cells may touch.
+
+        Args:
+            patches: Patches of the surface.
+            index: Flat index of the patch.
+        """
+        patch = patches.single(index)
+        return replace(self, within=patch, periodic=False), patch
+
+    def solve(
+        self,
+        approach: float,
+        *,
+        tilt: tuple[float, float] = _LEVEL,
+        start: HalfSpaceState | None = None,
+    ) -> HalfSpaceState:
+        """Solve the contact at one approach of the plane.
+
+        Args:
+            approach: Rigid approach δ at the centre of the rectangle [mm].
+            tilt: Slopes (tx, ty) of the approach: δ(x, y) = δ + tx (x − xc) + ty (y − yc).
+            start: A solution nearby to start from; by default coarse grids give the start.
+
+        Raises:
+            InputError: When the approach or the tilt is not finite, or a periodic surface is
+                pressed to full contact or by a tilted plane.
+            NotConverged: When the contact conditions cannot be met to the tolerance.
+        """
+        first = None if start is None else self._started(start)
+        return self._pressed(self._plane(approach, tilt), first)
+
+    def solve_force(
+        self,
+        force: float,
+        *,
+        tilt: tuple[float, float] = _LEVEL,
+        start: HalfSpaceState | None = None,
+    ) -> HalfSpaceState:
+        """Solve the contact under a given normal force.
+
+        Args:
+            force: Normal force, ≥ 0 [N]; beyond full contact of a periodic surface too.
+            tilt: Slopes (tx, ty) of the plane, kept while it finds its height.
+            start: A solution nearby to start from; by default coarse grids give the start.
+
+        Returns:
+            The solution; without force that of first touch of a cell.
+
+        Raises:
+            InputError: When the force is negative or not finite, or as for `solve`.
+            NotConverged: When the contact conditions cannot be met to the tolerance.
+        """
+        if not (np.isfinite(force) and force >= 0.0):
+            raise InputError("the force must not be negative", value=force, allowed="≥ 0 N")
+        level = self._required(self._plane(0.0, tilt))
+        if force == 0.0:
+            return self._pressed(self._plane(-float(level.max()), tilt), None)
+        dx, dy = self.surface.spacing
+        known = None
+        if start is not None and start.force > 0.0:
+            known = Pressures(self._started(start), start.approach, 0.0, 0, 0)
+        total = force / (self.contact_modulus * dx * dy)
+        found = self._pressing.by_force(level, total, known)
+        return self._state(self._plane(found.approach, tilt), level + found.approach, found)
+
+    def respond(
+        self,
+        approaches: ArrayLike,
+        *,
+        patches: PatchGrid,
+        mean_heights: ArrayLike,
+        tilt: tuple[float, float] = _LEVEL,
+    ) -> Response:
+        """Solve along approaches, each from the two solutions before it, extrapolated.
+
+        Args:
+            approaches: Rigid approaches in any order, shape (m,) [mm].
+            patches: Patches within the surface's rectangle; a cell that straddles a border is
+                shared by area.
+            mean_heights: Mean heights of the surface on the patches, shape (N,) [mm].
+            tilt: Slopes (tx, ty) of the approach.
+
+        Returns:
+            The response, in the order of ``approaches``.
+
+        Raises:
+            InputError: When the approaches are not a finite, non-empty list, the patches do not
+                fit the surface or the mean heights not the patches, or as for `solve`.
+            NotConverged: When the contact conditions cannot be met to the tolerance.
+        """
+        sums = CellSums(
+            surface=self.surface, patches=patches, mean_heights=np.asarray(mean_heights, float)
+        )
+        given = np.atleast_1d(np.asarray(approaches, float))
+        order = np.argsort(given, kind="stable")
+        path = self._along([self._plane(given[index], tilt) for index in order])
+        rows = {int(index): sums.row(*step) for index, step in zip(order, path, strict=True)}
+        ordered = [rows[index] for index in range(len(given))]
+        return Response.of(ordered, self.name, self.contact_modulus, patches)
+
+    def _along(self, planes: list[RigidPlane]) -> Iterator[tuple[RigidPlane, HalfSpaceState]]:
+        """Solve at rising approaches; pressures are extrapolated in the approach."""
+        before = last = None
+        for plane in planes:
+            first = None
+            if last is not None:
+                first = last.pressure / self.contact_modulus
+                if before is not None and last.approach > before.approach:
+                    ahead = (plane.approach - last.approach) / (last.approach - before.approach)
+                    change = last.pressure - before.pressure
+                    first = np.maximum(first + ahead * change / self.contact_modulus, 0.0)
+            before, last = last, self._pressed(plane, first)
+            yield plane, last
+
+    def _started(self, start: HalfSpaceState) -> Array:
+        if start.pressure.shape != self.surface.grid:
+            raise InputError(
+                "the solution to start from is of another grid",
+                value=start.pressure.shape,
+                allowed=f"{self.surface.grid}",
+            )
+        return start.pressure / self.contact_modulus
+
+    def _pressed(self, plane: RigidPlane, start: Array | None) -> HalfSpaceState:
+        required = self._required(plane)
+        if self.periodic and required.mean() >= 0.0:
+            raise InputError(
+                "a periodic surface has no gap left at this approach",
+                value=plane.approach,
+                allowed=f"< {plane.approach - required.mean():.6g} mm; beyond it give the force",
+            )
+        return self._state(plane, required, self._pressing.by_approach(required, start))
+
+    def _plane(self, approach: float, tilt: tuple[float, float]) -> RigidPlane:
+        lx, ly = self.surface.lengths
+        plane = RigidPlane(approach=float(approach), tilt=tilt, centre=(0.5 * lx, 0.5 * ly))
+        if self.periodic and any(tilt):
+            raise InputError(
+                "a tilted plane does not continue periodically", value=tilt, allowed="(0, 0)"
+            )
+        return plane
+
+    def _required(self, plane: RigidPlane) -> Array:
+        surface = self.surface
+        below = surface.highest - surface.heights
+        required = plane.at(surface.x[:, None], surface.y) - below
+        if self._free is not None:
+            required[self._free] -= _OUT_OF_REACH * max(surface.lengths)
+        return required
+
+    @cached_property
+    def _free(self) -> NDArray[np.bool_] | None:
+        """Cells that may not touch, shape (nx, ny)."""
+        if self.within is None:
+            return None
+        edges = self.within.borders_x, self.within.borders_y
+        x, y = (
+            (centres >= border[0]) & (centres < border[-1])
+            for centres, border in zip((self.surface.x, self.surface.y), edges, strict=True)
+        )
+        return ~(x[:, None] & y)
+
+    def _state(self, plane: RigidPlane, required: Array, found: Pressures) -> HalfSpaceState:
+        return HalfSpaceState(
+            approach=plane.approach,
+            required=required,
+            pressure=found.pressure * self.contact_modulus,
+            contact_modulus=self.contact_modulus,
+            spacing=self.surface.spacing,
+            periodic=self.periodic,
+            residual=found.residual,
+            iterations=found.iterations,
+            grids=self._pressing.grids,
+        )
+
+    @cached_property
+    def _pressing(self) -> Pressing:
+        grids = ElasticGrids(periodic=self.periodic)
+        return Pressing(grids=grids, spacing=self.surface.spacing, tolerance=self.tolerance)

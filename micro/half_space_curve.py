@@ -1,0 +1,68 @@
+"""From the pressures on cells to the response of the surface and its patches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry import PatchGrid, Surface, patch_means
+from micro.contacts import true_area
+from micro.curve import checked_means
+from micro.half_space_state import HalfSpaceState
+from micro.plane import RigidPlane
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CellSums:
+    """Sums and means over patches of what the cells do.
+
+    Pressure, area and displacement of a cell that straddles a border are shared by area; a contact
+    counts for the patch that holds its largest pressure.
+
+    Args:
+        surface: The surface.
+        patches: The N patches, within the surface's rectangle.
+        mean_heights: Mean heights of the patches, shape (N,) [mm].
+
+    Raises:
+        InputError: When not every patch has a mean height.
+    """
+
+    surface: Surface
+    patches: PatchGrid
+    mean_heights: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mean_heights", checked_means(self.mean_heights, self.patches))
+
+    def row(self, plane: RigidPlane, state: HalfSpaceState) -> dict[str, Any]:
+        """Return the fields of a response for one approach."""
+        displacement = self._means(state.displacement)
+        below = self.surface.highest - plane.at(*self.patches.centres.T)
+        separation = below - self.mean_heights + displacement
+        area = true_area(state.in_contact, periodic=state.periodic)
+        contacts = state.contacts
+        owner = self.patches.index_of(*contacts.peak.T)
+        return {
+            "approach": plane.approach,
+            "force": state.force,
+            "contact_area": state.contact_area,
+            "contacts": len(contacts),
+            "mean_separation": separation.mean(),
+            "iterations": state.iterations,
+            "residual": state.residual,
+            "engulfed": 0,
+            "patch_force": self._means(state.pressure) * self.patches.area,
+            "patch_contact_area": self._means(area) * self.patches.area,
+            "patch_contacts": np.bincount(owner, minlength=self.patches.count),
+            "patch_displacement": displacement,
+            "patch_separation": separation,
+        }
+
+    def _means(self, field: Array) -> Array:
+        return patch_means(Surface(heights=field, lengths=self.surface.lengths), self.patches)

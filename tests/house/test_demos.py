@@ -1,0 +1,37 @@
+"""Every demo runs in reduced size; each asserts its own number."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+DEMOS = sorted((Path(__file__).parents[2] / "demos").glob("*.py"))
+
+
+@pytest.mark.parametrize("demo", DEMOS, ids=lambda path: path.stem)
+def test_demo_runs(demo, tmp_path):
+    done = subprocess.run(
+        [sys.executable, demo, "--quick", "--out", tmp_path],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    pictures = list(tmp_path.glob("*.png"))
+    assert pictures
+    assert all(picture.stat().st_size > 10_000 for picture in pictures)
+
+
+@pytest.mark.parametrize("demo", DEMOS, ids=lambda path: path.stem)
+def test_demo_is_a_narrative_that_asserts_a_number(demo):
+    text = demo.read_text(encoding="utf-8")
+    assert text.startswith("# %% [markdown]")
+    assert "\nassert " in text or "\n    assert " in text
+    assert len(text.splitlines()) <= 130
+
+
+def test_demo_runs_under_mpi(mpirun, tmp_path):
+    done = mpirun(2, "demos/paper_block.py", "--quick", "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("half-space, circular-independent") == 1

@@ -1,0 +1,192 @@
+"""The half-space model: its calls, its states and its refusals."""
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry import InputError, NotConverged, PatchGrid, Spectrum, Surface, patch_means, synthesise
+from micro import HalfSpaceModel
+
+E_STAR = 4000.0
+PATCHES = PatchGrid(grid=(3, 2), lengths=(1.0, 1.0))
+
+
+def rough(grid=(48, 48), **options):
+    spectrum = Spectrum(hurst=0.95, waves=(2, 8), rms_slope=0.215, seed=3)
+    return synthesise(spectrum, grid=grid, lengths=options.pop("lengths", (1.0, 1.0)))
+
+
+@pytest.fixture(scope="module")
+def surface():
+    return rough()
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["free", "periodic"])
+def model(request, surface):
+    return HalfSpaceModel(surface=surface, contact_modulus=E_STAR, periodic=request.param)
+
+
+@pytest.mark.parametrize("approach", [1e-3, 2e-3, 8e-3, 18e-3])
+def test_contact_conditions(model, approach):
+    state = model.solve(approach)
+    assert state.residual <= model.tolerance
+    assert np.all(state.pressure >= 0.0)
+    # the displacement is evaluated anew on the whole grid, with another padding
+    slack = 1.01 * model.tolerance * approach
+    assert state.gap.min() >= -slack
+    assert np.abs(state.gap[state.in_contact]).max(initial=0.0) <= slack
+
+
+def test_force_and_approach_are_inverse(model):
+    pressed = model.solve(6e-3)
+    again = model.solve_force(pressed.force)
+    # each solution is exact for approaches within 1e-8 of its own
+    assert again.approach == pytest.approx(6e-3, rel=3e-8)
+    assert again.force == pytest.approx(pressed.force, rel=1e-14)  # met by scaling
+    warm = model.solve_force(1.1 * pressed.force, start=pressed)
+    cold = model.solve_force(1.1 * pressed.force)
+    assert warm.approach == pytest.approx(cold.approach, rel=3e-8)
+
+
+def test_start_changes_the_way_but_not_the_answer(model):
+    cold = model.solve(6e-3)
+    near = model.solve(5.9e-3)
+    warm = model.solve(6e-3, start=near)
+    assert warm.force == pytest.approx(cold.force, rel=1e-7)  # 2 ε dlnF/dlnδ, ε = 1e-8
+    assert model.solve(6e-3, start=cold).iterations <= 2
+    assert model.solve(6e-3, start=model.solve(0.0)).force == pytest.approx(cold.force, rel=1e-7)
+
+
+def test_linear_in_the_contact_modulus(surface):
+    one, ten = (HalfSpaceModel(surface=surface, contact_modulus=e).solve(6e-3) for e in (1.0, 10.0))
+    assert ten.pressure == pytest.approx(10.0 * one.pressure, rel=1e-14)  # solved as p / E*
+
+
+def test_unit_of_length_does_not_matter(surface):
+    inch = 1.0 / 25.4
+    small = Surface(heights=surface.heights * inch, lengths=(inch, inch), periodic=True)
+    mm = HalfSpaceModel(surface=surface, contact_modulus=1.0).solve(6e-3)
+    other = HalfSpaceModel(surface=small, contact_modulus=1.0).solve(6e-3 * inch)
+    assert other.force == pytest.approx(mm.force * inch**2, rel=1e-7)  # both within 1e-8 in δ
+    assert other.iterations == mm.iterations
+
+
+def test_response_is_in_the_order_given(model):
+    approaches = np.array([6e-3, 0.0, 2e-3, 9e-3])
+    means = patch_means(model.surface, PATCHES)
+    response = model.respond(approaches, patches=PATCHES, mean_heights=means)
+    assert response.approach == pytest.approx(approaches)
+    for approach, force, area in zip(
+        approaches, response.force, response.contact_area, strict=True
+    ):
+        state = model.solve(approach)
+        assert force == pytest.approx(state.force, rel=1e-7)
+        assert area == pytest.approx(state.contact_area, rel=1e-12)  # the same cells
+
+
+def test_patches_sum_to_the_whole(model):
+    # 48 cells over 5 patches: cells straddle borders
+    patches = PatchGrid(grid=(5, 7), lengths=(1.0, 1.0))
+    means = patch_means(model.surface, patches)
+    response = model.respond([4e-3, 8e-3], patches=patches, mean_heights=means)
+    assert response.patch_force.sum(axis=1) == pytest.approx(response.force, rel=1e-13)
+    assert response.patch_contact_area.sum(axis=1) == pytest.approx(
+        response.contact_area, rel=1e-13
+    )
+    assert response.patch_contacts.sum(axis=1).tolist() == response.contacts.tolist()
+    state = model.solve(8e-3)
+    mean = patch_means(Surface(heights=state.gap, lengths=(1.0, 1.0)), patches)
+    # required and mean heights are averaged over the same shares of cells
+    assert response.patch_separation[1] == pytest.approx(mean, rel=1e-7)
+    assert response.mean_separation[1] == pytest.approx(state.gap.mean(), rel=1e-7)
+
+
+def test_tilt_turns_the_plane_about_the_centre():
+    model = HalfSpaceModel(surface=rough(), contact_modulus=E_STAR)
+    tilt = (3e-3, -2e-3)
+    state = model.solve(6e-3, tilt=tilt)
+    surface = model.surface
+    plane = tilt[0] * (surface.x[:, None] - 0.5) + tilt[1] * (surface.y - 0.5)
+    inclined = Surface(heights=surface.heights + plane, lengths=(1.0, 1.0))
+    other = HalfSpaceModel(surface=inclined, contact_modulus=E_STAR)
+    # the other surface counts its approach from a highest point of its own
+    same = other.solve(6e-3 + inclined.highest - surface.highest)
+    assert same.force == pytest.approx(state.force, rel=1e-7)
+
+
+@pytest.mark.parametrize("force", [1e-12, 1e-3, 1e4])
+@pytest.mark.parametrize("tilt", [(0.0, 0.0), (0.1, 0.05)])
+def test_any_force_and_tilt(force, tilt):
+    model = HalfSpaceModel(surface=rough(), contact_modulus=E_STAR)
+    state = model.solve_force(force, tilt=tilt)
+    assert state.force == pytest.approx(force, rel=1e-12)  # met by scaling
+    assert state.residual <= model.tolerance
+    # with this tilt a cell touches before the approach at the centre is 0
+    assert (state.approach < 0.0) == (tilt != (0.0, 0.0) and force < 1.0)
+
+
+def test_within_patches_only_they_touch():
+    surface = rough()
+    half = PatchGrid(grid=(1, 1), lengths=(0.48, 1.0))  # 23 rows of cells
+    low = np.where(surface.x[:, None] < 0.48, surface.heights, surface.heights.min() - 1.0)
+    model = HalfSpaceModel(surface=surface, contact_modulus=E_STAR, within=half)
+    state = model.solve(9e-3)
+    assert state.in_contact.any() and not state.in_contact[23:].any()
+    other = HalfSpaceModel(surface=Surface(heights=low, lengths=(1.0, 1.0)), contact_modulus=E_STAR)
+    same = other.solve(9e-3 + other.surface.highest - surface.highest)
+    assert state.force == pytest.approx(same.force, rel=1e-7)
+    by_force = model.solve_force(state.force)
+    assert by_force.approach == pytest.approx(9e-3, rel=3e-8)
+    response = model.respond([9e-3], patches=half, mean_heights=patch_means(surface, half))
+    assert response.force == pytest.approx(state.force, rel=1e-7)
+    with pytest.raises(InputError, match="no cell has its centre in the patches"):
+        replace(model, within=PatchGrid(grid=(1, 1), lengths=(0.1, 0.1), origin=(2.0, 0.0)))
+
+
+def test_no_contact():
+    model = HalfSpaceModel(surface=rough(), contact_modulus=E_STAR)
+    for state in (model.solve(0.0), model.solve(-1e-3), model.solve_force(0.0)):
+        assert state.force == 0.0 and state.contact_area == 0.0 and len(state.contacts) == 0
+        assert state.gap.min() >= 0.0
+
+
+def test_travels_without_its_work_arrays():
+    model = HalfSpaceModel(surface=rough(), contact_modulus=E_STAR)
+    force = model.solve(6e-3).force
+    copy = pickle.loads(pickle.dumps(model))
+    assert copy.solve(6e-3).force == force
+
+
+def test_refusals(surface):
+    with pytest.raises(InputError, match=r"0\.0: the contact modulus must be positive"):
+        HalfSpaceModel(surface=surface, contact_modulus=0.0)
+    with pytest.raises(InputError, match=r"-1: the tolerance must be positive"):
+        HalfSpaceModel(surface=surface, contact_modulus=1.0, tolerance=-1)
+    with pytest.raises(InputError, match="needs a periodic surface"):
+        HalfSpaceModel(surface=surface.cropped(), contact_modulus=1.0, periodic=True)
+    free = HalfSpaceModel(surface=surface, contact_modulus=1.0)
+    with pytest.raises(InputError, match="nan: the approach must be finite"):
+        free.solve(np.nan)
+    with pytest.raises(InputError, match=r"-1\.0: the force must not be negative"):
+        free.solve_force(-1.0)
+    with pytest.raises(InputError, match="at least one approach"):
+        free.respond([], patches=PATCHES, mean_heights=np.zeros(6))
+    with pytest.raises(InputError, match="every patch needs one mean height"):
+        free.respond([1e-3], patches=PATCHES, mean_heights=np.zeros(5))
+    other = HalfSpaceModel(surface=rough((24, 48)), contact_modulus=1.0).solve(0.0)
+    with pytest.raises(InputError, match=r"\(24, 48\): the solution to start from is of another"):
+        free.solve(1e-3, start=other)
+    periodic = HalfSpaceModel(surface=surface, contact_modulus=1.0, periodic=True)
+    with pytest.raises(InputError, match="a tilted plane does not continue periodically"):
+        periodic.solve(1e-3, tilt=(1e-3, 0.0))
+    with pytest.raises(InputError, match=r"no gap left at this approach.*beyond it give the force"):
+        periodic.solve(1.001 * (surface.highest - surface.mean_height))
+
+
+def test_what_cannot_be_reached_is_said(surface):
+    # round-off of the convolution is about 1e-15 of the displacement
+    model = HalfSpaceModel(surface=surface, contact_modulus=1.0, tolerance=1e-18)
+    with pytest.raises(NotConverged, match=r"asked 1\.0e-18"):
+        model.solve(6e-3)

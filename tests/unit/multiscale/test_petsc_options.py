@@ -1,0 +1,68 @@
+"""PETSc options behind ``--``, in processes of their own: PETSc takes options once."""
+
+import csv
+import subprocess
+import sys
+
+import pytest
+
+SMALL = [
+    "surface.grid=[64, 64]", "block.cells=[8, 8, 4]", "load.steps=2", "output.figures=false",
+]  # fmt: skip
+
+
+@pytest.fixture
+def patchlaw(root, tmp_path):
+    def run(*options):
+        words = [
+            "run",
+            "demos/scenes/paper.toml",
+            "--out",
+            tmp_path,
+            "--set",
+            *SMALL,
+            "--",
+            *options,
+        ]
+        return subprocess.run(
+            [sys.executable, "-m", "multiscale", *map(str, words)],
+            cwd=root,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+
+    return run
+
+
+def history(folder):
+    with (folder / "history.csv").open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_options_reach_the_solver_with_or_without_prefix(patchlaw, tmp_path):
+    assert patchlaw("-ksp_rtol", "1e-12").returncode == 0
+    tight = [int(row["linear_iterations"]) for row in history(tmp_path)]
+    assert patchlaw("-patchlaw_ksp_rtol", "1e-2").returncode == 0
+    loose = [int(row["linear_iterations"]) for row in history(tmp_path)]
+    assert tight[0] > 1.5 * loose[0]
+
+
+def test_user_may_watch_newton(patchlaw):
+    shown = patchlaw("-snes_monitor")
+    assert "SNES Function norm" in shown.stdout
+
+
+def test_misspelt_option_is_named_at_the_end(patchlaw):
+    shown = patchlaw("-ksp_tpye", "cg")
+    assert "unused database option" in shown.stdout
+    assert "-patchlaw_ksp_tpye" in shown.stdout
+
+
+def test_failure_exits_3_and_names_step_and_remedy(patchlaw, tmp_path):
+    done = patchlaw("-snes_max_it", "1", "-snes_rtol", "1e-14")
+    assert done.returncode == 3
+    assert "load step 1" in done.stderr
+    assert "raise load.steps" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "history.csv").exists()  # no step was accepted
