@@ -45,7 +45,8 @@ class Asperities:
         rejected: Number of maxima without two positive radii, not asperities either.
 
     Raises:
-        InputError: When the arrays differ in length, or not R' ≥ R'' > 0 everywhere.
+        InputError: When the arrays differ in length, a number is not finite, or not R' ≥ R'' > 0
+            everywhere.
     """
 
     x: Array
@@ -70,6 +71,14 @@ class Asperities:
             sizes = {name: getattr(self, name).shape for name in group}
             if len(set(sizes.values())) != 1 or any(len(size) != 1 for size in sizes.values()):
                 raise InputError("the asperities' arrays differ in shape", value=sizes)
+        for name in ("x", "y", "z", "angle", *_BORDER_ARRAYS):
+            bad = np.flatnonzero(~np.isfinite(getattr(self, name)))
+            if bad.size:
+                raise InputError(
+                    f"{name} of {bad.size} asperities is not finite, the first at index {bad[0]}",
+                    value=float(getattr(self, name)[bad[0]]),
+                    allowed="finite numbers in mm and rad",
+                )
         if not np.all((self.radius_major >= self.radius_minor) & (self.radius_minor > 0.0)):
             raise InputError("an asperity's principal radii are not R' ≥ R'' > 0")
 

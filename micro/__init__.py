@@ -1,8 +1,9 @@
 """Contact of a rough surface with a rigid plane on the scale of its asperities.
 
-Asperities and a contact modulus make an `AsperityModel`, a surface and a contact modulus an
-`IslandModel` or a `HalfSpaceModel`; solved along approaches each gives a `Response` of the surface
-and its patches; `love` tells how patches of pressure move the half-space.
+Asperities and a contact modulus make an `AsperityModel`; a surface and a contact modulus make a
+`ScaledModel`, whose asperities follow the load, an `IslandModel` or a `HalfSpaceModel`. Solved
+along approaches each gives a `Response` of the surface and its patches; `love` tells how patches
+of pressure move the half-space.
 """
 
 from micro.asperity_models import MODELS, SOLVERS, AsperityModel, ModelKind, asperity_model
@@ -25,8 +26,11 @@ from micro.love import love_centre, love_integral, love_mean, love_mutual
 from micro.many_summits import PAIR_SUMS
 from micro.models import MODEL_NAMES, MicroModel, micro_model
 from micro.response import Response
+from micro.scaled_model import BORDERS, CURVATURES, ScaledModel
 
 __all__ = [
+    "BORDERS",
+    "CURVATURES",
     "MODELS",
     "MODEL_NAMES",
     "PAIR_SUMS",
@@ -42,6 +46,7 @@ __all__ = [
     "MicroModel",
     "ModelKind",
     "Response",
+    "ScaledModel",
     "area_factor",
     "asperity_model",
     "axis_factor",

@@ -151,20 +151,23 @@ class AsperityModel:
         plane = RigidPlane.above(self.asperities, approach, tilt)
         required = plane.required(self.asperities)
         first = np.zeros(len(required)) if start is None else start.indentation
-        found = self._solution(required, first)
-        own = found.indentation
+        return self.state(plane, self.solution(required, first))
+
+    def state(self, plane: RigidPlane, solution: Solution) -> AsperityState:
+        """Return the contacts of a solution under a plane."""
+        own = solution.indentation
         return AsperityState(
             approach=plane.approach,
-            required=required,
+            required=plane.required(self.asperities),
             displacement=own + self._lift(own),
             indentation=own,
             semi_axes=self._hertz.semi_axes * np.sqrt(own)[:, None],
             contact_area=self._hertz.area * own,
             force=self._hertz.force * own**1.5,
             peak_pressure=self._hertz.peak_pressure * np.sqrt(own),
-            engulfed=found.engulfed,
-            iterations=found.iterations,
-            residual=found.residual,
+            engulfed=solution.engulfed,
+            iterations=solution.iterations,
+            residual=solution.residual,
         )
 
     def respond(
@@ -192,13 +195,7 @@ class AsperityModel:
             NotConverged: When the contact conditions cannot be met to 1e-10.
         """
         given = np.atleast_1d(np.asarray(approaches, float))
-        sums = PatchSums(
-            asperities=self.asperities,
-            patches=patches,
-            mean_heights=np.asarray(mean_heights, float),
-            hertz=self._hertz,
-            contact_modulus=self.contact_modulus,
-        )
+        sums = self.sums(patches, mean_heights)
         rows: dict[int, dict[str, Any]] = {}
         own: Array = np.zeros(len(self.asperities))
         before = own
@@ -206,7 +203,7 @@ class AsperityModel:
             plane = RigidPlane.above(self.asperities, given[index], tilt)
             # Going on as before is right to second order when the steps are equal.
             start = np.maximum(2.0 * own - before, 0.0)
-            found = self._solution(plane.required(self.asperities), start)
+            found = self.solution(plane.required(self.asperities), start)
             own, before = found.indentation, own
             rows[int(index)] = sums.row(plane, found)
         return sums.response(self.name, [rows[index] for index in range(len(given))])
@@ -255,8 +252,38 @@ class AsperityModel:
             return self._many.lift(own)
         return self._interaction.lift(own).displacement
 
-    def _solution(self, required: Array, start: Array) -> Solution:
-        """Solve for the summits in reach; the displacement of the others is left at 0."""
+    def sums(
+        self, patches: PatchGrid, mean_heights: ArrayLike, home: Asperities | None = None
+    ) -> PatchSums:
+        """Return what sums the results of this model over patches.
+
+        Args:
+            patches: Patches; every asperity lies in one.
+            mean_heights: Mean heights of the surface on the patches, shape (N,) [mm].
+            home: The summits, where they are not the centres of the contacts.
+
+        Raises:
+            InputError: When a summit lies outside the patches, or the mean heights do not fit.
+        """
+        return PatchSums(
+            asperities=self.asperities,
+            home=self.asperities if home is None else home,
+            patches=patches,
+            mean_heights=np.asarray(mean_heights, float),
+            hertz=self._hertz,
+            contact_modulus=self.contact_modulus,
+        )
+
+    def solution(self, required: Array, start: Array) -> Solution:
+        """Solve for the summits in reach; the displacement of the others is left at 0.
+
+        Args:
+            required: Displacements d_k that the plane requires, shape (n,) [mm].
+            start: First guess of the own indentations, shape (n,) [mm].
+
+        Raises:
+            NotConverged: When the contact conditions cannot be met to 1e-10.
+        """
         if not self.interacting:
             return Solution(required, required, 0, 0.0, 0)
         reached = np.flatnonzero(required > 0.0)
@@ -282,7 +309,12 @@ class AsperityModel:
 
 
 def asperity_model(
-    name: str, asperities: Asperities, *, contact_modulus: float, solver: str = "active-set"
+    name: str,
+    asperities: Asperities,
+    *,
+    contact_modulus: float,
+    solver: str = "active-set",
+    pairs: str = "auto",
 ) -> AsperityModel:
     """Return the model of a given name on some asperities.
 
@@ -291,6 +323,7 @@ def asperity_model(
         asperities: The summits.
         contact_modulus: E* [MPa].
         solver: A name in `SOLVERS`, for the models with interaction.
+        pairs: A name in `PAIR_SUMS` or ``"auto"``, for the models with interaction.
 
     Raises:
         InputError: When a name is unknown or the modulus not positive.
@@ -300,6 +333,7 @@ def asperity_model(
         asperities=asperities,
         contact_modulus=contact_modulus,
         solver=solver,
+        pairs=pairs,
         **MODELS[name]._asdict(),
     )
 

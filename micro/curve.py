@@ -29,6 +29,7 @@ class PatchSums:
 
     Args:
         asperities: The n asperities.
+        home: The same at their summits, which tell the patch.
         patches: The N patches; every summit lies in one.
         mean_heights: Mean heights of the patches, shape (N,) [mm].
         hertz: Coefficients of the asperities.
@@ -39,6 +40,7 @@ class PatchSums:
     """
 
     asperities: Asperities
+    home: Asperities
     patches: PatchGrid
     mean_heights: Array
     hertz: HertzCoefficients
@@ -52,7 +54,7 @@ class PatchSums:
     @cached_property
     def owner(self) -> NDArray[np.intp]:
         """Flat index of the patch that holds each summit, shape (n,)."""
-        return self.patches.index_of(self.asperities.x, self.asperities.y)
+        return self.patches.index_of(self.home.x, self.home.y)
 
     def row(self, plane: RigidPlane, solution: Solution) -> dict[str, Any]:
         """Return the fields of a response for one approach."""

@@ -35,6 +35,7 @@ cut-off: there the mesh alone acts, without the fourth moments."""
 
 _NEIGHBOURS = 80.0
 _CUT_OFF = 3.2
+_BLOCK = 2**19
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -117,17 +118,22 @@ class FarMesh:
         """Evaluate neighbours and take close pairs, and contacts themselves, off the mesh."""
         count = len(places.interaction.x)
         own = np.arange(count, dtype=np.int32)
-        taken_row = np.concatenate([close.row, own]).astype(np.int64)
-        taken_column = np.concatenate([close.column, own]).astype(np.int64)
+        taken = [np.concatenate([part.astype(np.int32), own]) for part in (close.row, close.column)]
         key = places.row.astype(np.int64) * count + places.column
-        other = ~np.isin(key, taken_row * count + taken_column)
-        row = np.concatenate([places.row[other], taken_row])
-        column = np.concatenate([places.column[other], taken_column])
-        values = _corrections(places, row, column, int(np.count_nonzero(other)))
-        near = [
-            csr_array((part, (row[: len(part)], column[: len(part)])), shape=(count, count))
-            for part in values
-        ]
+        other = ~np.isin(key, taken[0].astype(np.int64) * count + taken[1])
+        del key
+        pairs = np.stack([places.row[other], places.column[other]])
+        values = np.concatenate(
+            [
+                _corrections(places, *pairs, distant=True),
+                _corrections(places, *taken, distant=False),
+            ],
+            axis=1,
+        )
+        row, column = np.concatenate([pairs, taken], axis=1)
+        near = [csr_array((part, (row, column)), shape=(count, count)) for part in values[:2]]
+        last = csr_array((values[2, : pairs.shape[1]], (pairs[0], pairs[1])), shape=(count, count))
+        near.append(last)
         return cls(interaction=places.interaction, near=near, mesh=places.mesh)
 
     def displacement(self, moments: Array) -> Array:
@@ -158,8 +164,24 @@ class FarMesh:
         return mean + along, 2.0 * cross, mean - along
 
 
-def _corrections(places: Neighbourhood, row: Indices, column: Indices, kept: int) -> list[Array]:
-    """Return the three terms of the first ``kept`` pairs less the mesh's, of the others −mesh."""
+def _corrections(
+    places: Neighbourhood,
+    row: NDArray[np.int32],
+    column: NDArray[np.int32],
+    *,
+    distant: bool,
+) -> Array:
+    """Return the three terms of pairs less the mesh's, those of pairs that are not distant 0."""
+    values = np.empty((TERMS, len(row)))
+    for first in range(0, len(row), _BLOCK):  # blocks bound the memory
+        block = slice(first, first + _BLOCK)
+        values[:, block] = _correction(places, row[block], column[block], distant)
+    return values
+
+
+def _correction(
+    places: Neighbourhood, row: NDArray[np.int32], column: NDArray[np.int32], distant: bool
+) -> Array:
     i, alpha = places.interaction, places.mesh.sharpness
     dx, dy = i.x[row] - i.x[column], i.y[row] - i.y[column]
     distance = np.hypot(dx, dy)
@@ -168,10 +190,8 @@ def _corrections(places: Neighbourhood, row: Indices, column: Indices, kept: int
     value, slope, curvature = smooth_kernel(distance, alpha)
     beta = i.beta[column]
     mean, half = 0.5 * (1.0 + beta), 0.5 * (1.0 - beta) * cosine
-    first, second = -value, -((mean + half) * curvature + (mean - half) * slope)
-    r, polynomials = distance[:kept], angular_polynomials(i.beta, TERMS)
-    polynomials = [part[:, column[:kept]] for part in polynomials]
-    _, quadrupole, hexadecapole = pair_terms(r, cosine[:kept], polynomials)
-    first[:kept] = erfc(alpha * r) / r
-    second[:kept] += quadrupole
-    return [first, second, hexadecapole]
+    second = (mean + half) * curvature + (mean - half) * slope
+    if not distant:
+        return np.stack([-value, -second, np.zeros_like(value)])
+    terms = list(pair_terms(distance, cosine, angular_polynomials(beta, TERMS)))
+    return np.stack([erfc(alpha * distance) / distance, terms[1] - second, terms[2]])

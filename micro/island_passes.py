@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from geometry.errors import NotConverged
 from micro.island_shapes import Islands, islands
+from micro.relaxation import Relaxation
 from micro.relief import Relief
 
 Array = NDArray[np.float64]
@@ -16,8 +17,6 @@ Array = NDArray[np.float64]
 TOLERANCE = 1e-6
 """Largest change of a displacement in a pass, relative to the greatest height above the plane."""
 
-_DAMPING = (0.2, 1.0)
-_FIRST = 0.6
 _FREE_PASSES = 10
 _MOST_PASSES = 200
 
@@ -42,7 +41,7 @@ def settle(relief: Relief, level: float) -> Settled:
     """Cut the surface, let the islands displace each other, cut it again at the new levels.
 
     Every pass goes a part of the way to the displacements by the islands it found; the part
-    follows from the last two changes (Irons and Tuck). From the tenth pass on, regions can fall
+    follows from the last two changes. From the tenth pass on, regions can fall
     apart but not grow together again: a pair that does both in turn would never settle.
 
     Args:
@@ -51,39 +50,27 @@ def settle(relief: Relief, level: float) -> Settled:
 
     Raises:
         NotConverged: When the displacements do not settle.
-
-    Source:
-        Irons & Tuck, Int. J. Numer. Meth. Eng. 1 (1969) 275, doi 10.1002/nme.1620010306.
     """
     above = relief.z - level
     deepest = float(above.max(initial=0.0))
     reached = above > 0.0
     linked = relief.open_passes(np.full(len(relief), level))
-    region, lift, part = relief.regions(linked), np.zeros(len(relief)), _FIRST
-    last: Array | None = None
+    region, lift, relaxed = relief.regions(linked), np.zeros(len(relief)), Relaxation()
     for number in range(_MOST_PASSES):
         now = relief.open_passes(level + lift)
         now &= linked | (number < _FREE_PASSES)
         if np.any(now != linked):
-            linked, region, last = now, relief.regions(now), None
+            linked, region = now, relief.regions(now)
+            relaxed.forget()
         found = islands(relief, above - lift, region)
         change = np.where(reached, found.lift(relief.x, relief.y) - lift, 0.0)
         residual = float(np.abs(change).max(initial=0.0)) / (deepest or 1.0)
         if residual <= TOLERANCE:
             return Settled(found, above - lift, number + 1, residual)
-        part = _FIRST if last is None else _relaxed(part, change, last)
-        lift, last = lift + part * change, change
+        lift = relaxed.next(lift, change)
     raise NotConverged(
         f"the passes between islands and their displacements at height {level:.6g} mm",
         reason="MAX_ITERATIONS",
         iterations=_MOST_PASSES,
         remedy='lower load.approach, or choose micro.model = "half-space"',
     )
-
-
-def _relaxed(part: float, change: Array, last: Array) -> float:
-    difference = change - last
-    scale = float(difference @ difference)
-    if scale == 0.0:
-        return _FIRST
-    return float(np.clip(-part * (last @ difference) / scale, *_DAMPING))

@@ -12,6 +12,7 @@ gives R = V/(π w²), the ratio of the principal moments gives R'/R'', their dir
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,24 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 _MOST_SLENDER = 1e4
+
+
+class Paraboloids(NamedTuple):
+    """Paraboloid caps equivalent to m regions.
+
+    Attributes:
+        x: Abscissae of the centroids of volume, shape (m,) [mm].
+        y: Ordinates, shape (m,) [mm].
+        angle: Directions of the larger principal radii from the x axis, shape (m,) [rad].
+        radius: R = sqrt(R' R''), shape (m,) [mm].
+        ratio: R'/R'' ≥ 1, shape (m,).
+    """
+
+    x: Array
+    y: Array
+    angle: Array
+    radius: Array
+    ratio: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -81,30 +100,52 @@ def islands(relief: Relief, height: Array, region: Indices) -> Islands:
     count = int(member.max(initial=-1)) + 1
     depth = np.zeros(count)
     np.maximum.at(depth, island, height[on])
-    moments = _from_origin(caps[:, on], relief.x[on], relief.y[on])
-    total = np.stack([np.bincount(island, part, count) for part in moments])
-    volume: Array = total[0]
-    x, y, xx, xy, yy = list(total[1:] / volume)
-    mean, half = 0.5 * (xx - x**2 + yy - y**2), 0.5 * (xx - x**2 - yy + y**2)
-    cross = xy - x * y
-    spread = np.hypot(half, cross)
-    ratio = (mean + spread) / np.maximum(mean - spread, (mean + spread) / _MOST_SLENDER)
-    radius = volume / (np.pi * depth**2)
-    shape = shape_factors(ratio, np.ones(count))
-    major = shape.axis * np.sqrt(radius * depth)
+    moments = from_origin(caps[:, on], relief.x[on], relief.y[on])
+    total: Array = np.stack([np.bincount(island, part, count) for part in moments])
+    found = equivalent(total, depth)
+    shape = shape_factors(found.ratio, np.ones(count))
+    major = shape.axis * np.sqrt(found.radius * depth)
     return Islands(
         member=member,
         depth=depth,
-        x=x,
-        y=y,
-        angle=np.mod(0.5 * np.arctan2(cross, half), np.pi),
+        x=found.x,
+        y=found.y,
+        angle=found.angle,
         semi_axes=np.stack([major, major * np.sqrt(shape.axis_ratio_squared)], axis=1),
-        force=4.0 / 3.0 * np.sqrt(radius) * shape.force * depth**1.5,
+        force=4.0 / 3.0 * np.sqrt(found.radius) * shape.force * depth**1.5,
     )
 
 
-def _from_origin(moments: Array, x: Array, y: Array) -> Array:
-    """Refer moments of volume to the origin instead of the peaks (parallel axes)."""
+def equivalent(moments: Array, depth: Array) -> Paraboloids:
+    """Return the paraboloids with the volume and the principal moments of regions.
+
+    Args:
+        moments: ∫ X^p Y^q dV for 1, X, Y, X², XY, Y² from any origin, shape (6, m) [mm³ … mm⁵].
+        depth: Heights w > 0 of the regions, shape (m,) [mm].
+    """
+    volume: Array = moments[0]
+    x, y, xx, xy, yy = list(moments[1:] / volume)
+    mean, half = 0.5 * (xx - x**2 + yy - y**2), 0.5 * (xx - x**2 - yy + y**2)
+    cross = xy - x * y
+    spread = np.hypot(half, cross)
+    largest = np.maximum(mean + spread, np.finfo(float).tiny)  # 0 for a single sample
+    return Paraboloids(
+        x=x,
+        y=y,
+        angle=np.mod(0.5 * np.arctan2(cross, half), np.pi),
+        radius=volume / (np.pi * depth**2),
+        ratio=largest / np.clip(mean - spread, largest / _MOST_SLENDER, largest),
+    )
+
+
+def from_origin(moments: Array, x: Array, y: Array) -> Array:
+    """Refer moments of volume to the origin instead of the peaks (parallel axes).
+
+    Args:
+        moments: Moments as `Relief.caps` gives them, shape (6, n).
+        x: Abscissae of the peaks, shape (n,) [mm].
+        y: Ordinates, shape (n,) [mm].
+    """
     volume, along, across, xx, xy, yy = moments
     return np.stack(
         [

@@ -12,6 +12,7 @@ from micro.asperity_models import MODELS, asperity_model
 from micro.half_space import HalfSpaceModel
 from micro.islands import IslandModel
 from micro.response import Response
+from micro.scaled_model import ScaledModel
 
 MODEL_NAMES = (*MODELS, "islands", "half-space")
 """Names of all micro models, the cheapest kinds first."""
@@ -67,7 +68,13 @@ class MicroModel(Protocol):
 
 
 def micro_model(
-    name: str, surface: Surface, *, contact_modulus: float, solver: str = "active-set"
+    name: str,
+    surface: Surface,
+    *,
+    contact_modulus: float,
+    solver: str = "active-set",
+    curvature: str = "summit",
+    border: str = "ignore",
 ) -> MicroModel:
     """Make a micro model of a surface whose border is free, as that of a block's top is.
 
@@ -76,9 +83,11 @@ def micro_model(
         surface: The surface.
         contact_modulus: E* [MPa].
         solver: Solver of the interacting asperity models.
+        curvature: Where asperity models take the curvature, a name in `CURVATURES`.
+        border: What they make of maxima on the border, a name in `BORDERS`.
 
     Raises:
-        InputError: When there is no such model or solver, or the modulus is not positive.
+        InputError: When there is no such model, option or solver, or the modulus is not positive.
     """
     if name == "half-space":
         return HalfSpaceModel(surface=surface, contact_modulus=contact_modulus)
@@ -86,5 +95,14 @@ def micro_model(
         return IslandModel(surface=surface, contact_modulus=contact_modulus)
     if name not in MODELS:
         raise InputError("unknown micro model", value=name, allowed=", ".join(MODEL_NAMES))
+    if (curvature, border) != ("summit", "ignore"):
+        return ScaledModel(
+            kind=name,
+            surface=surface,
+            contact_modulus=contact_modulus,
+            curvature=curvature,
+            border=border,
+            solver=solver,
+        )
     asperities = find_asperities(surface, periodic=False)
     return asperity_model(name, asperities, contact_modulus=contact_modulus, solver=solver)

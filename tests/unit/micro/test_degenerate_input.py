@@ -1,0 +1,115 @@
+"""What every model does with degenerate surfaces and loads: a defined answer or a clear error."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry import (
+    InputError,
+    PatchGrid,
+    Spectrum,
+    Surface,
+    find_asperities,
+    patch_means,
+    synthesise,
+)
+from micro import MODELS, SOLVERS, IslandModel, ScaledModel, asperity_model
+
+PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
+
+
+def models(surface):
+    """Return every model on a surface."""
+    asperities = find_asperities(surface, periodic=False)
+    for kind in MODELS:
+        for solver in SOLVERS:
+            yield asperity_model(kind, asperities, contact_modulus=1.0, solver=solver)
+        yield ScaledModel(kind=kind, surface=surface, contact_modulus=1.0)
+        yield ScaledModel(kind=kind, surface=surface, contact_modulus=1.0, border="ignore")
+    yield IslandModel(surface=surface, contact_modulus=1.0)
+
+
+def respond(model, surface, approaches):
+    means = patch_means(surface, PATCHES)
+    return model.respond(approaches, patches=PATCHES, mean_heights=means)
+
+
+@pytest.fixture(scope="module")
+def surface():
+    spectrum = Spectrum(hurst=0.8, waves=(2, 6), rms_slope=0.2, seed=2)
+    return synthesise(spectrum, grid=(40, 40), lengths=(1.0, 1.0))
+
+
+def test_flat_surface():
+    flat = Surface(heights=np.zeros((12, 12)), lengths=(1.0, 1.0))
+    for model in models(flat):
+        response = respond(model, flat, [-1e-3, 0.0, 1e-3])
+        assert response.force[:2].tolist() == [0.0, 0.0]
+        assert np.isfinite(response.force[2])
+        # Nothing is a summit; regions and border asperities see the whole surface.
+        whole = isinstance(model, IslandModel) or getattr(model, "border", "") == "include"
+        assert (response.force[2] > 0.0) == whole
+    assert len(find_asperities(flat)) == 0
+
+
+def test_ties_are_one_contact():
+    x = (np.arange(41) + 0.5) / 41
+    dome = -((x[:, None] - 0.5) ** 2 + (x - 0.5) ** 2) / 0.4
+    ties = Surface(heights=np.round(dome, 2), lengths=(1.0, 1.0))  # steps of 10 µm
+    for model in models(ties):
+        response = respond(model, ties, [5e-3])
+        assert response.contacts[0] >= 1 and np.isfinite(response.force[0])
+    assert len(find_asperities(ties)) == 1
+
+
+def test_before_touch(surface):
+    for model in models(surface):
+        response = respond(model, surface, [0.0, -1e-3, -1.0])
+        assert response.force.tolist() == [0.0] * 3 and response.contacts.tolist() == [0] * 3
+        assert not response.patch_force.any() and not response.patch_displacement.any()
+
+
+def test_approach_beyond_the_range_of_heights(surface):
+    span = np.ptp(surface.heights)
+    for model in models(surface):
+        response = respond(model, surface, span * np.array([1.0, 3.0, 30.0]))
+        assert np.all(np.isfinite(response.force)) and np.all(np.diff(response.force) > 0.0)
+        if isinstance(model, IslandModel):
+            assert len(response.warnings) == 3
+        elif not response.model.startswith(("elliptic-", "circular-")):
+            assert response.engulfed[-1] > 0  # merged: the result tells so
+
+
+def test_tiny_approach(surface):
+    for model in models(surface):
+        response = respond(model, surface, [1e-9, 1e-7])
+        assert response.contacts.tolist() == [1, 1]
+        # One Hertz contact: P ∝ δ^(3/2); the highest summit and z_M differ by 1e-13 mm at most.
+        assert response.force[1] == pytest.approx(1e3 * response.force[0], rel=1e-2)
+
+
+def test_nan_is_refused_where_it_enters(surface):
+    heights = surface.heights.copy()
+    heights[3, 5] = np.nan
+    with pytest.raises(InputError, match=r"1 of 1600 heights are not finite.*index \(3, 5\)"):
+        Surface(heights=heights, lengths=(1.0, 1.0))
+    asperities = find_asperities(surface, periodic=False)
+    for name in ("x", "z", "angle", "border_z"):
+        values = getattr(asperities, name).copy()
+        values[1] = np.nan
+        message = rf"nan: {name} of 1 asperities is not finite, the first at index 1"
+        with pytest.raises(InputError, match=message):
+            replace(asperities, **{name: values})
+    for model in models(surface):
+        with pytest.raises(InputError, match="nan: the approach must be finite"):
+            respond(model, surface, [1e-3, np.nan])
+        with pytest.raises(InputError, match="the tilt must be two finite slopes"):
+            model.solve(1e-3, tilt=(0.0, np.nan))
+
+
+def test_summit_outside_the_patches(surface):
+    small = PatchGrid(grid=(1, 1), lengths=(1.0, 0.5))
+    for model in models(surface):
+        with pytest.raises(InputError, match="lie outside the patches"):
+            model.respond([np.ptp(surface.heights)], patches=small, mean_heights=[0.0])

@@ -1,0 +1,183 @@
+"""Asperities fitted at the scale of the contact: options, limits, states and curves."""
+
+import numpy as np
+import pytest
+
+from geometry import (
+    InputError,
+    PatchGrid,
+    Spectrum,
+    Surface,
+    find_asperities,
+    patch_means,
+    synthesise,
+)
+from micro import BORDERS, CURVATURES, MODELS, ScaledModel, asperity_model, micro_model
+
+E_STAR = 4000.0
+PATCHES = PatchGrid(grid=(3, 2), lengths=(1.0, 1.0))
+
+
+@pytest.fixture(scope="module")
+def surface():
+    spectrum = Spectrum(hurst=0.8, waves=(2, 8), rms_slope=0.2, seed=4)
+    return synthesise(spectrum, grid=(64, 64), lengths=(1.0, 1.0))
+
+
+def scaled(surface, kind="elliptic", **options):
+    return ScaledModel(kind=kind, surface=surface, contact_modulus=E_STAR, **options)
+
+
+def respond(model, approaches, patches=PATCHES, **options):
+    means = patch_means(model.surface, patches)
+    return model.respond(approaches, patches=patches, mean_heights=means, **options)
+
+
+def dome(cx, cy, major=0.3, minor=0.3, grid=96):
+    x = (np.arange(grid) + 0.5) / grid
+    heights = -((x[:, None] - cx) ** 2) / (2 * major) - (x - cy) ** 2 / (2 * minor)
+    return Surface(heights=heights, lengths=(1.0, 1.0))
+
+
+@pytest.mark.parametrize("kind", MODELS)
+def test_without_options_it_is_the_paper_s_model(surface, kind):
+    plain = asperity_model(kind, find_asperities(surface, periodic=False), contact_modulus=E_STAR)
+    same = scaled(surface, kind, curvature="summit", border="ignore")
+    for approach in (1e-3, 8e-3):
+        assert same.solve(approach).force == pytest.approx(plain.solve(approach).force, rel=1e-9)
+    means = patch_means(surface, PATCHES)
+    ours = respond(same, [1e-3, 8e-3])
+    paper = plain.respond([1e-3, 8e-3], patches=PATCHES, mean_heights=means)
+    assert ours.patch_force == pytest.approx(paper.patch_force, rel=1e-8, abs=1e-12)
+    assert ours.mean_separation == pytest.approx(paper.mean_separation, rel=1e-9)
+
+
+@pytest.mark.parametrize(("major", "minor"), [(0.3, 0.3), (0.9, 0.3)])
+@pytest.mark.parametrize("approach", [1e-3, 5e-3])
+def test_paraboloid_keeps_its_radii(major, minor, approach):
+    surface = dome(0.5, 0.5, major, minor)
+    fitted, plain = (
+        scaled(surface, curvature=curvature).solve(approach) for curvature in CURVATURES[::-1]
+    )
+    # Sums over at least 1500 samples.
+    assert fitted.force == pytest.approx(plain.force, rel=2e-3)
+    assert fitted.semi_axes == pytest.approx(plain.semi_axes, rel=5e-3)
+
+
+def test_curvature_is_that_of_the_contact():
+    x = (np.arange(128) + 0.5) / 128 - 0.5
+    squared = x[:, None] ** 2 + x**2
+    # Sharp at the summit, 20 times as blunt beyond 30 µm.
+    heights = -squared / 0.8 - 2e-4 * (1.0 - np.exp(-squared / 0.03**2))
+    surface = Surface(heights=heights, lengths=(1.0, 1.0))
+    model = scaled(surface)
+    radius = [
+        state.semi_axes[0].prod() / state.indentation[0]
+        for state in (model.solve(2e-6), model.solve(2e-2))
+    ]
+    assert radius[0] == pytest.approx(1.0 / (2.0 / 0.8 + 4e-4 / 0.03**2), rel=0.05)
+    assert radius[1] == pytest.approx(0.4, rel=0.05)  # 1 % is still the sharp tip's depth
+    assert scaled(surface, curvature="summit").solve(2e-2).force < 0.95 * model.solve(2e-2).force
+
+
+@pytest.mark.parametrize(("place", "count"), [((0.0, 0.5), 1), ((1.0, 0.0), 1), ((0.5, 0.5), 1)])
+def test_border_asperities(place, count):
+    surface = dome(*place)
+    both = scaled(surface, border="include")
+    inside = place == (0.5, 0.5)
+    assert (both.solve(1e-3).force > 0.0).sum() == count
+    alone = scaled(surface, border="ignore").solve(1e-3)
+    assert (alone.force.sum() > 0.0) == inside
+    if not inside:  # a corner of the dome at most has the R of a half or a quarter
+        state = both.solve(1e-3)
+        share = 0.5 if 0.5 in place else 0.25
+        k = state.in_contact
+        radius = state.semi_axes[k].prod() / state.indentation[k]
+        assert 0.8 * share < radius[0] / 0.3 < share  # π a b = π R A1 w with A1 ≤ 1
+
+
+@pytest.mark.parametrize("kind", ["elliptic", "circular-independent"])
+def test_curve_is_made_of_states(surface, kind):
+    model = scaled(surface, kind)
+    approaches = np.array([8e-3, -1e-3, 0.0, 3e-3, 8e-3])
+    response = respond(model, approaches)
+    assert response.approach.tolist() == approaches.tolist()
+    for row, approach in enumerate(approaches):
+        state = model.solve(approach)
+        # Contacts and curvatures agree to 1e-6 of the approach on either path.
+        assert response.force[row] == pytest.approx(state.force.sum(), rel=2e-5, abs=1e-12)
+        assert response.contacts[row] == state.in_contact.sum()
+    assert response.patch_force.sum(axis=1) == pytest.approx(response.force, rel=1e-12)
+    assert response.force[1] == response.force[2] == 0.0
+    assert response.model == f"{kind}, curvature contact, border include"
+    warm = model.solve(8e-3, start=model.solve(7.9e-3))
+    assert warm.force.sum() == pytest.approx(response.force[0], rel=2e-5)
+
+
+@pytest.mark.parametrize("border", BORDERS)
+@pytest.mark.parametrize("curvature", CURVATURES)
+def test_force_grows_with_the_approach(surface, curvature, border):
+    response = respond(
+        scaled(surface, curvature=curvature, border=border), np.linspace(0.0, 0.02, 81)
+    )
+    assert np.all(np.diff(response.force) > 0.0)
+    assert np.all(np.diff(response.contact_area) > -1e-3 * response.contact_area[1:])
+
+
+def test_tilt_turns_the_load(surface):
+    model = scaled(surface)
+    left, right = (respond(model, [8e-3], tilt=(t, 0.0)).patch_force[0] for t in (-2e-2, 2e-2))
+    assert left[:2].sum() > right[:2].sum() and left[4:].sum() < right[4:].sum()
+
+
+def test_homogeneous_in_the_modulus(surface):
+    soft = ScaledModel(kind="elliptic", surface=surface, contact_modulus=1.0).solve(8e-3)
+    hard = scaled(surface).solve(8e-3)
+    assert hard.force == pytest.approx(4000.0 * soft.force, rel=1e-9)
+
+
+def test_models_by_name(surface):
+    plain = micro_model("circular", surface, contact_modulus=1.0)
+    assert plain.name == "circular"
+    model = micro_model("circular", surface, contact_modulus=1.0, border="include")
+    assert model.name == "circular, curvature summit, border include"
+    assert model.datum == surface.highest
+
+
+def test_patches_alone_hold_all_asperities(surface):
+    model = scaled(surface)
+    count = 0
+    for index in range(PATCHES.count):
+        alone, patch = model.of_patch(PATCHES, index)
+        count += len(alone.asperities)
+        assert alone.first_touch >= model.first_touch - 1e-12
+        curve = alone.respond([2e-3, 1e-2], patches=patch, mean_heights=[0.0])
+        beside = model.respond([2e-3, 1e-2], patches=PATCHES, mean_heights=np.zeros(6))
+        # Without neighbours that press its summits down a patch carries more.
+        assert np.all(curve.force >= beside.patch_force[:, index] * (1.0 - 1e-3))
+    assert count == len(model.asperities)
+
+
+def test_flat_surface():
+    flat = Surface(heights=np.zeros((16, 16)), lengths=(1.0, 1.0))
+    model = scaled(flat, border="ignore")
+    assert len(model.asperities) == 0 and len(model.solve(1e-3).force) == 0
+    # The border's highest cell stands for the plateau; its fit has the area of the surface.
+    assert np.isfinite(scaled(flat).solve(1e-3).force).all()
+
+
+def test_refuses(surface):
+    with pytest.raises(InputError, match=r"'tip': this scale of the curvature is unknown.*contact"):
+        scaled(surface, curvature="tip")
+    with pytest.raises(InputError, match=r"'mirror': this treatment of the border.*ignore"):
+        scaled(surface, border="mirror")
+    with pytest.raises(InputError, match=r"'flat': this micro model is unknown"):
+        scaled(surface, "flat")
+    with pytest.raises(InputError, match=r"'lemke': this solver is unknown"):
+        scaled(surface, solver="lemke")
+    with pytest.raises(InputError, match=r"-1\.0: the contact modulus must be positive"):
+        ScaledModel(kind="circular", surface=surface, contact_modulus=-1.0)
+    with pytest.raises(InputError, match="inf: the approach must be finite"):
+        scaled(surface).solve(np.inf)
+    with pytest.raises(InputError, match="at least one approach"):
+        respond(scaled(surface), [])

@@ -1,0 +1,25 @@
+"""No force drop along the approach where contacts merge; the benchmark studies 70 surfaces."""
+
+import numpy as np
+import pytest
+from interaction_cases import E_STAR, PATCHES, set_1
+
+from micro import MODELS, ScaledModel, asperity_model
+
+APPROACHES = np.linspace(0.5e-3, 52e-3, 104)
+
+
+@pytest.mark.parametrize("seed", [1, 6, 8])
+@pytest.mark.parametrize("kind", MODELS)
+@pytest.mark.parametrize("scaled", [False, True], ids=["summit", "contact"])
+def test_force_never_falls(seed, kind, scaled):
+    surface, asperities, means = set_1(seed)
+    model = (
+        ScaledModel(kind=kind, surface=surface, contact_modulus=E_STAR)
+        if scaled
+        else asperity_model(kind, asperities, contact_modulus=E_STAR)
+    )
+    response = model.respond(APPROACHES, patches=PATCHES, mean_heights=means)
+    assert np.all(np.diff(response.force) > 0.0)
+    # Ellipses overlap long before: the kernel of merging contacts starts to act.
+    assert response.contact_area_fraction[-1] > 0.1
