@@ -37,7 +37,7 @@ def warnings(stage: Stage) -> Iterator[str]:
         )
     if not stage.reached_patches:
         yield "nothing lies within the largest approach: no force will act"
-    if stage.by_summits and stage.reached_at_border:
+    if stage.by_summits and stage.scene.micro.border == "ignore" and stage.reached_at_border:
         yield (
             f"maxima on the surface's border within the largest approach: "
             f"{stage.reached_at_border}; an 8-neighbour search cannot confirm them, and they carry "

@@ -111,6 +111,8 @@ class MicroSection(_Section):
         "half-space",
     ] = "elliptic"
     solver: Literal["active-set", "truncated-newton"] = "active-set"
+    curvature: Literal["summit", "contact"] = "summit"
+    border: Literal["ignore", "include"] = "ignore"
 
 
 class CouplingSection(_Section):

@@ -110,7 +110,7 @@ class Stage:
         """Number of patches with anything that the largest closure of their laws can touch."""
         x, y = (part.ravel() for part in np.meshgrid(self.surface.x, self.surface.y, indexing="ij"))
         z = self.surface.heights.ravel()
-        if self.by_summits:
+        if self.by_summits and self.scene.micro.border == "ignore":
             x, y, z = self.asperities.x, self.asperities.y, self.asperities.z
         owner = self.patches.index_of(x, y)
         return int(np.unique(owner[self.closure_ends[owner] > self.surface.highest - z]).size)
@@ -134,7 +134,8 @@ def make_stage(scene: Scene) -> Stage:
     _check_patches(scene, surface)
     block = scene.block
     asperities = find_asperities(surface, periodic=False)  # the block's sides are free
-    if scene.micro.model in MODELS and not len(asperities):
+    by_summits = scene.micro.model in MODELS and scene.micro.border == "ignore"
+    if by_summits and not len(asperities):
         raise InputError(
             "the surface has no summit that could carry load",
             key="micro.model",
@@ -151,6 +152,8 @@ def make_stage(scene: Scene) -> Stage:
             surface,
             contact_modulus=contact_modulus(block.young_modulus, block.poisson_ratio),
             solver=scene.micro.solver,
+            curvature=scene.micro.curvature,
+            border=scene.micro.border,
         ),
         patches=patches,
         mean_heights=patch_means(surface, patches),

@@ -165,6 +165,24 @@ def test_surface_without_summit_needs_another_model(capsys, heights):
     assert " 100 " in shown  # full contact, in per cent
 
 
+def test_border_and_curvature_come_closer_to_the_half_space(capsys, tmp_path):
+    """Seed 1 carries a fifth of its load on the border, which the paper's search leaves out."""
+    forces = {}
+    for model, options in {
+        "half-space": [],
+        "elliptic": [],
+        "mended": ["micro.curvature=contact", "micro.border=include"],
+    }.items():
+        name = "half-space" if model == "half-space" else "elliptic"
+        extra = ["coupling.kind=analytic", f"micro.model={name}", "output.figures=false"]
+        words = ("run", PAPER, "--out", str(tmp_path), "--set", "load.steps=1", *extra, *options)
+        assert call(capsys, *words)[0] == 0
+        with (tmp_path / "history.csv").open(encoding="utf-8") as file:
+            forces[model] = float(next(csv.DictReader(file))["force_N"])
+    assert forces["elliptic"] < 0.85 * forces["half-space"]
+    assert forces["mended"] == pytest.approx(forces["half-space"], rel=0.03)  # the model's own
+
+
 def test_areas_beyond_the_asperity_models_are_said(capsys, tmp_path):
     extra = ["coupling.kind=analytic", "load.approach=40 um", "output.figures=false"]
     _, shown, _ = call(capsys, "run", PAPER, "--out", str(tmp_path), "--set", *SMALL, *extra)
