@@ -27,6 +27,13 @@ def statements(stage: Stage) -> Iterator[tuple[str, str]]:
 
 def warnings(stage: Stage) -> Iterator[str]:
     """Yield what a user should know about the validity of the scene."""
+    yield from _surface_warnings(stage)
+    if stage.embedded:
+        yield from _patch_warnings(stage)
+        yield from _block_warnings(stage)
+
+
+def _surface_warnings(stage: Stage) -> Iterator[str]:
     excess = stage.surface.highest - stage.surface.heights.max()
     if excess > 0.1 * stage.scene.loading.approach:
         x, y = stage.surface.highest_point
@@ -39,18 +46,28 @@ def warnings(stage: Stage) -> Iterator[str]:
         yield "nothing lies within the largest approach: no force will act"
     if stage.by_summits and stage.scene.micro.border == "ignore" and stage.reached_at_border:
         yield (
-            f"maxima on the surface's border within the largest approach: "
+            "maxima on the surface's border within the largest approach: "
             f"{stage.reached_at_border}; an 8-neighbour search cannot confirm them, and they carry "
             "no load here"
         )
-    if not stage.embedded:
-        return
+
+
+def _patch_warnings(stage: Stage) -> Iterator[str]:
     grids = zip(stage.surface.grid, stage.patches.grid, strict=True)
     if stage.model.name == "islands" and any(cells % patches for cells, patches in grids):
         yield (
             "patch borders cut cells of the surface: every patch is taken alone along whole cells; "
             "a grid that is a multiple of the patches would fit"
         )
+    widths = [length + 2.0 * stage.shape.margin for length in stage.surface.lengths]
+    if max(stage.patches.size) > 0.5 * min(stage.shape.height, *widths):
+        yield (
+            "the patches are not small against the block: the half-space correction (Love) inside "
+            "their laws is an approximation there"
+        )
+
+
+def _block_warnings(stage: Stage) -> Iterator[str]:
     cells = min(c / n for c, n in zip(stage.shape.cells[:2], stage.patches.grid, strict=True))
     if cells * stage.shape.degree < 4:
         yield (
@@ -60,12 +77,6 @@ def warnings(stage: Stage) -> Iterator[str]:
     fit = alignment(stage.shape, stage.patches)
     if not fit:
         yield fit.sentence
-    widths = [length + 2.0 * stage.shape.margin for length in stage.surface.lengths]
-    if max(stage.patches.size) > 0.5 * min(stage.shape.height, *widths):
-        yield (
-            "the patches are not small against the block: the half-space correction (Love) inside "
-            "their laws is an approximation there"
-        )
 
 
 def _surface(stage: Stage) -> str:
