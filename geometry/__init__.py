@@ -5,6 +5,7 @@ means over patches; a block shape gives the mesh of the body that carries it.
 """
 
 from geometry.asperities import Asperities, find_asperities
+from geometry.control import Control
 from geometry.errors import InputError, NotConverged, PatchlawError
 from geometry.files import read_surface
 from geometry.meshes import Alignment, BlockShape, alignment, flat_block
@@ -17,6 +18,7 @@ __all__ = [
     "Alignment",
     "Asperities",
     "BlockShape",
+    "Control",
     "InputError",
     "NotConverged",
     "PatchGrid",
