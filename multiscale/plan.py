@@ -18,11 +18,7 @@ def statements(stage: Stage) -> Iterator[tuple[str, str]]:
     yield "coupling", _coupling(stage)
     if stage.embedded:
         yield "block", _block(stage)
-    yield (
-        "load",
-        f"{scene.loading.steps} steps to an approach of {1e3 * scene.loading.approach:g} µm"
-        + (f", tilt {scene.loading.tilt}" if any(scene.loading.tilt) else ""),
-    )
+    yield "load", _load(stage)
 
 
 def warnings(stage: Stage) -> Iterator[str]:
@@ -35,7 +31,7 @@ def warnings(stage: Stage) -> Iterator[str]:
 
 def _surface_warnings(stage: Stage) -> Iterator[str]:
     excess = stage.surface.highest - stage.surface.heights.max()
-    if excess > 0.1 * stage.scene.loading.approach:
+    if excess > 0.1 * stage.furthest[0]:
         x, y = stage.surface.highest_point
         yield (
             f"the approach counts from the interpolant's highest point, {1e3 * excess:.3g} µm "
@@ -128,3 +124,23 @@ def _block(stage: Stage) -> str:
         f"{shape.grading:g}, {margin}{block.sides} sides, contact modulus "
         f"{stage.model.contact_modulus:.6g} MPa"
     )
+
+
+def _load(stage: Stage) -> str:
+    programme = stage.scene.loading.programme
+    scale, unit = (1.0, "N") if programme.quantity == "force" else (1e3, "µm")
+    way = ", ".join(f"{scale * point:g} {unit}" for point in programme.points)
+    text = f"{len(programme.targets)} steps to {_article(programme.quantity)} of {way}"
+    if programme.force_change is not None:
+        text += f", halved where the force changes by more than {programme.force_change:.3g}"
+    if programme.tilt is None:
+        text += ", the plane free to tilt"
+    elif any(programme.tilt):
+        text += f", tilt {programme.tilt}"
+    if programme.quantity == "force":
+        text += f"; on a half-space its approach is {1e3 * stage.furthest[0]:.4g} µm"
+    return text
+
+
+def _article(quantity: str) -> str:
+    return f"an {quantity}" if quantity == "approach" else f"a {quantity}"

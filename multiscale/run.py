@@ -8,13 +8,12 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from geometry.collective import on_root
-from multiscale.coupling import AnalyticCoupling, Coupling, EmbeddedCoupling
+from multiscale.assemble import Assembly, assemble, make_table
 from multiscale.history import History, LoadStep
 from multiscale.law_files import LawTable
-from multiscale.laws import ExtendedLaw
+from multiscale.loading import Coupling, load_steps
 from multiscale.scene import Scene
 from multiscale.stage import Stage, make_stage
-from multiscale.tabulate import isolated_laws
 
 LARGEST_SUMMIT_AREA = 0.1
 """Contact area fraction up to which asperity models are meant (they are 10 % off well before)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -11,7 +11,16 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 
 from geometry.errors import InputError
 from geometry.spectrum import Spectrum
-from multiscale.quantities import Length, Pressure, Slope, SpectralAmplitude
+from multiscale.loading import Programme
+from multiscale.quantities import (
+    Approaches,
+    Forces,
+    Length,
+    Pressure,
+    Slope,
+    SpectralAmplitude,
+    Tilt,
+)
 from multiscale.refusals import first_refusal
 
 
@@ -81,11 +90,13 @@ class BlockSection(_Section):
     young_modulus: Annotated[Pressure, Field(gt=0)]
     poisson_ratio: Annotated[Number, Field(gt=-1, lt=0.5)]
     sides: Literal["free", "roller"] = "free"
-    cells: Annotated[tuple[Count, Count, Count], Field(description="cells in x, y, z")] = (
-        40,
-        40,
-        25,
-    )
+    cells: (
+        Annotated[
+            tuple[Count, Count, Count],
+            Field(description="cells in x, y, z; by default as fine as the coupling needs"),
+        ]
+        | None
+    ) = None
     element: Literal["Q1", "Q2", "P1", "P2"] = "Q1"
     grading: Annotated[Number, Field(ge=1, description="bottom to top layer height")] = 1.0
     margin: Annotated[Length, Field(ge=0, description="block beyond the interface")] = 0.0
@@ -116,23 +127,112 @@ class MicroSection(_Section):
 
 
 class CouplingSection(_Section):
-    """How micro and macro model are put together."""
+    """How micro and macro model are put together.
 
-    kind: Literal["isolated", "analytic"] = "isolated"
+    ``kind``: ``isolated`` takes every patch's law from what lies in it alone (Waddad et al. 2016);
+    ``consistent`` takes all laws from one solution of the whole surface; ``concurrent`` solves the
+    whole surface on the block at every load step, without laws; ``analytic`` is the micro model
+    alone on a half-space.
+
+    ``compliance`` of the block under its patches: ``finite-element`` from the plain mesh under the
+    laws; ``decomposed`` is the half-space exactly and finite elements for the smooth rest. By
+    default decomposed, but for isolated laws and laws at points.
+
+    ``newton``: ``condensed`` solves for the patches alone, with the compliance computed once;
+    ``full`` for all displacements of the mesh. By default what is predicted to cost less.
+    """
+
+    kind: Literal["isolated", "consistent", "concurrent", "analytic"] = "consistent"
+    compliance: Literal["auto", "finite-element", "decomposed"] = "auto"
+    newton: Literal["auto", "condensed", "full"] = "auto"
     love: Literal["mean", "centre"] = "mean"
     interface: Literal["patchwise", "pointwise"] = "patchwise"
     table_tolerance: Annotated[Number, Field(gt=0, lt=0.1)] | None = None
 
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        for clash, problem, allowed in self._clashes():
+            if clash:
+                raise ValueError(f"{problem} (allowed: {allowed})")
+        return self
+
+    def _clashes(self) -> Iterator[tuple[bool, str, str]]:
+        """Yield whether keys contradict each other, how, and what would do."""
+        if self.kind == "analytic":  # ignores what is about patches and finite elements
+            return
+        kind, points = f"kind = '{self.kind}'", self.interface == "pointwise"
+        yield (
+            self.kind != "isolated" and self.love == "centre",
+            f"love = 'centre' does not go with {kind}",
+            "love = 'mean', or kind = 'isolated'",
+        )
+        for key, value, meant in (
+            ("compliance", self.compliance, "decomposed"),
+            ("newton", self.newton, "auto"),
+            ("interface", self.interface, "patchwise"),
+        ):
+            yield (
+                self.kind == "concurrent" and value not in ("auto", meant),
+                f"{key} = '{value}' does not go with {kind}",
+                f"{key} = '{meant}'",
+            )
+        yield (
+            points and self.compliance == "decomposed",
+            "compliance = 'decomposed' does not go with interface = 'pointwise'",
+            "compliance = 'finite-element', or interface = 'patchwise'",
+        )
+        yield (
+            points and self.newton == "condensed",
+            "newton = 'condensed' does not go with interface = 'pointwise'",
+            "newton = 'full', or interface = 'patchwise'",
+        )
+        yield (
+            self.newton == "full" and self.compliance == "decomposed",
+            "newton = 'full' does not go with compliance = 'decomposed'",
+            "newton = 'condensed', or compliance = 'finite-element'",
+        )
+
+    @property
+    def decomposed(self) -> bool:
+        """Whether the block is the half-space and a smooth correction."""
+        if self.kind in ("analytic", "concurrent"):
+            return self.kind == "concurrent"
+        if self.compliance != "auto":
+            return self.compliance == "decomposed"
+        return self.kind == "consistent" and self.interface != "pointwise" and self.newton != "full"
+
 
 class LoadSection(_Section):
-    """The motion of the rigid plane."""
+    """The motion of the rigid plane: turning points of its approach, or of the force on it.
 
-    approach: PositiveLength
+    ``steps`` load steps lead to every turning point. ``tilt`` are the slopes of the approach along
+    x and y about the middle of the interface; ``"free"`` lets the plane turn until the pressures
+    have no moment. ``force_change`` is the largest change of the force in one step relative to the
+    largest force so far: larger steps are halved.
+    """
+
+    approach: Approaches | None = None
+    force: Forces | None = None
     steps: Annotated[int, Field(ge=1, le=1_000_000, strict=True)] = 8
-    tilt: Annotated[tuple[Slope, Slope], Field(description="d approach/dx, d approach/dy")] = (
-        0.0,
-        0.0,
-    )
+    tilt: Tilt = (0.0, 0.0)
+    force_change: Annotated[Number, Field(ge=1e-3, lt=1)] | None = None
+
+    @model_validator(mode="after")
+    def _one_load(self) -> Self:
+        if (self.approach is None) == (self.force is None):
+            raise ValueError("needs exactly one load (allowed: either 'approach' or 'force')")
+        return self
+
+    @property
+    def programme(self) -> Programme:
+        """What the rigid plane is made to do."""
+        return Programme(
+            quantity="approach" if self.force is None else "force",
+            points=self.approach or self.force or (),
+            steps=self.steps,
+            tilt=None if self.tilt == "free" else self.tilt,
+            force_change=self.force_change,
+        )
 
 
 class OutputSection(_Section):
@@ -211,12 +311,6 @@ class Scene(_Section):
             return None
         folder = self._source.parent if self._source else Path()
         return folder / self.surface.file
-
-    @property
-    def approaches(self) -> list[float]:
-        """Approach of the plane at each load step [mm]."""
-        approach, steps = self.loading.approach, self.loading.steps
-        return [approach * step / steps for step in range(1, steps + 1)]
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
