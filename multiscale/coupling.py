@@ -74,20 +74,28 @@ class EmbeddedCoupling:
     Args:
         pressed: The block with the laws on its interface.
         table: The laws, which also give contact area, contacts and separation.
-
-    Attributes:
-        last: The block's latest equilibrium; histories of displacement fields are not kept.
     """
 
     def __init__(self, pressed: PressedBlock, table: LawTable) -> None:
         self._pressed, self._table = pressed, table
-        self.last: PressState | None = None
+        self._last: PressState | None = None
+
+    @property
+    def displacement(self) -> Array:
+        """This rank's displacements at the latest load step; earlier ones are not kept [mm].
+
+        Raises:
+            ValueError: Before the first load step.
+        """
+        if self._last is None:
+            raise ValueError("no load step has been accepted yet")
+        return self._last.displacement
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `Coupling.press`."""
         state = self._pressed.press(control)
         step = self._step(control, state)
-        self.last = state
+        self._last = state
         return step
 
     def _step(self, control: Control, press: PressState) -> LoadStep:

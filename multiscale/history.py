@@ -64,7 +64,7 @@ class LoadStep:
         wall_s: Wall time of the step [s].
         reason: Name of the reason for which the iteration stopped.
         patches: The state of every patch.
-        imbalance: Force on the plane minus reaction of the support, relative to the force; zero
+        imbalance: Force on the plane minus reaction of the support, relative to the force; None
             where no support takes part.
         residuals: Norms of the residual over the Newton steps, relative to the interface load.
         tilt: Slopes (tx, ty) of the approach about the middle of the interface [mm/mm].
@@ -84,7 +84,7 @@ class LoadStep:
     wall_s: float
     reason: str
     patches: PatchState
-    imbalance: float = 0.0
+    imbalance: float | None = None
     residuals: tuple[float, ...] = ()
     tilt: tuple[float, float] = (0.0, 0.0)
     moment_N_mm: tuple[float, float] = (0.0, 0.0)

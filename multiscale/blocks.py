@@ -1,0 +1,51 @@
+"""Blocks for couplings: the meshed block under its interface, its compliance, its correction."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from multiscale.stage import Stage
+
+if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
+    from macro import Correction, Interface
+
+Array = NDArray[np.float64]
+
+
+def embedding(stage: Stage, comm: Any) -> Interface:
+    """Mesh and assemble the block of a scene, with its patches on top.
+
+    Args:
+        stage: The scene's ingredients.
+        comm: MPI communicator; None for this process alone.
+
+    Note:
+        Collective.
+    """
+    from mpi4py import MPI
+
+    from macro import Block, Interface, Material, block_mesh
+
+    section = stage.scene.block
+    mesh = block_mesh(stage.shape, comm or MPI.COMM_SELF)
+    material = Material(young_modulus=section.young_modulus, poisson_ratio=section.poisson_ratio)
+    return Interface(Block(mesh, material, sides=section.sides), stage.patches)
+
+
+def final_field(stage: Stage, pressure: Array, comm: Any) -> tuple[Interface, Array]:
+    """Return the meshed block and its displacements under pressures that are uniform on patches.
+
+    Args:
+        stage: The scene's ingredients.
+        pressure: Pressures of the patches, shape (N,) [MPa].
+        comm: MPI communicator; None for this process alone.
+
+    Note:
+        Collective.
+    """
+    interface = embedding(stage, comm)
+    function = interface.block.solve(interface.load(pressure))
+    return interface, function.x.array[: interface.block.owned_dofs].copy()
