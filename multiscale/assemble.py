@@ -49,9 +49,7 @@ def make_table(stage: Stage, comm: Any) -> LawTable:
     )
 
 
-def assemble(
-    stage: Stage, table: LawTable | None, comm: Any
-) -> tuple[Coupling, Interface | None]:
+def assemble(stage: Stage, table: LawTable | None, comm: Any) -> tuple[Coupling, Interface | None]:
     """Put micro and macro model together as the scene asks.
 
     Args:
@@ -72,9 +70,7 @@ def assemble(
     return AnalyticCoupling(stage.model, stage.patches, stage.mean_heights), None
 
 
-def _with_laws(
-    stage: Stage, table: LawTable, comm: Any
-) -> tuple[Coupling, Interface | None]:
+def _with_laws(stage: Stage, table: LawTable, comm: Any) -> tuple[Coupling, Interface | None]:
     if newton_choice(stage).condensed:
         return CondensedCoupling(table, patch_compliance(stage, comm)), None
     from macro import PressedBlock
@@ -82,7 +78,8 @@ def _with_laws(
     interface = embedding(stage, comm)
     laws = [ExtendedLaw(law) for law in table.laws]
     mode = stage.scene.coupling.interface
-    return EmbeddedCoupling(PressedBlock(interface.block, interface, laws, mode=mode), table), interface
+    pressed = PressedBlock(interface.block, interface, laws, mode=mode)
+    return EmbeddedCoupling(pressed, table), interface
 
 
 def _concurrent(stage: Stage, comm: Any) -> Coupling:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from multiscale.stage import Stage
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import Correction, Interface
+    from macro import Interface
 
 Array = NDArray[np.float64]
 

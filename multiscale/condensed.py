@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.control import Control
-from multiscale.coupling import beyond_law, embedded_step
 from multiscale.dense_newton import DenseNewton, DenseState
-from multiscale.history import LoadStep, PatchState
+from multiscale.history import LoadStep
 from multiscale.law_files import LawTable
 
 Array = NDArray[np.float64]

@@ -12,7 +12,6 @@ from multiscale.stage import Stage
 
 def statements(stage: Stage) -> Iterator[tuple[str, str]]:
     """Yield pairs of topic and sentence that say what will be done and why."""
-    scene = stage.scene
     yield "surface", _surface(stage)
     yield "contact", _contact(stage)
     yield "micro model", _model(stage)
@@ -55,7 +54,8 @@ def _surface_warnings(stage: Stage) -> Iterator[str]:
 def _patch_warnings(stage: Stage) -> Iterator[str]:
     isolated = stage.scene.coupling.kind == "isolated"
     grids = zip(stage.surface.grid, stage.patches.grid, strict=True)
-    if isolated and stage.model.name == "islands" and any(cells % patches for cells, patches in grids):
+    cut = any(cells % patches for cells, patches in grids)
+    if isolated and stage.model.name == "islands" and cut:
         yield (
             "patch borders cut cells of the surface: every patch is taken alone along whole cells; "
             "a grid that is a multiple of the patches would fit"
@@ -128,7 +128,9 @@ def _coupling(stage: Stage) -> str:
 
 def _newton(stage: Stage) -> str:
     choice = newton_choice(stage)
-    return ("condensed to the patches: " if choice.condensed else "full, on the mesh: ") + choice.why
+    return (
+        f"{'condensed to the patches' if choice.condensed else 'full, on the mesh'}: {choice.why}"
+    )
 
 
 def _block(stage: Stage) -> str:

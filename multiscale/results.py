@@ -128,9 +128,7 @@ def write_fields(folder: Path, run: Run) -> list[Path]:
         aside.mkdir(parents=True)
 
     on_root(run.comm, empty)
-    write_xdmf(
-        aside / "fields.xdmf", interface, displacement, run.steps[-1].patches.pressure_MPa
-    )
+    write_xdmf(aside / "fields.xdmf", interface, displacement, run.steps[-1].patches.pressure_MPa)
 
     def move() -> list[Path]:
         files = [path.replace(folder / path.name) for path in sorted(aside.iterdir())]
