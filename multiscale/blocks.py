@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from micro import influence_matrix
 from multiscale.stage import Stage
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
@@ -33,6 +34,51 @@ def embedding(stage: Stage, comm: Any) -> Interface:
     mesh = block_mesh(stage.shape, comm or MPI.COMM_SELF)
     material = Material(young_modulus=section.young_modulus, poisson_ratio=section.poisson_ratio)
     return Interface(Block(mesh, material, sides=section.sides), stage.patches)
+
+
+def patch_compliance(stage: Stage, comm: Any) -> Array:
+    """Return the compliance of a scene's block under its patches, shape (N, N) [mm/MPa].
+
+    Args:
+        stage: The scene's ingredients.
+        comm: MPI communicator; None for this process alone.
+
+    Note:
+        Collective.
+    """
+    if stage.scene.coupling.decomposed:
+        correction = smooth_correction(stage, comm)
+        half_space = influence_matrix(stage.patches) / (np.pi * stage.model.contact_modulus)
+        return half_space + correction.patch_compliance(stage.patches)
+    from macro import plain_compliance
+
+    interface = embedding(stage, comm)
+    return plain_compliance(interface.block, interface)
+
+
+def smooth_correction(stage: Stage, comm: Any) -> Correction:
+    """Return what the scene's block adds to the half-space.
+
+    Args:
+        stage: The scene's ingredients.
+        comm: MPI communicator; None for this process alone.
+
+    Note:
+        Collective.
+    """
+    from mpi4py import MPI
+
+    from macro import Material, make_correction
+
+    section = stage.scene.block
+    return make_correction(
+        stage.shape,
+        Material(young_modulus=section.young_modulus, poisson_ratio=section.poisson_ratio),
+        section.sides,
+        stage.patches,
+        HalfSpace(section.young_modulus, section.poisson_ratio),
+        comm or MPI.COMM_SELF,
+    )
 
 
 def final_field(stage: Stage, pressure: Array, comm: Any) -> tuple[Interface, Array]:
