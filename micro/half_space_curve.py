@@ -43,7 +43,7 @@ class CellSums:
     def row(self, plane: RigidPlane, state: HalfSpaceState) -> dict[str, Any]:
         """Return the fields of a response for one approach."""
         displacement = self._means(state.displacement)
-        below = self.surface.highest - plane.at(*self.patches.centres.T)
+        below = self.surface.highest - plane.means(self.patches)
         separation = below - self.mean_heights + displacement
         area = true_area(state.in_contact, periodic=state.periodic)
         contacts = state.contacts
@@ -51,6 +51,7 @@ class CellSums:
         return {
             "approach": plane.approach,
             "force": state.force,
+            "moment": self._moment(plane, state),
             "contact_area": state.contact_area,
             "contacts": len(contacts),
             "mean_separation": separation.mean(),
@@ -63,6 +64,11 @@ class CellSums:
             "patch_displacement": displacement,
             "patch_separation": separation,
         }
+
+    def _moment(self, plane: RigidPlane, state: HalfSpaceState) -> tuple[float, float]:
+        dx, dy = self.surface.spacing
+        cells = state.pressure * (dx * dy)
+        return plane.moment(self.surface.x[:, None], self.surface.y, cells)
 
     def _means(self, field: Array) -> Array:
         return patch_means(Surface(heights=field, lengths=self.surface.lengths), self.patches)
