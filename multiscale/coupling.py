@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from geometry.control import Control
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
-from micro import MicroModel, Response
-from micro.plane import RigidPlane
+from micro import MicroModel, Response, RigidPlane
 from multiscale.balance import Balance
 from multiscale.history import LoadStep, PatchState
 from multiscale.law_files import LawTable
@@ -22,6 +21,8 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import PressedBlock, PressState
 
 Array = NDArray[np.float64]
+
+_BALANCE = 1e-10  # of a plane on the mesh, whose residual is driven to as much of the load
 
 
 class AnalyticCoupling:
@@ -82,7 +83,7 @@ class EmbeddedCoupling:
         self._newton = self._linear = 0
         half = 0.5 * float(np.hypot(*table.patches.lengths))
         touch = float(min(law.touch for law in table.laws))
-        self._balance = Balance(half=half, first_touch=touch)
+        self._balance = Balance(half=half, first_touch=touch, tolerance=_BALANCE)
 
     @property
     def displacement(self) -> Array:
@@ -184,7 +185,7 @@ def embedded_step(
     grid: PatchGrid,
     *,
     approach: float,
-    tilt: Sequence[float],
+    tilt: Sequence[float] | Array,
     moment: Sequence[float] | Array,
     force: float,
     patches: PatchState,

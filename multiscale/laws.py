@@ -14,6 +14,7 @@ from multiscale.law_curves import Curves
 
 Array = NDArray[np.float64]
 
+_FLATTEST = 1e-9  # slope of a closure that is as good as at the end of its rise
 _MOST_STEPS = 80  # of an inversion; bisection alone takes 53
 
 
@@ -146,7 +147,7 @@ class PatchLaw:
             InputError: When a closure lies beyond the law's range and `extend` is false.
         """
         point = self.along(self._local(closure, extend))
-        return point.pressure, point.dpressure / point.dclosure
+        return point.pressure, point.dpressure / np.maximum(point.dclosure, _FLATTEST)
 
     def area_fraction_at(self, closure: ArrayLike, *, extend: bool = False) -> Array:
         """Return the real contact area over the nominal one.
@@ -199,35 +200,40 @@ class PatchLaw:
         return values[function].reshape(local.shape)
 
     def _local(self, closure: ArrayLike, extend: bool) -> Array:
-        """Return the local approaches of closures, by Newton steps kept within brackets."""
+        """Return the local approaches of closures."""
         closures = self._checked(closure, extend)
         if self.is_open:
             return closures
-        rows, ends = slice(0, self._rising), self.closure[: self._rising]
-        outside = (closures <= ends[0]) | (closures >= ends[-1])
-        piece = np.clip(np.searchsorted(ends, closures, side="right") - 1, 0, len(ends) - 2)
-        low, high = self.approach[rows][piece], self.approach[rows][piece + 1]
+        first, last = self.closure[0], self.closure[self._rising - 1]
+        end = self.approach[self._rising - 1]
+        slope = max(float(self.along(end).dclosure), _FLATTEST)
+        local = np.where(
+            closures <= first,
+            self.approach[0] - (first - closures),
+            end + (closures - last) / slope,
+        )
+        between = (closures > first) & (closures < last)
+        local[between] = self._inverted(closures[between])
+        return local
+
+    def _inverted(self, closures: Array) -> Array:
+        """Invert the rising part of the closure's interpolant by bracketed Newton steps."""
+        rows, ends = self.approach[: self._rising], self.closure[: self._rising]
+        piece = np.searchsorted(ends, closures, side="right") - 1
+        low, high = rows[piece], rows[piece + 1]
         share = (closures - ends[piece]) / (ends[piece + 1] - ends[piece])
         local = low + share * (high - low)
-        last = self.along(self.approach[self._rising - 1])
-        # where closure stops to rise with a tangent to it, nothing but its slope is left to go on
-        slope = last.dclosure if last.dclosure > 0.0 else 1.0
-        local = np.where(closures <= ends[0], low - (ends[0] - closures), local)
-        local = np.where(closures >= ends[-1], high + (closures - ends[-1]) / slope, local)
         for _ in range(_MOST_STEPS):
             point = self.along(local)
-            error = np.where(outside, 0.0, point.closure - closures)
+            error = point.closure - closures
             low, high = np.where(error < 0.0, local, low), np.where(error > 0.0, local, high)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                newton = local - error / point.dclosure
+            newton = local - error / np.maximum(point.dclosure, _FLATTEST)
             inside = (newton >= low) & (newton <= high)
-            step = np.where(
-                outside | (error == 0.0), local, np.where(inside, newton, 0.5 * (low + high))
-            )
+            step = np.where(inside, newton, 0.5 * (low + high))
             if np.all(np.abs(step - local) <= 4e-16 * np.abs(step)):
-                return step
+                break
             local = step
-        return local
+        return step if closures.size else closures
 
     def _checked(self, closure: ArrayLike, extend: bool) -> Array:
         closures = np.asarray(closure, dtype=float)
