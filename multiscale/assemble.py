@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from geometry.patches import PatchGrid
 from multiscale.blocks import embedding, patch_compliance, smooth_correction
+from multiscale.concurrent import ConcurrentCoupling
 from multiscale.condensed import CondensedCoupling
 from multiscale.consistent import consistent_laws
 from multiscale.coupling import AnalyticCoupling, EmbeddedCoupling
@@ -17,6 +19,8 @@ from multiscale.tabulate import isolated_laws
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import Interface
+
+_LOADS = 8  # rectangles along a side, at least, that a smooth field is told the contacts' forces by
 
 
 def make_table(stage: Stage, comm: Any) -> LawTable:
@@ -83,8 +87,8 @@ def _with_laws(stage: Stage, table: LawTable, comm: Any) -> tuple[Coupling, Inte
 
 
 def _concurrent(stage: Stage, comm: Any) -> Coupling:
-    from multiscale.concurrent import ConcurrentCoupling
-
-    return ConcurrentCoupling(
-        stage.model, stage.patches, stage.mean_heights, smooth_correction(stage, comm)
-    )
+    """Gather forces on rectangles that divide the patches, several along each side."""
+    nx, ny = (count * -(-_LOADS // count) for count in stage.patches.grid)
+    loads = PatchGrid(grid=(nx, ny), lengths=stage.patches.lengths)
+    correction = smooth_correction(stage, loads, comm)
+    return ConcurrentCoupling(stage.model, stage.patches, stage.mean_heights, correction)

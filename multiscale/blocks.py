@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.patches import PatchGrid
 from micro import influence_matrix
 from multiscale.stage import Stage
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
+    from macro.correction import Correction
+
     from macro import Interface
 
 Array = NDArray[np.float64]
@@ -47,7 +50,7 @@ def patch_compliance(stage: Stage, comm: Any) -> Array:
         Collective.
     """
     if stage.scene.coupling.decomposed:
-        correction = smooth_correction(stage, comm)
+        correction = smooth_correction(stage, stage.patches, comm)
         half_space = influence_matrix(stage.patches) / (np.pi * stage.model.contact_modulus)
         return half_space + correction.patch_compliance(stage.patches)
     from macro import plain_compliance
@@ -56,27 +59,30 @@ def patch_compliance(stage: Stage, comm: Any) -> Array:
     return plain_compliance(interface.block, interface)
 
 
-def smooth_correction(stage: Stage, comm: Any) -> Correction:
+def smooth_correction(stage: Stage, loads: PatchGrid, comm: Any) -> Correction:
     """Return what the scene's block adds to the half-space.
 
     Args:
         stage: The scene's ingredients.
+        loads: Rectangles that pressures are gathered on.
         comm: MPI communicator; None for this process alone.
 
     Note:
         Collective.
     """
+    from macro.correction import make_correction
+    from micro.boussinesq import HalfSpace
     from mpi4py import MPI
 
-    from macro import Material, make_correction
+    from macro import Material
 
-    section = stage.scene.block
+    e, nu = stage.scene.block.young_modulus, stage.scene.block.poisson_ratio
     return make_correction(
         stage.shape,
-        Material(young_modulus=section.young_modulus, poisson_ratio=section.poisson_ratio),
-        section.sides,
-        stage.patches,
-        HalfSpace(section.young_modulus, section.poisson_ratio),
+        Material(young_modulus=e, poisson_ratio=nu),
+        stage.scene.block.sides,
+        loads,
+        HalfSpace(e, nu),
         comm or MPI.COMM_SELF,
     )
 

@@ -43,7 +43,7 @@ def test_whole_surface_comes_back(surface, grid, name):
         allowed = 1e-6 if approach in rows else 1e-3
         assert step.force_N == pytest.approx(whole.force[0], rel=allowed)
         # an untouched patch is taken to sink by its neighbours' mean pressures
-        assert step.mean_separation_mm == pytest.approx(whole.mean_separation[0], rel=3e-3)
+        assert step.mean_separation_mm == pytest.approx(whole.mean_separation[0], rel=5e-3)
         np.testing.assert_allclose(
             step.patches.pressure_MPa,
             whole.patch_pressure[0],
