@@ -65,7 +65,7 @@ def test_block_on_a_spring_is_the_micro_model_further_away(parts, sink):
     step = coupling.press(Control(approach=8e-3))
     same = alone(parts).press(Control(approach=8e-3 - sink * step.force_N))
     assert step.force_N == pytest.approx(same.force_N, rel=1e-7)  # the iteration's 1e-8
-    assert step.newton_iterations <= 10
+    assert step.newton_iterations <= 12  # at once from nothing
 
 
 def test_turning_block_is_a_turned_plane(parts):
@@ -73,8 +73,6 @@ def test_turning_block_is_a_turned_plane(parts):
     forces = step.patches.pressure_MPa * PATCHES.area
     assert forces.sum() == pytest.approx(step.force_N, rel=1e-12)
     # the block turns by the moment of the forces as its rectangles gather them
-    trial = np.linspace(0.5, 1.5, 3)
-    assert trial.size
     lean = 2e-3 * _gathered_moment(parts, step)
     same = alone(parts).press(
         Control(approach=8e-3 - 1e-3 * step.force_N, tilt=(2e-3 - lean, 1e-3))
