@@ -76,7 +76,8 @@ def test_both_compliances_of_a_coarse_block():
     """The plain mesh is too stiff below a loaded patch, the smooth rest of the half-space is not.
 
     Measured relative to the largest entry: 6 % apart with 2 × 4 elements under a patch, 2.6 % with
-    4 × 8, 0.5 % with 8 × 16; the decomposed one on 8 × 8 × 5 cells within 2 % of that on 16 × 16 × 8.
+    4 × 8, 0.5 % with 8 × 16; the decomposed one on 8 × 8 × 5 cells within 2 % of it on
+    16 × 16 × 8.
     """
     fine = compliance("decomposed", [16, 16, 8])
     np.testing.assert_allclose(fine, fine.T, rtol=1e-12)
