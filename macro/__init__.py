@@ -5,6 +5,7 @@ BlockShape → block_mesh → Block (with a Material) → Interface (with a Patc
 """
 
 from macro.block import Block
+from macro.correction import Correction, HalfSpaceField, Sag, make_correction
 from macro.elasticity import Material
 from macro.interface import ContactLaw, Interface
 from macro.mesh import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
@@ -18,10 +19,14 @@ __all__ = [
     "Block",
     "BlockMesh",
     "ContactLaw",
+    "Correction",
+    "HalfSpaceField",
     "Interface",
     "Material",
     "PressState",
     "PressedBlock",
+    "Sag",
     "block_mesh",
+    "make_correction",
     "write_fields",
 ]
