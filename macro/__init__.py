@@ -8,6 +8,7 @@ from macro.block import Block
 from macro.correction import Correction, HalfSpaceField, Sag, make_correction
 from macro.elasticity import Material
 from macro.interface import ContactLaw, Interface
+from macro.kept import cached_correction
 from macro.mesh import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
 from macro.output import write_fields
 from macro.pressed import PressedBlock, PressState
@@ -27,6 +28,7 @@ __all__ = [
     "PressedBlock",
     "Sag",
     "block_mesh",
+    "cached_correction",
     "make_correction",
     "write_fields",
 ]
