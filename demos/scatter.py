@@ -84,7 +84,9 @@ if comm.rank == 0:
     choice.out.mkdir(parents=True, exist_ok=True)
     low, median, high = np.percentile(forces, (5, 50, 95), axis=0)
     mean, deviation = forces.mean(axis=0), forces.std(axis=0, ddof=1)
-    print(f"{SURFACES} surfaces, {comm.size} rank(s): compliance {once:.1f} s, curves {spent:.1f} s")
+    print(
+        f"{SURFACES} surfaces, {comm.size} rank(s): compliance {once:.1f} s, curves {spent:.1f} s"
+    )
     print("approach [µm]   mean force [N]   deviation   5 … 95 % [N]")
     for row in zip(1e3 * approach, mean, deviation / mean, low, high, strict=True):
         print("{:10.1f} {:16.3f} {:12.0%} {:9.3f} … {:.3f}".format(*row))

@@ -5,11 +5,8 @@ BlockShape → block_mesh → Block (with a Material) → Interface (with a Patc
 """
 
 from macro.block import Block
-<<<<<<< HEAD
 from macro.compliance import plain_compliance
-=======
 from macro.correction import Correction, HalfSpaceField, Sag, make_correction
->>>>>>> block
 from macro.elasticity import Material
 from macro.interface import ContactLaw, Interface
 from macro.kept import cached_correction
@@ -32,11 +29,8 @@ __all__ = [
     "PressedBlock",
     "Sag",
     "block_mesh",
-<<<<<<< HEAD
-    "plain_compliance",
-=======
     "cached_correction",
     "make_correction",
->>>>>>> block
+    "plain_compliance",
     "write_fields",
 ]
