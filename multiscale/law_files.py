@@ -22,7 +22,8 @@ _COLUMNS = {
     "contacts": "1",
     "relief": "mm",
 }
-_SCALARS = {"touch": "mm", "reach": "mm", "interpolation_error": "1"}
+_SCALARS = {"touch": "mm", "reach": "mm", "interpolation_error": "1", "stiffness_error": "1"}
+_LATER = {"stiffness_error": float("nan")}  # what older files lack
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,7 +100,14 @@ def read_laws(path: Path) -> LawTable:
 
 def _law(group: Any) -> PatchLaw:
     content: dict[str, Any] = {name: np.asarray(group[name][()]) for name in _COLUMNS}
-    content.update({name: float(group.attrs[name]) for name in _SCALARS})
+    content.update(
+        {
+            name: float(
+                group.attrs.get(name, _LATER[name]) if name in _LATER else group.attrs[name]
+            )
+            for name in _SCALARS
+        }
+    )
     return PatchLaw(**content)
 
 
