@@ -11,7 +11,9 @@ Array = NDArray[np.float64]
 ROOT, CLOSURE, AREA, RELIEF = range(4)
 """Columns of the pieces: p^(2/3), closure, area fraction, relief."""
 
-_NEWTON_STEPS = 4
+_MOST_STEPS = 60
+_ROUNDING = 1e-14
+_LEAST_SLOPE = 1e-6  # of closure over approach
 
 
 def pieces_of(approach: Array, columns: Array) -> Array:
@@ -43,32 +45,48 @@ def inverted(
     """Find where the closure takes given values.
 
     Args:
-        pieces: Pieces of the closure, shape (4, n + 1).
+        pieces: Pieces of the closure, that after row `last` straight, shape (4, n + 1).
         approach: Approaches of the rows, shape (n,) [mm].
         closure: Closures of the rows, increasing up to row `last`, shape (n,) [mm].
         last: Row beyond which the tangent there goes on.
         asked: Closures of any shape [mm].
 
     Returns:
-        Pieces and distances from their first rows [mm]. Newton's steps start from the inverse
-        interpolant of third order; bracketed, they end at rounding.
+        Pieces and distances from their first rows [mm]. Newton's steps, halved
+        where they would leave the bracket, end at rounding.
     """
     piece = np.searchsorted(closure[: last + 1], asked, side="right")
     start = closure[np.maximum(piece - 1, 0)]
-    width = np.append(np.inf, np.append(np.diff(approach), np.inf))
+    width = np.concatenate(([np.inf], np.diff(approach), [np.inf]))
     width[last + 1] = np.inf
-    c3, c2, c1, c0 = np.array(pieces)
-    if last + 1 < len(c3) - 1:  # the table turns: go on straight
-        c3[last + 1] = c2[last + 1] = 0.0
-    a3, a2, a1, wide = c3[piece], c2[piece], c1[piece], width[piece]
-    rise = asked - start
-    secant = np.append(1.0, np.append(np.diff(closure) / np.diff(approach), 1.0))[piece]
-    straight = (a3 == 0.0) & (a2 == 0.0)
-    step = rise / np.where(straight, np.maximum(a1, 1e-6), secant)
-    for _ in range(_NEWTON_STEPS):
-        value = ((a3 * step + a2) * step + a1) * step - rise
-        slope = (3.0 * a3 * step + 2.0 * a2) * step + a1
-        step = step - value / np.maximum(slope, 1e-6)
-        np.minimum(step, wide, out=step)
-        np.maximum(step, np.where(piece > 0, 0.0, -np.inf), out=step)
+    c3, c2, c1 = pieces[:3]
+    rise = np.concatenate(([0.0], np.diff(closure), [0.0]))
+    straight = np.isinf(width) | (rise <= 0.0)
+    first = np.where(
+        straight, 1.0 / np.maximum(c1, _LEAST_SLOPE), width / np.where(straight, 1.0, rise)
+    )
+    excess = np.asarray(asked - start)
+    cubic = c3[piece], c2[piece], c1[piece]
+    low = np.where(piece > 0, 0.0, -np.inf)
+    step = _solved(cubic, excess, excess * first[piece], low, width[piece])
     return piece, step
+
+
+def _solved(
+    cubic: tuple[Array, Array, Array], excess: Array, step: Array, low: Array, high: Array
+) -> Array:
+    """Solve ((c3 x + c2) x + c1) x = excess for x in [low, high], where it grows."""
+    c3, c2, c1 = cubic
+    for _ in range(_MOST_STEPS):
+        miss = ((c3 * step + c2) * step + c1) * step - excess
+        slope = (3.0 * c3 * step + 2.0 * c2) * step + c1
+        low, high = np.where(miss < 0.0, step, low), np.where(miss > 0.0, step, high)
+        better = step - miss / np.maximum(slope, _LEAST_SLOPE)
+        outside = (better < low) | (better > high)
+        if outside.any():
+            better = np.where(outside, 0.5 * (low + high), better)
+        change = np.abs(better - step)
+        step = better
+        if np.all(change <= _ROUNDING * np.abs(step)):
+            break
+    return np.asarray(step)

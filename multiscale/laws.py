@@ -115,6 +115,15 @@ class PatchLaw:
         columns = (root, self.closure, self.contact_area_fraction, self.relief)
         return pieces_of(self.approach, np.column_stack(columns))
 
+    @cached_property
+    def _growing(self) -> Array:
+        """The pieces up to where closure stops growing, the tangent there as the last of them."""
+        pieces = self.pieces.copy()
+        pieces[:2, self._last + 1] = 0.0
+        slope = pieces[2, self._last + 1, CLOSURE]
+        pieces[2, self._last + 1, CLOSURE] = max(slope, 1e-6)  # flat where the table would turn
+        return pieces
+
     def along(self, approach: ArrayLike) -> LawPoint:
         """Return the law at local approaches s of any shape [mm], in and beyond the table."""
         s = np.asarray(approach, dtype=float)
@@ -139,9 +148,8 @@ class PatchLaw:
         if self.is_open:
             return np.zeros_like(closures), np.zeros_like(closures)
         piece, step = self._inverse(closures)
-        point = _point(self.pieces[:, piece, :2], step)
-        # flat only at the very end of a table that would turn there
-        return point.pressure, point.dpressure / np.maximum(point.dclosure, 1e-6)
+        point = _point(self._growing[:, piece, :2], step)
+        return point.pressure, point.dpressure / point.dclosure
 
     def area_fraction_at(self, closure: ArrayLike, *, extend: bool = False) -> Array:
         """Return the real contact area over the nominal one; arguments and errors as in `at`."""
@@ -165,7 +173,7 @@ class PatchLaw:
 
     def _column(self, column: int, closures: Array) -> Array:
         piece, step = self._inverse(closures)
-        return _cubic(self.pieces[:, piece, column], step)
+        return _cubic(self._growing[:, piece, column], step)
 
     def _place(self, s: Array) -> tuple[NDArray[np.intp], Array]:
         """Return the piece that holds each approach and the approach counted from its start."""
@@ -176,9 +184,8 @@ class PatchLaw:
 
     def _inverse(self, closures: Array) -> tuple[NDArray[np.intp], Array]:
         """Return piece and step at closures, the same as `_place` at their approaches."""
-        return inverted(
-            self.pieces[:, :, CLOSURE], self.approach, self.closure, self._last, closures
-        )
+        closure = self._growing[:, :, CLOSURE]
+        return inverted(closure, self.approach, self.closure, self._last, closures)
 
     def _checked(self, closure: ArrayLike, extend: bool) -> Array:
         closures = np.asarray(closure, dtype=float)
@@ -230,9 +237,8 @@ class PatchLaws:
         for i, law in enumerate(laws):
             rows = law.approach.size
             self._knots[i, :rows] = law.approach
-            self._starts[i, : rows + 1] = (
-                np.concatenate((law.approach[:1], law.approach))[: rows + 1] if rows else 0.0
-            )
+            self._starts[i, 0] = law.approach[0] if rows else 0.0
+            self._starts[i, 1 : rows + 1] = law.approach
             self._pieces[i, : rows + 1] = law.pieces.transpose(1, 0, 2)
             self._contacts[i, 1 : rows + 1] = law.contacts
         self._reach = np.array([law.reach for law in laws])
