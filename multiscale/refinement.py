@@ -16,7 +16,9 @@ STIFFNESS_FACTOR = 10.0
 """Tolerance of dp/dc over that of the pressure."""
 
 _MOST_ROWS = 400  # solutions of the micro model
-_LEAST_SCALE = 0.01  # of the largest mean pressure: an error below it counts as one of this much
+_LEAST_SCALE = (
+    0.01  # of the largest pressure of any patch: an error below it counts as one of this much
+)
 _LEAST_SLOPE = 0.1  # dc/ds that dp/dc is judged with where the closure is about to turn
 
 
@@ -29,10 +31,10 @@ def refined(
     """Make laws and halve the intervals between their rows until they meet the tolerance.
 
     The error of the pressure half-way between rows is that at the same closure, relative to the
-    pressure there or, where that is more, to a hundredth of the mean pressure of all patches at
+    pressure there or, where that is more, to a hundredth of the largest pressure of any patch at
     the end. The error of the stiffness dp/dc is the change that the row half-way makes to it,
-    relative to the law's largest; it may be ten times the tolerance. The errors recorded are the
-    largest found where no further row was asked for: those of the laws before the last rows, thus
+    relative to the largest of all laws; it may be ten times the tolerance. The errors recorded are
+    the largest found where no further row was asked for, of the laws before the last rows: thus
     on the safe side. At most 400 rows are solved; the errors then say what was missed.
 
     Args:
@@ -47,7 +49,7 @@ def refined(
     """
     rows = solve(approaches)
     laws = make(rows)
-    scale = _LEAST_SCALE * rows[-1, :, 2].mean()
+    scale = _LEAST_SCALE * rows[-1, :, 2].max()
     kept = np.zeros((2, len(laws)))
     halfway = 0.5 * (approaches[:-1] + approaches[1:])
     missed = kept
@@ -88,6 +90,8 @@ def _errors(
 ) -> Array:
     """Return the errors of pressure and stiffness of laws at new rows, shape (2, m, N)."""
     errors = np.zeros((2, *new.shape[:2]))
+    closed = [law for law in after if not law.is_open]
+    largest = max((_stiffness(law.along(law.approach)).max() for law in closed), default=1.0)
     for i, (old, law) in enumerate(zip(before, after, strict=True)):
         if law.is_open:
             continue
@@ -96,9 +100,8 @@ def _errors(
         slope = _stiffness(guess)
         off = guess.pressure - pressure - slope * (guess.closure - closure)
         errors[0, :, i] = np.abs(off) / np.maximum(pressure, scale)
-        largest = _stiffness(law.along(law.approach)).max()
         change = np.abs(slope - _stiffness(law.along(approach)))
-        errors[1, :, i] = change / max(largest, np.finfo(float).tiny)
+        errors[1, :, i] = change / largest
     return errors
 
 

@@ -20,11 +20,11 @@ def rough(seed, cells=64):
     return synthesise(spectrum, grid=(cells, cells), lengths=(1.0, 1.0))
 
 
-def table_of(surface, patches, end=END):
+def table_of(surface, patches, end=END, tolerance=TOLERANCE):
     model = micro_model("half-space", surface, contact_modulus=MODULUS)
     means = patch_means(surface, patches)
     table = consistent_laws(
-        model, patches, mean_heights=means, approach_end=end, tolerance=TOLERANCE
+        model, patches, mean_heights=means, approach_end=end, tolerance=tolerance
     )
     return model, means, table
 
@@ -65,9 +65,10 @@ def test_force_of_the_whole_surface(count):
 @pytest.mark.parametrize(("count", "allowed"), [(8, 0.03), (16, 0.01)])
 def test_tilted_plane(seed, count, allowed):
     """Laws of a level plane serve a plane tilted by 10 µm/mm: patches see little of the tilt."""
-    surface, tilt = rough(seed), (10e-3, 0.0)
+    # 8 × 8 cells to the smallest patch: with 4 × 4 the second seed misses by 1.1 % instead of 0.5 %
+    surface, tilt = rough(seed, cells=128), (10e-3, 0.0)
     patches = PatchGrid(grid=(count, count), lengths=surface.lengths)
-    model, means, table = table_of(surface, patches, end=14e-3)
+    model, means, table = table_of(surface, patches, end=14e-3, tolerance=1e-2)
     force = model.respond([8e-3], patches=patches, mean_heights=means, tilt=tilt).force[0]
     distance = 8e-3 + tilt[0] * (patches.centres[:, 0] - 0.5)
     assert macro_force(table, distance) == pytest.approx(force, rel=allowed)
