@@ -29,7 +29,6 @@ def table():
             touch=rising[0, 0] if rows else np.inf,
             reach=random.random(),
             interpolation_error=1 / 3,
-            stiffness_error=1 / 7,
         )
 
     patches = PatchGrid(grid=(2, 3), lengths=(0.1, 1 / 3))
@@ -45,7 +44,6 @@ def test_round_trip_is_exact(table, tmp_path):
     for law, copy in zip(table.laws, back.laws, strict=True):
         for name in COLUMNS:
             assert getattr(law, name).tobytes() == getattr(copy, name).tobytes()
-        assert law.stiffness_error == copy.stiffness_error == 1 / 7
         assert (law.touch, law.reach, law.interpolation_error) == (
             copy.touch,
             copy.reach,
@@ -59,15 +57,6 @@ def test_every_column_says_its_unit(table, tmp_path):
         units = {name: file["patch_0_0"][name].attrs["unit"] for name in COLUMNS}
     assert units["closure"] == "mm"
     assert units["pressure"] == "MPa"
-
-
-def test_files_without_a_stiffness_error_are_read(table, tmp_path):
-    path = tmp_path / "laws.h5"
-    write_laws(path, table)
-    with h5py.File(path, "a") as file:
-        for group in file.values():
-            del group.attrs["stiffness_error"]
-    assert all(np.isnan(law.stiffness_error) for law in read_laws(path).laws)
 
 
 def test_other_files_are_refused(tmp_path):
@@ -97,7 +86,7 @@ def test_damaged_law_is_refused(table, tmp_path):
     write_laws(path, table)
     with h5py.File(path, "a") as file:
         file["patch_0_0/closure"][3] = np.nan
-    with pytest.raises(InputError, match=r"laws.h5: .*finite closure"):
+    with pytest.raises(InputError, match=r"laws.h5: .*closure that increases from"):
         read_laws(path)
 
 
