@@ -1,74 +1,163 @@
-"""Adds rows to patch laws until what lies between them is known to a tolerance."""
+"""Adds rows to patch laws, where they are needed most, until what lies between them is known."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from multiscale.laws import LawPoint, PatchLaw
+from multiscale.patch_laws import PatchLaws
 
 Array = NDArray[np.float64]
 
-STIFFNESS_FACTOR = 10.0
-"""Tolerance of dp/dc over that of the pressure."""
+PATCH_FACTOR = 10.0
+"""Tolerance of a patch's pressure over that of the force."""
 
-_MOST_ROWS = 400  # solutions of the micro model
-_LEAST_SCALE = (
-    0.01  # of the largest pressure of any patch: an error below it counts as one of this much
-)
-_LEAST_SLOPE = 0.1  # dc/ds that dp/dc is judged with where the closure is about to turn
+MOST_ROWS = 65
+"""Rows that are solved at most, unless told otherwise."""
+
+_FIRST_ROWS = 17
+_BATCH = 8  # rows that are solved together, each starting from those before it
+_LEAST_LOAD = 0.01  # of the mean pressure at the end: loads below count as this much
+_LEAST_SLOPE = 0.1  # of what the plane's way is shared by, where neighbours take nearly all
+_OF_HALVES = 0.5  # of an interval's error that is left in its halves
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Errors:
+    """Errors of laws between their rows, as a half-space would see them.
+
+    The whole surface was solved at the approach of a row that was then put half-way between two
+    others. The laws without it, pressed on the half-space by a plane at that approach, miss the
+    solution by what is computed here to the first order: errors of pressure and of closure both
+    count, by what a load step makes of them. Halving an interval leaves less than half of its
+    error, also at a kink, where a contact begins or two join; half of it is what is recorded.
+
+    Attributes:
+        force: Error of the force over the force, shape (m,). Forces less than a hundredth of that
+            at the end of the table count as this much, here and below.
+        pressure: Error of a patch's pressure over that pressure, or over the mean pressure of all
+            patches where that is more, shape (m, N).
+        stiffness: Change, by the new row, of a patch's dp/dδ under a plane at δ, over the largest
+            of all patches there, shape (m, N).
+    """
+
+    force: Array
+    pressure: Array
+    stiffness: Array
+
+    @classmethod
+    def unknown(cls, intervals: int, patches: int) -> Errors:
+        """Return what is known before any row is put between others."""
+        all_patches = np.full((intervals, patches), np.inf)
+        return cls(np.full(intervals, np.inf), all_patches, all_patches)
+
+    @classmethod
+    def of(
+        cls,
+        before: Sequence[PatchLaw],
+        after: Sequence[PatchLaw],
+        new: Array,
+        compliance: Array,
+        least: float,
+    ) -> Errors:
+        """Return what the laws before lacked at new rows (m, N, 6) that the laws after have."""
+        old, laws = PatchLaws(before), PatchLaws(after)
+        found = []
+        for row in new:
+            local, closure, pressure = row[:, :3].T
+            guess = old.along(local)
+            off = guess.closure - closure + compliance @ (guess.pressure - pressure)
+            shift = np.linalg.solve(
+                compliance * guess.dpressure + np.diag(guess.dclosure), off
+            )
+            wrong = guess.pressure - pressure - guess.dpressure * shift
+            load = max(float(pressure.mean()), least)
+            true = _stiffness(laws.along(local), compliance)
+            change = _stiffness(guess, compliance) - true
+            found.append(
+                (
+                    abs(wrong.mean()) / load,
+                    np.abs(wrong) / np.maximum(pressure, load),
+                    np.abs(change) / max(float(true.max()), np.finfo(float).tiny),
+                )
+            )
+        return cls(*(_OF_HALVES * np.array(part) for part in zip(*found, strict=True)))
+
+    def __add__(self, other: Errors) -> Errors:
+        return Errors(
+            np.concatenate((self.force, other.force)),
+            np.concatenate((self.pressure, other.pressure)),
+            np.concatenate((self.stiffness, other.stiffness)),
+        )
+
+    def __getitem__(self, rows: NDArray[np.intp]) -> Errors:
+        return Errors(self.force[rows], self.pressure[rows], self.stiffness[rows])
+
+    @property
+    def worst(self) -> Array:
+        """What is compared to the tolerance of the force, shape (m,)."""
+        return np.maximum(self.force, self.pressure.max(axis=1, initial=0.0) / PATCH_FACTOR)
 
 
 def refined(
     solve: Callable[[Array], Array],
     make: Callable[[Array], Sequence[PatchLaw]],
-    approaches: Array,
+    start: float,
+    end: float,
+    *,
+    compliance: Array,
     tolerance: float,
-) -> list[PatchLaw]:
-    """Make laws and halve the intervals between their rows until they meet the tolerance.
+    most_rows: int = MOST_ROWS,
+) -> tuple[list[PatchLaw], float]:
+    """Make laws, and halve the worst of the intervals between their rows until they will do.
 
-    The error of the pressure half-way between rows is that at the same closure, relative to the
-    pressure there or, where that is more, to a hundredth of the largest pressure of any patch at
-    the end. The error of the stiffness dp/dc is the change that the row half-way makes to it,
-    relative to the largest of all laws; it may be ten times the tolerance. The errors recorded are
-    the largest found where no further row was asked for, of the laws before the last rows: thus
-    on the safe side. At most 400 rows are solved; the errors then say what was missed.
+    The first rows lie closer where the load is small: as squares of equal steps.
 
     Args:
         solve: Returns rows at approaches (m,) for N patches: approach, closure, pressure, area
             fraction, contacts, relief; shape (m, N, 6).
         make: Makes the N laws out of such rows, sorted by approach.
-        approaches: Approaches to begin with, increasing, shape (n,) [mm].
-        tolerance: Error of the pressure.
+        start: Approach of the first row [mm].
+        end: Approach of the last row [mm].
+        compliance: Mean displacement of patch i of the half-space by unit pressure on patch j,
+            shape (N, N) [mm/MPa].
+        tolerance: Error of the force; that of a patch's pressure may be ten times as large, see
+            `Errors`.
+        most_rows: Rows that may be solved, 33 at least. The errors then say what was reached.
 
     Returns:
-        The N laws, with their errors.
+        The N laws, with their errors, and the error of the force.
     """
-    rows = solve(approaches)
+    rows = solve(start + (end - start) * np.linspace(0.0, 1.0, _FIRST_ROWS) ** 2)
     laws = make(rows)
-    scale = _LEAST_SCALE * rows[-1, :, 2].max()
-    kept = np.zeros((2, len(laws)))
-    halfway = 0.5 * (approaches[:-1] + approaches[1:])
-    missed = kept
-    while halfway.size and len(rows) + halfway.size <= _MOST_ROWS:
-        new = solve(halfway)
+    if not rows[-1, :, 2].any():
+        return list(laws), 0.0
+    most_rows = max(most_rows, 2 * _FIRST_ROWS - 1)  # each interval is measured once
+    least = _LEAST_LOAD * float(rows[-1, :, 2].mean())
+    intervals = np.column_stack((rows[:-1, 0, 0], rows[1:, 0, 0]))
+    errors = Errors.unknown(len(intervals), len(laws))
+    while (room := min(_BATCH, most_rows - len(rows))) > 0 and np.any(errors.worst > tolerance):
+        order = np.argsort(-errors.worst, kind="stable")
+        split = np.sort(order[: min(room, int(np.sum(errors.worst > tolerance)))])
+        middle = intervals[split].mean(axis=1)
+        new = solve(middle)
         rows = np.concatenate((rows, new))
         rows = rows[np.argsort(rows[:, 0, 0])]
         before, laws = laws, make(rows)
-        errors = _errors(before, laws, new, scale)  # kind, row, patch
-        allowed = np.array([tolerance, STIFFNESS_FACTOR * tolerance])[:, None, None]
-        bad = np.any(errors > allowed, axis=(0, 2))
-        kept = np.maximum(kept, errors[:, ~bad].max(axis=1, initial=0.0))
-        missed = errors.max(axis=1)
-        halfway = _around(rows[:, 0, 0], halfway[bad])
-    errors_left = np.maximum(kept, missed) if halfway.size else kept
+        found = Errors.of(before, laws, new, compliance, least)
+        halves = np.column_stack((intervals[split, 0], middle, middle, intervals[split, 1]))
+        intervals = np.concatenate((np.delete(intervals, split, 0), halves.reshape(-1, 2)))
+        kept = np.delete(np.arange(len(errors.force)), split)
+        errors = errors[kept] + found[np.repeat(np.arange(len(new)), 2)]
+    largest = errors.pressure.max(axis=0), errors.stiffness.max(axis=0)
     return [
         replace(law, interpolation_error=float(error), stiffness_error=float(stiffness))
-        for law, error, stiffness in zip(laws, *errors_left, strict=True)
-    ]
+        for law, error, stiffness in zip(laws, *largest, strict=True)
+    ], float(errors.force.max())
 
 
 def law_of(rows: Array, touch: float, reach: float) -> PatchLaw:
@@ -85,32 +174,7 @@ def law_of(rows: Array, touch: float, reach: float) -> PatchLaw:
     )
 
 
-def _errors(
-    before: Sequence[PatchLaw], after: Sequence[PatchLaw], new: Array, scale: float
-) -> Array:
-    """Return the errors of pressure and stiffness of laws at new rows, shape (2, m, N)."""
-    errors = np.zeros((2, *new.shape[:2]))
-    closed = [law for law in after if not law.is_open]
-    largest = max((_stiffness(law.along(law.approach)).max() for law in closed), default=1.0)
-    for i, (old, law) in enumerate(zip(before, after, strict=True)):
-        if law.is_open:
-            continue
-        approach, closure, pressure = new[:, i, :3].T
-        guess = old.along(approach)
-        slope = _stiffness(guess)
-        off = guess.pressure - pressure - slope * (guess.closure - closure)
-        errors[0, :, i] = np.abs(off) / np.maximum(pressure, scale)
-        change = np.abs(slope - _stiffness(law.along(approach)))
-        errors[1, :, i] = change / largest
-    return errors
-
-
-def _stiffness(point: LawPoint) -> Array:
-    return np.asarray(point.dpressure / np.maximum(point.dclosure, _LEAST_SLOPE))
-
-
-def _around(points: Array, centres: Array) -> Array:
-    """Return the middles of the intervals on either side of some of the points."""
-    index = np.searchsorted(points, centres)
-    sides = np.concatenate((points[index - 1], points[index + 1]))
-    return np.unique(0.5 * (sides + np.tile(points[index], 2)))
+def _stiffness(point: LawPoint, compliance: Array) -> Array:
+    """Return dp/dδ of every patch as if its neighbours' pressures stayed, shape (N,)."""
+    way = point.dclosure + np.diag(compliance) * point.dpressure
+    return np.asarray(point.dpressure / np.maximum(way, _LEAST_SLOPE))
