@@ -85,10 +85,11 @@ class Curves:
         """Return the number of rows at or before each law's approach, shape (N,)."""
         return np.asarray((self.breaks <= approach[:, None]).sum(axis=1))
 
-    def at(self, approach: Array) -> tuple[Array, Array]:
-        """Return values and derivatives at one approach per law, shapes (f, N)."""
+    def at(self, approach: Array, functions: slice = slice(None)) -> tuple[Array, Array]:
+        """Return values and derivatives of functions at one approach per law, shapes (f, N)."""
         law, piece = np.arange(len(approach)), self.rows_passed(approach)
-        return _cubic(self.coefficients[law, piece], approach - self.left[law, piece])
+        pieces = self.coefficients[..., functions][law, piece]
+        return _cubic(pieces, approach - self.left[law, piece])
 
     def placed(self, approach: Array) -> tuple[Pieces, Array]:
         """Return the pieces of a single law that hold approaches, and how far into them, (m,)."""

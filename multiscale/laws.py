@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geometry.errors import InputError
-from multiscale.law_curves import FLATTEST, Curves, Pieces
+from multiscale.law_curves import FLATTEST, Curves
 
 Array = NDArray[np.float64]
 
@@ -46,11 +46,10 @@ class PatchLaw:
     surface: the gap g_n of Waddad et al. 2016, section 3.2. The rows are over the local rigid
     approach s that they were computed at, and so are the interpolants: where a patch alone comes
     near full contact, its pressure is no function of its closure any more, yet closure and
-    pressure are of s. Neighbours that come into contact may even relieve a patch. Before the first
-    touch pressure is zero and closure grows as s. Between rows the interpolants are monotone where
-    the rows are: p^(2/3) is interpolated (PCHIP), for Hertz' law p ~ (s - s_touch)^(3/2) is a
-    straight line in it, so that pressure and stiffness are right from the first touch on. Beyond
-    the rows the tangents go on.
+    pressure are of s. Before the first touch pressure is zero and closure grows as s. Between rows
+    the interpolants are monotone where the rows are: p^(2/3) is interpolated (PCHIP), for Hertz'
+    law p ~ (s - s_touch)^(3/2) is a straight line in it, so that pressure and stiffness are right
+    from the first touch on. Beyond the rows the tangents go on.
 
     Attributes:
         closure: Closures from the first touch on, shape (n,) [mm]; empty for a patch that stays

@@ -71,9 +71,7 @@ class Errors:
             local, closure, pressure = row[:, :3].T
             guess = old.along(local)
             off = guess.closure - closure + compliance @ (guess.pressure - pressure)
-            shift = np.linalg.solve(
-                compliance * guess.dpressure + np.diag(guess.dclosure), off
-            )
+            shift = np.linalg.solve(compliance * guess.dpressure + np.diag(guess.dclosure), off)
             wrong = guess.pressure - pressure - guess.dpressure * shift
             load = max(float(pressure.mean()), least)
             true = _stiffness(laws.along(local), compliance)
@@ -142,7 +140,8 @@ def refined(
     errors = Errors.unknown(len(intervals), len(laws))
     while (room := min(_BATCH, most_rows - len(rows))) > 0 and np.any(errors.worst > tolerance):
         order = np.argsort(-errors.worst, kind="stable")
-        split = np.sort(order[: min(room, int(np.sum(errors.worst > tolerance)))])
+        split = order[: min(room, int(np.sum(errors.worst > tolerance)))]
+        split = split[np.argsort(intervals[split, 0])]  # rising, as the micro models like it
         middle = intervals[split].mean(axis=1)
         new = solve(middle)
         rows = np.concatenate((rows, new))

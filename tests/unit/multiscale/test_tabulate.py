@@ -98,8 +98,9 @@ def test_stiff_patch_goes_on_where_closure_falls(surface, model):
     assert law.approach[-1] >= 60e-3
     local = np.linspace(1e-3, 60e-3, 50)
     response = model.respond(local, patches=patch.patch, mean_heights=[surface.mean_height])
-    # the tolerance, measured half-way between rows
-    np.testing.assert_allclose(law.along(local).pressure, response.mean_pressure, rtol=5e-4)
+    # the tolerance, of the pressure or a hundredth of the last, is measured half-way between rows
+    scale = np.maximum(response.mean_pressure, 0.01 * law.pressure[-1])
+    assert np.all(np.abs(law.along(local).pressure - response.mean_pressure) < 3e-4 * scale)
     assert law.along(local).dclosure.min() < -0.5
 
 
