@@ -35,6 +35,8 @@ class Errors:
     solution by what is computed here to the first order: errors of pressure and of closure both
     count, by what a load step makes of them. Halving an interval leaves less than half of its
     error, also at a kink, where a contact begins or two join; half of it is what is recorded.
+    Elsewhere between rows it may be more: on random surfaces of 256² cells, in 1 to 256 patches,
+    the force erred by up to 1.7 times and a patch's pressure by up to 3 times the largest recorded.
 
     Attributes:
         force: Error of the force over the force, shape (m,). Forces less than a hundredth of that
