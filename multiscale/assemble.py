@@ -49,6 +49,7 @@ def make_table(stage: Stage, comm: Any) -> LawTable:
             mean_heights=stage.mean_heights,
             approach_end=stage.approach_end,
             tolerance=stage.table_tolerance,
+            most_rows=stage.table_rows,
             comm=comm,
         )
     return isolated_laws(
@@ -58,6 +59,7 @@ def make_table(stage: Stage, comm: Any) -> LawTable:
         closure_ends=stage.closure_ends,
         love=stage.scene.coupling.love,
         tolerance=stage.table_tolerance,
+        most_rows=stage.table_rows,
         comm=comm,
     )
 

@@ -20,6 +20,7 @@ from geometry.surface import Surface
 from micro import MODELS, MicroModel, contact_modulus, micro_model
 from multiscale.coupling import AnalyticCoupling, tilted_approaches
 from multiscale.loading import Programme
+from multiscale.refinement import MOST_ROWS
 from multiscale.scene import Scene
 from multiscale.stage_checks import block_cells, check_patches, check_size
 
@@ -76,6 +77,11 @@ class Stage:
         By default 1e-4, and 1e-3 for models that see cells, whose steps finer tables would trace.
         """
         return self.scene.coupling.table_tolerance or (1e-4 if self.by_summits else 1e-3)
+
+    @property
+    def table_rows(self) -> int:
+        """Rows that laws may take to get there; models that see cells pay for each."""
+        return 400 if self.by_summits else MOST_ROWS
 
     @property
     def closure_ends(self) -> NDArray[np.float64]:
