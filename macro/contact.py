@@ -120,8 +120,10 @@ class Contact:
             stiffness: D of this rank's samples, shape (n,) [MPa/mm].
         """
         columns = self.levers * stiffness[:, None]
+        if not self.free.any():
+            return columns
         values, vectors = np.linalg.eigh(self.resistance(stiffness))
-        held = values > LOOSE * max(values[-1], 0.0) if values.size else values > 0.0
+        held = values > LOOSE * max(values[-1], 0.0)
         return columns @ (vectors[:, held] / np.sqrt(values[held]))
 
     def resistance(self, stiffness: Array) -> Array:
