@@ -90,7 +90,7 @@ def settle(motions: Motions, start: Array) -> Array:
         largest = max(largest, found.measure)
         step, held = _direction(motions, now, found)
         if held and np.abs(step).max() <= _ULP * motions.reach(now):
-            return now  # the rounding of closures allows no more
+            return now + step  # the rounding of closures allows no more
         if found.measure <= _CLEAR * largest:
             # Newton's steps alone come ever closer to a plane that is clear, and never there
             clear = now + 3.0 * step

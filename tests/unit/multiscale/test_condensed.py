@@ -66,8 +66,9 @@ def test_way_down_is_the_way_up(way):
     np.testing.assert_allclose(force[[4, 3, 6, 7, 8]], force[[0, 1, 0, 1, 2]], rtol=2e-8)
 
 
-def test_force_up_and_down():
-    history = run(scene("coupling.newton=condensed", approach=None, force=["1 N", 0, "1 N"]))
+@pytest.mark.parametrize("newton", ["condensed", "full"])
+def test_force_up_and_down(newton):
+    history = run(scene(f"coupling.newton={newton}", approach=None, force=["1 N", 0, "1 N"]))
     approach = history.approach_mm
     # first touch of the highest patch, up to the rounding of a law's first row
     assert approach[5] == pytest.approx(0.0, abs=1e-9)
