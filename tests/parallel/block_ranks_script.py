@@ -38,7 +38,9 @@ def run(case, mode):
     states = [
         pressed.press(Control(approach=approach, tilt=(1e-3, 5e-4))) for approach in (4e-3, 8e-3)
     ]
-    states.append(pressed.press(Control(force=interface.areas.sum(), tilt=None)))
+    # enough for more than two patches: a plane on an edge has no tilt of its own
+    force = 20.0 * float(interface.areas.sum())
+    states.append(pressed.press(Control(force=force, tilt=None)))
     numbers = {
         "force": [state.force for state in states],
         "plane": [states[-1].approach, *states[-1].tilt],
