@@ -101,8 +101,9 @@ def test_both_compliances_carry_nearly_the_same_force():
     np.testing.assert_allclose(plain, decomposed, rtol=0.01)  # the plain mesh is coarse
 
 
-def test_force_up_and_down():
-    history = run(scene("coupling.newton=condensed", approach=None, force=["1 N", 0, "1 N"]))
+@pytest.mark.parametrize("newton", ["condensed", "full"])
+def test_force_up_and_down(newton):
+    history = run(scene(f"coupling.newton={newton}", approach=None, force=["1 N", 0, "1 N"]))
     approach = history.approach_mm
     # first touch of the highest patch, up to the rounding of a law's first row
     assert approach[5] == pytest.approx(0.0, abs=1e-9)
