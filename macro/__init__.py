@@ -6,6 +6,7 @@ BlockShape → block_mesh → Block (with a Material) → Interface (with a Patc
 
 from macro.block import Block
 from macro.correction import Correction, HalfSpaceField, Sag, make_correction
+from macro.compliance import plain_compliance
 from macro.elasticity import Material
 from macro.interface import ContactLaw, Interface
 from macro.kept import cached_correction
@@ -30,5 +31,6 @@ __all__ = [
     "block_mesh",
     "cached_correction",
     "make_correction",
+    "plain_compliance",
     "write_fields",
 ]

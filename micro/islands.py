@@ -150,7 +150,10 @@ class IslandModel:
         mean_heights: ArrayLike,
         start: Any = None,
     ) -> Pressed:
-        """Solve under one plane; see `micro.models.MicroModel.press`."""
+        """Solve under one plane; see `micro.models.MicroModel.press`.
+
+        Islands are found anew under every plane: there is no start to go on from.
+        """
         return Pressed(self._response([plane], patches, mean_heights), None)
 
     def _response(

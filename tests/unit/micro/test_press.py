@@ -61,6 +61,39 @@ def test_goes_on_from_a_plane_nearby(model):
     same(nearby.response, press(model, approach=1.01 * APPROACH).response, rel=1e-5)
 
 
+@pytest.mark.parametrize("name", [name for name in MODEL_NAMES if name != "islands"])
+def test_the_same_plane_again_costs_nothing(name):
+    model = micro_model(name, SURFACE, contact_modulus=4000.0)
+    first = press(model)
+    # the half-space evaluates the displacement once to see that nothing is left to do
+    assert press(model, start=first.start).response.iterations[0] <= 1
+
+
+def test_a_slightly_other_sag_costs_less_than_a_start_from_nothing():
+    def sag(x, y):
+        return 1e-6 * np.cos(3.0 * x) * np.cos(2.0 * y)
+
+    model = HalfSpaceModel(surface=SURFACE, contact_modulus=4000.0)
+    warm = press(model, sag=sag, start=press(model).start).response
+    cold = press(model, sag=sag).response
+    assert warm.iterations[0] < 0.75 * cold.iterations[0]
+    # both residuals are 1e-8 of the approach, and bound the error of the force
+    assert warm.force == pytest.approx(cold.force, rel=5e-8)
+
+
+def test_cells_that_reach_out_of_a_patch_alone_stay_in_it():
+    """Borders cut cells here; what reaches beyond the one patch counts for it all the same."""
+    model = HalfSpaceModel(surface=SURFACE, contact_modulus=4000.0)
+    patches = PatchGrid(grid=(5, 3), lengths=SURFACE.lengths)
+    plane = RigidPlane.above(SURFACE, 4 * APPROACH)
+    for index in range(patches.count):
+        alone, patch = model.of_patch(patches, index)
+        found = alone.press(plane, patches=patch, mean_heights=np.zeros(1)).response
+        assert found.force[0] > 0.0
+        assert found.patch_force[0] == pytest.approx(found.force, rel=1e-13)
+        assert found.patch_contact_area[0] == pytest.approx(found.contact_area, rel=1e-13)
+
+
 def test_separation_counts_the_sag(model):
     def sag(x, y):
         return 1e-3 * np.cos(np.pi * x / SURFACE.lengths[0]) + 0.0 * y
