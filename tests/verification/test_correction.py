@@ -10,7 +10,7 @@ from geometry import PatchGrid
 from geometry.errors import InputError
 from geometry.meshes import BlockShape
 from macro.block import Block
-from macro.correction import make_correction
+from macro.condense import make_correction
 from macro.elasticity import Material
 from macro.interface import Interface
 from macro.kept import cached_correction
