@@ -178,6 +178,7 @@ def _solved(matrix: PETSc.Mat, right: Array) -> Array:
         for array in (right, solution)
     ]
     factor.getFactorMatrix().matSolve(*dense)
+    solver.destroy()  # its factors are large: not to wait for the collector
     return solution
 
 
