@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.errors import InputError
 from geometry.lattice import Axes, Segment
 from geometry.meshes import BlockShape
 
@@ -19,6 +20,9 @@ ACROSS, IN_DEPTH = 2.0, 4.0
 Of 1, 1.5, 2, 3 and 1, 4, 8 these served a cube under 8 × 8 loads best: what is left there
 concentrates at the top's edges, where loads end at free sides, and at those of the clamped bottom.
 """
+
+MOST_UNKNOWNS = 150_000
+"""Unknowns of the largest division: its factorisation takes half a minute and 3 GB."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,9 +73,20 @@ def smooth_shape(shape: BlockShape) -> SmoothShape:
 
     Args:
         shape: The block; its element and its grading in depth do not matter.
+
+    Raises:
+        InputError: When the cells are more than one factorisation should take.
     """
     given = {field.name: getattr(shape, field.name) for field in fields(BlockShape)}
-    return SmoothShape(**given | {"element": "Q2", "grading": 1.0})
+    smooth = SmoothShape(**given | {"element": "Q2", "grading": 1.0})
+    if smooth.unknowns > MOST_UNKNOWNS:
+        raise InputError(
+            f"{smooth.unknowns} unknowns are too many for the smooth correction of a half-space, "
+            "which coarse cells resolve",
+            value=list(shape.cells),
+            allowed=f"at most {MOST_UNKNOWNS} unknowns; [16, 16, 12] are 11271 in a cube",
+        )
+    return smooth
 
 
 def _towards_ends(start: float, end: float, cells: int, growth: float) -> tuple[Segment, ...]:

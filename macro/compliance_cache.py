@@ -69,7 +69,8 @@ def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], co
         with suppress(OSError):
             _write(path, made)
             _clear(path.parent)
-    return comm.bcast(made, root=0)  # type: ignore[no-any-return]
+    kept: Arrays = comm.bcast(made, root=0)
+    return kept
 
 
 def _spelt(value: object) -> object:

@@ -27,9 +27,6 @@ from macro.side_loads import sides as side_planes
 
 Array = NDArray[np.float64]
 
-MOST_UNKNOWNS = 150_000
-"""Unknowns of the largest mesh: its factorisation takes about a minute."""
-
 _BLOCK = 1024  # points at which the half-space is evaluated together
 
 
@@ -76,7 +73,6 @@ def make_correction(
     """
     _check_place(shape, loads)
     smooth = smooth_shape(shape)
-    _check_size(smooth)
     block = Block(block_mesh(smooth, MPI.COMM_SELF), material, sides)
     mine = np.arange(comm.rank, loads.count, comm.size)
     parts = comm.allgather(_Solver(block, smooth, half_space, loads).top(mine))
@@ -192,13 +188,3 @@ def _check_place(shape: BlockShape, loads: PatchGrid) -> None:
                 value=(float(borders[0]), float(borders[-1])),
                 allowed=f"{low} … {high} mm",
             )
-
-
-def _check_size(shape: SmoothShape) -> None:
-    if shape.unknowns > MOST_UNKNOWNS:
-        raise InputError(
-            f"the block's cells make {shape.unknowns} unknowns, too many for the smooth correction "
-            "of the half-space, which coarse cells resolve",
-            value=shape.cells,
-            allowed=f"at most {MOST_UNKNOWNS} unknowns; (16, 16, 12) cells are 11271",
-        )

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from geometry.errors import InputError
 from geometry.meshes import BlockShape
 from geometry.smooth_shape import smooth_shape
 
@@ -21,7 +22,10 @@ def test_nodes_are_as_many_as_those_of_the_trilinear_cells():
 
 def test_cells_shrink_towards_all_faces_alike():
     for ticks, ends, ratio in zip(
-        block((16, 16, 8)).ticks, ((0.0, 1.0), (0.0, 2.0), (-0.5, 0.0)), (2.0, 2.0, 4.0), strict=True
+        block((16, 16, 8)).ticks,
+        ((0.0, 1.0), (0.0, 2.0), (-0.5, 0.0)),
+        (2.0, 2.0, 4.0),
+        strict=True,
     ):
         sizes = np.diff(ticks)
         assert (ticks[0], ticks[-1]) == ends
@@ -41,3 +45,8 @@ def test_margin_keeps_its_own_grading():
 def test_element_and_grading_in_depth_do_not_matter():
     assert block((4, 4, 4), grading=3.0, element="P1") == block((4, 4, 4))
     assert block((4, 4, 4)).degree == 2
+
+
+def test_more_unknowns_than_one_factorisation_takes_are_refused():
+    with pytest.raises(InputError, match="519675 unknowns are too many for the smooth correction"):
+        block((64, 64, 40))

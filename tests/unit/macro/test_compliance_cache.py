@@ -56,7 +56,12 @@ def test_key_does_not_depend_on_how_numpy_prints(counted):
     calls, compute = counted
     for value in (0.1, np.float64(0.1)):
         for count in (2, np.int64(2)):
-            cached("kind", (PatchGrid(grid=(1, 1), lengths=(value, 1.0)), count), compute, MPI.COMM_SELF)
+            cached(
+                "kind",
+                (PatchGrid(grid=(1, 1), lengths=(value, 1.0)), count),
+                compute,
+                MPI.COMM_SELF,
+            )
     assert len(calls) == 1
     cached("kind", (PatchGrid(grid=(1, 1), lengths=(0.2, 1.0)), 2), compute, MPI.COMM_SELF)
     assert len(calls) == 2
@@ -71,7 +76,9 @@ def test_what_was_not_used_for_longest_goes_first(counted, monkeypatch):
     calls, compute = counted
     for key in range(3):
         cached("kind", (key,), compute, MPI.COMM_SELF)
-    for age, path in enumerate(sorted(cache_directory().iterdir(), key=lambda p: p.stat().st_mtime)):
+    for age, path in enumerate(
+        sorted(cache_directory().iterdir(), key=lambda p: p.stat().st_mtime)
+    ):
         os.utime(path, (1e6 + age, 1e6 + age))
     cached("kind", (0,), compute, MPI.COMM_SELF)  # a hit makes it the youngest
     size = path.stat().st_size
