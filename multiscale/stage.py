@@ -15,6 +15,7 @@ from geometry.errors import InputError
 from geometry.files import read_surface
 from geometry.meshes import BlockShape
 from geometry.patches import PatchGrid, patch_means
+from geometry.smooth_shape import smooth_shape
 from geometry.spectrum import synthesise
 from geometry.surface import Surface
 from micro import MODELS, MicroModel, contact_modulus, micro_model
@@ -220,7 +221,7 @@ def make_surface(scene: Scene) -> Surface:
 
 def _block_shape(scene: Scene, surface: Surface) -> BlockShape:
     block = scene.block
-    return BlockShape(
+    shape = BlockShape(
         interface=surface.lengths,
         height=block.height,
         cells=block_cells(scene),
@@ -230,6 +231,9 @@ def _block_shape(scene: Scene, surface: Surface) -> BlockShape:
         margin_cells=block.margin_cells if block.margin else 0,
         margin_grading=block.margin_grading if block.margin else 1.0,
     )
+    if scene.coupling.kind != "analytic" and scene.coupling.decomposed:
+        _located(scene, "block.cells", lambda: smooth_shape(shape))
+    return shape
 
 
 def _located(scene: Scene, key: str, make: Callable[[], Any]) -> Any:
