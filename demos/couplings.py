@@ -55,7 +55,7 @@ def forces(seed: int, tilt: float, patches: int, *more: str) -> np.ndarray:
             f"surface.grid=[{CELLS}, {CELLS}]",
             f"patches.grid=[{patches}, {patches}]",
             "micro.model=half-space",
-            'block.cells=[16, 16, 8]',
+            "block.cells=[16, 16, 8]",
             'load.approach=["2 um", "4 um", "8 um"]',
             "load.steps=1",
             f'load.tilt=["{tilt} um/mm", "0 um/mm"]',
@@ -117,13 +117,22 @@ figure.savefig(choice.out / "couplings.png", dpi=130)
 # for everything. Consistent laws of 4 × 4 patches in both.
 
 # %%
-meshes = [(8, 8, 5), (16, 16, 8)] if choice.quick else [(8, 8, 5), (16, 16, 8), (24, 24, 12), (32, 32, 16)]
+meshes = (
+    [(8, 8, 5), (16, 16, 8)]
+    if choice.quick
+    else [(8, 8, 5), (16, 16, 8), (24, 24, 12), (32, 32, 16)]
+)
 plain_meshes = meshes if choice.quick else [*meshes, (64, 64, 24)]
 by_mesh = {
     way: [
         forces(
-            SEEDS[0], 0.0, 4, "coupling.kind=isolated", f"coupling.compliance={way}",
-            "coupling.newton=condensed", f"block.cells={list(cells)}",
+            SEEDS[0],
+            0.0,
+            4,
+            "coupling.kind=isolated",
+            f"coupling.compliance={way}",
+            "coupling.newton=condensed",
+            f"block.cells={list(cells)}",
         )[-1]
         for cells in cells_of
     ]

@@ -50,6 +50,7 @@ def make_table(stage: Stage, comm: Any) -> LawTable:
             approach_end=stage.approach_end,
             tolerance=stage.table_tolerance,
             most_rows=stage.table_rows,
+            tilt=stage.furthest[1],
             comm=comm,
         )
     return isolated_laws(

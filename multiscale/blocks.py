@@ -19,7 +19,9 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
 
 Array = NDArray[np.float64]
 
-_LOADS = 8  # rectangles along a side, at least, that a smooth field is told the contacts' forces by
+_LOADS = (
+    16  # rectangles along a side, at least, that a smooth field is told the contacts' forces by
+)
 
 
 def embedding(stage: Stage, comm: Any) -> Interface:
@@ -88,7 +90,7 @@ def yielding(stage: Stage, comm: Any) -> Yielding:
         stage.patches,
         loads,
         approach_end=stage.approach_end,
-        tilt=stage.scene.loading.programme.tilt or (0.0, 0.0),
+        tilt=stage.furthest[1],
         comm=comm,
     )
     correction = smooth_correction(stage, loads, comm).patch_compliance(loads) / loads.area

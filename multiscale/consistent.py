@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,43 +19,64 @@ from multiscale.refinement import MOST_ROWS, law_of, refined
 
 Array = NDArray[np.float64]
 
+_TOUCH = 1e-3  # first touch under a tilt, relative to what the tilt adds to the approach
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class WholeSurface:
-    """A rough surface pressed as a whole by a level plane, seen patch by patch.
+    """A rough surface pressed as a whole by a rigid plane, seen patch by patch.
 
-    The closure of a patch is the approach less the mean displacement of the patch by the mean
-    pressures of all patches, c_i = δ − Σ_j Λ_ij p_j / (π E*): what a block answers with. What a
+    The closure of a patch is its local approach less the mean displacement of the patch by the mean
+    pressures of all patches, c_i = s_i − Σ_j Λ_ij p_j / (π E*): what a block answers with. What a
     patch sinks beyond that (`PatchLaw.relief`) is told from its first touch on; before, by that
-    there.
+    there. Laws made under a tilt know how it shares the load.
 
     Attributes:
         model: Micro model of the whole surface.
         patches: Its partition.
         mean_heights: Mean height of each patch, shape (N,) [mm].
         compliance: Λ / (π E*), shape (N, N) [mm/MPa].
+        tilt: Slopes of the plane.
     """
 
     model: MicroModel
     patches: PatchGrid
     mean_heights: Array
     compliance: Array
+    tilt: tuple[float, float] = (0.0, 0.0)
+
+    @cached_property
+    def lean(self) -> Array:
+        """Local approach of every patch over that at the middle, shape (N,) [mm]."""
+        middle = np.add(self.patches.origin, np.multiply(0.5, self.patches.lengths))
+        return np.asarray((self.patches.centres - middle) @ np.asarray(self.tilt))
+
+    @cached_property
+    def first_touch(self) -> float:
+        """Approach at the middle at first contact under the tilt [mm]."""
+        if self.tilt == (0.0, 0.0):
+            return self.model.first_touch
+        reach = 0.5 * float(np.abs(self.tilt) @ np.asarray(self.patches.lengths))
+        below = self.model.first_touch - reach
+        return below + _first_loaded(lambda way: self._force(below + way), 2.0 * reach)
 
     def rows(self, approaches: Array) -> Array:
-        """Return rows of all patches at increasing approaches, shape (m, N, 6).
+        """Return rows of all patches at increasing approaches of the first, shape (m, N, 6).
 
-        The columns are approach, closure, pressure, area fraction, contacts, relief.
+        The columns are local approach, closure, pressure, area fraction, contacts, relief.
         """
+        middle = approaches - self.lean[0]
         response = self.model.respond(
-            approaches, patches=self.patches, mean_heights=self.mean_heights
+            middle, patches=self.patches, mean_heights=self.mean_heights, tilt=self.tilt
         )
         pressure = response.patch_pressure.copy()
-        pressure[approaches <= self.model.first_touch] = 0.0  # whatever round-off makes of it
+        pressure[middle <= self.first_touch] = 0.0  # whatever round-off makes of it
+        local = middle[:, None] + self.lean
         displacement = pressure @ self.compliance
         touched = pressure > 0.0
         columns = (
-            np.broadcast_to(approaches[:, None], pressure.shape),
-            approaches[:, None] - displacement,
+            local,
+            local - displacement,
             pressure,
             np.where(touched, response.patch_contact_area / self.patches.area, 0.0),
             np.where(touched, response.patch_contacts, 0),
@@ -70,17 +93,23 @@ class WholeSurface:
         self, approach_end: float, tolerance: float, most_rows: int
     ) -> tuple[list[PatchLaw], float]:
         """Return all laws up to an approach, and the error of the force; see `refined`."""
-        if approach_end <= self.model.first_touch:
-            return self.laws(self.rows(np.array([approach_end]))), 0.0
+        if approach_end <= self.first_touch:
+            return self.laws(self.rows(np.array([approach_end]) + self.lean[0])), 0.0
         return refined(
             self.rows,
             self.laws,
-            self.model.first_touch,
-            approach_end,
+            self.first_touch + self.lean[0],
+            approach_end + self.lean[0],
             compliance=self.compliance,
             tolerance=tolerance,
             most_rows=most_rows,
         )
+
+    def _force(self, approach: float) -> float:
+        response = self.model.respond(
+            [approach], patches=self.patches, mean_heights=self.mean_heights, tilt=self.tilt
+        )
+        return float(response.force[0])
 
 
 def consistent_laws(
@@ -91,6 +120,7 @@ def consistent_laws(
     approach_end: float,
     tolerance: float = 1e-3,
     most_rows: int = MOST_ROWS,
+    tilt: tuple[float, float] = (0.0, 0.0),
     comm: Any = None,
 ) -> LawTable:
     """Tabulate the laws of all patches of one surface that is pressed as a whole.
@@ -103,10 +133,11 @@ def consistent_laws(
         model: Micro model of the whole surface.
         patches: Its partition.
         mean_heights: Mean height of the surface over each patch, shape (N,) [mm].
-        approach_end: Largest local approach that the laws will be asked for [mm]; patches that
-            are not touched up to it are open.
+        approach_end: Largest approach at the middle that the laws will be asked for [mm];
+            patches that are not touched up to it are open.
         tolerance: Interpolation error of the force, see `refinement.refined`.
         most_rows: Rows that are solved at most.
+        tilt: Slopes of the plane that presses the surface; laws serve other planes less well.
         comm: MPI communicator; its first rank solves, so that the table is the same to the bit on
             any number of ranks.
 
@@ -125,6 +156,7 @@ def consistent_laws(
         patches=patches,
         mean_heights=means,
         compliance=influence_matrix(patches) / (np.pi * model.contact_modulus),
+        tilt=tilt,
     )
     laws, error = on_root(comm, lambda: whole.tabulated(approach_end, tolerance, most_rows))
     return LawTable(
@@ -138,6 +170,15 @@ def consistent_laws(
         },
         force_error=error,
     )
+
+
+def _first_loaded(force: Callable[[float], float], way: float) -> float:
+    """Return the way on which a force appears, to a thousandth below."""
+    low, high = 0.0, way
+    while high - low > _TOUCH * way:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if force(middle) <= 0.0 else (low, middle)
+    return low
 
 
 def _law(rows: Array, reach: float) -> PatchLaw:

@@ -17,7 +17,7 @@ from micro import MicroModel
 
 Array = NDArray[np.float64]
 
-_ROWS = 13  # the contacts' places change slowly with the load
+_ROWS = 17  # the contacts' places change slowly with the load
 
 
 class Shares(NamedTuple):

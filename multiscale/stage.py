@@ -102,14 +102,17 @@ class Stage:
 
     @property
     def approach_end(self) -> float:
-        """Largest local approach that laws of the whole surface are made for [mm].
+        """Largest approach at the middle that laws of the whole surface are made for [mm].
 
         Under a patch that is closed further than its neighbours, or on a block that is stiffer
         than the half-space, the law's own surface moves away under more load than is there; the
         laws go further by what all of its displacement is worth.
         """
-        end = float(self.closure_ends.max())
-        response = self.model.respond([end], patches=self.patches, mean_heights=self.mean_heights)
+        tilt = self.furthest[1]
+        end = float(np.max(self.closure_ends - tilted_approaches(self.patches, 0.0, tilt)))
+        response = self.model.respond(
+            [end], patches=self.patches, mean_heights=self.mean_heights, tilt=tilt
+        )
         return end + float(response.patch_displacement.mean())
 
     @property
