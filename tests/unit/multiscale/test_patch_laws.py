@@ -90,7 +90,7 @@ def test_falling_closure_ends_the_law_over_closure():
     pressure, stiffness = FALLING.at(np.linspace(start, end, 50))
     assert np.all(np.diff(pressure) > 0.0)
     assert np.all(stiffness >= 0.0)
-    with pytest.raises(InputError, match="beyond the end .* stops being a function of closure"):
+    with pytest.raises(InputError, match=r"beyond the end .* stops being a function of closure"):
         FALLING.at(1.01 * end)
 
 
