@@ -82,3 +82,17 @@ def test_tilted_plane(seed, count, allowed):
     force = model.respond([8e-3], patches=patches, mean_heights=means, tilt=tilt).force[0]
     distance = 8e-3 + tilt[0] * (patches.centres[:, 0] - 0.5)
     assert macro_force(table, distance) == pytest.approx(force, rel=allowed)
+
+
+@pytest.mark.parametrize("count", [1, 2, 8])
+@pytest.mark.parametrize("name", ["half-space", "elliptic"])
+def test_laws_made_under_the_tilt(name, count):
+    """They share the load as the tilted plane does: no patch is too large."""
+    surface, tilt = rough(2), (10e-3, -4e-3)
+    patches = PatchGrid(grid=(count, count), lengths=surface.lengths)
+    model, means, table = table_of(surface, patches, name, tilt=tilt)
+    for approach in (3e-3, 8e-3):
+        force = model.respond([approach], patches=patches, mean_heights=means, tilt=tilt).force[0]
+        distance = approach + (patches.centres - 0.5) @ tilt
+        # between rows: what the table promises half-way, and up to twice as much elsewhere
+        assert macro_force(table, distance) == pytest.approx(force, rel=2 * TOLERANCE)
