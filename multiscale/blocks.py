@@ -8,14 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.patches import PatchGrid
+from geometry.patches import PatchGrid
 from micro import influence_matrix
+from multiscale.spread import contact_spread
 from multiscale.stage import Stage
+from multiscale.yielding import SpreadLoads, UniformLoads, Yielding
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import Interface
+    from macro import Interface, Material
     from macro.correction import Correction
 
 Array = NDArray[np.float64]
+
+_LOADS = 8  # rectangles along a side, at least, that a smooth field is told the contacts' forces by
 
 
 def embedding(stage: Stage, comm: Any) -> Interface:
@@ -30,12 +35,11 @@ def embedding(stage: Stage, comm: Any) -> Interface:
     """
     from mpi4py import MPI
 
-    from macro import Block, Interface, Material, block_mesh
+    from macro import Block, Interface, block_mesh
 
     section = stage.scene.block
     mesh = block_mesh(stage.shape, comm or MPI.COMM_SELF)
-    material = Material(young_modulus=section.young_modulus, poisson_ratio=section.poisson_ratio)
-    return Interface(Block(mesh, material, sides=section.sides), stage.patches)
+    return Interface(Block(mesh, _material(stage), sides=section.sides), stage.patches)
 
 
 def patch_compliance(stage: Stage, comm: Any) -> Array:
@@ -50,12 +54,56 @@ def patch_compliance(stage: Stage, comm: Any) -> Array:
     """
     if stage.scene.coupling.decomposed:
         correction = smooth_correction(stage, stage.patches, comm)
-        half_space = influence_matrix(stage.patches) / (np.pi * stage.model.contact_modulus)
-        return half_space + correction.patch_compliance(stage.patches)
-    from macro import plain_compliance
+        return _half_space(stage) + correction.patch_compliance(stage.patches)
+    from mpi4py import MPI
 
-    interface = embedding(stage, comm)
-    return plain_compliance(interface.block, interface)
+    from macro import plain_compliance
+    from macro.compliance_cache import cached
+
+    def compute() -> dict[str, Array]:
+        interface = embedding(stage, comm)
+        return {"compliance": plain_compliance(interface.block, interface)}
+
+    key = (stage.shape, _material(stage), stage.scene.block.sides, stage.patches)
+    return cached("plain", key, compute, comm or MPI.COMM_SELF)["compliance"]
+
+
+def yielding(stage: Stage, comm: Any) -> Yielding:
+    """Return how a scene's block yields to the pressures of patch laws.
+
+    Consistent laws come with the contacts' places: the correction counts where they are.
+
+    Args:
+        stage: The scene's ingredients.
+        comm: MPI communicator; None for this process alone.
+
+    Note:
+        Collective.
+    """
+    coupling = stage.scene.coupling
+    if not (coupling.decomposed and coupling.kind == "consistent"):
+        return UniformLoads(patch_compliance(stage, comm))
+    loads = fine_loads(stage)
+    spread = contact_spread(
+        stage.model,
+        stage.patches,
+        loads,
+        approach_end=stage.approach_end,
+        tilt=stage.scene.loading.programme.tilt or (0.0, 0.0),
+        comm=comm,
+    )
+    correction = smooth_correction(stage, loads, comm).patch_compliance(loads) / loads.area
+    return SpreadLoads(_half_space(stage), correction, spread)
+
+
+def fine_loads(stage: Stage) -> PatchGrid:
+    """Return rectangles that divide the patches of a scene, several along each side."""
+    nx, ny = (count * -(-_LOADS // count) for count in stage.patches.grid)
+    return PatchGrid(grid=(nx, ny), lengths=stage.patches.lengths)
+
+
+def _half_space(stage: Stage) -> Array:
+    return np.asarray(influence_matrix(stage.patches) / (np.pi * stage.model.contact_modulus))
 
 
 def smooth_correction(stage: Stage, loads: PatchGrid, comm: Any) -> Correction:
@@ -71,19 +119,25 @@ def smooth_correction(stage: Stage, loads: PatchGrid, comm: Any) -> Correction:
     """
     from mpi4py import MPI
 
-    from macro import Material
-    from macro.correction import make_correction
+    from macro.kept import cached_correction
     from micro.boussinesq import HalfSpace
 
-    e, nu = stage.scene.block.young_modulus, stage.scene.block.poisson_ratio
-    return make_correction(
+    material = _material(stage)
+    return cached_correction(
         stage.shape,
-        Material(young_modulus=e, poisson_ratio=nu),
+        material,
         stage.scene.block.sides,
         loads,
-        HalfSpace(e, nu),
+        HalfSpace(material.young_modulus, material.poisson_ratio),
         comm or MPI.COMM_SELF,
     )
+
+
+def _material(stage: Stage) -> Material:
+    from macro import Material
+
+    section = stage.scene.block
+    return Material(young_modulus=section.young_modulus, poisson_ratio=section.poisson_ratio)
 
 
 def final_field(stage: Stage, pressure: Array, comm: Any) -> tuple[Interface, Array]:
