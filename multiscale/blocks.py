@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.patches import PatchGrid
-from geometry.patches import PatchGrid
 from micro import influence_matrix
 from multiscale.spread import contact_spread
 from multiscale.stage import Stage

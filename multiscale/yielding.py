@@ -98,4 +98,4 @@ class SpreadLoads:
         return np.asarray(self._correction @ forces)
 
     def _by_patch(self, values: Array) -> Array:
-        return np.bincount(self._spread.owner, values, minlength=self.count)
+        return np.asarray(np.bincount(self._spread.owner, values, minlength=self.count), float)

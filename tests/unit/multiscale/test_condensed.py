@@ -92,7 +92,7 @@ def test_both_compliances_of_a_coarse_block():
 
 
 def test_both_compliances_carry_nearly_the_same_force():
-    """Isolated laws see the block's mean over a patch on both; consistent ones where contacts are."""
+    """Isolated laws see means over patches on both; consistent ones where contacts are."""
     laws = ["coupling.kind=isolated", "coupling.newton=condensed", "block.cells=[16, 16, 8]"]
     plain, decomposed = (
         run(scene(*laws, f"coupling.compliance={way}")).force_N
