@@ -56,9 +56,7 @@ class RefinedShape:
                 allowed="0 < fine ≤ coarse",
             )
         if not (self.height > 0.0 and self.growth > 0.0):
-            raise InputError(
-                "height and growth must be positive", value=(self.height, self.growth)
-            )
+            raise InputError("height and growth must be positive", value=(self.height, self.growth))
 
     @property
     def hexahedral(self) -> bool:

@@ -17,12 +17,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import ufl
 from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.errors import NotConverged
+from macro import compat
 from macro.block import Block
 from macro.mesh import TOP
 from macro.solvers import reason_name
@@ -74,6 +76,7 @@ class ObstacleBlock:
         highest: Height of the highest point of the top, which the approach counts from [mm].
 
     Attributes:
+        dofs: Vertical degrees of freedom of this rank's nodes of the top, shape (n,).
         x: Abscissae of this rank's nodes of the top, shape (n,) [mm].
         y: Their ordinates [mm].
         height: Their heights [mm].
@@ -88,7 +91,7 @@ class ObstacleBlock:
         space = block.space
         found = fem.locate_dofs_topological(space, 2, block.mesh.facet_tags.find(TOP))
         found = np.sort(found[found < space.dofmap.index_map.size_local])
-        self._dofs = 3 * found + 2
+        self.dofs = 3 * found + 2
         self.x, self.y, self.height = space.tabulate_dof_coordinates()[found].T.copy()
         self.area = self._areas()
         stiffness = block.stiffness
@@ -107,55 +110,51 @@ class ObstacleBlock:
         Raises:
             NotConverged: When the active set does not settle, or a linear solve fails.
         """
-        comm = self.block.mesh.comm
         lx, ly = self.block.mesh.shape.interface
         lean = tilt[0] * (self.x - 0.5 * lx) + tilt[1] * (self.y - 0.5 * ly)
         gap = self._highest - (approach + lean) - self.height
         displacement = self.block.stiffness.createVecRight()
         active = self._start(displacement, approach, gap)
-        forces = np.zeros(len(gap))
         spent, tolerance = 0, _LOOSE
         for sets in range(1, _MOST_SETS + 1):
             spent += self._solve(displacement, active, gap, tolerance)
             forces = self._forces(displacement)
-            moved = displacement.array_r[self._dofs]
-            new = np.where(active, forces > 0.0, moved > gap)
-            changed = comm.allreduce(int(np.count_nonzero(new != active)))
+            touching = displacement.array_r[self.dofs] > gap
+            new = np.where(active, forces > 0.0, touching)
+            changed, total = self._count(new != active), self._count(active)
             if not changed and tolerance <= TOLERANCE:
-                break
-            total = comm.allreduce(int(np.count_nonzero(active)))
+                return self._state(approach, displacement, active, gap, sets, spent)
             # a settled or nearly settled set is worth solving for well
             tolerance = TOLERANCE if changed <= max(1, total // 200) else _LOOSE
             active = new
-        else:
-            raise NotConverged(
-                f"the contact of the rough block at an approach of {approach:.6g} mm",
-                reason="ACTIVE_SET_CYCLES",
-                iterations=_MOST_SETS,
-                remedy="take smaller load steps (load.steps)",
-            )
-        return self._state(approach, displacement, active, gap, forces, sets, spent)
+        raise NotConverged(
+            f"the contact of the rough block at an approach of {approach:.6g} mm",
+            reason="ACTIVE_SET_CYCLES",
+            iterations=_MOST_SETS,
+            remedy="take smaller load steps (load.steps)",
+        )
 
     def _start(self, displacement: PETSc.Vec, approach: float, gap: Array) -> NDArray[np.bool_]:
-        """Extrapolate displacements from the last two solutions; nodes that penetrate are active."""
+        """Extrapolate from the last two solutions; nodes that would penetrate are active."""
         if not self._last:
             return gap < 0.0
         approach1, values, active = self._last[-1]
         displacement.array[:] = values
         if len(self._last) > 1 and approach1 != self._last[-2][0]:
             approach0, before, _ = self._last[-2]
-            displacement.array[:] += (approach - approach1) / (approach1 - approach0) * (values - before)
-        return active | (displacement.array_r[self._dofs] > gap)
+            ahead = (approach - approach1) / (approach1 - approach0)
+            displacement.array[:] += ahead * (values - before)
+        return active | (displacement.array_r[self.dofs] > gap)
 
     def _solve(
         self, displacement: PETSc.Vec, active: NDArray[np.bool_], gap: Array, tolerance: float
     ) -> int:
         """Solve with the active nodes on the plane; return the linear iterations."""
         self._free.set(1.0)
-        self._free.array[self._dofs[active]] = 0.0
-        displacement.array[self._dofs[active]] = gap[active]
+        self._free.array[self.dofs[active]] = 0.0
+        displacement.array[self.dofs[active]] = gap[active]
         residual = self._residual(displacement)
-        scale = np.sqrt(self._sum(float(np.sum(residual.array_r[self._dofs[active]] ** 2))))
+        scale = np.sqrt(self._sum(float(np.sum(residual.array_r[self.dofs[active]] ** 2))))
         residual.pointwiseMult(residual, self._free)
         norm = residual.norm()
         if norm <= 0.5 * tolerance * scale:
@@ -181,7 +180,7 @@ class ObstacleBlock:
         return self._work
 
     def _forces(self, displacement: PETSc.Vec) -> Array:
-        return self._residual(displacement).array_r[self._dofs].copy()
+        return self._residual(displacement).array_r[self.dofs].copy()
 
     def _state(
         self,
@@ -189,16 +188,15 @@ class ObstacleBlock:
         displacement: PETSc.Vec,
         active: NDArray[np.bool_],
         gap: Array,
-        forces: Array,
         sets: int,
         spent: int,
     ) -> ObstacleState:
         values = displacement.array_r.copy()
         self._last = [*self._last[-1:], (approach, values, active)]
-        pressing = np.where(active, forces, 0.0)
+        pressing = np.where(active, self._forces(displacement), 0.0)
         comm = self.block.mesh.comm
         peak = comm.allreduce(float(pressing.max(initial=0.0)), op=MPI.MAX) or 1.0
-        over = float(np.max(values[self._dofs] - gap, initial=0.0)) / max(abs(approach), 1e-300)
+        over = float(np.max(values[self.dofs] - gap, initial=0.0)) / max(abs(approach), 1e-300)
         tension = float(np.max(-pressing, initial=0.0)) / peak
         return ObstacleState(
             approach=approach,
@@ -207,7 +205,7 @@ class ObstacleBlock:
             force=self._sum(float(pressing.sum())),
             reaction=self.block.reaction(displacement),
             contact_area=self._sum(float(self.area[active].sum())),
-            nodes=comm.allreduce(int(np.count_nonzero(active))),
+            nodes=self._count(active),
             active_sets=sets,
             linear_iterations=spent,
             complementarity=comm.allreduce(max(over, tension), op=MPI.MAX),
@@ -215,16 +213,15 @@ class ObstacleBlock:
 
     def _areas(self) -> Array:
         """Return the projected areas that belong to this rank's nodes of the top."""
-        import ufl
-
-        from macro import compat
-
         space, mesh = self.block.space, self.block.mesh
         test = ufl.TestFunction(space)
         ds = ufl.Measure("ds", domain=mesh.mesh, subdomain_data=mesh.facet_tags)
         normal = ufl.FacetNormal(mesh.mesh)
         form = compat.compile_form(test[2] * normal[2] * ds(TOP))
-        return compat.assemble_vector(form).array_r[self._dofs].copy()
+        return compat.assemble_vector(form).array_r[self.dofs].copy()
+
+    def _count(self, which: NDArray[np.bool_]) -> int:
+        return int(self.block.mesh.comm.allreduce(int(np.count_nonzero(which))))
 
     def _sum(self, value: float) -> float:
         return float(self.block.mesh.comm.allreduce(value))
