@@ -12,8 +12,10 @@ from macro.elasticity import Material
 from macro.interface import ContactLaw, Interface
 from macro.kept import cached_correction
 from macro.mesh import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
+from macro.obstacle import ObstacleBlock, ObstacleState
 from macro.output import write_fields
 from macro.pressed import PressedBlock, PressState
+from macro.rough_mesh import MeshQuality, rough_block_mesh
 
 __all__ = [
     "BOTTOM",
@@ -26,6 +28,9 @@ __all__ = [
     "HalfSpaceField",
     "Interface",
     "Material",
+    "MeshQuality",
+    "ObstacleBlock",
+    "ObstacleState",
     "PressState",
     "PressedBlock",
     "Sag",
@@ -33,5 +38,6 @@ __all__ = [
     "cached_correction",
     "make_correction",
     "plain_compliance",
+    "rough_block_mesh",
     "write_fields",
 ]
