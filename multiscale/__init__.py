@@ -15,12 +15,15 @@ from multiscale.loading import Programme, load_steps
 from multiscale.patch_laws import PatchLaws
 from multiscale.run import Run, run
 from multiscale.scene import Scene
+from multiscale.spread import ContactSpread, contact_spread
 from multiscale.stage import Stage, make_stage
 from multiscale.tabulate import isolated_laws
+from multiscale.yielding import SpreadLoads, UniformLoads
 
 __all__ = [
     "ConcurrentCoupling",
     "CondensedCoupling",
+    "ContactSpread",
     "History",
     "LawTable",
     "LoadStep",
@@ -30,8 +33,11 @@ __all__ = [
     "Programme",
     "Run",
     "Scene",
+    "SpreadLoads",
     "Stage",
+    "UniformLoads",
     "consistent_laws",
+    "contact_spread",
     "isolated_laws",
     "load_steps",
     "make_stage",
