@@ -82,7 +82,7 @@ class Errors:
                 (
                     abs(wrong.mean()) / load,
                     np.abs(wrong) / np.maximum(pressure, load),
-                    np.abs(change) / max(float(true.max()), np.finfo(float).tiny),
+                    np.abs(change) / (float(true.max()) or 1.0),
                 )
             )
         return cls(*(_OF_HALVES * np.array(part) for part in zip(*found, strict=True)))

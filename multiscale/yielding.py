@@ -72,6 +72,8 @@ class SpreadLoads:
     def __init__(self, half_space: Array, correction: Array, spread: ContactSpread) -> None:
         self._half_space, self._correction, self._spread = half_space, correction, spread
         self._area = spread.patches.area
+        # which rectangle is whose, as a matrix: sums over patches are products
+        self._belongs = np.equal.outer(spread.owner, np.arange(len(half_space))).astype(float)
         self.count = len(half_space)
 
     def displacement(self, local: Array, point: LawPoint) -> Array:
@@ -84,10 +86,9 @@ class SpreadLoads:
         """Return the derivative; see `Yielding.slope`."""
         shares, owner = self._spread.shares(local), self._spread.owner
         rise = shares.dforce * point.pressure[owner] + shares.force * point.dpressure[owner]
-        columns = np.zeros((len(owner), self.count))
-        np.add.at(columns.T, owner, self._area * (self._correction * rise).T)
+        below = (self._correction * (self._area * rise)) @ self._belongs
         matrix = self._half_space * point.dpressure
-        np.add.at(matrix, owner, shares.stiffness[:, None] * columns)
+        matrix += self._belongs.T @ (shares.stiffness[:, None] * below)
         own = self._by_patch(shares.dstiffness * self._below(shares, point))
         matrix[np.diag_indices_from(matrix)] += own
         return matrix
@@ -98,4 +99,4 @@ class SpreadLoads:
         return np.asarray(self._correction @ forces)
 
     def _by_patch(self, values: Array) -> Array:
-        return np.asarray(np.bincount(self._spread.owner, values, minlength=self.count), float)
+        return np.asarray(values @ self._belongs)
