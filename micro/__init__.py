@@ -8,6 +8,7 @@ of pressure move the half-space.
 
 from micro.asperity_models import MODELS, SOLVERS, AsperityModel, ModelKind, asperity_model
 from micro.asperity_state import AsperityState
+from micro.auto import Candidate, Choice, choose
 from micro.contacts import Contacts, find_contacts
 from micro.ellipse import (
     area_factor,
@@ -37,6 +38,8 @@ __all__ = [
     "SOLVERS",
     "AsperityModel",
     "AsperityState",
+    "Candidate",
+    "Choice",
     "Contacts",
     "HalfSpaceModel",
     "HalfSpaceState",
@@ -51,6 +54,7 @@ __all__ = [
     "asperity_model",
     "axis_factor",
     "axis_ratio",
+    "choose",
     "contact_modulus",
     "eccentricity",
     "eccentricity_approximate",

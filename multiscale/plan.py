@@ -99,6 +99,8 @@ def _contact(stage: Stage) -> str:
 
 
 def _model(stage: Stage) -> str:
+    if stage.choice is not None:
+        return f"auto: {stage.choice.sentence}"
     micro = stage.scene.micro
     solver = f", solved by {micro.solver}" if micro.model in ("elliptic", "circular") else ""
     return stage.model.name + solver

@@ -109,10 +109,24 @@ class MicroSection(_Section):
         "circular-independent",
         "islands",
         "half-space",
+        "auto",
     ] = "elliptic"
+    tolerance: Annotated[Number, Field(gt=0, lt=0.5)] | None = None
     solver: Literal["active-set", "truncated-newton"] = "active-set"
     curvature: Literal["summit", "contact"] = "summit"
     border: Literal["ignore", "include"] = "ignore"
+
+    @model_validator(mode="after")
+    def _chooses_or_states(self) -> Self:
+        if self.model != "auto" and self.tolerance is not None:
+            raise ValueError("'tolerance' needs model = 'auto' (allowed: leave it out)")
+        stated = (self.solver, self.curvature, self.border)
+        if self.model == "auto" and stated != ("active-set", "summit", "ignore"):
+            raise ValueError(
+                "'solver', 'curvature' and 'border' are chosen by model = 'auto' "
+                "(allowed: leave them out)"
+            )
+        return self
 
 
 class CouplingSection(_Section):

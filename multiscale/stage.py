@@ -19,7 +19,7 @@ from geometry.meshes import BlockShape
 from geometry.patches import PatchGrid, patch_means
 from geometry.spectrum import synthesise
 from geometry.surface import Surface
-from micro import MODELS, MicroModel, contact_modulus, micro_model
+from micro import MODELS, Choice, MicroModel, choose, contact_modulus, micro_model
 from multiscale.coupling import tilted_approaches
 from multiscale.scene import Scene
 
@@ -28,6 +28,9 @@ BYTES_PER_HEIGHT = 100
 
 BYTES_PER_CELL = 5000
 """Memory that mesh, stiffness and multigrid take per cell, roughly [B]."""
+
+DEFAULT_TOLERANCE = 0.02
+"""Relative error of the force that a micro model is chosen for, unless the scene says."""
 
 CLOSURE_RESERVE = 0.15
 """Closure beyond the largest approach that laws are made for, relative to load.approach."""
@@ -47,6 +50,7 @@ class Stage:
         patches: Partition of the interface.
         mean_heights: Mean height of each patch, shape (N,) [mm].
         shape: The block's shape and mesh.
+        choice: Why this micro model, where the scene leaves it open.
     """
 
     scene: Scene
@@ -56,6 +60,7 @@ class Stage:
     patches: PatchGrid
     mean_heights: NDArray[np.float64]
     shape: BlockShape
+    choice: Choice | None = None
 
     @property
     def embedded(self) -> bool:
@@ -132,7 +137,6 @@ def make_stage(scene: Scene) -> Stage:
     surface = make_surface(scene)
     patches = PatchGrid(grid=scene.patches.grid, lengths=surface.lengths)
     _check_patches(scene, surface)
-    block = scene.block
     asperities = find_asperities(surface, periodic=False)  # the block's sides are free
     by_summits = scene.micro.model in MODELS and scene.micro.border == "ignore"
     if by_summits and not len(asperities):
@@ -143,21 +147,40 @@ def make_stage(scene: Scene) -> Stage:
             allowed="half-space, islands",
             file=scene.file,
         )
+    choice = _choice(scene, surface, patches) if scene.micro.model == "auto" else None
     return Stage(
         scene=scene,
         surface=surface,
         asperities=asperities,
-        model=micro_model(
-            scene.micro.model,
-            surface,
-            contact_modulus=contact_modulus(block.young_modulus, block.poisson_ratio),
-            solver=scene.micro.solver,
-            curvature=scene.micro.curvature,
-            border=scene.micro.border,
-        ),
+        model=choice.model if choice else _stated_model(scene, surface),
         patches=patches,
         mean_heights=patch_means(surface, patches),
         shape=_located(scene, "block", lambda: _block_shape(scene, surface)),
+        choice=choice,
+    )
+
+
+def _stated_model(scene: Scene, surface: Surface) -> MicroModel:
+    return micro_model(
+        scene.micro.model,
+        surface,
+        contact_modulus=contact_modulus(scene.block.young_modulus, scene.block.poisson_ratio),
+        solver=scene.micro.solver,
+        curvature=scene.micro.curvature,
+        border=scene.micro.border,
+    )
+
+
+def _choice(scene: Scene, surface: Surface, patches: PatchGrid) -> Choice:
+    """Choose the micro model at the load that brings the plane nearest anywhere."""
+    loading = scene.loading
+    rise = 0.5 * float(np.abs(np.multiply(surface.lengths, loading.tilt)).sum())
+    return choose(
+        surface,
+        contact_modulus=contact_modulus(scene.block.young_modulus, scene.block.poisson_ratio),
+        approach=loading.approach + rise,
+        tolerance=scene.micro.tolerance or DEFAULT_TOLERANCE,
+        patches=patches if scene.coupling.kind != "analytic" else None,
     )
 
 
