@@ -4,6 +4,8 @@ import pytest
 
 from geometry.errors import InputError
 from multiscale.plan import statements
+from multiscale.provenance import provenance
+from multiscale.run import Run
 from multiscale.scene import Scene
 from multiscale.stage import make_stage
 
@@ -43,3 +45,12 @@ def test_without_a_tolerance_two_per_cent_are_asked():
 def test_refuses(micro, problem):
     with pytest.raises(InputError, match=problem):
         scene(**micro)
+
+
+def test_results_record_the_chosen_model():
+    done = Run(scene(model="auto", tolerance=0.1))
+    recorded = provenance(done, options=[])
+    choice = done.stage.choice
+    assert recorded["micro_model"]["chosen"]["label"] == choice.taken.label
+    assert recorded["micro_model"]["chosen"]["checked_error"] == choice.checked_error
+    assert recorded["notes"] == [f"micro model chosen: {choice.sentence}"]
