@@ -1,9 +1,12 @@
 """Choice of the cheapest micro model whose expected error in force is below a tolerance.
 
 The error of a grid follows from its cells per contact radius. Islands and asperities have no
-resolution to refine, so a bound for each kind stands for them. All constants are upper ends of the
-errors of 247 surfaces (Hurst exponent 0.4 to 0.9, isotropic and anisotropic bands, 64² to 128²
-heights, rms gradients 0.05 to 0.2) against half-space solutions on twice as many cells a side.
+resolution to refine, so a bound for each kind stands for them. The constants were set on 62
+surfaces (Hurst exponent 0.4 to 0.9, isotropic and anisotropic bands, 64² to 128² heights, rms
+gradients 0.05 to 0.2) against half-space solutions on twice as many cells a side. On 247 such
+surfaces the bounds held in 96 % or more of the cases for asperities and islands, in 99 % for the
+surface's own grid, 93 % for half of it and 52 % for a quarter of it (82 % where 10 % are promised):
+the check catches what the bounds of coarse grids miss.
 """
 
 from __future__ import annotations
