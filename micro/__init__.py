@@ -8,7 +8,8 @@ of pressure move the half-space.
 
 from micro.asperity_models import MODELS, SOLVERS, AsperityModel, ModelKind, asperity_model
 from micro.asperity_state import AsperityState
-from micro.auto import Candidate, Choice, choose
+from micro.auto import Choice, choose
+from micro.auto_candidates import Candidate, resampled
 from micro.contacts import Contacts, find_contacts
 from micro.ellipse import (
     area_factor,
@@ -71,6 +72,7 @@ __all__ = [
     "love_mean",
     "love_mutual",
     "micro_model",
+    "resampled",
     "mutual_influence",
     "rectangle_influence",
 ]

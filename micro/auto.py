@@ -1,56 +1,32 @@
 """Choice of the cheapest micro model whose expected error in force is below a tolerance.
 
-The error of a grid follows from its cells per contact radius. Islands and asperities have no
-resolution to refine, so a bound for each kind stands for them. The constants were set on 62
-surfaces (Hurst exponent 0.4 to 0.9, isotropic and anisotropic bands, 64² to 128² heights, rms
-gradients 0.05 to 0.2) against half-space solutions on twice as many cells a side. On 247 such
-surfaces the bounds held in 96 % or more of the cases for asperities and islands, in 99 % for the
-surface's own grid, 93 % for half of it and 52 % for a quarter of it (82 % where 10 % are promised):
-the check catches what the bounds of coarse grids miss.
+Candidates promise a bound of their error from measures of the contacts (`micro.auto_errors`) and
+a cost (`micro.auto_candidates`). The cheapest that promises the tolerance is made, solved at one
+load and compared with a half-space solution; one that misses there gives way to the next.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from scipy.ndimage import label
 
 from geometry import PatchGrid, Surface, patch_means
-from geometry.errors import InputError
-from micro.half_space import HalfSpaceModel
-from micro.models import MicroModel, micro_model
+from geometry.errors import InputError, NotConverged
+from micro.auto_candidates import Candidate, Option, half_space, options
+from micro.auto_errors import grid_error
+from micro.auto_measures import ContactMeasures, contact_measures
+from micro.models import MicroModel
 
-_GRID_ERROR, _GRID_ORDER = 0.15, 1.6
-"""Error of the force at one cell per radius, and the power of the cells it falls with."""
+_FINER = (1.0, 1.5, 2.0, 3.0)
+"""Grids that checks are made against, relative to the surface's own."""
 
-_LEAST_CELLS = 8
-"""Cells along a patch that a grid needs at least."""
+_SURER = 3.0
+"""How many times smaller than the tolerance the expected error of a check should be."""
 
-_PLAIN = {"expected_error": 0.55, "cost": 1.5e-3}
-_SCALED = {"expected_error": 0.06, "cost": 0.06}
-_ISLANDS = {"expected_error": 0.05, "cost": 0.06}
-"""Bounds and seconds per approach; the latter mostly set-up."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Candidate:
-    """A model that could be taken.
-
-    Attributes:
-        label: Name of the model with its options or its grid.
-        expected_error: Upper end of the relative error of the force between half the largest
-            approach and all of it.
-        cost: Predicted time per approach [s].
-        checked_error: Force relative to the half-space model on the surface's own grid, minus 1,
-            in absolute value; None where it was not computed.
-    """
-
-    label: str
-    expected_error: float
-    cost: float
-    checked_error: float | None = None
+_MOST_CHECKED = 2**21
+"""Cells of the largest grid, finer than the surface's own, that a check is made on."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -71,14 +47,8 @@ class Choice:
 
     @property
     def checked_error(self) -> float | None:
-        """Error of the model at half the largest approach, by the surface's own grid."""
+        """Difference from the half-space solution checked against, None without a check."""
         return self.taken.checked_error
-
-
-@dataclass(frozen=True)
-class _Option:
-    candidate: Candidate
-    make: Callable[[], MicroModel]
 
 
 def choose(
@@ -87,133 +57,152 @@ def choose(
     contact_modulus: float,
     approach: float,
     tolerance: float = 0.02,
+    solutions: int = 40,
     patches: PatchGrid | None = None,
+    periodic: bool = False,
 ) -> Choice:
-    """Choose a micro model of a surface with a free border.
+    """Choose a micro model of a surface.
 
-    Every model taken is solved at half the largest approach, where contacts are smallest, and
-    compared with the half-space model on the surface's own grid; one that misses the tolerance
-    there gives way to the next. When nothing promises the tolerance, the most accurate is taken.
+    Errors are promised for the largest approach and half of it. The check is made at half, where
+    contacts are smallest, against the half-space model on the surface's own grid, or on a finer
+    one where that is not expected to be three times as good as the tolerance or is the candidate
+    itself. When nothing promises and keeps the tolerance, the model with the least expected error
+    is taken.
 
     Args:
         surface: The surface.
         contact_modulus: E* [MPa].
         approach: Largest approach of the plane [mm].
         tolerance: Largest relative error of the force.
+        solutions: Approaches that the model will be solved for; set-up is shared among them.
         patches: Patches that must hold at least 8 cells of a grid along each side.
+        periodic: Whether surface and pressures continue periodically; else the border is free.
 
     Raises:
-        InputError: When approach or tolerance is out of range.
+        InputError: When approach, tolerance or number of solutions is out of range, or a surface
+            that is not periodic shall be.
     """
-    if not (np.isfinite(approach) and approach > 0.0):
-        raise InputError("the largest approach must be positive", value=approach, allowed="mm")
-    if not 0.0 < tolerance < 0.5:
-        raise InputError("the tolerance is out of range", value=tolerance, allowed="0 to 0.5")
-    radius = cells_per_radius(surface, 0.5 * approach)
-    options = sorted(
-        _options(surface, contact_modulus, radius, patches), key=lambda o: o.candidate.cost
+    for what, value, good, allowed in (
+        ("largest approach", approach, np.isfinite(approach) and approach > 0.0, "mm, > 0"),
+        ("tolerance", tolerance, 0.0 < tolerance < 0.5, "0 to 0.5"),
+        ("number of solutions", solutions, solutions >= 1, "≥ 1"),
+        ("surface to continue", surface.source, surface.periodic or not periodic, "periodic"),
+    ):
+        if not good:
+            raise InputError(f"the {what} is out of range", value=value, allowed=allowed)
+    measures = [contact_measures(surface, at, periodic=periodic) for at in (0.5 * approach, approach)]
+    found = options(
+        surface,
+        measures,
+        contact_modulus=contact_modulus,
+        solutions=solutions,
+        patches=patches,
+        periodic=periodic,
     )
-    candidates = [option.candidate for option in options]
-    good = [k for k, item in enumerate(candidates) if item.expected_error <= tolerance]
-    best = int(np.argmin([item.expected_error for item in candidates]))
-    own = HalfSpaceModel(surface=surface, contact_modulus=contact_modulus)
-    truth = _force(own, surface, 0.5 * approach)
-    failed: list[str] = []
-    for k in good or [best]:
-        model = options[k].make()
-        error = abs(_force(model, surface, 0.5 * approach) / truth - 1.0) if truth else 0.0
-        candidates[k] = replace(candidates[k], checked_error=error)
-        finer = isinstance(model, HalfSpaceModel) and min(model.surface.grid) >= min(surface.grid)
-        if error <= tolerance or finer:
-            break
-        failed.append(f"{candidates[k].label} missed it by its check ({error:.2%})")
-    else:
-        k, model = best, options[best].make()
-    taken = candidates[k]
-    return Choice(
-        model=model,
-        taken=taken,
-        candidates=tuple(candidates),
-        sentence=_sentence(taken, radius, tolerance, failed),
-    )
+    check = _Check(surface, contact_modulus, 0.5 * approach, tolerance, periodic, measures[0])
+    return _Search(sorted(found, key=lambda o: o.candidate.cost), tolerance, check).choice()
 
 
-def cells_per_radius(surface: Surface, approach: float) -> float:
-    """Return the cells of the grid per radius of the regions above the plane, their mean square.
+class _Check:
+    """Compares forces at one load with those of half-space models on grids of the surface."""
 
-    Args:
-        surface: The surface.
-        approach: Approach of the undeformed plane [mm].
-    """
-    above = surface.heights > surface.highest - approach
-    regions = label(above, np.ones((3, 3)))[1]
-    return float(np.sqrt(above.sum() / (np.pi * max(regions, 1))))
+    def __init__(
+        self,
+        surface: Surface,
+        modulus: float,
+        approach: float,
+        tolerance: float,
+        periodic: bool,
+        measures: ContactMeasures,
+    ) -> None:
+        self._surface, self._modulus, self._approach = surface, modulus, approach
+        self._periodic, self.measures = periodic, measures
+        grids = [self._cells(f) for f in _FINER]
+        good = [grid_error(measures, f) <= tolerance / _SURER for f in _FINER]
+        self._least = good.index(True) if any(good) else len(good) - 1
+        self._grids, self._forces = grids, dict[tuple[int, int], float]()
+
+    def difference(self, option: Option, model: MicroModel) -> tuple[float | None, str]:
+        """Return the relative difference of a model's force, and what it differs from."""
+        cells = self._grid(option.cells)
+        if cells is None:
+            return None, ""
+        if cells not in self._forces:
+            fine = half_space(self._surface, cells, self._modulus, self._periodic)
+            self._forces[cells] = self._force(fine)
+        truth = self._forces[cells]
+        try:
+            force = self._force(model)
+        except NotConverged:
+            force = np.inf
+        error = abs(force / truth - 1.0) if truth else float(force > 0.0)
+        return float(error), f"the half-space solution on {cells[0]} × {cells[1]} cells"
+
+    def _grid(self, taken: tuple[int, int] | None) -> tuple[int, int] | None:
+        """Return the coarsest grid that is fine enough, finer than the one taken, if any."""
+        finer = [g for g in self._grids if taken is None or min(g) > min(taken)]
+        able = [g for g in finer if g == self._surface.grid or np.prod(g) <= _MOST_CHECKED]
+        enough = [g for g in able if g in self._grids[self._least :]]
+        return enough[0] if enough else able[-1] if able else None
+
+    def _force(self, model: MicroModel) -> float:
+        whole = self._whole
+        response = model.respond([self._approach], patches=whole[0], mean_heights=whole[1])
+        return float(response.force[0])
+
+    @cached_property
+    def _whole(self) -> tuple[PatchGrid, np.ndarray]:
+        whole = PatchGrid(grid=(1, 1), lengths=self._surface.lengths)
+        return whole, patch_means(self._surface, whole)
+
+    def _cells(self, factor: float) -> tuple[int, int]:
+        return round(factor * self._surface.grid[0]), round(factor * self._surface.grid[1])
 
 
-def _options(
-    surface: Surface, modulus: float, radius: float, patches: PatchGrid | None
-) -> Iterator[_Option]:
-    def named(name: str, **options: str) -> Callable[[], MicroModel]:
-        return lambda: micro_model(name, surface, contact_modulus=modulus, **options)
+class _Search:
+    """Goes through the candidates, the cheapest first."""
 
-    for name in ("elliptic", "circular", "elliptic-independent", "circular-independent"):
-        yield _Option(Candidate(label=name, **_PLAIN), named(name))
-    scaled = named("elliptic", curvature="contact", border="include")
-    label_ = "elliptic with curvature at the contact's scale and border summits"
-    yield _Option(Candidate(label=label_, **_SCALED), scaled)
-    parts = patches.grid if patches else (1, 1)
-    if _fits(surface.grid, parts):
-        yield _Option(Candidate(label="islands", **_ISLANDS), named("islands"))
-    for factor in (0.25, 0.375, 0.5, 0.75, 1.0, 1.5, 2.0):
-        grid = (round(factor * surface.grid[0]), round(factor * surface.grid[1]))
-        if factor < 1.0 and not _fits(grid, parts):
-            continue
-        error = _GRID_ERROR * max(factor * radius, 0.3) ** -_GRID_ORDER
-        cost = 2e-3 + 4e-7 * grid[0] * grid[1]
-        yield _Option(
-            Candidate(
-                label=f"half-space on {grid[0]} × {grid[1]} cells", expected_error=error, cost=cost
-            ),
-            lambda grid=grid: HalfSpaceModel(  # type: ignore[misc]
-                surface=resampled(surface, grid), contact_modulus=modulus
-            ),
+    def __init__(self, found: list[Option], tolerance: float, check: _Check) -> None:
+        self._options, self._tolerance, self._check = found, tolerance, check
+        self._candidates = [option.candidate for option in found]
+        self._failed: list[str] = []
+
+    def choice(self) -> Choice:
+        """Return the first that keeps the tolerance, or the one with the least expected error."""
+        promised = [k for k, c in enumerate(self._candidates) if c.expected_error <= self._tolerance]
+        for k in promised:
+            model, against = self._made(k)
+            error = self._candidates[k].checked_error
+            if error is None or error <= self._tolerance:
+                return self._chosen(k, model, against, "the cheapest that promises the tolerance")
+            said = "has no solution" if np.isinf(error) else f"differs by {error:.2%}"
+            self._failed.append(f"{self._candidates[k].label} {said} when checked")
+        best = int(np.argmin([c.expected_error for c in self._candidates]))
+        model, against = self._made(best)
+        why = "all that promise the tolerance fail the check" if promised else "none promises the tolerance"
+        return self._chosen(best, model, against, f"{why}, this one's expected error is least")
+
+    def _made(self, k: int) -> tuple[MicroModel, str]:
+        model = self._options[k].make()
+        error, against = self._check.difference(self._options[k], model)
+        self._candidates[k] = replace(self._candidates[k], checked_error=error)
+        return model, against
+
+    def _chosen(self, k: int, model: MicroModel, against: str, why: str) -> Choice:
+        taken = self._candidates[k]
+        checked = "not checked, for a finer grid would be too large"
+        if taken.checked_error is not None:
+            checked = f"{taken.checked_error:.2%} from {against} at half the largest approach"
+        at = self._check.measures
+        sentence = (
+            f"{taken.label}: {why} of {self._tolerance:.1%}; expected error of the force "
+            f"{taken.expected_error:.1%}, {checked}; there the contacts cover about "
+            f"{at.contact_fraction:.2g} of the surface, with {at.cells_per_radius:.2g} cells per "
+            f"radius in {at.regions} regions; predicted {taken.cost:.2g} s for all solutions"
         )
-
-
-def resampled(surface: Surface, grid: tuple[int, int]) -> Surface:
-    """Return the interpolant of a surface at the centres of other cells.
-
-    Args:
-        surface: The surface.
-        grid: Cells in x and y.
-    """
-    if grid == surface.grid:
-        return surface
-    x, y = (
-        (np.arange(n) + 0.5) * (size / n) for n, size in zip(grid, surface.lengths, strict=True)
-    )
-    points = np.meshgrid(x, y, indexing="ij")
-    return replace(surface, heights=surface.height_at(*points))
-
-
-def _fits(grid: tuple[int, int], parts: tuple[int, int]) -> bool:
-    return all(n >= max(_LEAST_CELLS * m, 16) for n, m in zip(grid, parts, strict=True))
-
-
-def _force(model: MicroModel, surface: Surface, approach: float) -> float:
-    whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
-    heights = patch_means(surface, whole)
-    return float(model.respond([approach], patches=whole, mean_heights=heights).force[0])
-
-
-def _sentence(taken: Candidate, radius: float, tolerance: float, failed: list[str]) -> str:
-    promise = "below" if taken.expected_error <= tolerance else "the least there is, above"
-    before = "; ".join(failed)
-    checked = "" if taken.checked_error is None else f", {taken.checked_error:.2%} from its"
-    check = f"{checked} half-space solution when checked" if checked else ""
-    return (
-        f"{taken.label}: expected error of the force {taken.expected_error:.1%}, {promise} the "
-        f"tolerance {tolerance:.1%} (the surface's grid has {radius:.2g} cells per contact radius"
-        f"{check}), predicted "
-        f"{1e3 * taken.cost:.2g} ms per approach" + (f"; before it, {before}" if before else "")
-    )
+        return Choice(
+            model=model,
+            taken=taken,
+            candidates=tuple(self._candidates),
+            sentence="; ".join([sentence, *self._failed]),
+        )
