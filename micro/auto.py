@@ -90,7 +90,9 @@ def choose(
     ):
         if not good:
             raise InputError(f"the {what} is out of range", value=value, allowed=allowed)
-    measures = [contact_measures(surface, at, periodic=periodic) for at in (0.5 * approach, approach)]
+    measures = [
+        contact_measures(surface, at, periodic=periodic) for at in (0.5 * approach, approach)
+    ]
     found = options(
         surface,
         measures,
@@ -169,7 +171,9 @@ class _Search:
 
     def choice(self) -> Choice:
         """Return the first that keeps the tolerance, or the one with the least expected error."""
-        promised = [k for k, c in enumerate(self._candidates) if c.expected_error <= self._tolerance]
+        promised = [
+            k for k, c in enumerate(self._candidates) if c.expected_error <= self._tolerance
+        ]
         for k in promised:
             model, against = self._made(k)
             error = self._candidates[k].checked_error
@@ -179,7 +183,11 @@ class _Search:
             self._failed.append(f"{self._candidates[k].label} {said} when checked")
         best = int(np.argmin([c.expected_error for c in self._candidates]))
         model, against = self._made(best)
-        why = "all that promise the tolerance fail the check" if promised else "none promises the tolerance"
+        why = (
+            "all that promise the tolerance fail the check"
+            if promised
+            else "none promises the tolerance"
+        )
         return self._chosen(best, model, against, f"{why}, this one's expected error is least")
 
     def _made(self, k: int) -> tuple[MicroModel, str]:
@@ -198,7 +206,7 @@ class _Search:
             f"{taken.label}: {why} of {self._tolerance:.1%}; expected error of the force "
             f"{taken.expected_error:.1%}, {checked}; there the contacts cover about "
             f"{at.contact_fraction:.2g} of the surface, with {at.cells_per_radius:.2g} cells per "
-            f"radius in {at.regions} regions; predicted {taken.cost:.2g} s for all solutions"
+            f"radius, in regions of the number {at.regions}; predicted {taken.cost:.2g} s for all solutions"
         )
         return Choice(
             model=model,

@@ -27,13 +27,13 @@ _SCALED = {"curvature": "contact", "border": "include"}
 _SCALED_LABEL = "elliptic with curvature at the contact's scale and border summits"
 
 _COSTS = {
-    "elliptic": (2e-3, 4e-7, 1e-3, 0.0),
-    "circular": (2e-3, 4e-7, 1e-3, 0.0),
-    "elliptic-independent": (2e-3, 4e-7, 3e-4, 0.0),
-    "circular-independent": (2e-3, 4e-7, 3e-4, 0.0),
-    "scaled": (0.25, 1e-6, 1e-2, 5e-7),
-    "islands": (0.25, 1e-6, 2e-3, 6e-8),
-    "half-space": (0.0, 2e-7, 1.5e-3, 8e-7),
+    "elliptic": (2e-3, 1.8e-7, 1e-3, 0.0),
+    "circular": (2e-3, 1.8e-7, 1e-3, 0.0),
+    "elliptic-independent": (2e-3, 1.8e-7, 3e-4, 0.0),
+    "circular-independent": (2e-3, 1.8e-7, 3e-4, 0.0),
+    "scaled": (0.15, 1e-7, 4e-3, 6e-7),
+    "islands": (0.15, 1e-7, 3e-3, 1e-8),
+    "half-space": (0.0, 2e-7, 3e-3, 4e-7),
 }
 """Seconds to set up, and per cell; seconds per approach, and per cell: minima on one core."""
 

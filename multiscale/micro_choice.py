@@ -7,7 +7,15 @@ from numpy.typing import NDArray
 
 from geometry.patches import PatchGrid, patch_means
 from geometry.surface import Surface
-from micro import Choice, HalfSpaceModel, MicroModel, choose, contact_modulus, micro_model, resampled
+from micro import (
+    Choice,
+    HalfSpaceModel,
+    MicroModel,
+    choose,
+    contact_modulus,
+    micro_model,
+    resampled,
+)
 from multiscale.coupling import AnalyticCoupling
 from multiscale.loading import Programme
 from multiscale.scene import Scene

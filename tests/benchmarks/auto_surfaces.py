@@ -6,14 +6,16 @@ from geometry import PatchGrid, Spectrum, Surface, synthesise
 from micro import HalfSpaceModel, resampled
 
 WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
-GRIDS = (48, 64, 96, 128, 192, 256, 512)
+GRIDS = {48: 0.15, 64: 0.2, 96: 0.15, 128: 0.2, 192: 0.1, 256: 0.1, 512: 0.1}
+"""Heights along a side, and how often they are drawn."""
 
 
-def surfaces(count, seed):
+def surfaces(count, seed, grids=None):
     """Yield surfaces with a free border and their largest approach."""
+    grids = grids or GRIDS
     draw = np.random.default_rng(seed)
     for index in range(count):
-        n = int(draw.choice(GRIDS, p=(0.15, 0.2, 0.15, 0.2, 0.1, 0.1, 0.1)))
+        n = int(draw.choice(list(grids), p=list(grids.values())))
         low = int(draw.choice([1, 2, 4]))
         top = max(n // int(draw.choice([8, 12, 16, 32])), 2 * low, 6)
         band = {"waves": (low, top)}

@@ -29,25 +29,24 @@ def fine(surface, cells, **options):
     )
 
 
-@pytest.mark.parametrize("tolerance", [0.02, 0.05, 0.1])
 @pytest.mark.parametrize("seed", range(901, 905))
-def test_a_promised_tolerance_is_kept(seed, tolerance):
+def test_promised_tolerances_are_kept(seed):
     surface = rough(seed)
     approach = 1.5 * surface.heights.std()
     loads = [0.5 * approach, approach]
-    choice = choose(surface, contact_modulus=1.0, approach=approach, tolerance=tolerance)
-    assert choice.taken.expected_error <= tolerance
     # 256² cells are themselves within 0.3 % of extrapolated forces on these bands.
     truth = force(fine(surface, 256), loads)
-    np.testing.assert_allclose(force(choice.model, loads), truth, rtol=tolerance)
+    for tolerance in (0.02, 0.05, 0.1):
+        choice = choose(surface, contact_modulus=1.0, approach=approach, tolerance=tolerance)
+        assert choice.taken.expected_error <= tolerance
+        assert choice.model.datum == surface.highest
+        np.testing.assert_allclose(force(choice.model, loads), truth, rtol=tolerance)
 
 
 def test_a_periodic_surface_gets_a_periodic_model():
     surface = rough(6, periodic=True)
     approach = 0.8 * surface.heights.std()
-    choice = choose(
-        surface, contact_modulus=1.0, approach=approach, tolerance=0.05, periodic=True
-    )
+    choice = choose(surface, contact_modulus=1.0, approach=approach, tolerance=0.05, periodic=True)
     assert choice.model.name == "half-space-periodic"
     assert all(c.label.startswith("half-space on") for c in choice.candidates)
     truth = force(fine(surface, 256, periodic=True), [approach])
@@ -82,7 +81,7 @@ def test_the_check_is_the_difference_from_the_surfaces_own_grid():
 def test_the_surfaces_own_grid_is_checked_against_a_finer_one(monkeypatch):
     surface = rough(5)
     monkeypatch.setattr("micro.auto_candidates.FACTORS", (1.0,))
-    choice = choose(surface, contact_modulus=1.0, approach=0.02, tolerance=0.01)
+    choice = choose(surface, contact_modulus=1.0, approach=0.02, tolerance=0.2)
     expected = abs(force(choice.model, [0.01])[0] / force(fine(surface, 96), [0.01])[0] - 1.0)
     assert choice.taken.label == "half-space on 64 × 64 cells"
     assert 0.0 < choice.checked_error == pytest.approx(expected, abs=1e-12)

@@ -199,7 +199,8 @@ def test_the_approach_counts_from_the_height_given(surface):
     assert above.first_touch == pytest.approx(model.first_touch + 2e-3, abs=1e-15)
     means = patch_means(surface, PATCHES)
     near, far = (
-        m.respond([d], patches=PATCHES, mean_heights=means) for m, d in ((model, 6e-3), (above, 8e-3))
+        m.respond([d], patches=PATCHES, mean_heights=means)
+        for m, d in ((model, 6e-3), (above, 8e-3))
     )
     assert far.force[0] == pytest.approx(near.force[0], rel=1e-7)  # tolerance of the solutions
     np.testing.assert_allclose(far.patch_separation, near.patch_separation, atol=1e-9)
