@@ -10,6 +10,7 @@ from micro.asperity_models import MODELS, SOLVERS, AsperityModel, ModelKind, asp
 from micro.asperity_state import AsperityState
 from micro.auto import Choice, choose
 from micro.auto_candidates import Candidate, resampled
+from micro.boussinesq import HalfSpace
 from micro.contacts import Contacts, find_contacts
 from micro.ellipse import (
     area_factor,
@@ -45,6 +46,7 @@ __all__ = [
     "Choice",
     "Contacts",
     "Field",
+    "HalfSpace",
     "HalfSpaceModel",
     "HalfSpaceState",
     "HertzContact",
@@ -72,7 +74,7 @@ __all__ = [
     "love_mean",
     "love_mutual",
     "micro_model",
-    "resampled",
     "mutual_influence",
     "rectangle_influence",
+    "resampled",
 ]

@@ -171,24 +171,25 @@ class _Search:
 
     def choice(self) -> Choice:
         """Return the first that keeps the tolerance, or the one with the least expected error."""
-        promised = [
-            k for k, c in enumerate(self._candidates) if c.expected_error <= self._tolerance
-        ]
-        for k in promised:
+        left = dict(enumerate(self._candidates))
+        for k, candidate in enumerate(self._candidates):
+            if candidate.expected_error > self._tolerance:
+                continue
             model, against = self._made(k)
             error = self._candidates[k].checked_error
             if error is None or error <= self._tolerance:
-                return self._chosen(k, model, against, "the cheapest that promises the tolerance")
+                return self._chosen(k, model, against, "the cheapest that promises")
             said = "has no solution" if np.isinf(error) else f"differs by {error:.2%}"
-            self._failed.append(f"{self._candidates[k].label} {said} when checked")
-        best = int(np.argmin([c.expected_error for c in self._candidates]))
-        model, against = self._made(best)
-        why = (
-            "all that promise the tolerance fail the check"
-            if promised
-            else "none promises the tolerance"
-        )
-        return self._chosen(best, model, against, f"{why}, this one's expected error is least")
+            self._failed.append(f"{candidate.label} {said} when checked")
+            del left[k]
+        best = min(left or dict(enumerate(self._candidates)), key=self._expected)
+        why = "the least expected error, for none promises"
+        if self._failed:
+            why = "the least expected error of the rest, for none that was checked keeps"
+        return self._chosen(best, *self._made(best), why)
+
+    def _expected(self, k: int) -> float:
+        return self._candidates[k].expected_error
 
     def _made(self, k: int) -> tuple[MicroModel, str]:
         model = self._options[k].make()
@@ -198,15 +199,16 @@ class _Search:
 
     def _chosen(self, k: int, model: MicroModel, against: str, why: str) -> Choice:
         taken = self._candidates[k]
-        checked = "not checked, for a finer grid would be too large"
+        checked = "not checked, for a finer grid would be too large, at half the largest approach"
         if taken.checked_error is not None:
             checked = f"{taken.checked_error:.2%} from {against} at half the largest approach"
         at = self._check.measures
         sentence = (
-            f"{taken.label}: {why} of {self._tolerance:.1%}; expected error of the force "
-            f"{taken.expected_error:.1%}, {checked}; there the contacts cover about "
-            f"{at.contact_fraction:.2g} of the surface, with {at.cells_per_radius:.2g} cells per "
-            f"radius, in regions of the number {at.regions}; predicted {taken.cost:.2g} s for all solutions"
+            f"{taken.label}: {why} the tolerance of {100 * self._tolerance:.3g} %; expected error "
+            f"of the force {taken.expected_error:.1%}, {checked}, where contacts cover about "
+            f"{at.contact_fraction:.2g} of the surface in {at.regions or 'no'} "
+            f"region{'s' * (at.regions != 1)} above the plane, with {at.cells_per_radius:.2g} of "
+            f"its cells per radius; predicted {taken.cost:.2g} s for all solutions"
         )
         return Choice(
             model=model,

@@ -5,8 +5,8 @@ A bound is a sum of terms with non-negative coefficients. For asperities and isl
     c₀ + c₁ a √η + c₂ e² + c₃ a/λ + c₄ e² a/λ + c₅ β
 
 with contact radius a, density η of the summits above the plane, eccentricity e, shortest
-wavelength λ and the share β of the bearing area that the border cuts; for a half-space grid with n cells per contact radius, m
-per shortest wavelength and N regions
+wavelength λ and the share β of the bearing area that the border cuts; for a half-space grid with
+n cells per contact radius, m per shortest wavelength and N regions
 
     g₀ / (n² √N) + g₁ / n² + g₂ / m:
 

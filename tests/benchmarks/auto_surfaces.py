@@ -48,5 +48,5 @@ def converged(surface, loads):
         model = HalfSpaceModel(surface=fine, contact_modulus=1.0, highest=surface.highest)
         found.append(forces(model, loads))
     step = np.array(factors, float) ** -2.0
-    slope, limit = np.polyfit(step, np.array(found), 1)
+    limit = np.polyfit(step, np.array(found), 1)[1]
     return limit, np.abs(limit / found[-1] - 1.0)

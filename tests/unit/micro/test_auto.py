@@ -66,7 +66,7 @@ def test_the_cheapest_that_promises_is_taken():
     choice = choose(rough(5), contact_modulus=1.0, approach=0.02, tolerance=0.1)
     good = [c for c in choice.candidates if c.expected_error <= 0.1]
     assert choice.taken.cost == min(c.cost for c in good)
-    assert "the cheapest that promises the tolerance of 10.0%" in choice.sentence
+    assert "the cheapest that promises the tolerance of 10 %;" in choice.sentence
 
 
 def test_the_check_is_the_difference_from_the_surfaces_own_grid():
@@ -92,7 +92,10 @@ def test_a_failed_check_gives_way_to_the_next_and_says_so(monkeypatch):
     monkeypatch.setattr("micro.auto_candidates.contact_error", lambda kind, at: 1e-5)
     choice = choose(rough(5), contact_modulus=1.0, approach=0.02, tolerance=0.005)
     assert "circular-independent differs by" in choice.sentence
-    assert choice.taken.label.startswith("half-space")
+    assert "none that was checked keeps" in choice.sentence
+    assert choice.taken.label.startswith("half-space")  # of those that did not fail
+    rest = [c.expected_error for c in choice.candidates if c.expected_error > 1e-5]
+    assert choice.taken.expected_error == min(rest)
 
 
 def test_a_model_without_a_solution_gives_way(monkeypatch):
@@ -107,7 +110,9 @@ def test_a_model_without_a_solution_gives_way(monkeypatch):
 
 def test_says_when_nothing_promises_the_tolerance():
     choice = choose(rough(5), contact_modulus=1.0, approach=0.002, tolerance=1e-5)
-    assert "none promises the tolerance of 0.0%, this one's expected error is" in choice.sentence
+    assert (
+        "the least expected error, for none promises the tolerance of 0.001 %;" in choice.sentence
+    )
     assert choice.taken.expected_error == min(c.expected_error for c in choice.candidates)
 
 
