@@ -65,15 +65,21 @@ def test_under_a_force_a_half_space_tells_how_near_that_is(monkeypatch, tilt):
     assert asked["approach"] == pytest.approx(approach + rise, rel=1e-6)  # both on 64² cells
 
 
-def test_a_chosen_asperity_model_counts_and_warns_as_a_stated_one():
-    loose = scene({"approach": 0.02}, model="auto", tolerance=0.45)
-    stage = make_stage(loose)
+def test_a_chosen_asperity_model_counts_and_warns_as_a_stated_one(monkeypatch):
+    monkeypatch.setattr("micro.auto_candidates.contact_error", lambda kind, at: 1e-5)
+    stage = make_stage(scene({"approach": 0.02}, model="auto", tolerance=0.45))
     assert stage.by_summits
     assert stage.ignores_border
     stated = make_stage(scene({"approach": 0.02}, model=stage.choice.taken.label))
     assert dict(statements(stage))["contact"] == dict(statements(stated))["contact"]
     assert list(warnings(stage)) == list(warnings(stated))
     assert stage.table_tolerance == stated.table_tolerance
+
+
+def test_asperities_with_those_of_the_border_ignore_nothing():
+    stage = make_stage(scene(model="elliptic", curvature="contact", border="include"))
+    assert stage.by_summits
+    assert not stage.ignores_border
 
 
 @pytest.mark.parametrize(
