@@ -8,25 +8,15 @@ load and compared with a half-space solution; one that misses there gives way to
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
-from geometry import PatchGrid, Surface, patch_means
-from geometry.errors import InputError, NotConverged
-from micro.auto_candidates import Candidate, Option, half_space, options
-from micro.auto_errors import grid_error
-from micro.auto_measures import ContactMeasures, contact_measures
+from geometry import PatchGrid, Surface
+from geometry.errors import InputError
+from micro.auto_candidates import Candidate, Option, options
+from micro.auto_check import Check
+from micro.auto_measures import contact_measures
 from micro.models import MicroModel
-
-_FINER = (1.0, 1.5, 2.0, 3.0)
-"""Grids that checks are made against, relative to the surface's own."""
-
-_SURER = 3.0
-"""How many times smaller than the tolerance the expected error of a check should be."""
-
-_MOST_CHECKED = 2**21
-"""Cells of the largest grid, finer than the surface's own, that a check is made on."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -82,6 +72,28 @@ def choose(
         InputError: When approach, tolerance or number of solutions is out of range, or a surface
             that is not periodic shall be.
     """
+    _refuse(surface, approach, tolerance, solutions, periodic)
+    check = Check(
+        surface,
+        contact_modulus=contact_modulus,
+        approach=0.5 * approach,
+        tolerance=tolerance,
+        periodic=periodic,
+    )
+    found = options(
+        surface,
+        [check.measures, contact_measures(surface, approach, periodic=periodic)],
+        contact_modulus=contact_modulus,
+        solutions=solutions,
+        patches=patches,
+        periodic=periodic,
+    )
+    return _Search(sorted(found, key=lambda o: o.candidate.cost), tolerance, check).choice()
+
+
+def _refuse(
+    surface: Surface, approach: float, tolerance: float, solutions: int, periodic: bool
+) -> None:
     for what, value, good, allowed in (
         ("largest approach", approach, np.isfinite(approach) and approach > 0.0, "mm, > 0"),
         ("tolerance", tolerance, 0.0 < tolerance < 0.5, "0 to 0.5"),
@@ -90,81 +102,12 @@ def choose(
     ):
         if not good:
             raise InputError(f"the {what} is out of range", value=value, allowed=allowed)
-    measures = [
-        contact_measures(surface, at, periodic=periodic) for at in (0.5 * approach, approach)
-    ]
-    found = options(
-        surface,
-        measures,
-        contact_modulus=contact_modulus,
-        solutions=solutions,
-        patches=patches,
-        periodic=periodic,
-    )
-    check = _Check(surface, contact_modulus, 0.5 * approach, tolerance, periodic, measures[0])
-    return _Search(sorted(found, key=lambda o: o.candidate.cost), tolerance, check).choice()
-
-
-class _Check:
-    """Compares forces at one load with those of half-space models on grids of the surface."""
-
-    def __init__(
-        self,
-        surface: Surface,
-        modulus: float,
-        approach: float,
-        tolerance: float,
-        periodic: bool,
-        measures: ContactMeasures,
-    ) -> None:
-        self._surface, self._modulus, self._approach = surface, modulus, approach
-        self._periodic, self.measures = periodic, measures
-        grids = [self._cells(f) for f in _FINER]
-        good = [grid_error(measures, f) <= tolerance / _SURER for f in _FINER]
-        self._least = good.index(True) if any(good) else len(good) - 1
-        self._grids, self._forces = grids, dict[tuple[int, int], float]()
-
-    def difference(self, option: Option, model: MicroModel) -> tuple[float | None, str]:
-        """Return the relative difference of a model's force, and what it differs from."""
-        cells = self._grid(option.cells)
-        if cells is None:
-            return None, ""
-        if cells not in self._forces:
-            fine = half_space(self._surface, cells, self._modulus, self._periodic)
-            self._forces[cells] = self._force(fine)
-        truth = self._forces[cells]
-        try:
-            force = self._force(model)
-        except NotConverged:
-            force = np.inf
-        error = abs(force / truth - 1.0) if truth else float(force > 0.0)
-        return float(error), f"the half-space solution on {cells[0]} × {cells[1]} cells"
-
-    def _grid(self, taken: tuple[int, int] | None) -> tuple[int, int] | None:
-        """Return the coarsest grid that is fine enough, finer than the one taken, if any."""
-        finer = [g for g in self._grids if taken is None or min(g) > min(taken)]
-        able = [g for g in finer if g == self._surface.grid or np.prod(g) <= _MOST_CHECKED]
-        enough = [g for g in able if g in self._grids[self._least :]]
-        return enough[0] if enough else able[-1] if able else None
-
-    def _force(self, model: MicroModel) -> float:
-        whole = self._whole
-        response = model.respond([self._approach], patches=whole[0], mean_heights=whole[1])
-        return float(response.force[0])
-
-    @cached_property
-    def _whole(self) -> tuple[PatchGrid, np.ndarray]:
-        whole = PatchGrid(grid=(1, 1), lengths=self._surface.lengths)
-        return whole, patch_means(self._surface, whole)
-
-    def _cells(self, factor: float) -> tuple[int, int]:
-        return round(factor * self._surface.grid[0]), round(factor * self._surface.grid[1])
 
 
 class _Search:
     """Goes through the candidates, the cheapest first."""
 
-    def __init__(self, found: list[Option], tolerance: float, check: _Check) -> None:
+    def __init__(self, found: list[Option], tolerance: float, check: Check) -> None:
         self._options, self._tolerance, self._check = found, tolerance, check
         self._candidates = [option.candidate for option in found]
         self._failed: list[str] = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -99,21 +100,14 @@ def options(
             yield Option(
                 candidate=Candidate(label=label, expected_error=error, cost=cost), make=made
             )
-    for factor in FACTORS:
-        cells = round(factor * surface.grid[0]), round(factor * surface.grid[1])
-        if (factor < 1.0 and not _fits(cells, parts)) or np.prod(cells) > _MOST_CELLS >= (
-            surface.heights.size
-        ):
-            continue
+    for factor, cells in _grids(surface, parts):
         yield Option(
             candidate=Candidate(
                 label=f"half-space on {cells[0]} × {cells[1]} cells",
                 expected_error=max(grid_error(at, factor) for at in measures),
-                cost=_cost("half-space", int(np.prod(cells)), solutions),
+                cost=_cost("half-space", cells[0] * cells[1], solutions),
             ),
-            make=lambda cells=cells: half_space(  # type: ignore[misc]
-                surface, cells, contact_modulus, periodic
-            ),
+            make=partial(half_space, surface, cells, contact_modulus, periodic),
             cells=cells,
         )
 
@@ -152,14 +146,21 @@ def resampled(surface: Surface, grid: tuple[int, int]) -> Surface:
 def _by_contacts(
     surface: Surface, modulus: float, parts: tuple[int, int]
 ) -> Iterator[tuple[str, str, Callable[[], MicroModel]]]:
-    def named(name: str, **chosen: str) -> Callable[[], MicroModel]:
-        return lambda: micro_model(name, surface, contact_modulus=modulus, **chosen)
-
+    named = partial(micro_model, surface=surface, contact_modulus=modulus)
     for kind in MODELS:
-        yield kind, kind, named(kind)
-    yield "scaled", _SCALED_LABEL, named("elliptic", **_SCALED)
+        yield kind, kind, partial(named, kind)
+    yield "scaled", _SCALED_LABEL, partial(named, "elliptic", **_SCALED)
     if _fits(surface.grid, parts):
-        yield "islands", "islands", named("islands")
+        yield "islands", "islands", partial(named, "islands")
+
+
+def _grids(surface: Surface, parts: tuple[int, int]) -> Iterator[tuple[float, tuple[int, int]]]:
+    """Yield the grids that hold the patches and are not too large, the surface's own always."""
+    for factor in FACTORS:
+        cells = round(factor * surface.grid[0]), round(factor * surface.grid[1])
+        fits = factor >= 1.0 or _fits(cells, parts)
+        if factor == 1.0 or (fits and cells[0] * cells[1] <= _MOST_CELLS):
+            yield factor, cells
 
 
 def _cost(kind: str, cells: int, solutions: int) -> float:
