@@ -90,7 +90,11 @@ class PatchesSection(Section):
 
 
 class MicroSection(Section):
-    """The micro model that gives the laws."""
+    """The micro model that gives the laws.
+
+    ``model = "auto"`` takes the cheapest whose expected error of the force is below ``tolerance``
+    (by default 2 %) at the largest load and half of it, and checks it at one load.
+    """
 
     model: Literal[
         "elliptic",

@@ -1,7 +1,8 @@
 """Does the automatically chosen micro model keep the tolerance? Over 60 random surfaces.
 
 Run by hand, some minutes: python tests/benchmarks/auto_study.py [--surfaces N] [--seed S]
-[--rows FILE …], which keeps or joins what was measured.
+[--large] [--periodic] [--rows FILE …]. The rows are kept in the first file, or joined from all
+files that exist.
 
 Truth is extrapolated from half-space solutions on grids up to four times as fine as the surface's
 own. None of the seeds took part in the calibration.
@@ -22,14 +23,20 @@ TOLERANCES = (0.02, 0.05, 0.1, 0.2)
 LARGE = {512: 0.6, 1024: 0.4}
 
 
-def study(count, seed, grids):
+def study(count, seed, grids, periodic):
     """Return rows (heights, tolerance, error, promised, label, truth's error)."""
     rows = []
-    for surface, approach in surfaces(count, seed, grids):
+    for surface, approach in surfaces(count, seed, grids, periodic=periodic):
         loads = [0.5 * approach, approach]
         truth, own = converged(surface, loads)
         for tolerance in TOLERANCES:
-            found = choose(surface, contact_modulus=1.0, approach=approach, tolerance=tolerance)
+            found = choose(
+                surface,
+                contact_modulus=1.0,
+                approach=approach,
+                tolerance=tolerance,
+                periodic=periodic,
+            )
             error = np.abs(forces(found.model, loads) / truth - 1.0).max()
             taken = found.taken
             kept = taken.checked_error is None or taken.checked_error <= tolerance
@@ -66,13 +73,14 @@ def main():
     parser.add_argument("--surfaces", type=int, default=60)
     parser.add_argument("--seed", type=int, default=770_000)
     parser.add_argument("--large", action="store_true", help="512² and 1024² heights only")
+    parser.add_argument("--periodic", action="store_true")
     parser.add_argument("--rows", type=Path, nargs="*", default=[])
     given = parser.parse_args()
     rows = []
     for path in given.rows:
         rows += np.load(path, allow_pickle=True)["rows"].tolist() if path.exists() else []
     if not rows:
-        rows = study(given.surfaces, given.seed, LARGE if given.large else None)
+        rows = study(given.surfaces, given.seed, LARGE if given.large else None, given.periodic)
         if given.rows:
             np.savez(given.rows[0], rows=np.array(rows, dtype=object))
     table(rows)

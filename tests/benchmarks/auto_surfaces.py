@@ -10,8 +10,8 @@ GRIDS = {48: 0.15, 64: 0.2, 96: 0.15, 128: 0.2, 192: 0.1, 256: 0.1, 512: 0.1}
 """Heights along a side, and how often they are drawn."""
 
 
-def surfaces(count, seed, grids=None):
-    """Yield surfaces with a free border and their largest approach."""
+def surfaces(count, seed, grids=None, *, periodic=False):
+    """Yield surfaces and their largest approach."""
     grids = grids or GRIDS
     draw = np.random.default_rng(seed)
     for index in range(count):
@@ -24,8 +24,8 @@ def surfaces(count, seed, grids=None):
         slope, hurst = draw.choice([0.05, 0.1, 0.2]), draw.uniform(0.3, 1.0)
         spectrum = Spectrum(hurst=hurst, rms_slope=slope, seed=seed + index, **band)
         made = synthesise(spectrum, grid=(n, n), lengths=(1.0, 1.0))
-        free = Surface(heights=made.heights, lengths=made.lengths)
-        yield free, free.heights.std() * draw.choice([0.4, 0.7, 1.0, 1.5, 2.0])
+        rough = Surface(heights=made.heights, lengths=made.lengths, periodic=periodic)
+        yield rough, rough.heights.std() * draw.choice([0.4, 0.7, 1.0, 1.5, 2.0])
 
 
 def forces(model, loads):
@@ -45,7 +45,12 @@ def converged(surface, loads):
     for factor in factors:
         cells = (round(factor * n),) * 2
         fine = resampled(surface, cells)
-        model = HalfSpaceModel(surface=fine, contact_modulus=1.0, highest=surface.highest)
+        model = HalfSpaceModel(
+            surface=fine,
+            contact_modulus=1.0,
+            periodic=surface.periodic,
+            highest=surface.highest,
+        )
         found.append(forces(model, loads))
     step = np.array(factors, float) ** -2.0
     limit = np.polyfit(step, np.array(found), 1)[1]
