@@ -3,6 +3,11 @@
 Candidates promise a bound of their error from measures of the contacts (`micro.auto_errors`) and
 a cost (`micro.auto_candidates`). The cheapest that promises the tolerance is made, solved at one
 load and compared with a half-space solution; one that misses there gives way to the next.
+
+On 60 surfaces that took no part in the calibration (`tests/benchmarks/auto_study.py`; their true
+forces known to 0.7 %, half of them to 0.1 %) all promises of 2, 5, 10 and 20 % were kept: 47 of 60
+surfaces had a model that promised 2 %, all had one for the others. So were they on 8 surfaces of
+512² and 1024² heights and on 16 periodic ones.
 """
 
 from __future__ import annotations
@@ -57,7 +62,7 @@ def choose(
     contacts are smallest, against the half-space model on the surface's own grid, or on a finer
     one where that is not expected to be three times as good as the tolerance or is the candidate
     itself. When nothing promises and keeps the tolerance, the model with the least expected error
-    is taken.
+    is taken. Periodic surfaces get half-space models, with the bounds found for free borders.
 
     Args:
         surface: The surface.
