@@ -93,8 +93,8 @@ class MicroSection(Section):
     """The micro model that gives the laws.
 
     ``model = "auto"`` takes the cheapest whose expected error of the force is below ``tolerance``
-    (by default 2 %) at the largest load and half of it, and checks it at one load. The promise is about the
-    micro model of the whole surface, not about what isolated laws leave out.
+    (by default 2 %) at the largest load and half of it, and checks it at one load. The promise is
+    about the micro model of the whole surface, not about what isolated laws leave out.
     """
 
     model: Literal[
