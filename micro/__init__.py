@@ -8,6 +8,8 @@ of pressure move the half-space.
 
 from micro.asperity_models import MODELS, SOLVERS, AsperityModel, ModelKind, asperity_model
 from micro.asperity_state import AsperityState
+from micro.auto import Choice, choose
+from micro.auto_candidates import Candidate, resampled
 from micro.boussinesq import HalfSpace
 from micro.contacts import Contacts, find_contacts
 from micro.ellipse import (
@@ -40,6 +42,8 @@ __all__ = [
     "SOLVERS",
     "AsperityModel",
     "AsperityState",
+    "Candidate",
+    "Choice",
     "Contacts",
     "Field",
     "HalfSpace",
@@ -58,6 +62,7 @@ __all__ = [
     "asperity_model",
     "axis_factor",
     "axis_ratio",
+    "choose",
     "contact_modulus",
     "eccentricity",
     "eccentricity_approximate",
@@ -71,4 +76,5 @@ __all__ = [
     "micro_model",
     "mutual_influence",
     "rectangle_influence",
+    "resampled",
 ]

@@ -34,7 +34,7 @@ class HalfSpaceModel:
     Pressure is uniform on every cell; contact conditions hold at the cell centres.
 
     Args:
-        surface: The surface; the approach counts from the highest point of its interpolant.
+        surface: The surface.
         contact_modulus: E* [MPa].
         periodic: Whether surface and pressures continue periodically. The mean displacement of
             a periodic half-space is not determined: displacements, and so the approach, count
@@ -44,6 +44,8 @@ class HalfSpaceModel:
             1e-13 with 1e-10.
         within: Patches that hold the centres of all cells that may touch; all cells when not
             given.
+        highest: Height z_M that the approach counts from [mm], such as that of the surface that
+            this one was resampled from; the surface's own when not given.
 
     Raises:
         InputError: When the modulus or the tolerance is not positive, a periodic model is asked
@@ -58,6 +60,7 @@ class HalfSpaceModel:
     periodic: bool = False
     tolerance: float = 1e-8
     within: PatchGrid | None = None
+    highest: float | None = None
 
     def __post_init__(self) -> None:
         for what in ("contact_modulus", "tolerance"):
@@ -84,7 +87,7 @@ class HalfSpaceModel:
     @property
     def datum(self) -> float:
         """Height z_M that the approach counts from [mm]."""
-        return self.surface.highest
+        return self.surface.highest if self.highest is None else self.highest
 
     @property
     def first_touch(self) -> float:
@@ -182,9 +185,7 @@ class HalfSpaceModel:
                 fit the surface or the mean heights not the patches, or as for `solve`.
             NotConverged: When the contact conditions cannot be met to the tolerance.
         """
-        sums = CellSums(
-            surface=self.surface, patches=patches, mean_heights=np.asarray(mean_heights, float)
-        )
+        sums = self._sums(patches, mean_heights)
         given = np.atleast_1d(np.asarray(approaches, float))
         order = np.argsort(given, kind="stable")
         path = self._along([self._plane(given[index], tilt) for index in order])
@@ -201,13 +202,17 @@ class HalfSpaceModel:
         start: Any = None,
     ) -> Pressed:
         """Solve under one plane; see `micro.models.MicroModel.press`."""
-        sums = CellSums(
-            surface=self.surface, patches=patches, mean_heights=np.asarray(mean_heights, float)
-        )
+        sums = self._sums(patches, mean_heights)
         self._check_tilt(plane.tilt)
         state = self._pressed(plane, None if start is None else self._started(start))
         rows = [sums.row(plane, state)]
         return Pressed(Response.of(rows, self.name, self.contact_modulus, patches), state)
+
+    def _sums(self, patches: PatchGrid, mean_heights: ArrayLike) -> CellSums:
+        means = np.asarray(mean_heights, float)
+        return CellSums(
+            surface=self.surface, patches=patches, mean_heights=means, highest=self.datum
+        )
 
     def _along(self, planes: list[RigidPlane]) -> Iterator[tuple[RigidPlane, HalfSpaceState]]:
         """Solve at rising approaches; pressures are extrapolated in the approach."""
@@ -254,7 +259,7 @@ class HalfSpaceModel:
 
     def _required(self, plane: RigidPlane) -> Array:
         surface = self.surface
-        below = surface.highest - surface.heights
+        below = self.datum - surface.heights
         required = plane.at(surface.x[:, None], surface.y) - below
         if self._free is not None:
             required[self._free] -= _OUT_OF_REACH * max(surface.lengths)

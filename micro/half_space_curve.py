@@ -29,6 +29,7 @@ class CellSums:
         surface: The surface.
         patches: The N patches, within the surface's rectangle.
         mean_heights: Mean heights of the patches, shape (N,) [mm].
+        highest: Height z_M that approaches count from [mm].
 
     Raises:
         InputError: When not every patch has a mean height.
@@ -37,6 +38,7 @@ class CellSums:
     surface: Surface
     patches: PatchGrid
     mean_heights: Array
+    highest: float
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mean_heights", checked_means(self.mean_heights, self.patches))
@@ -44,7 +46,7 @@ class CellSums:
     def row(self, plane: RigidPlane, state: HalfSpaceState) -> dict[str, Any]:
         """Return the fields of a response for one approach."""
         displacement = self._means(state.displacement)
-        below = self.surface.highest - plane.means(self.patches)
+        below = self.highest - plane.means(self.patches)
         separation = below - self.mean_heights + displacement
         area = true_area(state.in_contact, periodic=state.periodic)
         contacts = state.contacts

@@ -43,7 +43,7 @@ def _surface_warnings(stage: Stage) -> Iterator[str]:
         )
     if not stage.reached_patches:
         yield "nothing lies within the largest approach: no force will act"
-    if stage.by_summits and stage.scene.micro.border == "ignore" and stage.reached_at_border:
+    if stage.ignores_border and stage.reached_at_border:
         yield (
             "maxima on the surface's border within the largest approach: "
             f"{stage.reached_at_border}; an 8-neighbour search cannot confirm them, and they carry "
@@ -88,6 +88,8 @@ def _contact(stage: Stage) -> str:
 
 
 def _model(stage: Stage) -> str:
+    if stage.choice is not None:
+        return f"auto: {stage.choice.sentence}"
     micro = stage.scene.micro
     solver = f", solved by {micro.solver}" if micro.model in ("elliptic", "circular") else ""
     return stage.model.name + solver

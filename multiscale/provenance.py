@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import platform
 import sys
+from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
@@ -13,6 +14,7 @@ import numpy
 import scipy
 
 from multiscale.run import Run
+from multiscale.stage import Stage
 
 
 def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
@@ -39,6 +41,7 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
             "summits_in_reach": int(run.stage.reached.sum()),
             "border_maxima_in_reach": run.stage.reached_at_border,
         },
+        "micro_model": _micro_model(run.stage),
         "ranks": 1 if run.comm is None else run.comm.size,
         "threads": os.environ.get("OMP_NUM_THREADS"),
         "petsc_options": options,
@@ -49,6 +52,17 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "notes": list(history.notes),
         "versions": _versions(),
         "machine": platform.platform(),
+    }
+
+
+def _micro_model(stage: Stage) -> dict[str, Any]:
+    """Return the micro model used and, when it was chosen, from what."""
+    if stage.choice is None:
+        return {"name": stage.model.name}
+    return {
+        "name": stage.model.name,
+        "chosen": asdict(stage.choice.taken),
+        "candidates": [asdict(candidate) for candidate in stage.choice.candidates],
     }
 
 

@@ -79,6 +79,8 @@ class Run:
     def history(self) -> History:
         """Return the load steps accepted so far, with times and notes."""
         notes = []
+        if self.stage.choice is not None:
+            notes.append(f"micro model chosen: {self.stage.choice.sentence}")
         if self.table is not None:
             errors = [law.interpolation_error for law in self.table.laws]
             notes.append(

@@ -90,7 +90,12 @@ class PatchesSection(Section):
 
 
 class MicroSection(Section):
-    """The micro model that gives the laws."""
+    """The micro model that gives the laws.
+
+    ``model = "auto"`` takes the cheapest whose expected error of the force is below ``tolerance``
+    (by default 2 %) at the largest load and half of it, and checks it at one load. The promise is
+    about the micro model of the whole surface, not about what isolated laws leave out.
+    """
 
     model: Literal[
         "elliptic",
@@ -99,10 +104,24 @@ class MicroSection(Section):
         "circular-independent",
         "islands",
         "half-space",
+        "auto",
     ] = "elliptic"
+    tolerance: Annotated[Number, Field(gt=0, lt=0.5)] | None = None
     solver: Literal["active-set", "truncated-newton"] = "active-set"
     curvature: Literal["summit", "contact"] = "summit"
     border: Literal["ignore", "include"] = "ignore"
+
+    @model_validator(mode="after")
+    def _chooses_or_states(self) -> Self:
+        if self.model != "auto" and self.tolerance is not None:
+            raise ValueError("'tolerance' needs model = 'auto' (allowed: leave it out)")
+        stated = (self.solver, self.curvature, self.border)
+        if self.model == "auto" and stated != ("active-set", "summit", "ignore"):
+            raise ValueError(
+                "'solver', 'curvature' and 'border' are chosen by model = 'auto' "
+                "(allowed: leave them out)"
+            )
+        return self
 
 
 class OutputSection(Section):

@@ -18,9 +18,9 @@ from geometry.patches import PatchGrid, patch_means
 from geometry.smooth_shape import smooth_shape
 from geometry.spectrum import synthesise
 from geometry.surface import Surface
-from micro import MODELS, MicroModel, contact_modulus, micro_model
-from multiscale.coupling import AnalyticCoupling, tilted_approaches
-from multiscale.loading import Programme
+from micro import MODELS, AsperityModel, Choice, MicroModel, ScaledModel
+from multiscale.coupling import tilted_approaches
+from multiscale.micro_choice import chosen_model, furthest_plane, stated_model
 from multiscale.refinement import MOST_ROWS
 from multiscale.scene import Scene
 from multiscale.stage_checks import block_cells, check_patches, check_size
@@ -45,6 +45,7 @@ class Stage:
         shape: The block's shape and mesh.
         furthest: Largest approach at the middle of the interface [mm] and the plane's slopes
             there; where force or moment are prescribed, those of the surface on a half-space.
+        choice: Why this micro model, where the scene leaves it open.
     """
 
     scene: Scene
@@ -55,6 +56,7 @@ class Stage:
     mean_heights: NDArray[np.float64]
     shape: BlockShape
     furthest: tuple[float, tuple[float, float]]
+    choice: Choice | None = None
 
     @property
     def embedded(self) -> bool:
@@ -69,7 +71,15 @@ class Stage:
     @property
     def by_summits(self) -> bool:
         """Whether the micro model sees summits rather than the whole surface."""
-        return self.scene.micro.model in MODELS
+        return isinstance(self.model, AsperityModel | ScaledModel)
+
+    @property
+    def ignores_border(self) -> bool:
+        """Whether maxima on the surface's border carry no load in the micro model."""
+        model = self.model
+        return self.by_summits and not (
+            isinstance(model, ScaledModel) and model.border == "include"
+        )
 
     @property
     def table_tolerance(self) -> float:
@@ -137,7 +147,7 @@ class Stage:
         """Number of patches with anything that the largest closure of their laws can touch."""
         x, y = (part.ravel() for part in np.meshgrid(self.surface.x, self.surface.y, indexing="ij"))
         z = self.surface.heights.ravel()
-        if self.by_summits and self.scene.micro.border == "ignore":
+        if self.ignores_border:
             x, y, z = self.asperities.x, self.asperities.y, self.asperities.z
         owner = self.patches.index_of(x, y)
         return int(np.unique(owner[self.closure_ends[owner] > self.surface.highest - z]).size)
@@ -159,7 +169,6 @@ def make_stage(scene: Scene) -> Stage:
     surface = make_surface(scene)
     patches = PatchGrid(grid=scene.patches.grid, lengths=surface.lengths)
     check_patches(scene, surface)
-    block = scene.block
     asperities = find_asperities(surface, periodic=False)  # the block's sides are free
     by_summits = scene.micro.model in MODELS and scene.micro.border == "ignore"
     if by_summits and not len(asperities):
@@ -171,14 +180,8 @@ def make_stage(scene: Scene) -> Stage:
             file=scene.file,
         )
     shape = _located(scene, "block", lambda: _block_shape(scene, surface))
-    model = micro_model(
-        scene.micro.model,
-        surface,
-        contact_modulus=contact_modulus(block.young_modulus, block.poisson_ratio),
-        solver=scene.micro.solver,
-        curvature=scene.micro.curvature,
-        border=scene.micro.border,
-    )
+    choice = chosen_model(scene, surface, patches) if scene.micro.model == "auto" else None
+    model = choice.model if choice else stated_model(scene, surface)
     mean_heights = patch_means(surface, patches)
     return Stage(
         scene=scene,
@@ -188,19 +191,9 @@ def make_stage(scene: Scene) -> Stage:
         patches=patches,
         mean_heights=mean_heights,
         shape=shape,
-        furthest=_furthest(scene.loading.programme, model, patches, mean_heights),
+        furthest=furthest_plane(scene.loading.programme, model, patches, mean_heights),
+        choice=choice,
     )
-
-
-def _furthest(
-    programme: Programme, model: MicroModel, patches: PatchGrid, mean_heights: NDArray[np.float64]
-) -> tuple[float, tuple[float, float]]:
-    """Return the largest approach and the slopes there, from the half-space where not given."""
-    if programme.quantity == "approach" and programme.tilt is not None:
-        return programme.largest, programme.tilt
-    alone = AnalyticCoupling(model, patches, mean_heights)
-    step = alone.press(programme.control(programme.largest))
-    return step.approach_mm, step.tilt
 
 
 def make_surface(scene: Scene) -> Surface:

@@ -1,0 +1,103 @@
+from __future__ import annotations
+
+import pytest
+
+from geometry.errors import InputError
+from micro import choose
+from multiscale.plan import statements, warnings
+from multiscale.provenance import provenance
+from multiscale.run import Run
+from multiscale.scene import Scene
+from multiscale.stage import make_stage
+
+
+def scene(load=None, coupling="analytic", **micro):
+    spectrum = {"hurst": 0.8, "waves": [2, 6], "rms_slope": 0.2}
+    return Scene.from_dict(
+        {
+            "surface": {"spectrum": spectrum, "grid": [64, 64], "lengths": [1.0, 1.0]},
+            "block": {"young_modulus": 4000.0, "poisson_ratio": 0.15},
+            "micro": micro,
+            "coupling": {"kind": coupling},
+            "load": load or {"approach": 0.01},
+        }
+    )
+
+
+def test_the_plan_says_what_was_chosen_and_why():
+    stage = make_stage(scene(model="auto", tolerance=0.1))
+    said = dict(statements(stage))["micro model"]
+    assert said == f"auto: {stage.choice.sentence}"
+    assert "tolerance of 10 %" in said
+    assert stage.model is stage.choice.model
+
+
+def test_without_a_tolerance_two_per_cent_are_asked():
+    assert "tolerance of 2 %" in make_stage(scene(model="auto")).choice.sentence
+
+
+def chosen_for(monkeypatch, load):
+    asked = {}
+
+    def watched(*given, **options):
+        asked.update(options)
+        return choose(*given, **options)
+
+    monkeypatch.setattr("multiscale.micro_choice.choose", watched)
+    make_stage(scene(load, model="auto", tolerance=0.1))
+    return asked
+
+
+def test_the_model_is_chosen_for_the_nearest_the_plane_comes(monkeypatch):
+    load = {"approach": [0.006, 0.001, 0.004], "tilt": [0.002, -0.004], "steps": 3}
+    asked = chosen_for(monkeypatch, load)
+    # A plane tilted by 2 and 4 µm/mm comes 3 µm nearer at a corner of 1 mm².
+    assert asked["approach"] == pytest.approx(0.009, rel=1e-12)
+    assert asked["solutions"] == 9
+
+
+@pytest.mark.parametrize("tilt", [[0.0, 0.0], "free"])
+def test_under_a_force_a_half_space_tells_how_near_that_is(monkeypatch, tilt):
+    asked = chosen_for(monkeypatch, {"force": 1.0, "tilt": tilt})
+    by_cells = make_stage(scene({"force": 1.0, "tilt": tilt}, model="half-space"))
+    approach, slopes = by_cells.furthest
+    rise = 0.5 * (abs(slopes[0]) + abs(slopes[1]))
+    assert asked["approach"] == pytest.approx(approach + rise, rel=1e-6)  # both on 64² cells
+
+
+def test_a_chosen_asperity_model_counts_and_warns_as_a_stated_one(monkeypatch):
+    monkeypatch.setattr("micro.auto_candidates.contact_error", lambda kind, at: 1e-5)
+    stage = make_stage(scene({"approach": 0.02}, model="auto", tolerance=0.45))
+    assert stage.by_summits
+    assert stage.ignores_border
+    stated = make_stage(scene({"approach": 0.02}, model=stage.choice.taken.label))
+    assert dict(statements(stage))["contact"] == dict(statements(stated))["contact"]
+    assert list(warnings(stage)) == list(warnings(stated))
+    assert stage.table_tolerance == stated.table_tolerance
+
+
+def test_asperities_with_those_of_the_border_ignore_nothing():
+    stage = make_stage(scene(model="elliptic", curvature="contact", border="include"))
+    assert stage.by_summits
+    assert not stage.ignores_border
+
+
+@pytest.mark.parametrize(
+    ("micro", "problem"),
+    [
+        ({"model": "elliptic", "tolerance": 0.1}, "'tolerance' needs model = 'auto'"),
+        ({"model": "auto", "border": "include"}, "are chosen by model = 'auto'"),
+    ],
+)
+def test_refuses(micro, problem):
+    with pytest.raises(InputError, match=problem):
+        scene(**micro)
+
+
+def test_results_record_the_chosen_model():
+    done = Run(scene(model="auto", tolerance=0.1))
+    recorded = provenance(done, options=[])
+    choice = done.stage.choice
+    assert recorded["micro_model"]["chosen"]["label"] == choice.taken.label
+    assert recorded["micro_model"]["chosen"]["checked_error"] == choice.checked_error
+    assert recorded["notes"] == [f"micro model chosen: {choice.sentence}"]
