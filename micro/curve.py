@@ -20,6 +20,9 @@ from micro.response import Response
 
 Array = NDArray[np.float64]
 
+LARGEST_AREA_FRACTION = 0.1
+"""Contact area fraction up to which separate summits are meant (errors may be large before)."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PatchSums:
@@ -81,8 +84,16 @@ class PatchSums:
         }
 
     def response(self, name: str, rows: Sequence[dict[str, Any]]) -> Response:
-        """Put rows together, in their order."""
-        return Response.of(rows, name, self.contact_modulus, self.patches)
+        """Put rows together, in their order, with warnings outside the range of validity."""
+        nominal = self.patches.area * self.patches.count
+        warnings = [
+            f"at an approach of {row['approach']:.4g} mm the contacts cover"
+            f" {row['contact_area'] / nominal:.1%} of the surface: the model {name} of separate"
+            f" summits stands for up to {LARGEST_AREA_FRACTION:.0%}"
+            for row in rows
+            if row["contact_area"] > LARGEST_AREA_FRACTION * nominal
+        ]
+        return Response.of(rows, name, self.contact_modulus, self.patches, warnings)
 
     def _summed(self, on: NDArray[np.intp], values: Array | None) -> NDArray[Any]:
         return np.bincount(self.owner[on], values, minlength=self.patches.count)

@@ -162,7 +162,8 @@ class ScaledModel:
             tilt: Slopes (tx, ty) of the approach.
 
         Returns:
-            The response, in the order of ``approaches``.
+            The response, in the order of ``approaches``, with a warning for each of them that
+            lies outside the range of validity.
 
         Raises:
             InputError: When the approaches are not a finite, non-empty list, an asperity lies
@@ -182,8 +183,9 @@ class ScaledModel:
             own = fitted.solution.indentation
             sums = fitted.model.sums(patches, means, home=scaled.summits)
             rows[int(index)] = sums.row(planes[index], fitted.solution)
-        ordered = [rows[index] for index in range(len(planes))]
-        return Response.of(ordered, self.name, self.contact_modulus, patches)
+        if not rows:
+            return Response.of([], self.name, self.contact_modulus, patches)
+        return sums.response(self.name, [rows[index] for index in range(len(planes))])
 
     def _fitted(self, scaled: ScaledAsperities, plane: RigidPlane, own: Array | None) -> _Fitted:
         """Fit the curvatures to the contacts and solve for the contacts until both agree."""

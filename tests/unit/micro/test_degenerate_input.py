@@ -14,7 +14,14 @@ from geometry import (
     patch_means,
     synthesise,
 )
-from micro import MODELS, SOLVERS, IslandModel, ScaledModel, asperity_model
+from micro import (
+    MODELS,
+    SOLVERS,
+    HalfSpaceModel,
+    IslandModel,
+    ScaledModel,
+    asperity_model,
+)
 
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
 
@@ -113,3 +120,26 @@ def test_summit_outside_the_patches(surface):
     for model in models(surface):
         with pytest.raises(InputError, match="lie outside the patches"):
             model.respond([np.ptp(surface.heights)], patches=small, mean_heights=[0.0])
+
+
+def test_models_of_summits_say_where_they_end(surface):
+    for model in models(surface):
+        few, many = (respond(model, surface, [a]) for a in (1e-4, 3.0 * np.ptp(surface.heights)))
+        assert few.contact_area_fraction[0] < 0.01 and few.warnings == ()
+        assert many.contact_area_fraction[0] > 0.1 and len(many.warnings) == 1
+        assert "stands for up to" in many.warnings[0]
+
+
+def test_half_space_has_an_answer_to_each(surface):
+    flat = Surface(heights=np.zeros((12, 12)), lengths=(1.0, 1.0))
+    model = HalfSpaceModel(surface=flat, contact_modulus=1.0)
+    response = respond(model, flat, [-1e-3, 0.0, 1e-3])
+    assert response.force[:2].tolist() == [0.0, 0.0] and response.force[2] > 0.0
+    assert response.contact_area_fraction[2] == pytest.approx(1.0)  # every cell, no border inside
+    model = HalfSpaceModel(surface=surface, contact_modulus=1.0)
+    assert not respond(model, surface, [0.0, -1.0]).force.any()
+    beyond = respond(model, surface, np.ptp(surface.heights) * np.array([1.0, 3.0, 30.0]))
+    assert np.all(np.isfinite(beyond.force)) and np.all(np.diff(beyond.force) > 0.0)
+    for approaches in ([1e-3, np.nan], [np.inf]):
+        with pytest.raises(InputError, match="finite"):
+            respond(model, surface, approaches)
