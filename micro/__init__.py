@@ -20,12 +20,14 @@ from micro.ellipse import (
 from micro.half_space import HalfSpaceModel
 from micro.half_space_state import HalfSpaceState
 from micro.hertz import HertzContact, contact_modulus
+from micro.influence import influence_matrix, mutual_influence, rectangle_influence
 from micro.island_state import IslandState
 from micro.islands import IslandModel
 from micro.love import love_centre, love_integral, love_mean, love_mutual
 from micro.many_summits import PAIR_SUMS
 from micro.models import MODEL_NAMES, MicroModel, micro_model
-from micro.response import Response
+from micro.plane import Field, RigidPlane
+from micro.response import Pressed, Response
 from micro.scaled_model import BORDERS, CURVATURES, ScaledModel
 
 __all__ = [
@@ -38,6 +40,7 @@ __all__ = [
     "AsperityModel",
     "AsperityState",
     "Contacts",
+    "Field",
     "HalfSpaceModel",
     "HalfSpaceState",
     "HertzContact",
@@ -45,7 +48,9 @@ __all__ = [
     "IslandState",
     "MicroModel",
     "ModelKind",
+    "Pressed",
     "Response",
+    "RigidPlane",
     "ScaledModel",
     "area_factor",
     "asperity_model",
@@ -56,9 +61,12 @@ __all__ = [
     "eccentricity_approximate",
     "find_contacts",
     "force_factor",
+    "influence_matrix",
     "love_centre",
     "love_integral",
     "love_mean",
     "love_mutual",
     "micro_model",
+    "mutual_influence",
+    "rectangle_influence",
 ]

@@ -26,7 +26,7 @@ from micro.hertz import HertzContact
 from micro.interaction import Interaction
 from micro.many_summits import PAIR_SUMS, ManySummits, pair_sum
 from micro.plane import RigidPlane
-from micro.response import Response
+from micro.response import Pressed, Response
 from micro.truncated_newton import truncated_newton
 
 Array = NDArray[np.float64]
@@ -208,6 +208,21 @@ class AsperityModel:
             own, before = found.indentation, own
             rows[int(index)] = sums.row(plane, found)
         return sums.response(self.name, [rows[index] for index in range(len(given))])
+
+    def press(
+        self,
+        plane: RigidPlane,
+        *,
+        patches: PatchGrid,
+        mean_heights: ArrayLike,
+        start: Any = None,
+    ) -> Pressed:
+        """Solve under one plane; see `micro.models.MicroModel.press`."""
+        first = np.zeros(len(self.asperities)) if start is None else start
+        found = self.solution(plane.required(self.asperities), first)
+        sums = self.sums(patches, mean_heights)
+        rows = [sums.row(plane, found)]
+        return Pressed(sums.response(self.name, rows), found.indentation)
 
     def surface_displacement(self, state: AsperityState, x: ArrayLike, y: ArrayLike) -> Array:
         """Return the normal displacement of the surface at points, by all contacts [mm].

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from geometry import Asperities, PatchGrid, Surface
 from geometry.errors import InputError
 from micro.asperity_state import HertzCoefficients
+from micro.attribution import shares
 from micro.contact_problem import Solution
 from micro.patch_displacement import patch_displacements
 from micro.plane import RigidPlane
@@ -28,7 +29,9 @@ LARGEST_AREA_FRACTION = 0.1
 class PatchSums:
     """Sums and means over patches of what the asperities do.
 
-    An asperity counts whole for the patch that holds its summit, as in the paper.
+    A contact that straddles borders is shared by the integral of its pressure over the patches
+    (`micro.attribution`); as a contact it counts for the patch that holds its summit. The paper
+    assigns it whole.
 
     Args:
         asperities: The n asperities.
@@ -64,21 +67,24 @@ class PatchSums:
         t = solution.indentation
         on = np.flatnonzero(t > 0.0)
         force, area = self.hertz.force[on] * t[on] ** 1.5, self.hertz.area[on] * t[on]
-        displacement = self._displacement(on, t[on], force)
-        below = self.asperities.highest - plane.at(*self.patches.centres.T)
+        axes = self.hertz.semi_axes[on] * np.sqrt(t[on])[:, None]
+        displacement = self._displacement(on, axes, force)
+        share = shares(self.patches, self._positions(on), axes, self.asperities.angle[on])
+        below = self.asperities.highest - plane.means(self.patches)
         separation = below - self.mean_heights + displacement
         return {
             "approach": plane.approach,
             "force": force.sum(),
+            "moment": plane.moment(self.asperities.x[on], self.asperities.y[on], force),
             "contact_area": area.sum(),
             "contacts": len(on),
             "mean_separation": separation.mean(),
             "iterations": solution.iterations,
             "residual": solution.residual,
             "engulfed": solution.engulfed,
-            "patch_force": self._summed(on, force),
-            "patch_contact_area": self._summed(on, area),
-            "patch_contacts": self._summed(on, None),
+            "patch_force": self._summed(share.patch, share.force * force[share.contact]),
+            "patch_contact_area": self._summed(share.patch, share.area * area[share.contact]),
+            "patch_contacts": self._summed(self.owner[on], None),
             "patch_displacement": displacement,
             "patch_separation": separation,
         }
@@ -95,16 +101,18 @@ class PatchSums:
         ]
         return Response.of(rows, name, self.contact_modulus, self.patches, warnings)
 
-    def _summed(self, on: NDArray[np.intp], values: Array | None) -> NDArray[Any]:
-        return np.bincount(self.owner[on], values, minlength=self.patches.count)
+    def _summed(self, patch: NDArray[np.intp], values: Array | None) -> NDArray[Any]:
+        return np.bincount(patch, values, minlength=self.patches.count)
 
-    def _displacement(self, on: NDArray[np.intp], t: Array, force: Array) -> Array:
-        a = self.asperities
+    def _positions(self, on: NDArray[np.intp]) -> Array:
+        return np.stack([self.asperities.x[on], self.asperities.y[on]], axis=1)
+
+    def _displacement(self, on: NDArray[np.intp], axes: Array, force: Array) -> Array:
         return patch_displacements(
             self.patches,
-            np.stack([a.x[on], a.y[on]], axis=1),
-            self.hertz.semi_axes[on] * np.sqrt(t)[:, None],
-            a.angle[on],
+            self._positions(on),
+            axes,
+            self.asperities.angle[on],
             force,
             self.contact_modulus,
         )

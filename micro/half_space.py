@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,7 +18,7 @@ from micro.half_space_curve import CellSums
 from micro.half_space_state import HalfSpaceState
 from micro.plane import RigidPlane
 from micro.pressing import Pressing
-from micro.response import Response
+from micro.response import Pressed, Response
 
 Array = NDArray[np.float64]
 
@@ -39,7 +39,9 @@ class HalfSpaceModel:
         periodic: Whether surface and pressures continue periodically. The mean displacement of
             a periodic half-space is not determined: displacements, and so the approach, count
             from the mean of the displaced surface.
-        tolerance: Largest residual of a solution (see `HalfSpaceState`).
+        tolerance: Largest residual of a solution (see `HalfSpaceState`), which bounds the error of
+            the force; on a random surface of 256² cells the force erred by 5e-10 with 1e-8, and by
+            1e-13 with 1e-10.
         within: Patches that hold the centres of all cells that may touch; all cells when not
             given.
 
@@ -190,6 +192,23 @@ class HalfSpaceModel:
         ordered = [rows[index] for index in range(len(given))]
         return Response.of(ordered, self.name, self.contact_modulus, patches)
 
+    def press(
+        self,
+        plane: RigidPlane,
+        *,
+        patches: PatchGrid,
+        mean_heights: ArrayLike,
+        start: Any = None,
+    ) -> Pressed:
+        """Solve under one plane; see `micro.models.MicroModel.press`."""
+        sums = CellSums(
+            surface=self.surface, patches=patches, mean_heights=np.asarray(mean_heights, float)
+        )
+        self._check_tilt(plane.tilt)
+        state = self._pressed(plane, None if start is None else self._started(start))
+        rows = [sums.row(plane, state)]
+        return Pressed(Response.of(rows, self.name, self.contact_modulus, patches), state)
+
     def _along(self, planes: list[RigidPlane]) -> Iterator[tuple[RigidPlane, HalfSpaceState]]:
         """Solve at rising approaches; pressures are extrapolated in the approach."""
         before = last = None
@@ -224,13 +243,14 @@ class HalfSpaceModel:
         return self._state(plane, required, self._pressing.by_approach(required, start))
 
     def _plane(self, approach: float, tilt: tuple[float, float]) -> RigidPlane:
-        lx, ly = self.surface.lengths
-        plane = RigidPlane(approach=float(approach), tilt=tilt, centre=(0.5 * lx, 0.5 * ly))
+        self._check_tilt(tilt)
+        return RigidPlane.above(self.surface, approach, tilt)
+
+    def _check_tilt(self, tilt: tuple[float, float]) -> None:
         if self.periodic and any(tilt):
             raise InputError(
                 "a tilted plane does not continue periodically", value=tilt, allowed="(0, 0)"
             )
-        return plane
 
     def _required(self, plane: RigidPlane) -> Array:
         surface = self.surface

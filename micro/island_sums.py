@@ -47,11 +47,12 @@ class IslandSums:
         """
         force_share, area_share = self._shares(settled)
         displacement = self._displacement(state)
-        separation = self.highest - plane.at(*self.patches.centres.T) - self.mean_heights
+        separation = self.highest - plane.means(self.patches) - self.mean_heights
         separation = separation + displacement
         return {
             "approach": plane.approach,
             "force": state.force.sum(),
+            "moment": plane.moment(state.x, state.y, state.force),
             "contact_area": state.contact_area.sum(),
             "contacts": len(state.force),
             "mean_separation": separation.mean(),

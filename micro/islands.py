@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,7 +31,7 @@ from micro.island_state import IslandState
 from micro.island_sums import IslandSums
 from micro.plane import RigidPlane
 from micro.relief import Relief
-from micro.response import Response
+from micro.response import Pressed, Response
 
 Array = NDArray[np.float64]
 
@@ -140,6 +140,26 @@ class IslandModel:
             RigidPlane.above(self.surface, approach, tilt)
             for approach in np.atleast_1d(np.asarray(approaches, float))
         ]
+        return self._response(planes, patches, mean_heights)
+
+    def press(
+        self,
+        plane: RigidPlane,
+        *,
+        patches: PatchGrid,
+        mean_heights: ArrayLike,
+        start: Any = None,
+    ) -> Pressed:
+        """Solve under one plane; see `micro.models.MicroModel.press`.
+
+        Islands are found anew under every plane: there is no start to go on from.
+        """
+        return Pressed(self._response([plane], patches, mean_heights), None)
+
+    def _response(
+        self, planes: list[RigidPlane], patches: PatchGrid, mean_heights: ArrayLike
+    ) -> Response:
+        """Solve under planes that differ in their approach alone."""
         means = checked_means(mean_heights, patches)
         if not planes:
             return Response.of([], self.name, self.contact_modulus, patches)
@@ -165,9 +185,10 @@ class IslandModel:
     def _relief(self, plane: RigidPlane) -> Relief:
         """Return the catchments that a plane and all above it need."""
         surface, small = self.surface, self.surface.heights.size <= _MOST_KEPT
-        if plane.tilt == _LEVEL and small:
+        level = plane.tilt == _LEVEL and plane.sag is None
+        if level and small:
             return self._whole
-        if plane.tilt != _LEVEL:
+        if not level:
             lean = plane.at(surface.x[:, None], surface.y) - plane.approach
             surface = replace(surface, heights=surface.heights + lean, periodic=False)
         floor = self.datum - _MARGIN * max(plane.approach, 0.0)

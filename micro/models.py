@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol, Self
+from typing import Any, Protocol, Self
 
 from numpy.typing import ArrayLike
 
@@ -11,7 +11,8 @@ from geometry.errors import InputError
 from micro.asperity_models import MODELS, asperity_model
 from micro.half_space import HalfSpaceModel
 from micro.islands import IslandModel
-from micro.response import Response
+from micro.plane import RigidPlane
+from micro.response import Pressed, Response
 from micro.scaled_model import ScaledModel
 
 MODEL_NAMES = (*MODELS, "islands", "half-space")
@@ -60,6 +61,30 @@ class MicroModel(Protocol):
             patches: Patches that results are summed over.
             mean_heights: Mean heights of the patches, shape (N,) [mm].
             tilt: Slopes (tx, ty) of the approach.
+
+        Raises:
+            InputError: When the arguments do not fit the surface.
+            NotConverged: When the contact conditions cannot be met.
+        """
+
+    def press(
+        self,
+        plane: RigidPlane,
+        *,
+        patches: PatchGrid,
+        mean_heights: ArrayLike,
+        start: Any = None,
+    ) -> Pressed:
+        """Solve under one plane, which may be tilted and sag.
+
+        Args:
+            plane: The plane, which turns about the centre of the surface's rectangle.
+            patches: Patches that results are summed over.
+            mean_heights: Mean heights of the patches, shape (N,) [mm].
+            start: What this model returned under a plane nearby; None starts from nothing.
+
+        Returns:
+            The response and where to start the next plane from.
 
         Raises:
             InputError: When the arguments do not fit the surface.

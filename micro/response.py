@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,18 @@ from geometry.errors import InputError
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
+
+
+class Pressed(NamedTuple):
+    """What pressing a plane once gives.
+
+    Attributes:
+        response: The response, of one row.
+        start: What the same model starts the next plane from, when that lies nearby.
+    """
+
+    response: Response
+    start: Any
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -32,15 +44,17 @@ class Response:
         nominal_area: Area of all patches [mm²].
         approach: Rigid approach at the centre, counted from first touch, shape (n,) [mm].
         force: Normal force, shape (n,) [N].
+        moment: First moments Σ P (x − xc), Σ P (y − yc) of the pressures about the centre of the
+            surface's rectangle, shape (n, 2) [N mm].
         contact_area: Real contact area, shape (n,) [mm²].
         contacts: Number of asperities in contact, shape (n,).
         mean_separation: Average gap, shape (n,) [mm].
         iterations: Iterations of the solver, shape (n,).
         residual: Complementarity error relative to the largest required displacement, shape (n,).
         engulfed: Pairs of merged asperities, shape (n,).
-        patch_force: Force of the asperities with their summit in the patch, shape (n, N) [N].
-        patch_contact_area: Their contact area, shape (n, N) [mm²].
-        patch_contacts: Their number, shape (n, N).
+        patch_force: Force on the patch, contacts across its border shared, shape (n, N) [N].
+        patch_contact_area: Real contact area in the patch, shared likewise, shape (n, N) [mm²].
+        patch_contacts: Number of contacts with their summit in the patch, shape (n, N).
         patch_displacement: Mean normal displacement of the patch by all contacts, (n, N) [mm].
         patch_separation: Average gap of the patch, shape (n, N) [mm].
         warnings: A sentence for each approach that lies outside the model's range of validity.
@@ -54,6 +68,7 @@ class Response:
     nominal_area: float
     approach: Array
     force: Array
+    moment: Array
     contact_area: Array
     contacts: Counts
     mean_separation: Array
@@ -74,7 +89,11 @@ class Response:
             value = getattr(self, item.name)
             if not isinstance(value, np.ndarray):
                 continue
-            expected = (count, *columns) if item.name.startswith("patch_") else (count,)
+            expected: tuple[int, ...] = (count,)
+            if item.name.startswith("patch_"):
+                expected = (count, *columns)
+            elif item.name == "moment":
+                expected = (count, 2)
             if value.shape != expected:
                 raise InputError(
                     f"{item.name} of a response does not fit",

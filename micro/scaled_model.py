@@ -26,7 +26,7 @@ from micro.contact_scale import ScaledAsperities
 from micro.curve import checked_means
 from micro.plane import RigidPlane
 from micro.relaxation import Relaxation
-from micro.response import Response
+from micro.response import Pressed, Response
 
 Array = NDArray[np.float64]
 
@@ -187,6 +187,23 @@ class ScaledModel:
             return Response.of([], self.name, self.contact_modulus, patches)
         return sums.response(self.name, [rows[index] for index in range(len(planes))])
 
+    def press(
+        self,
+        plane: RigidPlane,
+        *,
+        patches: PatchGrid,
+        mean_heights: ArrayLike,
+        start: Any = None,
+    ) -> Pressed:
+        """Solve under one plane; see `micro.models.MicroModel.press`."""
+        scaled = self._scaled(_highest_approach([plane], self.surface))
+        own = start if start is not None and len(start) == len(scaled.summits) else None
+        fitted = self._fitted(scaled, plane, own)
+        means = checked_means(mean_heights, patches)
+        row = fitted.model.sums(patches, means, home=scaled.summits).row(plane, fitted.solution)
+        response = Response.of([row], self.name, self.contact_modulus, patches)
+        return Pressed(response, fitted.solution.indentation)
+
     def _fitted(self, scaled: ScaledAsperities, plane: RigidPlane, own: Array | None) -> _Fitted:
         """Fit the curvatures to the contacts and solve for the contacts until both agree."""
         required = plane.required(scaled.summits)
@@ -253,9 +270,7 @@ class ScaledModel:
 
 
 def _highest_approach(planes: Sequence[RigidPlane], surface: Surface) -> float:
-    """Return the largest approach anywhere on the surface [mm]."""
-    lean = max(
-        (0.5 * float(np.abs(plane.tilt) @ np.array(surface.lengths)) for plane in planes),
-        default=0.0,
-    )
-    return lean + max((plane.approach for plane in planes), default=0.0)
+    """Return the largest approach at the corners and on a few lines of the surface [mm]."""
+    x, y = (np.linspace(0.0, length, 9) for length in surface.lengths)
+    grid = np.meshgrid(x, y, indexing="ij")
+    return max((float(plane.at(*grid).max()) for plane in planes), default=0.0)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
-import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,14 +18,10 @@ from geometry.patches import PatchGrid, patch_means
 from geometry.spectrum import synthesise
 from geometry.surface import Surface
 from micro import MODELS, MicroModel, contact_modulus, micro_model
-from multiscale.coupling import tilted_approaches
+from multiscale.coupling import AnalyticCoupling, tilted_approaches
+from multiscale.loading import Programme
 from multiscale.scene import Scene
-
-BYTES_PER_HEIGHT = 100
-"""Memory that surface, spline and spectrum take per height, roughly [B]."""
-
-BYTES_PER_CELL = 5000
-"""Memory that mesh, stiffness and multigrid take per cell, roughly [B]."""
+from multiscale.stage_checks import block_cells, check_patches, check_size
 
 CLOSURE_RESERVE = 0.15
 """Closure beyond the largest approach that laws are made for, relative to load.approach."""
@@ -47,6 +41,8 @@ class Stage:
         patches: Partition of the interface.
         mean_heights: Mean height of each patch, shape (N,) [mm].
         shape: The block's shape and mesh.
+        furthest: Largest approach at the middle of the interface [mm] and the plane's slopes
+            there; where force or moment are prescribed, those of the surface on a half-space.
     """
 
     scene: Scene
@@ -56,11 +52,17 @@ class Stage:
     patches: PatchGrid
     mean_heights: NDArray[np.float64]
     shape: BlockShape
+    furthest: tuple[float, tuple[float, float]]
 
     @property
     def embedded(self) -> bool:
-        """Whether finite elements take part."""
+        """Whether a block takes part."""
         return self.scene.coupling.kind != "analytic"
+
+    @property
+    def by_laws(self) -> bool:
+        """Whether the patches get laws."""
+        return self.scene.coupling.kind in ("isolated", "consistent")
 
     @property
     def by_summits(self) -> bool:
@@ -80,13 +82,28 @@ class Stage:
         """Largest closure that each patch's law is made for, shape (N,) [mm].
 
         It is the largest approach there, and a reserve: the surface of a bent block may rise
-        between its loads. Laws that hold at points see the approach at the patch's corners.
+        between its loads, and a free plane may turn further than on a half-space. Laws that hold
+        at points see the approach at the patch's corners.
         """
-        loading, size = self.scene.loading, self.patches.size
-        ends = tilted_approaches(self.patches, loading.approach, loading.tilt)
+        approach, tilt = self.furthest
+        ends = tilted_approaches(self.patches, approach, tilt)
         if self.scene.coupling.interface == "pointwise":
-            ends = ends + 0.5 * float(np.abs(np.multiply(size, loading.tilt)).sum())
-        return ends + CLOSURE_RESERVE * loading.approach
+            ends = ends + 0.5 * float(np.abs(np.multiply(self.patches.size, tilt)).sum())
+        if self.scene.loading.tilt == "free":
+            ends = ends + 0.5 * (ends.max() - approach)
+        return ends + CLOSURE_RESERVE * approach
+
+    @property
+    def approach_end(self) -> float:
+        """Largest local approach that laws of the whole surface are made for [mm].
+
+        Under a patch that is closed further than its neighbours, or on a block that is stiffer
+        than the half-space, the law's own surface moves away under more load than is there; the
+        laws go further by what all of its displacement is worth.
+        """
+        end = float(self.closure_ends.max())
+        response = self.model.respond([end], patches=self.patches, mean_heights=self.mean_heights)
+        return end + float(response.patch_displacement.mean())
 
     @property
     def reached(self) -> NDArray[np.bool_]:
@@ -116,9 +133,9 @@ class Stage:
         return int(np.unique(owner[self.closure_ends[owner] > self.surface.highest - z]).size)
 
     def _within(self, x: NDArray, y: NDArray, z: NDArray) -> NDArray[np.bool_]:
-        loading = self.scene.loading
+        approach, tilt = self.furthest
         from_centre = np.column_stack((x, y)) - 0.5 * np.asarray(self.surface.lengths)
-        approach = loading.approach + from_centre @ np.asarray(loading.tilt)
+        approach = approach + from_centre @ np.asarray(tilt)
         return np.asarray(approach > self.surface.highest - z)
 
 
@@ -128,10 +145,10 @@ def make_stage(scene: Scene) -> Stage:
     Raises:
         InputError: When something cannot be made or does not fit; names file, key and value.
     """
-    _check_size(scene)
+    check_size(scene)
     surface = make_surface(scene)
     patches = PatchGrid(grid=scene.patches.grid, lengths=surface.lengths)
-    _check_patches(scene, surface)
+    check_patches(scene, surface)
     block = scene.block
     asperities = find_asperities(surface, periodic=False)  # the block's sides are free
     by_summits = scene.micro.model in MODELS and scene.micro.border == "ignore"
@@ -143,22 +160,37 @@ def make_stage(scene: Scene) -> Stage:
             allowed="half-space, islands",
             file=scene.file,
         )
+    shape = _located(scene, "block", lambda: _block_shape(scene, surface))
+    model = micro_model(
+        scene.micro.model,
+        surface,
+        contact_modulus=contact_modulus(block.young_modulus, block.poisson_ratio),
+        solver=scene.micro.solver,
+        curvature=scene.micro.curvature,
+        border=scene.micro.border,
+    )
+    mean_heights = patch_means(surface, patches)
     return Stage(
         scene=scene,
         surface=surface,
         asperities=asperities,
-        model=micro_model(
-            scene.micro.model,
-            surface,
-            contact_modulus=contact_modulus(block.young_modulus, block.poisson_ratio),
-            solver=scene.micro.solver,
-            curvature=scene.micro.curvature,
-            border=scene.micro.border,
-        ),
+        model=model,
         patches=patches,
-        mean_heights=patch_means(surface, patches),
-        shape=_located(scene, "block", lambda: _block_shape(scene, surface)),
+        mean_heights=mean_heights,
+        shape=shape,
+        furthest=_furthest(scene.loading.programme, model, patches, mean_heights),
     )
+
+
+def _furthest(
+    programme: Programme, model: MicroModel, patches: PatchGrid, mean_heights: NDArray[np.float64]
+) -> tuple[float, tuple[float, float]]:
+    """Return the largest approach and the slopes there, from the half-space where not given."""
+    if programme.quantity == "approach" and programme.tilt is not None:
+        return programme.largest, programme.tilt
+    alone = AnalyticCoupling(model, patches, mean_heights)
+    step = alone.press(programme.control(programme.largest))
+    return step.approach_mm, step.tilt
 
 
 def make_surface(scene: Scene) -> Surface:
@@ -185,52 +217,13 @@ def _block_shape(scene: Scene, surface: Surface) -> BlockShape:
     return BlockShape(
         interface=surface.lengths,
         height=block.height,
-        cells=block.cells,
+        cells=block_cells(scene),
         element=block.element,
         grading=block.grading,
         margin=block.margin,
         margin_cells=block.margin_cells if block.margin else 0,
         margin_grading=block.margin_grading if block.margin else 1.0,
     )
-
-
-def _check_size(scene: Scene) -> None:
-    """Refuse what could never fit into this machine's memory, before anything is allocated."""
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    sizes: list[tuple[str, Sequence[int] | None, int]] = [
-        ("surface.grid", scene.surface.grid, BYTES_PER_HEIGHT),
-        ("patches.grid", scene.patches.grid, BYTES_PER_HEIGHT),
-    ]
-    if scene.coupling.kind != "analytic":
-        sizes.append(("block.cells", scene.block.cells, BYTES_PER_CELL))
-    for key, counts, each in sizes:
-        if counts is not None and math.prod(counts) * each > memory:
-            raise InputError(
-                f"needs about {math.prod(counts) * each / 1e9:.3g} GB of memory",
-                key=key,
-                value=list(counts),
-                allowed=f"what fits into {memory / 1e9:.3g} GB",
-                file=scene.file,
-            )
-
-
-def _check_patches(scene: Scene, surface: Surface) -> None:
-    """Refuse patches that no element or no height can resolve."""
-    limits: list[tuple[str, Sequence[int]]] = [("heights of the surface", surface.grid)]
-    if scene.micro.model == "islands":  # cuts patches out, and a surface has at least 4 × 4 heights
-        fourths = (surface.grid[0] // 4, surface.grid[1] // 4)
-        limits = [("fourths of the surface's heights", fourths)]
-    if scene.coupling.kind != "analytic":
-        limits.append(("cells of the interface (block.cells)", scene.block.cells[:2]))
-    for what, limit in limits:
-        if any(patches > most for patches, most in zip(scene.patches.grid, limit, strict=True)):
-            raise InputError(
-                f"more patches than {what}",
-                key="patches.grid",
-                value=list(scene.patches.grid),
-                allowed=f"at most {list(limit)}",
-                file=scene.file,
-            )
 
 
 def _located(scene: Scene, key: str, make: Callable[[], Any]) -> Any:

@@ -18,6 +18,16 @@ SCENES = {
         "load.tilt=['2 um/mm', '-1 um/mm']",
     ],
     "micro model alone": ["coupling.kind=analytic"],
+    "condensed, up and down": [
+        "block.cells=[8, 8, 5]", "patches.grid=[4, 2]", "coupling.newton=condensed",
+        "load.approach=['8 um', '2 um']", "load.tilt=[0.002, 0.001]", "output.fields=true",
+    ],
+    "consistent, decomposed": [
+        "block.cells=[8, 8, 5]", "coupling.kind=consistent", "micro.model=half-space",
+    ],
+    "concurrent": [
+        "block.cells=[8, 8, 5]", "coupling.kind=concurrent", "micro.model=half-space",
+    ],
     "laws of the half-space": ["block.cells=[8, 8, 5]", "micro.model=half-space"],
 }  # fmt: skip
 NUMBERS = (

@@ -5,6 +5,7 @@ import pytest
 
 from geometry import InputError, PatchGrid
 from micro import MODELS, AsperityModel, HertzContact, asperity_model
+from micro.attribution import shares
 
 E_STAR = 4000.0
 ONE_PATCH = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
@@ -104,13 +105,14 @@ def test_curve_is_made_of_states(cluster, name):
     approaches = np.array([4e-3, 0.0, 1e-3, 8e-3, 4e-3])  # any order, repeated
     response = respond(model, approaches)
     assert response.approach.tolist() == approaches.tolist()
-    owner = PATCHES.index_of(cluster.x, cluster.y)
+    place = np.stack([cluster.x, cluster.y], axis=1)
     for row, approach in enumerate(approaches):
         state = model.solve(approach)
         assert response.force[row] == pytest.approx(state.force.sum(), rel=1e-7, abs=1e-15)
         assert response.contact_area[row] == pytest.approx(state.contact_area.sum(), rel=1e-7)
         assert response.contacts[row] == state.in_contact.sum()
-        by_patch = np.bincount(owner, state.force, minlength=4)
+        share = shares(PATCHES, place, state.semi_axes, cluster.angle)
+        by_patch = np.bincount(share.patch, share.force * state.force[share.contact], minlength=4)
         assert response.patch_force[row] == pytest.approx(by_patch, rel=1e-7, abs=1e-12)
 
 

@@ -146,15 +146,16 @@ def test_models_by_name(surface):
 
 def test_patches_alone_hold_all_asperities(surface):
     model = scaled(surface)
-    count = 0
+    count, alone_force = 0, np.zeros(2)
+    beside = model.respond([2e-3, 1e-2], patches=PATCHES, mean_heights=np.zeros(6))
     for index in range(PATCHES.count):
         alone, patch = model.of_patch(PATCHES, index)
         count += len(alone.asperities)
         assert alone.first_touch >= model.first_touch - 1e-12
         curve = alone.respond([2e-3, 1e-2], patches=patch, mean_heights=[0.0])
-        beside = model.respond([2e-3, 1e-2], patches=PATCHES, mean_heights=np.zeros(6))
-        # Without neighbours that press its summits down a patch carries more.
-        assert np.all(curve.force >= beside.patch_force[:, index] * (1.0 - 1e-3))
+        alone_force += curve.force
+    # without neighbours that press its summits down a patch carries more
+    assert np.all(alone_force >= beside.force)
     assert count == len(model.asperities)
 
 
