@@ -212,7 +212,7 @@ def _asinh_ratio(numerator: Array, denominator: Array) -> Array:
 
 
 def _over(numerator: ArrayLike, denominator: Array) -> Array:
-    """Divide, and give 0 at a corner on the surface, where the term is singular or multiplied by 0."""
+    """Divide; 0 at a corner on the surface, where the term is singular or multiplied by 0."""
     return np.divide(
         numerator, denominator, out=np.zeros_like(denominator), where=denominator > _TINY
     )

@@ -46,8 +46,6 @@ def test_matrix_is_symmetric_with_loves_mean_on_the_diagonal():
     apart = patches.centres[i] - patches.centres[j]
     direct = mutual_influence(*apart, *patches.half_sizes)
     assert influence[i, j] == pytest.approx(direct, rel=1e-12)
-        mutual_influence(*apart, *patches.half_sizes), rel=1e-12
-    )
 
 
 def test_finer_patches_sum_up_to_coarser_ones():
