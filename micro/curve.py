@@ -91,15 +91,18 @@ class PatchSums:
 
     def response(self, name: str, rows: Sequence[dict[str, Any]]) -> Response:
         """Put rows together, in their order, with warnings outside the range of validity."""
-        nominal = self.patches.area * self.patches.count
-        warnings = [
-            f"at an approach of {row['approach']:.4g} mm the contacts cover"
-            f" {row['contact_area'] / nominal:.1%} of the surface: the model {name} of separate"
-            f" summits stands for up to {LARGEST_AREA_FRACTION:.0%}"
-            for row in rows
-            if row["contact_area"] > LARGEST_AREA_FRACTION * nominal
-        ]
-        return Response.of(rows, name, self.contact_modulus, self.patches, warnings)
+        told = [row | {"warning": self._warning(name, row)} for row in rows]
+        return Response.of(told, name, self.contact_modulus, self.patches)
+
+    def _warning(self, name: str, row: dict[str, Any]) -> str:
+        fraction = row["contact_area"] / (self.patches.area * self.patches.count)
+        if fraction <= LARGEST_AREA_FRACTION:
+            return ""
+        return (
+            f"at an approach of {row['approach']:.4g} mm the contacts cover {fraction:.1%} of the"
+            f" surface: the model {name} of separate summits stands for up to"
+            f" {LARGEST_AREA_FRACTION:.0%}"
+        )
 
     def _summed(self, patch: NDArray[np.intp], values: Array | None) -> NDArray[Any]:
         return np.bincount(patch, values, minlength=self.patches.count)

@@ -200,8 +200,8 @@ class ScaledModel:
         own = start if start is not None and len(start) == len(scaled.summits) else None
         fitted = self._fitted(scaled, plane, own)
         means = checked_means(mean_heights, patches)
-        row = fitted.model.sums(patches, means, home=scaled.summits).row(plane, fitted.solution)
-        response = Response.of([row], self.name, self.contact_modulus, patches)
+        sums = fitted.model.sums(patches, means, home=scaled.summits)
+        response = sums.response(self.name, [sums.row(plane, fitted.solution)])
         return Pressed(response, fitted.solution.indentation)
 
     def _fitted(self, scaled: ScaledAsperities, plane: RigidPlane, own: Array | None) -> _Fitted:

@@ -13,6 +13,7 @@ from geometry.patches import PatchGrid
 from micro import MicroModel, influence_matrix
 from multiscale.law_files import LawTable
 from multiscale.laws import PatchLaw
+from multiscale.validity import warned_from
 
 Array = NDArray[np.float64]
 
@@ -43,9 +44,10 @@ class WholeSurface:
     compliance: Array
 
     def rows(self, approaches: Array) -> Array:
-        """Return, for every approach, columns of all patches, shape (n, 6, N).
+        """Return, for every approach, columns of all patches, shape (n, 7, N).
 
-        The columns are approach, closure, pressure, area fraction, contacts, relief.
+        The columns are approach, closure, pressure, area fraction, contacts, relief, and whether
+        the model warns.
         """
         response = self.model.respond(
             approaches, patches=self.patches, mean_heights=self.mean_heights
@@ -59,6 +61,7 @@ class WholeSurface:
             response.patch_contact_area / self.patches.area,
             response.patch_contacts,
             response.patch_displacement - displacement,
+            np.broadcast_to((response.warning != "")[:, None], pressure.shape),
         )
         return np.stack(columns, axis=1).astype(np.float64)
 
@@ -145,7 +148,7 @@ def consistent_laws(
 
 
 def _law(rows: Array, reach: float) -> PatchLaw:
-    """Return the law of one patch through rows of its own, shape (n, 6)."""
+    """Return the law of one patch through rows of its own, shape (n, 7)."""
     loaded = np.flatnonzero(rows[:, 2] > 0.0)
     if not loaded.size:
         touch = float(rows[-1, 1])  # not touched as far as the table goes
@@ -160,6 +163,7 @@ def _law(rows: Array, reach: float) -> PatchLaw:
         contact_area_fraction=rows[:, 3],
         contacts=rows[:, 4].astype(np.int64),
         relief=rows[:, 5],
+        warned_from=warned_from(rows[:, 2], rows[:, 6]),
         touch=touch,
         reach=reach,
     )
@@ -176,7 +180,7 @@ def _from_touch(rows: Array, first: int) -> Array:
         straight = rows[0, 0] - root[0] * (rows[1, 0] - rows[0, 0]) / (root[1] - root[0])
         share = (straight - before[0]) / (rows[0, 0] - before[0]) if first else 1.0
         touch = before + np.clip(share, 0.0, 1.0 - 1e-6) * (rows[0] - before)
-    touch[2:5] = 0.0
+    touch[2:5], touch[6] = 0.0, before[6]
     return np.vstack((touch, rows))
 
 

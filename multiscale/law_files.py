@@ -22,7 +22,7 @@ _COLUMNS = {
     "contacts": "1",
     "relief": "mm",
 }
-_SCALARS = {"touch": "mm", "reach": "mm", "interpolation_error": "1"}
+_SCALARS = {"touch": "mm", "reach": "mm", "interpolation_error": "1", "warned_from": "MPa"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

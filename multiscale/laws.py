@@ -70,6 +70,8 @@ class PatchLaw:
         interpolation_error: Largest error of the interpolated pressure against the micro model
             half-way between rows, relative to the pressure there, or to a hundredth of the
             table's largest where that is more.
+        warned_from: Mean pressure from which on the micro model warned that the contacts lie
+            outside its range of validity [MPa]; infinite when it never did.
     """
 
     closure: Array
@@ -81,6 +83,7 @@ class PatchLaw:
     touch: float
     reach: float
     interpolation_error: float = 0.0
+    warned_from: float = np.inf
 
     def __post_init__(self) -> None:
         columns = (

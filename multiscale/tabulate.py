@@ -15,6 +15,7 @@ from micro import MicroModel
 from micro.love import love_centre, love_mean
 from multiscale.law_files import LawTable
 from multiscale.laws import PatchLaw
+from multiscale.validity import warned_from
 
 Array = NDArray[np.float64]
 _FIRST_ROWS = 9
@@ -61,7 +62,11 @@ class IsolatedPatch:
         return float(self.model.datum - self.mean_height)
 
     def rows(self, approaches: Array) -> Array:
-        """Return rows: approach, closure, pressure, area fraction, contacts, relief; (n, 6)."""
+        """Return rows, shape (n, 7).
+
+        The columns are approach, closure, pressure, area fraction, contacts, relief, and whether
+        the model warns.
+        """
         response = self.model.respond(
             approaches, patches=self.patch, mean_heights=np.array([self.mean_height])
         )
@@ -71,7 +76,8 @@ class IsolatedPatch:
         # the block's closure is a mean over the patch, whichever displacement made the law's
         mean = love_mean(*self.patch.half_sizes) / (np.pi * self.model.contact_modulus)
         relief = response.patch_displacement[:, 0] - mean * pressure
-        return np.column_stack((approaches, closure, pressure, area, response.contacts, relief))
+        columns = (approaches, closure, pressure, area, response.contacts, relief)
+        return np.column_stack((*columns, response.warning != ""))
 
     def law(self, closure_end: float, tolerance: float) -> PatchLaw:
         """Tabulate the law from first touch to a closure.
@@ -92,10 +98,10 @@ class IsolatedPatch:
             NotConverged: When the pressure is a function of closure nowhere.
         """
         if self.touch >= closure_end:
-            return _law(np.empty((0, 6)), self.touch, self.reach, 0.0)
+            return _law(np.empty((0, 7)), self.touch, self.reach, 0.0)
         end = self._approach_at(closure_end)
         rows = self.rows(np.linspace(self.touch, end, _FIRST_ROWS, dtype=np.float64))
-        rows[0, 1:] = self.touch, 0.0, 0.0, 0.0, 0.0  # whatever round-off makes of first touch
+        rows[0, 1:6] = self.touch, 0.0, 0.0, 0.0, 0.0  # whatever round-off makes of first touch
         rows = _increasing(rows)
         if len(rows) < 2 or rows[1, 1] <= rows[0, 1]:
             raise NotConverged(
@@ -177,6 +183,7 @@ def _law(rows: Array, touch: float, reach: float, error: float) -> PatchLaw:
         touch=touch,
         reach=reach,
         interpolation_error=error,
+        warned_from=warned_from(rows[:, 2], rows[:, 6]),
     )
 
 

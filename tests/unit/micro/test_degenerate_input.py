@@ -19,6 +19,7 @@ from micro import (
     SOLVERS,
     HalfSpaceModel,
     IslandModel,
+    RigidPlane,
     ScaledModel,
     asperity_model,
 )
@@ -128,6 +129,10 @@ def test_models_of_summits_say_where_they_end(surface):
         assert few.contact_area_fraction[0] < 0.01 and few.warnings == ()
         assert many.contact_area_fraction[0] > 0.1 and len(many.warnings) == 1
         assert "stands for up to" in many.warnings[0]
+        plane = RigidPlane.above(surface, float(many.approach[0]), (0.0, 0.0))
+        means = patch_means(surface, PATCHES)
+        pressed = model.press(plane, patches=PATCHES, mean_heights=means).response
+        assert pressed.warnings == many.warnings
 
 
 def test_half_space_has_an_answer_to_each(surface):

@@ -29,6 +29,7 @@ def table():
             touch=rising[0, 0] if rows else np.inf,
             reach=random.random(),
             interpolation_error=1 / 3,
+            warned_from=1 / 7,
         )
 
     patches = PatchGrid(grid=(2, 3), lengths=(0.1, 1 / 3))
@@ -44,11 +45,8 @@ def test_round_trip_is_exact(table, tmp_path):
     for law, copy in zip(table.laws, back.laws, strict=True):
         for name in COLUMNS:
             assert getattr(law, name).tobytes() == getattr(copy, name).tobytes()
-        assert (law.touch, law.reach, law.interpolation_error) == (
-            copy.touch,
-            copy.reach,
-            copy.interpolation_error,
-        )
+        for name in ("touch", "reach", "interpolation_error", "warned_from"):
+            assert getattr(law, name) == getattr(copy, name)
 
 
 def test_every_column_says_its_unit(table, tmp_path):
