@@ -11,7 +11,7 @@
 #                extrapolated (Richardson) with the rate observed over all results; its own
 #                error is what the finest grid changes in it; rows marked * are part of it
 #
-# Run time: ten minutes. `--quick` for two seeds on coarser grids, `--out DIR` for the figure's
+# Run time: four minutes. `--quick` for two seeds on coarser grids, `--out DIR` for the figure's
 # folder.
 
 # %%
