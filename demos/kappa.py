@@ -60,7 +60,8 @@ for name, values in found.items():
 # %%
 figure = Figure(figsize=(8.0, 4.4), layout="constrained")
 axes = figure.subplots()
-axes.axhspan(2.0, 2.34, color="0.85", label="the paper above 5 %, without interaction")
+paper = {"color": "0.85", "label": "the paper above 5 %, without interaction"}
+axes.fill_between([5.0, 10.0], 2.0, 2.34, **paper)
 for number, (name, values) in enumerate(found.items()):
     low, high = np.nanpercentile(values, (5, 95), axis=0)
     mean = np.nanmean(values, axis=0)
