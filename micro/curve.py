@@ -96,7 +96,8 @@ class PatchSums:
 
     def _warning(self, name: str, row: dict[str, Any]) -> str:
         fraction = row["contact_area"] / (self.patches.area * self.patches.count)
-        if fraction <= LARGEST_AREA_FRACTION:
+        alone = row["contacts"] + row["engulfed"] < 2  # in a small patch, say: Hertz's contact
+        if fraction <= LARGEST_AREA_FRACTION or alone:
             return ""
         return (
             f"at an approach of {row['approach']:.4g} mm the contacts cover {fraction:.1%} of the"

@@ -166,6 +166,17 @@ def test_half_space_has_an_answer_to_each(surface):
             respond(model, surface, approaches)
 
 
+def test_one_contact_alone_stands_for_itself():
+    x = (np.arange(41) + 0.5) / 41
+    dome = -((x[:, None] - 0.5) ** 2 + (x - 0.5) ** 2) / 2.0
+    surface = Surface(heights=dome, lengths=(1.0, 1.0))
+    asperities = find_asperities(surface, periodic=False)
+    model = asperity_model("circular", asperities, contact_modulus=1.0)
+    response = respond(model, surface, [5e-2])
+    assert response.contact_area_fraction[0] == pytest.approx(0.05 * np.pi)  # π R δ, R = 1 mm
+    assert response.warnings == ()
+
+
 def test_plateaus_are_flat_punches_on_the_half_space():
     heights = np.zeros((40, 40))
     heights[5:9, 5:9] = heights[30:33, 20:26] = 1e-2  # two ties of many cells
