@@ -6,7 +6,8 @@ BlockShape → block_mesh → Block (with a Material) → Interface (with a Patc
 
 from macro.block import Block
 from macro.compliance import plain_compliance
-from macro.correction import Correction, HalfSpaceField, Sag, make_correction
+from macro.condense import HalfSpaceField, make_correction
+from macro.correction import Correction, Sag
 from macro.elasticity import Material
 from macro.interface import ContactLaw, Interface
 from macro.kept import cached_correction

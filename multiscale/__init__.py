@@ -5,24 +5,35 @@ patch its law, the laws go onto the flat interface of an elastic block, and load
 `History`.
 """
 
+from multiscale.concurrent import ConcurrentCoupling
+from multiscale.condensed import CondensedCoupling
+from multiscale.consistent import consistent_laws
 from multiscale.history import History, LoadStep, PatchState
 from multiscale.law_files import LawTable, read_laws, write_laws
 from multiscale.laws import PatchLaw
+from multiscale.loading import Programme, load_steps
+from multiscale.patch_laws import PatchLaws
 from multiscale.run import Run, run
 from multiscale.scene import Scene
 from multiscale.stage import Stage, make_stage
 from multiscale.tabulate import isolated_laws
 
 __all__ = [
+    "ConcurrentCoupling",
+    "CondensedCoupling",
     "History",
     "LawTable",
     "LoadStep",
     "PatchLaw",
+    "PatchLaws",
     "PatchState",
+    "Programme",
     "Run",
     "Scene",
     "Stage",
+    "consistent_laws",
     "isolated_laws",
+    "load_steps",
     "make_stage",
     "read_laws",
     "run",

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from geometry.errors import InputError
-from geometry.patches import PatchGrid
-from multiscale.blocks import embedding, patch_compliance, smooth_correction
+from multiscale.blocks import embedding, fine_loads, smooth_correction, yielding
 from multiscale.concurrent import ConcurrentCoupling
 from multiscale.condensed import CondensedCoupling
 from multiscale.consistent import consistent_laws
@@ -20,8 +19,6 @@ from multiscale.tabulate import isolated_laws
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import Interface
-
-_LOADS = 8  # rectangles along a side, at least, that a smooth field is told the contacts' forces by
 
 
 def make_table(stage: Stage, comm: Any) -> LawTable:
@@ -52,6 +49,8 @@ def make_table(stage: Stage, comm: Any) -> LawTable:
             mean_heights=stage.mean_heights,
             approach_end=stage.approach_end,
             tolerance=stage.table_tolerance,
+            most_rows=stage.table_rows,
+            tilt=stage.furthest[1],
             comm=comm,
         )
     return isolated_laws(
@@ -61,6 +60,7 @@ def make_table(stage: Stage, comm: Any) -> LawTable:
         closure_ends=stage.closure_ends,
         love=stage.scene.coupling.love,
         tolerance=stage.table_tolerance,
+        most_rows=stage.table_rows,
         comm=comm,
     )
 
@@ -88,7 +88,7 @@ def assemble(stage: Stage, table: LawTable | None, comm: Any) -> tuple[Coupling,
 
 def _with_laws(stage: Stage, table: LawTable, comm: Any) -> tuple[Coupling, Interface | None]:
     if newton_choice(stage).condensed:
-        return CondensedCoupling(table, patch_compliance(stage, comm)), None
+        return CondensedCoupling(table, yielding(stage, comm)), None
     from macro import PressedBlock
 
     interface = embedding(stage, comm)
@@ -99,8 +99,5 @@ def _with_laws(stage: Stage, table: LawTable, comm: Any) -> tuple[Coupling, Inte
 
 
 def _concurrent(stage: Stage, comm: Any) -> Coupling:
-    """Gather forces on rectangles that divide the patches, several along each side."""
-    nx, ny = (count * -(-_LOADS // count) for count in stage.patches.grid)
-    loads = PatchGrid(grid=(nx, ny), lengths=stage.patches.lengths)
-    correction = smooth_correction(stage, loads, comm)
+    correction = smooth_correction(stage, fine_loads(stage), comm)
     return ConcurrentCoupling(stage.model, stage.patches, stage.mean_heights, correction)

@@ -5,23 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from multiscale.history import LoadStep
 from multiscale.law_files import LawTable
-
-Array = NDArray[np.float64]
-
-
-def warned_from(pressure: Array, warned: Array) -> float:
-    """Return the pressure of the first row with a warning [MPa]; infinite without any.
-
-    Args:
-        pressure: Pressures of the rows of a law, increasing, shape (n,) [MPa].
-        warned: Which rows the micro model warned of, shape (n,).
-    """
-    rows = np.flatnonzero(warned)
-    return float(pressure[rows[0]]) if rows.size else np.inf
 
 
 def range_notes(steps: Sequence[LoadStep], table: LawTable | None) -> Iterator[str]:
