@@ -187,7 +187,8 @@ class AsperityModel:
             tilt: Slopes (tx, ty) of the approach.
 
         Returns:
-            The response, in the order of ``approaches``.
+            The response, in the order of ``approaches``, with a warning for each of them that
+            lies outside the range of validity.
 
         Raises:
             InputError: When the approaches are not a finite, non-empty list, a summit lies outside

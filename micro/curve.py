@@ -21,6 +21,9 @@ from micro.response import Response
 
 Array = NDArray[np.float64]
 
+LARGEST_AREA_FRACTION = 0.1
+"""Contact area fraction up to which separate summits are meant (errors may be large before)."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PatchSums:
@@ -87,8 +90,20 @@ class PatchSums:
         }
 
     def response(self, name: str, rows: Sequence[dict[str, Any]]) -> Response:
-        """Put rows together, in their order."""
-        return Response.of(rows, name, self.contact_modulus, self.patches)
+        """Put rows together, in their order, with warnings outside the range of validity."""
+        told = [row | {"warning": self._warning(name, row)} for row in rows]
+        return Response.of(told, name, self.contact_modulus, self.patches)
+
+    def _warning(self, name: str, row: dict[str, Any]) -> str:
+        fraction = row["contact_area"] / (self.patches.area * self.patches.count)
+        alone = row["contacts"] + row["engulfed"] < 2  # in a small patch, say: Hertz's contact
+        if fraction <= LARGEST_AREA_FRACTION or alone:
+            return ""
+        return (
+            f"at an approach of {row['approach']:.4g} mm the contacts cover {fraction:.1%} of the"
+            f" surface: the model {name} of separate summits stands for up to"
+            f" {LARGEST_AREA_FRACTION:.0%}"
+        )
 
     def _summed(self, patch: NDArray[np.intp], values: Array | None) -> NDArray[Any]:
         return np.bincount(patch, values, minlength=self.patches.count)

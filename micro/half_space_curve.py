@@ -66,6 +66,7 @@ class CellSums:
             "patch_contacts": np.bincount(owner, minlength=self.patches.count),
             "patch_displacement": displacement,
             "patch_separation": separation,
+            "warning": "",
         }
 
     def _moment(self, plane: RigidPlane, state: HalfSpaceState) -> tuple[float, float]:

@@ -64,6 +64,7 @@ class IslandSums:
             "patch_contacts": np.bincount(self._homes(settled), minlength=self.patches.count),
             "patch_displacement": displacement,
             "patch_separation": separation,
+            "warning": state.warning,
         }
 
     def _homes(self, settled: Settled) -> NDArray[np.intp]:

@@ -171,13 +171,11 @@ class IslandModel:
             mean_heights=means,
             contact_modulus=self.contact_modulus,
         )
-        rows, warnings = [], []
+        rows = []
         for plane in planes:
             settled = self._settled(sums.relief, plane)
-            state = self._state(plane, settled)
-            rows.append(sums.row(plane, settled, state))
-            warnings += [state.warning] if state.warning else []
-        return Response.of(rows, self.name, self.contact_modulus, patches, warnings)
+            rows.append(sums.row(plane, settled, self._state(plane, settled)))
+        return Response.of(rows, self.name, self.contact_modulus, patches)
 
     def _settled(self, relief: Relief, plane: RigidPlane) -> Settled:
         return settle(relief, self.datum - plane.approach)

@@ -57,7 +57,8 @@ class Response:
         patch_contacts: Number of contacts with their summit in the patch, shape (n, N).
         patch_displacement: Mean normal displacement of the patch by all contacts, (n, N) [mm].
         patch_separation: Average gap of the patch, shape (n, N) [mm].
-        warnings: A sentence for each approach that lies outside the model's range of validity.
+        warning: Why the approach lies outside the model's range of validity, shape (n,); empty
+            within it.
 
     Raises:
         InputError: When the arrays do not fit each other.
@@ -80,7 +81,7 @@ class Response:
     patch_contacts: Counts
     patch_displacement: Array
     patch_separation: Array
-    warnings: tuple[str, ...] = ()
+    warning: NDArray[np.str_]
 
     def __post_init__(self) -> None:
         count = len(self.approach)
@@ -108,7 +109,6 @@ class Response:
         model: str,
         contact_modulus: float,
         patches: PatchGrid,
-        warnings: Sequence[str] = (),
     ) -> Self:
         """Put together the fields at single approaches, in their order.
 
@@ -117,7 +117,6 @@ class Response:
             model: Name of the micro model.
             contact_modulus: E* [MPa].
             patches: The patches.
-            warnings: Sentences about approaches outside the model's range of validity.
 
         Raises:
             InputError: When there is no row.
@@ -129,9 +128,13 @@ class Response:
             model=model,
             contact_modulus=contact_modulus,
             nominal_area=patches.area * patches.count,
-            warnings=tuple(warnings),
             **columns,
         )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """A sentence for each approach that lies outside the model's range of validity."""
+        return tuple(str(sentence) for sentence in self.warning if sentence)
 
     @property
     def mean_pressure(self) -> Array:

@@ -162,7 +162,8 @@ class ScaledModel:
             tilt: Slopes (tx, ty) of the approach.
 
         Returns:
-            The response, in the order of ``approaches``.
+            The response, in the order of ``approaches``, with a warning for each of them that
+            lies outside the range of validity.
 
         Raises:
             InputError: When the approaches are not a finite, non-empty list, an asperity lies
@@ -182,8 +183,9 @@ class ScaledModel:
             own = fitted.solution.indentation
             sums = fitted.model.sums(patches, means, home=scaled.summits)
             rows[int(index)] = sums.row(planes[index], fitted.solution)
-        ordered = [rows[index] for index in range(len(planes))]
-        return Response.of(ordered, self.name, self.contact_modulus, patches)
+        if not rows:
+            return Response.of([], self.name, self.contact_modulus, patches)
+        return sums.response(self.name, [rows[index] for index in range(len(planes))])
 
     def press(
         self,
@@ -198,8 +200,8 @@ class ScaledModel:
         own = start if start is not None and len(start) == len(scaled.summits) else None
         fitted = self._fitted(scaled, plane, own)
         means = checked_means(mean_heights, patches)
-        row = fitted.model.sums(patches, means, home=scaled.summits).row(plane, fitted.solution)
-        response = Response.of([row], self.name, self.contact_modulus, patches)
+        sums = fitted.model.sums(patches, means, home=scaled.summits)
+        response = sums.response(self.name, [sums.row(plane, fitted.solution)])
         return Pressed(response, fitted.solution.indentation)
 
     def _fitted(self, scaled: ScaledAsperities, plane: RigidPlane, own: Array | None) -> _Fitted:

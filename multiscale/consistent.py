@@ -61,9 +61,10 @@ class WholeSurface:
         return below + _first_loaded(lambda way: self._force(below + way), 2.0 * reach)
 
     def rows(self, approaches: Array) -> Array:
-        """Return rows of all patches at increasing approaches of the first, shape (m, N, 6).
+        """Return rows of all patches at increasing approaches of the first, shape (m, N, 7).
 
-        The columns are local approach, closure, pressure, area fraction, contacts, relief.
+        The columns are local approach, closure, pressure, area fraction, contacts, relief, and
+        whether the model warns.
         """
         middle = approaches - self.lean[0]
         response = self.model.respond(
@@ -81,11 +82,12 @@ class WholeSurface:
             np.where(touched, response.patch_contact_area / self.patches.area, 0.0),
             np.where(touched, response.patch_contacts, 0),
             response.patch_displacement - displacement,
+            np.broadcast_to((response.warning != "")[:, None], pressure.shape),
         )
         return np.stack(columns, axis=2).astype(np.float64)
 
     def laws(self, rows: Array) -> list[PatchLaw]:
-        """Return the laws of all patches through rows (m, N, 6), sorted by approach."""
+        """Return the laws of all patches through rows (m, N, 7), sorted by approach."""
         reaches = self.model.datum - self.mean_heights
         return [_law(rows[:, index], float(reach)) for index, reach in enumerate(reaches)]
 
@@ -182,7 +184,7 @@ def _first_loaded(force: Callable[[float], float], way: float) -> float:
 
 
 def _law(rows: Array, reach: float) -> PatchLaw:
-    """Return the law of one patch out of all rows (m, 6), those before its touch included."""
+    """Return the law of one patch out of all rows (m, 7), those before its touch included."""
     loaded = np.flatnonzero(rows[:, 2] > 0.0)
     if not loaded.size:
         return law_of(rows[:0], float(rows[:, 1].max()), reach)
@@ -204,5 +206,5 @@ def _touch(rows: Array) -> Array:
         back = root / (later - root) * (rows[2, 0] - after[0])
         share = np.clip(1.0 - back / (after[0] - before[0]), 0.0, 0.99)
     start = before + share * (after - before)
-    start[2:5] = 0.0
+    start[2:5], start[6] = 0.0, before[6]
     return np.asarray(start)

@@ -158,6 +158,7 @@ def response_step(
         residuals=(float(response.residual[0]),),
         tilt=(float(plane[1]), float(plane[2])),
         moment_N_mm=(float(response.moment[0, 0]), float(response.moment[0, 1])),
+        warnings=response.warnings,
     )
 
 

@@ -70,6 +70,8 @@ class LoadStep:
         tilt: Slopes (tx, ty) of the approach about the middle of the interface [mm/mm].
         moment_N_mm: First moments (Σ P (x − xc), Σ P (y − yc)) of the forces about the middle
             [N mm].
+        warnings: Why the micro model, where it was solved itself, is outside its range of
+            validity; empty within it.
     """
 
     step: int
@@ -88,6 +90,7 @@ class LoadStep:
     residuals: tuple[float, ...] = ()
     tilt: tuple[float, float] = (0.0, 0.0)
     moment_N_mm: tuple[float, float] = (0.0, 0.0)
+    warnings: tuple[str, ...] = ()
 
     @property
     def tilt_x(self) -> float:

@@ -22,8 +22,15 @@ _COLUMNS = {
     "contacts": "1",
     "relief": "mm",
 }
-_SCALARS = {"touch": "mm", "reach": "mm", "interpolation_error": "1", "stiffness_error": "1"}
-_UNKNOWN = float("nan")  # errors that older files lack
+_SCALARS = {
+    "touch": "mm",
+    "reach": "mm",
+    "interpolation_error": "1",
+    "stiffness_error": "1",
+    "warned_from": "MPa",
+}
+_UNKNOWN = float("nan")
+_OLDER = {"stiffness_error": _UNKNOWN, "warned_from": float("inf")}  # files that lack these
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,9 +116,8 @@ def read_laws(path: Path) -> LawTable:
 
 def _law(group: Any) -> PatchLaw:
     content: dict[str, Any] = {name: np.asarray(group[name][()]) for name in _COLUMNS}
-    for name in _SCALARS:
-        later = name == "stiffness_error"
-        content[name] = float(group.attrs.get(name, _UNKNOWN) if later else group.attrs[name])
+    scalars = _OLDER | dict(group.attrs)
+    content.update({name: float(scalars[name]) for name in _SCALARS})
     return PatchLaw(**content)
 
 

@@ -67,6 +67,8 @@ class PatchLaw:
         interpolation_error: Estimated error of the interpolated pressure against the micro model,
             see `refinement.Errors`.
         stiffness_error: The same of the stiffness; NaN where nobody estimated it.
+        warned_from: Mean pressure from which on the micro model warned that the contacts lie
+            outside its range of validity [MPa]; infinite when it never did.
     """
 
     closure: Array
@@ -79,6 +81,7 @@ class PatchLaw:
     reach: float
     interpolation_error: float = 0.0
     stiffness_error: float = float("nan")
+    warned_from: float = np.inf
 
     def __post_init__(self) -> None:
         names = ("closure", "pressure", "approach", "contact_area_fraction", "contacts", "relief")

@@ -66,7 +66,7 @@ class Errors:
         compliance: Array,
         least: float,
     ) -> Errors:
-        """Return what the laws before lacked at new rows (m, N, 6) that the laws after have."""
+        """Return what the laws before lacked at new rows (m, N, 7) that the laws after have."""
         old, laws = PatchLaws(before), PatchLaws(after)
         found = []
         for row in new:
@@ -119,7 +119,8 @@ def refined(
 
     Args:
         solve: Returns rows at approaches (m,) for N patches: approach, closure, pressure, area
-            fraction, contacts, relief; shape (m, N, 6).
+            fraction, contacts, relief, and 1 where the micro model warns that it is outside its
+            range of validity; shape (m, N, 7).
         make: Makes the N laws out of such rows, sorted by approach.
         start: Approach of the first row [mm].
         end: Approach of the last row [mm].
@@ -162,7 +163,8 @@ def refined(
 
 
 def law_of(rows: Array, touch: float, reach: float) -> PatchLaw:
-    """Return the law of rows, shape (n, 6), with the columns of `refined`."""
+    """Return the law of rows, shape (n, 7), with the columns of `refined`."""
+    warned = np.flatnonzero(rows[:, 6])
     return PatchLaw(
         approach=rows[:, 0],
         closure=rows[:, 1],
@@ -170,6 +172,7 @@ def law_of(rows: Array, touch: float, reach: float) -> PatchLaw:
         contact_area_fraction=rows[:, 3],
         contacts=rows[:, 4].astype(np.int64),
         relief=rows[:, 5],
+        warned_from=float(rows[warned[0], 2]) if warned.size else np.inf,
         touch=touch,
         reach=reach,
     )

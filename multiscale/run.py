@@ -19,9 +19,7 @@ from multiscale.law_files import LawTable
 from multiscale.loading import Coupling, load_steps
 from multiscale.scene import Scene
 from multiscale.stage import Stage, make_stage
-
-LARGEST_SUMMIT_AREA = 0.1
-"""Contact area fraction up to which asperity models are meant (they are 10 % off well before)."""
+from multiscale.validity import range_notes
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import Interface
@@ -90,12 +88,7 @@ class Run:
         imbalances = [abs(step.imbalance) for step in self.steps if step.imbalance is not None]
         if imbalances:
             notes.append(f"force against the support's reaction: equal to {max(imbalances):.1e}")
-        area = max((step.contact_area_fraction for step in self.steps), default=0.0)
-        if self.stage.by_summits and area > LARGEST_SUMMIT_AREA:
-            notes.append(
-                f"contact area fraction {area:.2g}: contacts of separate summits do not stand for "
-                "this surface any more; micro.model = 'half-space' does"
-            )
+        notes += range_notes(self.steps, self.table)
         return History(
             steps=tuple(self.steps),
             patches=self.stage.patches,

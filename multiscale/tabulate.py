@@ -58,7 +58,7 @@ class IsolatedPatch:
         return float(self.model.datum - self.mean_height)
 
     def rows(self, approaches: Array) -> Array:
-        """Return rows: approach, closure, pressure, area fraction, contacts, relief; (n, 6)."""
+        """Return rows, shape (n, 7), with the columns of `refinement.refined`."""
         response = self.model.respond(
             approaches, patches=self.patch, mean_heights=np.array([self.mean_height])
         )
@@ -68,7 +68,8 @@ class IsolatedPatch:
         # the block's closure is a mean over the patch, whichever displacement made the law's
         mean = love_mean(*self.patch.half_sizes) / (np.pi * self.model.contact_modulus)
         relief = response.patch_displacement[:, 0] - mean * pressure
-        return np.column_stack((approaches, closure, pressure, area, response.contacts, relief))
+        columns = (approaches, closure, pressure, area, response.contacts, relief)
+        return np.column_stack((*columns, response.warning != ""))
 
     def law(self, closure_end: float, tolerance: float, most_rows: int = MOST_ROWS) -> PatchLaw:
         """Tabulate the law from first touch to a closure.
@@ -85,11 +86,11 @@ class IsolatedPatch:
             The law; open when first touch lies beyond `closure_end`.
         """
         if self.touch >= closure_end:
-            return law_of(np.empty((0, 6)), self.touch, self.reach)
+            return law_of(np.empty((0, 7)), self.touch, self.reach)
 
         def rows(approaches: Array) -> Array:
             made = self.rows(approaches)
-            made[approaches <= self.touch, 1:] = self.touch, 0.0, 0.0, 0.0, 0.0  # not round-off's
+            made[approaches <= self.touch, 1:6] = self.touch, 0.0, 0.0, 0.0, 0.0  # not round-off's
             return made[:, None]
 
         def laws(made: Array) -> list[PatchLaw]:

@@ -14,7 +14,15 @@ from geometry import (
     patch_means,
     synthesise,
 )
-from micro import MODELS, SOLVERS, IslandModel, ScaledModel, asperity_model
+from micro import (
+    MODELS,
+    SOLVERS,
+    HalfSpaceModel,
+    IslandModel,
+    RigidPlane,
+    ScaledModel,
+    asperity_model,
+)
 
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
 
@@ -113,3 +121,84 @@ def test_summit_outside_the_patches(surface):
     for model in models(surface):
         with pytest.raises(InputError, match="lie outside the patches"):
             model.respond([np.ptp(surface.heights)], patches=small, mean_heights=[0.0])
+
+
+def test_one_summit_outside_the_patches():
+    x = (np.arange(48) + 0.5) / 48
+    bumps = [
+        height * np.exp(-((x[:, None] - 0.4) ** 2 + (x - y) ** 2) / 0.01)
+        for height, y in ((0.02, 0.3), (0.015, 0.8))
+    ]
+    surface = Surface(heights=sum(bumps), lengths=(1.0, 1.0))
+    part = PatchGrid(grid=(1, 1), lengths=(1.0, 0.6))
+    for model in (*models(surface), HalfSpaceModel(surface=surface, contact_modulus=1.0)):
+        with pytest.raises(InputError, match=r"points lie outside the patches.*y ≤ 0\.6 mm"):
+            model.respond([8e-3], patches=part, mean_heights=[0.0])
+        if isinstance(model, IslandModel | HalfSpaceModel):  # these see what the plane reaches
+            reached = model.respond([3e-3], patches=part, mean_heights=[0.0])
+            assert reached.contacts[0] == 1
+
+
+def test_models_of_summits_say_where_they_end(surface):
+    for model in models(surface):
+        few, many = (respond(model, surface, [a]) for a in (1e-4, 3.0 * np.ptp(surface.heights)))
+        assert few.contact_area_fraction[0] < 0.01 and few.warnings == ()
+        assert many.contact_area_fraction[0] > 0.1 and len(many.warnings) == 1
+        assert "stands for up to" in many.warnings[0]
+        plane = RigidPlane.above(surface, float(many.approach[0]), (0.0, 0.0))
+        means = patch_means(surface, PATCHES)
+        pressed = model.press(plane, patches=PATCHES, mean_heights=means).response
+        assert pressed.warnings == many.warnings
+
+
+def test_half_space_has_an_answer_to_each(surface):
+    flat = Surface(heights=np.zeros((12, 12)), lengths=(1.0, 1.0))
+    model = HalfSpaceModel(surface=flat, contact_modulus=1.0)
+    response = respond(model, flat, [-1e-3, 0.0, 1e-3])
+    assert response.force[:2].tolist() == [0.0, 0.0] and response.force[2] > 0.0
+    assert response.contact_area_fraction[2] == pytest.approx(1.0)  # every cell, no border inside
+    model = HalfSpaceModel(surface=surface, contact_modulus=1.0)
+    assert not respond(model, surface, [0.0, -1.0]).force.any()
+    beyond = respond(model, surface, np.ptp(surface.heights) * np.array([1.0, 3.0, 30.0]))
+    assert np.all(np.isfinite(beyond.force)) and np.all(np.diff(beyond.force) > 0.0)
+    for approaches in ([1e-3, np.nan], [np.inf]):
+        with pytest.raises(InputError, match="finite"):
+            respond(model, surface, approaches)
+
+
+def test_one_contact_alone_stands_for_itself():
+    x = (np.arange(41) + 0.5) / 41
+    dome = -((x[:, None] - 0.5) ** 2 + (x - 0.5) ** 2) / 2.0
+    surface = Surface(heights=dome, lengths=(1.0, 1.0))
+    asperities = find_asperities(surface, periodic=False)
+    model = asperity_model("circular", asperities, contact_modulus=1.0)
+    response = respond(model, surface, [5e-2])
+    assert response.contact_area_fraction[0] == pytest.approx(0.05 * np.pi)  # π R δ, R = 1 mm
+    assert response.warnings == ()
+
+
+def test_plateaus_are_flat_punches_on_the_half_space():
+    heights = np.zeros((40, 40))
+    heights[5:9, 5:9] = heights[30:33, 20:26] = 1e-2  # two ties of many cells
+    surface = Surface(heights=heights, lengths=(1.0, 1.0))
+    model = HalfSpaceModel(surface=surface, contact_modulus=1.0)
+    response = respond(model, surface, model.first_touch + np.array([0.0, 1e-6, 1e-3]))
+    assert response.force[0] == 0.0 and response.contacts.tolist() == [0, 2, 2]
+    assert response.patch_contacts[1].tolist() == [1, 0, 0, 1]
+    # nothing but the plateaus touches: force ∝ indentation, whatever the shape (residual 1e-8)
+    assert response.force[2] == pytest.approx(1e3 * response.force[1], rel=1e-7)
+    state = model.solve(model.first_touch + 1e-3)
+    assert np.array_equal(state.in_contact, heights > 0.0)
+
+
+def test_force_beyond_full_contact_of_a_periodic_surface(surface):
+    model = HalfSpaceModel(surface=surface, contact_modulus=1.0, periodic=True)
+    some, more = (model.solve_force(force) for force in (1.0, 10.0))
+    flat = surface.highest - surface.heights.mean()  # where no gap is left
+    for state in (some, more):
+        assert state.in_contact.all() and state.contact_area == pytest.approx(1.0)
+        assert state.approach == pytest.approx(flat, rel=1e-12)  # counts from the mean
+    # once all is flat a force adds the same pressure everywhere (round-off of 10 MPa)
+    np.testing.assert_allclose(more.pressure - some.pressure, 9.0, rtol=1e-11)
+    with pytest.raises(InputError, match=r"no gap left at this approach.*beyond it give the force"):
+        respond(model, surface, [1.01 * flat])

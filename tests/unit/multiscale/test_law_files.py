@@ -30,6 +30,7 @@ def table():
             reach=random.random(),
             interpolation_error=1 / 3,
             stiffness_error=1 / 7,
+            warned_from=1 / 11,
         )
 
     patches = PatchGrid(grid=(2, 3), lengths=(0.1, 1 / 3))
@@ -46,7 +47,7 @@ def test_round_trip_is_exact(table, tmp_path):
     for law, copy in zip(table.laws, back.laws, strict=True):
         for name in COLUMNS:
             assert getattr(law, name).tobytes() == getattr(copy, name).tobytes()
-        for name in ("touch", "reach", "interpolation_error", "stiffness_error"):
+        for name in ("touch", "reach", "interpolation_error", "stiffness_error", "warned_from"):
             assert getattr(law, name) == getattr(copy, name)
 
 
@@ -56,9 +57,11 @@ def test_files_from_before_some_errors_were_told(table, tmp_path):
     with h5py.File(path, "a") as file:
         del file.attrs["force_error"]
         for index in range(6):
-            del file[f"patch_{index // 3}_{index % 3}"].attrs["stiffness_error"]
+            group = file[f"patch_{index // 3}_{index % 3}"]
+            del group.attrs["stiffness_error"], group.attrs["warned_from"]
     back = read_laws(path)
     assert np.isnan([back.force_error, *(law.stiffness_error for law in back.laws)]).all()
+    assert all(law.warned_from == np.inf for law in back.laws)
 
 
 def test_every_column_says_its_unit(table, tmp_path):

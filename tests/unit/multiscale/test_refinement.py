@@ -24,7 +24,7 @@ class Solver:
         assert np.all(np.diff(approach) > 0.0)
         self.asked.extend(approach)
         pressure = pressures(approach)
-        rows = np.zeros((len(approach), 2, 6))
+        rows = np.zeros((len(approach), 2, 7))
         rows[:, :, 0] = approach[:, None]
         rows[:, :, 1] = approach[:, None] - pressure @ COMPLIANCE
         rows[:, :, 2] = pressure
@@ -105,7 +105,7 @@ def test_budget_is_kept_and_the_error_told(most):
 
 def test_nothing_to_refine_without_contact():
     def open_rows(approach):
-        rows = np.zeros((len(approach), 2, 6))
+        rows = np.zeros((len(approach), 2, 7))
         rows[:, :, :2] = approach[:, None, None]
         return rows
 
