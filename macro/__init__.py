@@ -5,6 +5,7 @@ BlockShape → block_mesh → Block (with a Material) → Interface (with a Patc
 """
 
 from macro.block import Block
+from macro.compliance import plain_compliance
 from macro.elasticity import Material
 from macro.interface import ContactLaw, Interface
 from macro.mesh import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
@@ -23,5 +24,6 @@ __all__ = [
     "PressState",
     "PressedBlock",
     "block_mesh",
+    "plain_compliance",
     "write_fields",
 ]

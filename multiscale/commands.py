@@ -32,7 +32,7 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
     run = Run(scene, comm)
     terminal.show_plan(comm, run.stage)
     failure = None
-    with terminal.progress(comm, len(scene.approaches)) as advance:
+    with terminal.progress(comm, scene.loading.programme) as advance:
         try:
             for step in run.load_steps():
                 advance(step)

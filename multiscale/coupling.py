@@ -1,165 +1,142 @@
-"""Load histories: each coupling is a generator of load steps."""
+"""Couplings that solve every load step in full: the micro model alone, laws on finite elements."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import InputError, NotConverged
+from geometry.control import Control
+from geometry.errors import InputError
 from geometry.patches import PatchGrid
-from micro import MicroModel
+from micro import MicroModel, Response, RigidPlane
+from multiscale.balance import Balance
 from multiscale.history import LoadStep, PatchState
 from multiscale.law_files import LawTable
+from multiscale.loading import BeyondLaws, described
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import PressedBlock, PressState
 
 Array = NDArray[np.float64]
-_MOST_HALVINGS = 8
+
+_BALANCE = 1e-10  # of a plane on the mesh, whose residual is driven to as much of the load
 
 
-class Coupling(Protocol):
-    """Anything that turns approaches into load steps."""
-
-    def load_steps(self, approaches: Sequence[float]) -> Iterator[LoadStep]:
-        """Yield one accepted load step per approach, in order.
-
-        Args:
-            approaches: Approaches of the plane at the middle of the interface [mm].
-
-        Raises:
-            NotConverged: When a step fails for good; the steps yielded before stay valid.
-        """
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class AnalyticCoupling:
     """The micro model alone: the whole surface on one elastic half-space.
 
-    Attributes:
+    Args:
         model: Micro model of the whole surface.
         patches: Partition that the results are summed over; it does not change the solution.
         mean_heights: Mean height of each patch, shape (N,) [mm].
-        tilt: Slopes of the plane's approach along x and y.
     """
 
-    model: MicroModel
-    patches: PatchGrid
-    mean_heights: Array
-    tilt: tuple[float, float] = (0.0, 0.0)
+    def __init__(self, model: MicroModel, patches: PatchGrid, mean_heights: Array) -> None:
+        self._model, self._patches, self._mean_heights = model, patches, mean_heights
+        self._start: Any = None
+        self._iterations = 0
+        half = 0.5 * float(np.hypot(*patches.lengths))
+        self._balance = Balance(half=half, first_touch=model.first_touch)
 
-    def load_steps(self, approaches: Sequence[float]) -> Iterator[LoadStep]:
-        """Yield one load step per approach; see `Coupling.load_steps`."""
-        lean = tilted_approaches(self.patches, 0.0, self.tilt)
-        for number, approach in enumerate(approaches, start=1):
-            start = time.perf_counter()
-            response = self.model.respond(
-                np.array([approach]),
-                patches=self.patches,
-                mean_heights=self.mean_heights,
-                tilt=self.tilt,
-            )
-            state = PatchState(
-                closure_mm=approach + lean - response.patch_displacement[0],
-                pressure_MPa=response.patch_force[0] / self.patches.area,
-                contact_area_fraction=response.patch_contact_area[0] / self.patches.area,
-            )
-            yield LoadStep(
-                step=number,
-                approach_mm=float(approach),
-                force_N=float(response.force[0]),
-                mean_pressure_MPa=float(response.mean_pressure[0]),
-                contact_area_fraction=float(response.contact_area_fraction[0]),
-                mean_separation_mm=float(response.mean_separation[0]),
-                contacts=int(response.contacts[0]),
-                newton_iterations=int(response.iterations[0]),
-                linear_iterations=0,
-                wall_s=time.perf_counter() - start,
-                reason="CONVERGED",
-                patches=state,
-                residuals=(float(response.residual[0]),),
-            )
+    def press(self, control: Control) -> LoadStep:
+        """Solve one load step; see `Coupling.press`."""
+        self._iterations = 0
+        plane, response = self._balance.solve(self._loads, control)
+        lean = tilted_approaches(self._patches, float(plane[0]), (plane[1], plane[2]))
+        return response_step(
+            response,
+            self._patches,
+            plane=plane,
+            closure=lean - response.patch_displacement[0],
+            iterations=self._iterations,
+        )
+
+    def _loads(self, plane: Array) -> tuple[Array, Response]:
+        """Return force and moments of a plane, and the response."""
+        middle = np.add(self._patches.origin, np.multiply(0.5, self._patches.lengths))
+        rigid = RigidPlane(
+            approach=float(plane[0]),
+            tilt=(float(plane[1]), float(plane[2])),
+            centre=(float(middle[0]), float(middle[1])),
+        )
+        response, self._start = self._model.press(
+            rigid, patches=self._patches, mean_heights=self._mean_heights, start=self._start
+        )
+        self._iterations += int(response.iterations[0])
+        return np.array([response.force[0], *response.moment[0]]), response
 
 
-@dataclass(slots=True, kw_only=True)
 class EmbeddedCoupling:
     """Patch laws on the flat interface of an elastic block (Waddad et al. 2016, section 3.2).
 
-    Attributes:
+    Args:
         pressed: The block with the laws on its interface.
         table: The laws, which also give contact area, contacts and separation.
-        tilt: Slopes of the plane's approach along x and y.
-        last: The block's latest equilibrium; histories of displacement fields are not kept.
     """
 
-    pressed: PressedBlock
-    table: LawTable
-    tilt: tuple[float, float] = (0.0, 0.0)
-    last: PressState | None = None
+    def __init__(self, pressed: PressedBlock, table: LawTable) -> None:
+        self._pressed, self._table = pressed, table
+        self._last: PressState | None = None
+        self._newton = self._linear = 0
+        half = 0.5 * float(np.hypot(*table.patches.lengths))
+        touch = float(min(law.touch for law in table.laws))
+        self._balance = Balance(half=half, first_touch=touch, tolerance=_BALANCE)
 
-    def load_steps(self, approaches: Sequence[float]) -> Iterator[LoadStep]:
-        """Yield one load step per approach; a step that fails is halved.
+    @property
+    def displacement(self) -> Array:
+        """This rank's displacements at the latest load step; earlier ones are not kept [mm].
 
         Raises:
-            NotConverged: When a step fails at the smallest increment too, or a patch is closed
-                beyond the end of its law.
+            ValueError: Before the first load step.
         """
-        last = 0.0
-        for number, approach in enumerate(approaches, start=1):
-            start = time.perf_counter()
-            press, newton, linear = self._advance(number, last, float(approach))
-            step = self._load_step(number, press, newton, linear)
-            self.last = press
-            yield replace(step, wall_s=time.perf_counter() - start)
-            last = float(approach)
+        if self._last is None:
+            raise ValueError("no load step has been accepted yet")
+        return self._last.displacement
 
-    def _advance(self, number: int, last: float, target: float) -> tuple[PressState, int, int]:
-        """Press to an approach, through smaller steps where the whole one fails."""
-        newton = linear = 0
-        smallest = abs(target - last) / 2**_MOST_HALVINGS
-        ahead = [target]
-        while True:
-            try:
-                press = self.pressed.press(ahead[-1], tilt=self.tilt)
-            except NotConverged as error:
-                newton += error.iterations
-                if abs(ahead[-1] - last) <= smallest:
-                    raise _failed_step(number, ahead[-1], error) from error
-                ahead.append(0.5 * (last + ahead[-1]))
-                continue
-            newton += press.newton_iterations
-            linear += press.linear_iterations
-            last = ahead.pop()
-            if not ahead:
-                return press, newton, linear
+    def press(self, control: Control) -> LoadStep:
+        """Solve one load step; see `Coupling.press`."""
+        self._newton = self._linear = 0
+        plane, state = self._balance.solve(self._loads, control)
+        step = self._step(control, plane, state)
+        self._last = state
+        return step
 
-    def _load_step(self, number: int, press: PressState, newton: int, linear: int) -> LoadStep:
+    def _loads(self, plane: Array) -> tuple[Array, PressState]:
+        """Return force and moments of a plane, and the block's equilibrium."""
+        state = self._pressed.press(float(plane[0]), (float(plane[1]), float(plane[2])))
+        self._newton += state.newton_iterations
+        self._linear += state.linear_iterations
+        return np.array([state.force, *self._moment(state.pressure)]), state
+
+    def _moment(self, pressure: Array) -> Array:
+        """Return the first moments of the patches' forces about the middle, shape (2,) [N mm]."""
+        patches = self._table.patches
+        middle = np.add(patches.origin, np.multiply(0.5, patches.lengths))
+        return patches.area * (patches.centres - middle).T @ pressure
+
+    def _step(self, control: Control, plane: Array, press: PressState) -> LoadStep:
         """Read area, contacts and separation off the laws at the converged closures."""
-        laws = self.table.laws
+        laws = self._table.laws
         try:
-            area = self.pressed.patch_means([law.area_fraction_at for law in laws])
-            gaps = self.pressed.patch_means([law.separation_at for law in laws])
+            area = self._pressed.patch_means([law.area_fraction_at for law in laws])
+            gaps = self._pressed.patch_means([law.separation_at for law in laws])
         except InputError as error:
-            raise _beyond_law(number, press.approach, error) from error
+            raise beyond_law(control, str(error)) from error
         mean_closures = zip(laws, press.closure, strict=True)
         contacts = sum(int(law.contacts_at(c, extend=True)) for law, c in mean_closures)
-        nominal = self.table.patches.area * self.table.patches.count
-        return LoadStep(
-            step=number,
-            approach_mm=press.approach,
-            force_N=press.force,
-            mean_pressure_MPa=press.force / nominal,
-            contact_area_fraction=float(np.mean(area)),
+        return embedded_step(
+            self._table.patches,
+            approach=plane[0],
+            tilt=plane[1:],
+            moment=self._moment(press.pressure),
+            force=press.force,
             mean_separation_mm=float(np.mean(gaps)),
             contacts=contacts,
-            newton_iterations=newton,
-            linear_iterations=linear,
-            wall_s=press.wall_s,
+            newton_iterations=self._newton,
+            linear_iterations=self._linear,
             reason=press.reason,
             patches=PatchState(
                 closure_mm=press.closure, pressure_MPa=press.pressure, contact_area_fraction=area
@@ -167,6 +144,76 @@ class EmbeddedCoupling:
             imbalance=(press.force - press.reaction) / press.force if press.force else 0.0,
             residuals=tuple(map(float, press.residuals)),
         )
+
+
+def response_step(
+    response: Response, patches: PatchGrid, *, plane: Array, closure: Array, iterations: int
+) -> LoadStep:
+    """Return the load step that a micro model's response to one plane is.
+
+    Args:
+        response: The response, of one row.
+        patches: The partition it is summed over.
+        plane: Approach at the middle [mm] and slopes of the plane, shape (3,).
+        closure: Mean closures of the patches, shape (N,) [mm].
+        iterations: Iterations of the micro model, of all solutions that led to this one.
+    """
+    return LoadStep(
+        step=0,
+        approach_mm=float(plane[0]),
+        force_N=float(response.force[0]),
+        mean_pressure_MPa=float(response.mean_pressure[0]),
+        contact_area_fraction=float(response.contact_area_fraction[0]),
+        mean_separation_mm=float(response.mean_separation[0]),
+        contacts=int(response.contacts[0]),
+        newton_iterations=iterations,
+        linear_iterations=0,
+        wall_s=0.0,
+        reason="CONVERGED",
+        patches=PatchState(
+            closure_mm=closure,
+            pressure_MPa=response.patch_force[0] / patches.area,
+            contact_area_fraction=response.patch_contact_area[0] / patches.area,
+        ),
+        residuals=(float(response.residual[0]),),
+        tilt=(float(plane[1]), float(plane[2])),
+        moment_N_mm=(float(response.moment[0, 0]), float(response.moment[0, 1])),
+    )
+
+
+def embedded_step(
+    grid: PatchGrid,
+    *,
+    approach: float,
+    tilt: Sequence[float] | Array,
+    moment: Sequence[float] | Array,
+    force: float,
+    patches: PatchState,
+    **rest: Any,
+) -> LoadStep:
+    """Return the load step of laws on patches; the rest are fields of a `LoadStep`.
+
+    Args:
+        grid: The partition.
+        approach: Approach at the middle of the interface [mm].
+        tilt: Slopes of the approach.
+        moment: First moments of the forces about the middle [N mm].
+        force: Force on the plane [N].
+        patches: The state of every patch.
+        **rest: The other fields.
+    """
+    return LoadStep(
+        step=0,
+        approach_mm=float(approach),
+        force_N=float(force),
+        mean_pressure_MPa=float(force) / (grid.area * grid.count),
+        contact_area_fraction=float(np.mean(patches.contact_area_fraction)),
+        wall_s=0.0,
+        patches=patches,
+        tilt=(float(tilt[0]), float(tilt[1])),
+        moment_N_mm=(float(moment[0]), float(moment[1])),
+        **rest,
+    )
 
 
 def tilted_approaches(patches: PatchGrid, approach: float, tilt: tuple[float, float]) -> Array:
@@ -181,22 +228,20 @@ def tilted_approaches(patches: PatchGrid, approach: float, tilt: tuple[float, fl
     return approach + (patches.centres - centre) @ np.asarray(tilt)
 
 
-def _failed_step(number: int, approach: float, error: NotConverged) -> NotConverged:
-    return NotConverged(
-        f"load step {number} (approach {approach:.6g} mm)",
-        reason=error.reason,
-        iterations=error.iterations,
-        remedy=f"it was halved {_MOST_HALVINGS} times; raise load.steps or lower load.approach",
-    )
+def beyond_law(control: Control, problem: str) -> BeyondLaws:
+    """Return the error of a patch that left its law's range.
 
-
-def _beyond_law(number: int, approach: float, error: InputError) -> NotConverged:
-    return NotConverged(
-        f"load step {number} (approach {approach:.6g} mm)",
-        reason=f"LAW_RANGE: {error}",
+    Args:
+        control: The load step.
+        problem: Which patch, and how far its law goes.
+    """
+    return BeyondLaws(
+        f"the patches at {described(control)}",
+        reason=f"LAW_RANGE: {problem}",
         iterations=0,
         remedy=(
             "near full contact a patch taken alone has no pressure as a function of closure: "
-            "use larger patches (patches.grid) or a smaller load.approach"
+            "take coupling.kind = 'consistent' or 'concurrent', larger patches (patches.grid) or "
+            "a smaller load"
         ),
     )

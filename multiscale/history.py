@@ -24,6 +24,10 @@ COLUMNS = (
     "linear_iterations",
     "wall_s",
     "reason",
+    "tilt_x",
+    "tilt_y",
+    "moment_x_N_mm",
+    "moment_y_N_mm",
 )
 PATCH_COLUMNS = ("step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area_fraction")
 
@@ -45,7 +49,7 @@ class PatchState:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoadStep:
-    """One accepted load step; the fields up to `reason` are the columns of ``history.csv``.
+    """One accepted load step; the fields up to `reason` are columns of ``history.csv``.
 
     Attributes:
         step: Number of the step, from 1.
@@ -60,9 +64,12 @@ class LoadStep:
         wall_s: Wall time of the step [s].
         reason: Name of the reason for which the iteration stopped.
         patches: The state of every patch.
-        imbalance: Force on the plane minus reaction of the support, relative to the force; zero
+        imbalance: Force on the plane minus reaction of the support, relative to the force; None
             where no support takes part.
         residuals: Norms of the residual over the Newton steps, relative to the interface load.
+        tilt: Slopes (tx, ty) of the approach about the middle of the interface [mm/mm].
+        moment_N_mm: First moments (Σ P (x − xc), Σ P (y − yc)) of the forces about the middle
+            [N mm].
     """
 
     step: int
@@ -77,8 +84,30 @@ class LoadStep:
     wall_s: float
     reason: str
     patches: PatchState
-    imbalance: float = 0.0
+    imbalance: float | None = None
     residuals: tuple[float, ...] = ()
+    tilt: tuple[float, float] = (0.0, 0.0)
+    moment_N_mm: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def tilt_x(self) -> float:
+        """Slope of the approach along x."""
+        return self.tilt[0]
+
+    @property
+    def tilt_y(self) -> float:
+        """Slope of the approach along y."""
+        return self.tilt[1]
+
+    @property
+    def moment_x_N_mm(self) -> float:
+        """First moment of the forces along x [N mm]."""
+        return self.moment_N_mm[0]
+
+    @property
+    def moment_y_N_mm(self) -> float:
+        """First moment of the forces along y [N mm]."""
+        return self.moment_N_mm[1]
 
 
 @dataclass(frozen=True, kw_only=True)

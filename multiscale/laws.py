@@ -1,34 +1,64 @@
-"""Patch laws: mean pressure of a patch tabulated against its closure."""
+"""Patch laws: closure and mean pressure of a patch, tabulated over its local rigid approach."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PchipInterpolator
 
 from geometry.errors import InputError
+from multiscale.law_curves import Curves
 
 Array = NDArray[np.float64]
+
+_FLATTEST = 1e-9  # slope of a closure that is as good as at the end of its rise
+_MOST_STEPS = 80  # of an inversion; bisection alone takes 53
+
+
+class LawPoint(NamedTuple):
+    """Laws at local approaches.
+
+    Attributes:
+        closure: Closures [mm].
+        pressure: Mean pressures [MPa].
+        dclosure: Derivative of the closure over the local approach.
+        dpressure: Derivative of the pressure over the local approach [MPa/mm].
+    """
+
+    closure: Array
+    pressure: Array
+    dclosure: Array
+    dpressure: Array
+
+    @classmethod
+    def of(cls, values: Array, slopes: Array) -> LawPoint:
+        """Return the point of closure and p^(2/3), the first two of some curves."""
+        root = np.maximum(values[1], 0.0)
+        half = np.sqrt(root)
+        return cls(values[0], half * root, slopes[0], 1.5 * half * slopes[1])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PatchLaw:
-    """Mean pressure, contact area and contacts of one patch over its closure.
+    """Mean pressure, contact area and contacts of one patch.
 
     The closure c is the rigid approach at the patch minus the macroscopic displacement of its
-    surface: the gap g_n of Waddad et al. 2016, section 3.2. Before the first touch everything is
-    zero. Between table points the interpolant is monotone: p^(2/3) is interpolated (PCHIP), for
-    Hertz' law p ~ (c - c_touch)^(3/2) is a straight line in it, so that pressure and stiffness
-    are right from the first touch on.
+    surface: the gap g_n of Waddad et al. 2016, section 3.2. The rows are over the local rigid
+    approach s that they were computed at, and so are the interpolants: where a patch alone comes
+    near full contact, its pressure is no function of its closure any more, yet closure and
+    pressure are of s. Before the first touch pressure is zero and closure grows as s. Between rows
+    the interpolants are monotone where the rows are: p^(2/3) is interpolated (PCHIP), for Hertz'
+    law p ~ (s - s_touch)^(3/2) is a straight line in it, so that pressure and stiffness are right
+    from the first touch on. Beyond the rows the tangents go on.
 
     Attributes:
-        closure: Closures, increasing from the first touch on, shape (n,) [mm]; empty for a patch
-            that stays open: such a law is zero as far as it goes.
+        closure: Closures from the first touch on, shape (n,) [mm]; empty for a patch that stays
+            open: such a law is zero as far as it goes.
         pressure: Mean pressures, increasing from zero, shape (n,) [MPa].
-        approach: Local rigid approaches that the rows were computed at, shape (n,) [mm].
+        approach: Local rigid approaches s, increasing, shape (n,) [mm].
         contact_area_fraction: Real over nominal contact area, shape (n,).
         contacts: Number of asperities in contact, shape (n,).
         relief: Mean displacement of the patch by its contacts beyond that by their mean pressure,
@@ -60,10 +90,12 @@ class PatchLaw:
             raise InputError("a patch law needs columns of one length")
         if self.closure.size == 1:
             raise InputError("a patch law needs no row (open patch) or at least two")
-        for name in ("closure", "pressure"):
+        for name in ("approach", "pressure"):
             column = getattr(self, name)
             if not np.all(np.isfinite(column)) or np.any(np.diff(column) <= 0):
                 raise InputError(f"a patch law needs a finite, strictly increasing {name}")
+        if not np.all(np.isfinite(self.closure)) or np.any(np.diff(self.closure[:2]) <= 0.0):
+            raise InputError("a patch law needs a finite closure that increases from first touch")
         if self.closure.size and self.pressure[0] != 0.0:
             raise InputError("a patch law starts at zero pressure", value=self.pressure[0])
 
@@ -73,43 +105,49 @@ class PatchLaw:
         return self.closure.size == 0
 
     @property
+    def is_function(self) -> bool:
+        """Whether the pressure is a function of closure in the whole range of the law."""
+        return self._rising == len(self.closure)
+
+    @property
     def range(self) -> tuple[float, float]:
-        """Closures at first touch and at the end of the law's validity [mm]."""
-        return self.touch, self.touch if self.is_open else float(self.closure[-1])
+        """Closures at first touch and at the end of the pressure's being a function of it [mm]."""
+        return self.touch, self.touch if self.is_open else float(self.closure[self._rising - 1])
 
     @cached_property
-    def _root(self) -> PchipInterpolator:
-        """Interpolant of p^(2/3) over closure, the end's tangent continued beyond the table."""
-        return _with_tangent(PchipInterpolator(self.closure, self.pressure ** (2 / 3)))
+    def curves(self) -> Curves:
+        """Closure, p^(2/3), area fraction and relief over the local approach."""
+        columns = (
+            self.closure, self.pressure ** (2 / 3), self.contact_area_fraction, self.relief,
+        )  # fmt: skip
+        return Curves.through(self.approach, columns, before=(1.0, 0.0, 0.0, 0.0))
 
-    @cached_property
-    def _area(self) -> PchipInterpolator:
-        return _with_tangent(PchipInterpolator(self.closure, self.contact_area_fraction))
+    def along(self, approach: ArrayLike) -> LawPoint:
+        """Return closure, pressure and their derivatives at local approaches.
 
-    @cached_property
-    def _lift(self) -> PchipInterpolator:
-        return _with_tangent(PchipInterpolator(self.closure, self.relief))
+        Args:
+            approach: Local rigid approaches of any shape [mm].
+        """
+        given = np.asarray(approach, dtype=float)
+        values, slopes = self.curves.of_one(given.ravel())
+        shape = (len(values), *given.shape)
+        return LawPoint.of(values.reshape(shape), slopes.reshape(shape))
 
     def at(self, closure: ArrayLike, *, extend: bool = False) -> tuple[Array, Array]:
         """Return pressure and stiffness, the exact derivative of the same interpolant.
 
         Args:
             closure: Closures of any shape [mm].
-            extend: Continue p^(2/3) along its tangent beyond the table instead of raising.
+            extend: Continue along the tangent beyond the table instead of raising.
 
         Returns:
             Pressure [MPa] and its derivative over closure [MPa/mm], in the shape of `closure`.
 
         Raises:
-            InputError: When a closure lies beyond the table and `extend` is false.
+            InputError: When a closure lies beyond the law's range and `extend` is false.
         """
-        closures = self._checked(closure, extend)
-        if self.is_open:
-            return np.zeros_like(closures), np.zeros_like(closures)
-        inside = np.maximum(closures, self.closure[0])
-        root = np.maximum(self._root(inside), 0.0)
-        slope = np.where(closures > self.closure[0], self._root(inside, 1), 0.0)
-        return root**1.5, 1.5 * np.sqrt(root) * slope
+        point = self.along(self._local(closure, extend))
+        return point.pressure, point.dpressure / np.maximum(point.dclosure, _FLATTEST)
 
     def area_fraction_at(self, closure: ArrayLike, *, extend: bool = False) -> Array:
         """Return the real contact area over the nominal one.
@@ -121,10 +159,7 @@ class PatchLaw:
         Raises:
             InputError: When a closure lies beyond the table and `extend` is false.
         """
-        closures = self._checked(closure, extend)
-        if self.is_open:
-            return np.zeros_like(closures)
-        return np.asarray(np.clip(self._area(np.maximum(closures, self.closure[0])), 0.0, 1.0))
+        return np.asarray(np.clip(self._read(2, closure, extend), 0.0, 1.0))
 
     def contacts_at(self, closure: ArrayLike, *, extend: bool = False) -> NDArray[np.int64]:
         """Return the number of contacts of the table row at or before each closure.
@@ -137,7 +172,7 @@ class PatchLaw:
             InputError: When a closure lies beyond the table and `extend` is false.
         """
         closures = self._checked(closure, extend)
-        row = np.searchsorted(self.closure, closures, side="right") - 1
+        row = np.searchsorted(self.closure[: self._rising], closures, side="right") - 1
         return np.where(row >= 0, np.append(self.contacts, 0)[row], 0)
 
     def separation_at(self, closure: ArrayLike, *, extend: bool = False) -> Array:
@@ -150,11 +185,55 @@ class PatchLaw:
         Raises:
             InputError: When a closure lies beyond the table and `extend` is false.
         """
+        closures = np.asarray(closure, dtype=float)
+        return np.asarray(self.reach - closures + self._read(3, closure, extend))
+
+    @cached_property
+    def _rising(self) -> int:
+        """Number of rows before closure stops to rise."""
+        stops = np.flatnonzero(np.diff(self.closure) <= 0.0)
+        return int(stops[0]) + 1 if stops.size else len(self.closure)
+
+    def _read(self, function: int, closure: ArrayLike, extend: bool) -> Array:
+        local = self._local(closure, extend)
+        values, _ = self.curves.of_one(local.ravel())
+        return values[function].reshape(local.shape)
+
+    def _local(self, closure: ArrayLike, extend: bool) -> Array:
+        """Return the local approaches of closures."""
         closures = self._checked(closure, extend)
         if self.is_open:
-            return self.reach - closures
-        inside = np.maximum(closures, self.closure[0])
-        return np.asarray(self.reach - closures + self._lift(inside))
+            return closures
+        first, last = self.closure[0], self.closure[self._rising - 1]
+        end = self.approach[self._rising - 1]
+        slope = max(float(self.along(end).dclosure), _FLATTEST)
+        local = np.where(
+            closures <= first,
+            self.approach[0] - (first - closures),
+            end + (closures - last) / slope,
+        )
+        between = (closures > first) & (closures < last)
+        local[between] = self._inverted(closures[between])
+        return local
+
+    def _inverted(self, closures: Array) -> Array:
+        """Invert the rising part of the closure's interpolant by bracketed Newton steps."""
+        rows, ends = self.approach[: self._rising], self.closure[: self._rising]
+        piece = np.searchsorted(ends, closures, side="right") - 1
+        low, high = rows[piece], rows[piece + 1]
+        share = (closures - ends[piece]) / (ends[piece + 1] - ends[piece])
+        local = low + share * (high - low)
+        for _ in range(_MOST_STEPS):
+            point = self.along(local)
+            error = point.closure - closures
+            low, high = np.where(error < 0.0, local, low), np.where(error > 0.0, local, high)
+            newton = local - error / np.maximum(point.dclosure, _FLATTEST)
+            inside = (newton >= low) & (newton <= high)
+            step = np.where(inside, newton, 0.5 * (low + high))
+            if np.all(np.abs(step - local) <= 4e-16 * np.abs(step)):
+                break
+            local = step
+        return step if closures.size else closures
 
     def _checked(self, closure: ArrayLike, extend: bool) -> Array:
         closures = np.asarray(closure, dtype=float)
@@ -185,11 +264,3 @@ class ExtendedLaw:
     def stiffness(self, closure: ArrayLike) -> Array:
         """Return dp/dc [MPa/mm] at closures of any shape [mm]."""
         return self.law.at(closure, extend=True)[1]
-
-
-def _with_tangent(interpolant: PchipInterpolator) -> PchipInterpolator:
-    """Append the end's tangent as a last, unbounded piece."""
-    end = interpolant.x[-1]
-    piece = np.array([[0.0], [0.0], [interpolant(end, 1)], [interpolant(end)]])
-    interpolant.extend(piece, np.array([end + 1.0]))
-    return interpolant

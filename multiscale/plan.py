@@ -6,36 +6,35 @@ from collections.abc import Iterator
 
 from geometry.meshes import alignment
 from geometry.statistics import roughness
+from multiscale.newton_choice import newton_choice
 from multiscale.stage import Stage
 
 
 def statements(stage: Stage) -> Iterator[tuple[str, str]]:
     """Yield pairs of topic and sentence that say what will be done and why."""
-    scene = stage.scene
     yield "surface", _surface(stage)
     yield "contact", _contact(stage)
     yield "micro model", _model(stage)
     yield "coupling", _coupling(stage)
     if stage.embedded:
         yield "block", _block(stage)
-    yield (
-        "load",
-        f"{scene.loading.steps} steps to an approach of {1e3 * scene.loading.approach:g} µm"
-        + (f", tilt {scene.loading.tilt}" if any(scene.loading.tilt) else ""),
-    )
+    if stage.by_laws:
+        yield "newton", _newton(stage)
+    yield "load", _load(stage)
 
 
 def warnings(stage: Stage) -> Iterator[str]:
     """Yield what a user should know about the validity of the scene."""
     yield from _surface_warnings(stage)
-    if stage.embedded:
+    if stage.by_laws:
         yield from _patch_warnings(stage)
+    if stage.embedded and not stage.scene.coupling.decomposed:
         yield from _block_warnings(stage)
 
 
 def _surface_warnings(stage: Stage) -> Iterator[str]:
     excess = stage.surface.highest - stage.surface.heights.max()
-    if excess > 0.1 * stage.scene.loading.approach:
+    if excess > 0.1 * stage.furthest[0]:
         x, y = stage.surface.highest_point
         yield (
             f"the approach counts from the interpolant's highest point, {1e3 * excess:.3g} µm "
@@ -53,14 +52,16 @@ def _surface_warnings(stage: Stage) -> Iterator[str]:
 
 
 def _patch_warnings(stage: Stage) -> Iterator[str]:
+    isolated = stage.scene.coupling.kind == "isolated"
     grids = zip(stage.surface.grid, stage.patches.grid, strict=True)
-    if stage.model.name == "islands" and any(cells % patches for cells, patches in grids):
+    cut = any(cells % patches for cells, patches in grids)
+    if isolated and stage.model.name == "islands" and cut:
         yield (
             "patch borders cut cells of the surface: every patch is taken alone along whole cells; "
             "a grid that is a multiple of the patches would fit"
         )
     widths = [length + 2.0 * stage.shape.margin for length in stage.surface.lengths]
-    if max(stage.patches.size) > 0.5 * min(stage.shape.height, *widths):
+    if isolated and max(stage.patches.size) > 0.5 * min(stage.shape.height, *widths):
         yield (
             "the patches are not small against the block: the half-space correction (Love) inside "
             "their laws is an approximation there"
@@ -108,11 +109,27 @@ def _coupling(stage: Stage) -> str:
     coupling, patches = stage.scene.coupling, stage.patches
     if not stage.embedded:
         return "analytic: the micro model alone on a half-space, no finite elements"
+    grid = f"{patches.grid[0]} × {patches.grid[1]} patches"
+    if not stage.by_laws:
+        return (
+            "concurrent: the whole surface on the block at every load step, no laws; "
+            f"{grid} gather the results"
+        )
     reached = stage.reached_patches
+    made = {
+        "isolated": f"every patch alone, Love's {coupling.love} displacement",
+        "consistent": "all from one solution of the whole surface",
+    }
     return (
-        f"{coupling.kind}: {patches.grid[0]} × {patches.grid[1]} patches, {reached} get a law, "
-        f"{patches.count - reached} stay open; Love's {coupling.love} displacement, "
-        f"{coupling.interface} closure"
+        f"{coupling.kind}: {grid}, {reached} get a law, {patches.count - reached} stay open; "
+        f"{made[coupling.kind]}; {coupling.interface} closure"
+    )
+
+
+def _newton(stage: Stage) -> str:
+    choice = newton_choice(stage)
+    return (
+        f"{'condensed to the patches' if choice.condensed else 'full, on the mesh'}: {choice.why}"
     )
 
 
@@ -123,8 +140,33 @@ def _block(stage: Stage) -> str:
         f"{shape.margin:g} mm beyond it in {shape.margin_cells} cells, " if shape.margin else ""
     )
     kind = "hexahedra" if shape.element.startswith("Q") else "hexahedra split into tetrahedra"
+    way = (
+        "half-space exactly, finite elements for the smooth rest (decomposed): "
+        if stage.scene.coupling.decomposed
+        else "finite elements under the patches: "
+    )
     return (
-        f"{nx} × {ny} × {nz} {kind} ({shape.element}) under the interface, grading "
+        f"{way}{nx} × {ny} × {nz} {kind} ({shape.element}) under the interface, grading "
         f"{shape.grading:g}, {margin}{block.sides} sides, contact modulus "
         f"{stage.model.contact_modulus:.6g} MPa"
     )
+
+
+def _load(stage: Stage) -> str:
+    programme = stage.scene.loading.programme
+    scale, unit = (1.0, "N") if programme.quantity == "force" else (1e3, "µm")
+    way = ", ".join(f"{scale * point:g} {unit}" for point in programme.points)
+    text = f"{len(programme.targets)} steps to {_article(programme.quantity)} of {way}"
+    if programme.force_change is not None:
+        text += f", halved where the force changes by more than {programme.force_change:.3g}"
+    if programme.tilt is None:
+        text += ", the plane free to tilt"
+    elif any(programme.tilt):
+        text += f", tilt {programme.tilt}"
+    if programme.quantity == "force":
+        text += f"; on a half-space its approach is {1e3 * stage.furthest[0]:.4g} µm"
+    return text
+
+
+def _article(quantity: str) -> str:
+    return f"an {quantity}" if quantity == "approach" else f"a {quantity}"

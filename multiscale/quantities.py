@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from functools import cache, partial
-from typing import Annotated, Any
+from itertools import pairwise
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, WithJsonSchema
 
@@ -13,6 +14,7 @@ _EXAMPLES = {
     "MPa": '"4 GPa"',
     "mm**4": '"1e-9 mm^4"',
     "": '"5 um/mm"',
+    "N": '"5 N"',
 }
 
 
@@ -60,19 +62,72 @@ def _with_unit(text: str, unit: str) -> float:
         raise ValueError(f"has the wrong unit {allowed}") from error
 
 
+def parse_turning_points(value: Any, unit: str) -> tuple[float, ...]:
+    """Turn one quantity, or a list of them, into the turning points of a load.
+
+    Args:
+        value: A quantity, or a list of quantities.
+        unit: Target unit in pint's notation.
+
+    Returns:
+        The magnitudes in ``unit``.
+
+    Raises:
+        ValueError: When a value is no quantity of that dimension, the list is empty, a value is
+            negative, the first is zero or one repeats the one before.
+    """
+    listed = isinstance(value, list | tuple)
+    points = tuple(parse_quantity(one, unit) for one in (value if listed else [value]))
+    allowed = f"(allowed: a quantity such as {_EXAMPLES[unit]}, or a list of turning points)"
+    if not points:
+        raise ValueError(f"is an empty list {allowed}")
+    if not points[0] > 0.0:
+        raise ValueError("must be greater than 0")
+    if min(points) < 0.0:
+        raise ValueError("must not turn below 0")
+    if any(one == other for one, other in pairwise(points)):
+        raise ValueError(f"repeats a turning point {allowed}")
+    return points
+
+
+def parse_tilt(value: Any) -> tuple[float, float] | Literal["free"]:
+    """Turn a pair of slopes into numbers, and let ``"free"`` pass.
+
+    Args:
+        value: Two slopes, or ``"free"``.
+
+    Raises:
+        ValueError: When it is neither.
+    """
+    if value == "free":
+        return "free"
+    if not isinstance(value, list | tuple) or len(value) != 2:
+        raise ValueError(
+            'is not a tilt (allowed: two slopes such as ["5 um/mm", "0 um/mm"], or "free")'
+        )
+    return parse_quantity(value[0], ""), parse_quantity(value[1], "")
+
+
 def _named(unit: str) -> str:
     return unit or "a ratio"
 
 
-def _schema(unit: str) -> WithJsonSchema:
+def _quantity_schema(unit: str) -> dict[str, Any]:
     """Describe a quantity for editors and for the JSON Schema of a scene."""
-    return WithJsonSchema(
-        {
-            "anyOf": [{"type": "number"}, {"type": "string"}],
-            "description": f"string with a unit, or a bare number in {_named(unit)}",
-            "examples": [_EXAMPLES[unit].strip('"')],
-        }
-    )
+    return {
+        "anyOf": [{"type": "number"}, {"type": "string"}],
+        "description": f"string with a unit, or a bare number in {_named(unit)}",
+        "examples": [_EXAMPLES[unit].strip('"')],
+    }
+
+
+def _schema(unit: str) -> WithJsonSchema:
+    return WithJsonSchema(_quantity_schema(unit))
+
+
+def _points_schema(unit: str) -> WithJsonSchema:
+    one = _quantity_schema(unit)
+    return WithJsonSchema({"anyOf": [one, {"type": "array", "items": one, "minItems": 1}]})
 
 
 def _reader(unit: str) -> BeforeValidator:
@@ -83,3 +138,22 @@ Length = Annotated[float, _reader("mm"), _schema("mm")]
 Pressure = Annotated[float, _reader("MPa"), _schema("MPa")]
 SpectralAmplitude = Annotated[float, _reader("mm**4"), _schema("mm**4")]
 Slope = Annotated[float, _reader(""), _schema("")]
+TurningPoints = tuple[float, ...]
+Approaches = Annotated[
+    TurningPoints, BeforeValidator(partial(parse_turning_points, unit="mm")), _points_schema("mm")
+]
+Forces = Annotated[
+    TurningPoints, BeforeValidator(partial(parse_turning_points, unit="N")), _points_schema("N")
+]
+Tilt = Annotated[
+    tuple[float, float] | Literal["free"],
+    BeforeValidator(parse_tilt),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"const": "free"},
+                {"type": "array", "items": _quantity_schema(""), "minItems": 2, "maxItems": 2},
+            ]
+        }
+    ),
+]

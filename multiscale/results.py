@@ -108,15 +108,17 @@ def write_fields(folder: Path, run: Run) -> list[Path]:
         run: The run.
 
     Returns:
-        The files written; none when no finite elements took part.
+        The files written; none when no block took part. Where the mesh was not pressed itself,
+        the displacements are those of the scene's block under the patches' mean pressures.
 
     Note:
         Collective: every rank writes its part.
     """
-    state = getattr(run.coupling, "last", None)
-    if state is None or run.interface is None:
+    if not run.stage.embedded or not run.steps:
         return []
     from macro import write_fields as write_xdmf
+
+    interface, displacement = run.last_field()
 
     # The XDMF file names its HDF5 file, so both are written under their names in a folder aside.
     aside = folder / ".fields.partial"
@@ -126,7 +128,7 @@ def write_fields(folder: Path, run: Run) -> list[Path]:
         aside.mkdir(parents=True)
 
     on_root(run.comm, empty)
-    write_xdmf(aside / "fields.xdmf", run.interface, state)
+    write_xdmf(aside / "fields.xdmf", interface, displacement, run.steps[-1].patches.pressure_MPa)
 
     def move() -> list[Path]:
         files = [path.replace(folder / path.name) for path in sorted(aside.iterdir())]

@@ -7,20 +7,24 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from geometry.collective import on_root
-from multiscale.coupling import AnalyticCoupling, Coupling, EmbeddedCoupling
+from multiscale.assemble import assemble, make_table
+from multiscale.blocks import final_field
+from multiscale.coupling import EmbeddedCoupling
 from multiscale.history import History, LoadStep
 from multiscale.law_files import LawTable
-from multiscale.laws import ExtendedLaw
+from multiscale.loading import Coupling, load_steps
 from multiscale.scene import Scene
 from multiscale.stage import Stage, make_stage
-from multiscale.tabulate import isolated_laws
 
 LARGEST_SUMMIT_AREA = 0.1
 """Contact area fraction up to which asperity models are meant (they are 10 % off well before)."""
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import Interface, PressedBlock
+    from macro import Interface
 
 
 class Run:
@@ -36,8 +40,7 @@ class Run:
         stage: The scene's ingredients, made at once: surface, summits, patches, micro model.
         seconds: Wall time of each phase so far [s].
         table: The patch laws, once made.
-        unknowns: Degrees of freedom of the block, once made.
-        interface: The interface of the block, once made.
+        interface: The interface of the block that is pressed itself, once made.
         coupling: What makes the load steps, once made.
         steps: The load steps accepted so far.
     """
@@ -47,7 +50,6 @@ class Run:
         self.seconds: dict[str, float] = {}
         self.steps: list[LoadStep] = []
         self.table: LawTable | None = None
-        self.unknowns: int | None = None
         self.interface: Interface | None = None
         self.coupling: Coupling | None = None
         with self._phase("surface"):
@@ -57,16 +59,7 @@ class Run:
         """Tabulate the laws of all patches, once."""
         if self.table is None:
             with self._phase("laws"):
-                coupling = self.scene.coupling
-                self.table = isolated_laws(
-                    self.stage.model,
-                    self.stage.patches,
-                    mean_heights=self.stage.mean_heights,
-                    closure_ends=self.stage.closure_ends,
-                    love=coupling.love,
-                    tolerance=self.stage.table_tolerance,
-                    comm=self.comm,
-                )
+                self.table = make_table(self.stage, self.comm)
         return self.table
 
     def load_steps(self) -> Iterator[LoadStep]:
@@ -75,9 +68,11 @@ class Run:
         Raises:
             NotConverged: When a step fails for good; `history` holds those before it.
         """
-        self.coupling = self._coupling()
+        table = self.make_laws() if self.stage.by_laws else None
+        with self._phase("block"):
+            self.coupling, self.interface = assemble(self.stage, table, self.comm)
         with self._phase("load steps"):
-            for step in self.coupling.load_steps(self.scene.approaches):
+            for step in load_steps(self.coupling, self.scene.loading.programme):
                 self.steps.append(step)
                 yield step
 
@@ -89,8 +84,9 @@ class Run:
             notes.append(
                 f"interpolation error of the laws half-way between their rows: {error:.1e}"
             )
-            imbalance = max((abs(step.imbalance) for step in self.steps), default=0.0)
-            notes.append(f"force against the support's reaction: equal to {imbalance:.1e}")
+        imbalances = [abs(step.imbalance) for step in self.steps if step.imbalance is not None]
+        if imbalances:
+            notes.append(f"force against the support's reaction: equal to {max(imbalances):.1e}")
         area = max((step.contact_area_fraction for step in self.steps), default=0.0)
         if self.stage.by_summits and area > LARGEST_SUMMIT_AREA:
             notes.append(
@@ -104,33 +100,20 @@ class Run:
             notes=tuple(notes),
         )
 
-    def _coupling(self) -> Coupling:
-        stage, tilt = self.stage, self.scene.loading.tilt
-        if not stage.embedded:
-            return AnalyticCoupling(
-                model=stage.model, patches=stage.patches, mean_heights=stage.mean_heights, tilt=tilt
-            )
-        table = self.make_laws()
-        with self._phase("block"):
-            pressed = self._press_block(table)
-        return EmbeddedCoupling(pressed=pressed, table=table, tilt=tilt)
+    @property
+    def unknowns(self) -> int | None:
+        """Degrees of freedom of the block that is pressed, where one is."""
+        return None if self.interface is None else self.interface.block.dofs
 
-    def _press_block(self, table: LawTable) -> PressedBlock:
-        """Mesh and assemble the block and put the laws on its interface."""
-        from mpi4py import MPI
+    def last_field(self) -> tuple[Interface, NDArray[np.float64]]:
+        """Return the meshed block and its displacements at the last load step, this rank's part.
 
-        from macro import Block, Interface, Material, PressedBlock, block_mesh
-
-        section = self.scene.block
-        mesh = block_mesh(self.stage.shape, self.comm or MPI.COMM_SELF)
-        material = Material(
-            young_modulus=section.young_modulus, poisson_ratio=section.poisson_ratio
-        )
-        block = Block(mesh, material, sides=section.sides)
-        self.interface = interface = Interface(block, self.stage.patches)
-        self.unknowns = block.dofs
-        laws = [ExtendedLaw(law) for law in table.laws]
-        return PressedBlock(block, interface, laws, mode=self.scene.coupling.interface)
+        Where the mesh was not pressed itself, it is loaded by the patches' mean pressures.
+        """
+        if isinstance(self.coupling, EmbeddedCoupling) and self.interface is not None:
+            return self.interface, self.coupling.displacement
+        with self._phase("field"):
+            return final_field(self.stage, self.steps[-1].patches.pressure_MPa, self.comm)
 
     @contextmanager
     def _phase(self, name: str) -> Iterator[None]:

@@ -7,22 +7,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from geometry.errors import InputError
 from geometry.spectrum import Spectrum
 from multiscale.quantities import Length, Pressure, Slope, SpectralAmplitude
 from multiscale.refusals import first_refusal
+from multiscale.sections import CouplingSection, LoadSection, Number, Section
 
-
-def _number(value: Any) -> Any:
-    """Refuse what pydantic would turn into a number: truth values and text."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError("is not a number (allowed: a number without quotes)")
-    return value
-
-
-Number = Annotated[float, BeforeValidator(_number)]
 Flag = Annotated[bool, Field(strict=True)]
 PositiveLength = Annotated[Length, Field(gt=0)]
 Count = Annotated[int, Field(ge=1, strict=True)]
@@ -30,11 +22,7 @@ Pair = Annotated[tuple[Count, Count], Field(description="x, y")]
 Band = Annotated[tuple[Number, Number], Field(description="lower, upper number of waves per side")]
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class SpectrumSection(_Section):
+class SpectrumSection(Section):
     """A synthesised self-affine surface; see `geometry.Spectrum` for the meaning of each key."""
 
     hurst: Annotated[Number, Field(gt=0, le=1)]
@@ -56,7 +44,7 @@ class SpectrumSection(_Section):
         return Spectrum(**self.model_dump())
 
 
-class SurfaceSection(_Section):
+class SurfaceSection(Section):
     """Exactly one source of heights, and the rectangle it covers."""
 
     spectrum: SpectrumSection | None = None
@@ -74,18 +62,20 @@ class SurfaceSection(_Section):
         return self
 
 
-class BlockSection(_Section):
+class BlockSection(Section):
     """The elastic block below the interface, pressed by a rigid plane."""
 
     height: PositiveLength = 1.0
     young_modulus: Annotated[Pressure, Field(gt=0)]
     poisson_ratio: Annotated[Number, Field(gt=-1, lt=0.5)]
     sides: Literal["free", "roller"] = "free"
-    cells: Annotated[tuple[Count, Count, Count], Field(description="cells in x, y, z")] = (
-        40,
-        40,
-        25,
-    )
+    cells: (
+        Annotated[
+            tuple[Count, Count, Count],
+            Field(description="cells in x, y, z; by default as fine as the coupling needs"),
+        ]
+        | None
+    ) = None
     element: Literal["Q1", "Q2", "P1", "P2"] = "Q1"
     grading: Annotated[Number, Field(ge=1, description="bottom to top layer height")] = 1.0
     margin: Annotated[Length, Field(ge=0, description="block beyond the interface")] = 0.0
@@ -93,13 +83,13 @@ class BlockSection(_Section):
     margin_grading: Annotated[Number, Field(ge=1)] = 8.0
 
 
-class PatchesSection(_Section):
+class PatchesSection(Section):
     """The partition of the interface."""
 
     grid: Pair = (4, 4)
 
 
-class MicroSection(_Section):
+class MicroSection(Section):
     """The micro model that gives the laws."""
 
     model: Literal[
@@ -115,27 +105,7 @@ class MicroSection(_Section):
     border: Literal["ignore", "include"] = "ignore"
 
 
-class CouplingSection(_Section):
-    """How micro and macro model are put together."""
-
-    kind: Literal["isolated", "analytic"] = "isolated"
-    love: Literal["mean", "centre"] = "mean"
-    interface: Literal["patchwise", "pointwise"] = "patchwise"
-    table_tolerance: Annotated[Number, Field(gt=0, lt=0.1)] | None = None
-
-
-class LoadSection(_Section):
-    """The motion of the rigid plane."""
-
-    approach: PositiveLength
-    steps: Annotated[int, Field(ge=1, le=1_000_000, strict=True)] = 8
-    tilt: Annotated[tuple[Slope, Slope], Field(description="d approach/dx, d approach/dy")] = (
-        0.0,
-        0.0,
-    )
-
-
-class OutputSection(_Section):
+class OutputSection(Section):
     """What is written beside the tables; nothing else is computed."""
 
     figures: Flag = True
@@ -143,7 +113,7 @@ class OutputSection(_Section):
     fields: Flag = False
 
 
-class Scene(_Section):
+class Scene(Section):
     """A complete scene. Lengths in mm, pressures in MPa.
 
     The section ``[load]`` is the attribute `loading`, for `Scene.load` reads a file.
@@ -211,12 +181,6 @@ class Scene(_Section):
             return None
         folder = self._source.parent if self._source else Path()
         return folder / self.surface.file
-
-    @property
-    def approaches(self) -> list[float]:
-        """Approach of the plane at each load step [mm]."""
-        approach, steps = self.loading.approach, self.loading.steps
-        return [approach * step / steps for step in range(1, steps + 1)]
 
 
 def _read_toml(path: Path) -> dict[str, Any]:

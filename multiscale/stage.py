@@ -20,7 +20,8 @@ from geometry.patches import PatchGrid, patch_means
 from geometry.spectrum import synthesise
 from geometry.surface import Surface
 from micro import MODELS, MicroModel, contact_modulus, micro_model
-from multiscale.coupling import tilted_approaches
+from multiscale.coupling import AnalyticCoupling, tilted_approaches
+from multiscale.loading import Programme
 from multiscale.scene import Scene
 
 BYTES_PER_HEIGHT = 100
@@ -31,6 +32,12 @@ BYTES_PER_CELL = 5000
 
 CLOSURE_RESERVE = 0.15
 """Closure beyond the largest approach that laws are made for, relative to load.approach."""
+
+EMBEDDED_CELLS = (40, 40, 25)
+"""Cells of a block that carries the laws itself: those of Waddad et al. 2016."""
+
+DECOMPOSED_CELLS = (16, 16, 8)
+"""Cells of a block that only corrects the half-space."""
 
 _DETREND_ORDER = {"mean": 0, "plane": 1, "quadratic": 2}
 
@@ -47,6 +54,8 @@ class Stage:
         patches: Partition of the interface.
         mean_heights: Mean height of each patch, shape (N,) [mm].
         shape: The block's shape and mesh.
+        furthest: Largest approach at the middle of the interface [mm] and the plane's slopes
+            there; where force or moment are prescribed, those of the surface on a half-space.
     """
 
     scene: Scene
@@ -56,11 +65,17 @@ class Stage:
     patches: PatchGrid
     mean_heights: NDArray[np.float64]
     shape: BlockShape
+    furthest: tuple[float, tuple[float, float]]
 
     @property
     def embedded(self) -> bool:
-        """Whether finite elements take part."""
+        """Whether a block takes part."""
         return self.scene.coupling.kind != "analytic"
+
+    @property
+    def by_laws(self) -> bool:
+        """Whether the patches get laws."""
+        return self.scene.coupling.kind in ("isolated", "consistent")
 
     @property
     def by_summits(self) -> bool:
@@ -80,13 +95,28 @@ class Stage:
         """Largest closure that each patch's law is made for, shape (N,) [mm].
 
         It is the largest approach there, and a reserve: the surface of a bent block may rise
-        between its loads. Laws that hold at points see the approach at the patch's corners.
+        between its loads, and a free plane may turn further than on a half-space. Laws that hold
+        at points see the approach at the patch's corners.
         """
-        loading, size = self.scene.loading, self.patches.size
-        ends = tilted_approaches(self.patches, loading.approach, loading.tilt)
+        approach, tilt = self.furthest
+        ends = tilted_approaches(self.patches, approach, tilt)
         if self.scene.coupling.interface == "pointwise":
-            ends = ends + 0.5 * float(np.abs(np.multiply(size, loading.tilt)).sum())
-        return ends + CLOSURE_RESERVE * loading.approach
+            ends = ends + 0.5 * float(np.abs(np.multiply(self.patches.size, tilt)).sum())
+        if self.scene.loading.tilt == "free":
+            ends = ends + 0.5 * (ends.max() - approach)
+        return ends + CLOSURE_RESERVE * approach
+
+    @property
+    def approach_end(self) -> float:
+        """Largest local approach that laws of the whole surface are made for [mm].
+
+        Under a patch that is closed further than its neighbours, or on a block that is stiffer
+        than the half-space, the law's own surface moves away under more load than is there; the
+        laws go further by what all of its displacement is worth.
+        """
+        end = float(self.closure_ends.max())
+        response = self.model.respond([end], patches=self.patches, mean_heights=self.mean_heights)
+        return end + float(response.patch_displacement.mean())
 
     @property
     def reached(self) -> NDArray[np.bool_]:
@@ -116,9 +146,9 @@ class Stage:
         return int(np.unique(owner[self.closure_ends[owner] > self.surface.highest - z]).size)
 
     def _within(self, x: NDArray, y: NDArray, z: NDArray) -> NDArray[np.bool_]:
-        loading = self.scene.loading
+        approach, tilt = self.furthest
         from_centre = np.column_stack((x, y)) - 0.5 * np.asarray(self.surface.lengths)
-        approach = loading.approach + from_centre @ np.asarray(loading.tilt)
+        approach = approach + from_centre @ np.asarray(tilt)
         return np.asarray(approach > self.surface.highest - z)
 
 
@@ -143,22 +173,37 @@ def make_stage(scene: Scene) -> Stage:
             allowed="half-space, islands",
             file=scene.file,
         )
+    shape = _located(scene, "block", lambda: _block_shape(scene, surface))
+    model = micro_model(
+        scene.micro.model,
+        surface,
+        contact_modulus=contact_modulus(block.young_modulus, block.poisson_ratio),
+        solver=scene.micro.solver,
+        curvature=scene.micro.curvature,
+        border=scene.micro.border,
+    )
+    mean_heights = patch_means(surface, patches)
     return Stage(
         scene=scene,
         surface=surface,
         asperities=asperities,
-        model=micro_model(
-            scene.micro.model,
-            surface,
-            contact_modulus=contact_modulus(block.young_modulus, block.poisson_ratio),
-            solver=scene.micro.solver,
-            curvature=scene.micro.curvature,
-            border=scene.micro.border,
-        ),
+        model=model,
         patches=patches,
-        mean_heights=patch_means(surface, patches),
-        shape=_located(scene, "block", lambda: _block_shape(scene, surface)),
+        mean_heights=mean_heights,
+        shape=shape,
+        furthest=_furthest(scene.loading.programme, model, patches, mean_heights),
     )
+
+
+def _furthest(
+    programme: Programme, model: MicroModel, patches: PatchGrid, mean_heights: NDArray[np.float64]
+) -> tuple[float, tuple[float, float]]:
+    """Return the largest approach and the slopes there, from the half-space where not given."""
+    if programme.quantity == "approach" and programme.tilt is not None:
+        return programme.largest, programme.tilt
+    alone = AnalyticCoupling(model, patches, mean_heights)
+    step = alone.press(programme.control(programme.largest))
+    return step.approach_mm, step.tilt
 
 
 def make_surface(scene: Scene) -> Surface:
@@ -180,12 +225,21 @@ def make_surface(scene: Scene) -> Surface:
     return surface.detrended(_DETREND_ORDER[section.detrend])
 
 
+def block_cells(scene: Scene) -> tuple[int, int, int]:
+    """Return the cells of the block: those asked for, or as many as its part needs.
+
+    Laws on the plain mesh need it fine under every patch; the smooth correction of the half-space
+    does not.
+    """
+    return scene.block.cells or (DECOMPOSED_CELLS if scene.coupling.decomposed else EMBEDDED_CELLS)
+
+
 def _block_shape(scene: Scene, surface: Surface) -> BlockShape:
     block = scene.block
     return BlockShape(
         interface=surface.lengths,
         height=block.height,
-        cells=block.cells,
+        cells=block_cells(scene),
         element=block.element,
         grading=block.grading,
         margin=block.margin,
@@ -202,7 +256,7 @@ def _check_size(scene: Scene) -> None:
         ("patches.grid", scene.patches.grid, BYTES_PER_HEIGHT),
     ]
     if scene.coupling.kind != "analytic":
-        sizes.append(("block.cells", scene.block.cells, BYTES_PER_CELL))
+        sizes.append(("block.cells", block_cells(scene), BYTES_PER_CELL))
     for key, counts, each in sizes:
         if counts is not None and math.prod(counts) * each > memory:
             raise InputError(
@@ -217,11 +271,14 @@ def _check_size(scene: Scene) -> None:
 def _check_patches(scene: Scene, surface: Surface) -> None:
     """Refuse patches that no element or no height can resolve."""
     limits: list[tuple[str, Sequence[int]]] = [("heights of the surface", surface.grid)]
-    if scene.micro.model == "islands":  # cuts patches out, and a surface has at least 4 × 4 heights
+    alone = scene.coupling.kind == "isolated"
+    # it cuts patches out, and a surface has at least 4 × 4 heights
+    if alone and scene.micro.model == "islands":
         fourths = (surface.grid[0] // 4, surface.grid[1] // 4)
         limits = [("fourths of the surface's heights", fourths)]
-    if scene.coupling.kind != "analytic":
-        limits.append(("cells of the interface (block.cells)", scene.block.cells[:2]))
+    on_mesh = not scene.coupling.decomposed or scene.output.fields
+    if scene.coupling.kind != "analytic" and on_mesh:
+        limits.append(("cells of the interface (block.cells)", block_cells(scene)[:2]))
     for what, limit in limits:
         if any(patches > most for patches, most in zip(scene.patches.grid, limit, strict=True)):
             raise InputError(

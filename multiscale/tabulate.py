@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
 from geometry.collective import together
 from geometry.errors import NotConverged
@@ -127,9 +126,9 @@ class IsolatedPatch:
         while halfway.size and spent < _MOST_ROWS:
             new = self.rows(halfway)
             spent += len(new)
-            root = PchipInterpolator(rows[:, 1], rows[:, 2] ** (2 / 3))
+            pressure, _ = _law(rows, self.touch, self.reach, 0.0).at(new[:, 1], extend=True)
             scale = np.maximum(new[:, 2], _LEAST_SCALE * rows[-1, 2])
-            error = np.abs(np.maximum(root(new[:, 1]), 0.0) ** 1.5 - new[:, 2]) / scale
+            error = np.abs(pressure - new[:, 2]) / scale
             bad = error > tolerance
             worst = max(worst, float(error[~bad].max(initial=0.0)))
             missed = float(error.max())

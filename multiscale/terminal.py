@@ -15,6 +15,7 @@ from rich.table import Table
 from geometry.errors import PatchlawError
 from multiscale import plan
 from multiscale.history import History, LoadStep
+from multiscale.loading import Programme
 from multiscale.report import curve_cells
 from multiscale.stage import Stage
 
@@ -78,18 +79,20 @@ def show_plan(comm: Any, stage: Stage) -> None:
 
 
 @contextmanager
-def progress(comm: Any, steps: int) -> Iterator[Callable[[LoadStep], None]]:
+def progress(comm: Any, programme: Programme) -> Iterator[Callable[[LoadStep], None]]:
     """Follow load steps: by a bar, or under ``mpirun`` by a line each, fit for a log file.
 
     Args:
         comm: MPI communicator, or None.
-        steps: Number of load steps to come.
+        programme: The load steps to come.
 
     Yields:
         The function to call with every load step.
     """
+    steps = None if programme.force_change else len(programme.targets)  # some may be halved
     if comm is not None:
-        yield lambda step: say(comm, f"load step {step.step}/{steps}: {_in_short(step)}")
+        of = "" if steps is None else f"/{steps}"
+        yield lambda step: say(comm, f"load step {step.step}{of}: {_in_short(step)}")
         return
     columns = (
         TextColumn("[bold]load steps"),

@@ -18,6 +18,14 @@ SCENES = {
         "load.tilt=['2 um/mm', '-1 um/mm']",
     ],
     "micro model alone": ["coupling.kind=analytic"],
+    "condensed, up and down": [
+        "block.cells=[8, 8, 5]", "patches.grid=[4, 2]", "coupling.newton=condensed",
+        "load.approach=['8 um', '2 um']", "load.tilt=[0.002, 0.001]", "output.fields=true",
+    ],
+    "consistent, under a force": [
+        "block.cells=[8, 8, 5]", "coupling.kind=consistent", "coupling.newton=full",
+        "micro.model=half-space",
+    ],
     "laws of the half-space": ["block.cells=[8, 8, 5]", "micro.model=half-space"],
 }  # fmt: skip
 NUMBERS = (

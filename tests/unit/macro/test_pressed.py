@@ -134,7 +134,7 @@ def test_fields_are_written_for_paraview(element, tmp_path):
     )
     interface = Interface(block, PatchGrid(grid=(2, 1), lengths=(1.0, 1.0)))
     state = PressedBlock(block, interface, [Spring(), Spring(k=5e3)]).press(1e-3)
-    write_fields(tmp_path / "fields.xdmf", interface, state)
+    write_fields(tmp_path / "fields.xdmf", interface, state.displacement, state.pressure)
     h5py = pytest.importorskip("h5py")
     with h5py.File(tmp_path / "fields.h5") as file:
         found = file["Function/pressure/0"][...].ravel()

@@ -1,15 +1,16 @@
-"""Load steps of the embedded coupling: halving, keeping what was accepted, laws' ranges."""
+"""Load steps of the embedded coupling: what is read off the laws, and their ranges."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from geometry.errors import NotConverged
+from geometry.control import Control
 from geometry.patches import PatchGrid
 from multiscale.coupling import EmbeddedCoupling, tilted_approaches
 from multiscale.law_files import LawTable
 from multiscale.laws import PatchLaw
+from multiscale.loading import BeyondLaws
 
 PATCHES = PatchGrid(grid=(2, 1), lengths=(1.0, 0.5))
 
@@ -28,25 +29,18 @@ def law(end=1.0):
     )
 
 
-class ShyBlock:
-    """Stands for a block that converges only when the approach grows by little at a time."""
-
-    def __init__(self, largest_step):
-        self.largest_step, self.last, self.tried = largest_step, 0.0, []
+class EasyBlock:
+    """Stands for a block that gives way to nothing: closures are the approach."""
 
     def press(self, approach, tilt):
-        self.tried.append(approach)
-        if abs(approach - self.last) > self.largest_step:
-            raise NotConverged(
-                "the block", reason="DIVERGED_LINE_SEARCH", iterations=2, remedy="smaller steps"
-            )
-        self.last = approach
+        self.approach = approach
         return SimpleNamespace(
             approach=approach,
             closure=np.full(2, approach),
-            pressure=np.full(2, approach**1.5),
+            pressure=np.array([1.5, 0.5]) * approach**1.5,
             force=0.5 * approach**1.5,
-            reaction=0.5 * approach**1.5,
+            reaction=0.5 * approach**1.5 * (1 - 1e-11),
+            displacement=np.array([approach]),
             newton_iterations=3,
             linear_iterations=10,
             residuals=np.array([1.0, 1e-11]),
@@ -55,49 +49,42 @@ class ShyBlock:
         )
 
     def patch_means(self, functions):
-        return np.array([function(np.array([self.last]))[0] for function in functions])
+        return np.array([function(np.array([self.approach]))[0] for function in functions])
 
 
-def embedded(block, *laws):
+def embedded(*laws):
     table = LawTable(patches=PATCHES, laws=laws or (law(), law()), made_by={})
-    return EmbeddedCoupling(pressed=block, table=table)
+    return EmbeddedCoupling(EasyBlock(), table)
 
 
 def test_steps_read_the_laws_at_their_closures():
-    (step,) = embedded(ShyBlock(1.0)).load_steps([0.45])
+    step = embedded().press(Control(approach=0.45, tilt=(1e-3, 0.0)))
     assert step.contacts == 8
     assert step.contact_area_fraction == pytest.approx(0.045, rel=1e-12)  # a straight line
     assert step.mean_separation_mm == pytest.approx(1.5545, rel=1e-12)  # reach − c + relief
     assert step.mean_pressure_MPa == pytest.approx(0.45**1.5, rel=1e-12)  # force over area
+    assert step.imbalance == pytest.approx(1e-11, rel=1e-4)  # of a difference of near equals
+    assert (step.tilt_x, step.tilt_y) == (1e-3, 0.0)
+    # patches of a quarter of a square millimetre, a quarter of a millimetre beside the middle
+    assert step.moment_x_N_mm == pytest.approx(-0.0625 * 0.45**1.5, rel=1e-12)
+    assert step.moment_y_N_mm == 0.0
 
 
-def test_failing_step_is_halved_and_its_work_is_counted():
-    block = ShyBlock(0.3)
-    (step,) = embedded(block).load_steps([1.0])
-    assert block.tried == [1.0, 0.5, 0.25, 0.5, 1.0, 0.75, 1.0]
-    assert step.approach_mm == 1.0
-    assert step.newton_iterations == 3 * 2 + 4 * 3
-    assert step.linear_iterations == 40
+def test_force_is_met_on_the_mesh():
+    step = embedded().press(Control(force=0.1))
+    assert step.force_N == pytest.approx(0.1, rel=1.1e-10)  # the balance's tolerance
+    assert step.approach_mm == pytest.approx(0.2 ** (2 / 3), rel=1e-9)
+    assert step.newton_iterations > 3
 
 
-def test_hopeless_step_keeps_those_before_it():
-    block, steps = ShyBlock(0.5), []
-    with pytest.raises(
-        NotConverged, match=r"load step 3 .approach .* DIVERGED_LINE_SEARCH after 2"
-    ) as error:
-        for step in embedded(block).load_steps([0.4, 0.8, 1.0]):
-            steps.append(step.step)
-            block.largest_step = 0.5 if step.step < 2 else 0.0
-    assert steps == [1, 2]
-    assert error.value.exit_code == 3
-    assert "raise load.steps" in str(error.value)
-
-
-def test_closure_beyond_a_law_ends_the_run():
-    steps = embedded(ShyBlock(1.0), law(), law(end=0.5)).load_steps([0.4, 0.8])
-    assert next(steps).step == 1
-    with pytest.raises(NotConverged, match=r"load step 2 .*LAW_RANGE: .*closure up to 0.5 mm"):
-        next(steps)
+def test_closure_beyond_a_law_is_refused_and_the_state_stays():
+    coupling = embedded(law(), law(end=0.5))
+    with pytest.raises(ValueError, match="no load step"):
+        _ = coupling.displacement
+    coupling.press(Control(approach=0.4))
+    with pytest.raises(BeyondLaws, match=r"LAW_RANGE: .*closure up to 0.5 mm"):
+        coupling.press(Control(approach=0.8))
+    np.testing.assert_array_equal(coupling.displacement, [0.4])
 
 
 def test_tilt_turns_about_the_middle():

@@ -86,7 +86,7 @@ def test_damaged_law_is_refused(table, tmp_path):
     write_laws(path, table)
     with h5py.File(path, "a") as file:
         file["patch_0_0/closure"][3] = np.nan
-    with pytest.raises(InputError, match=r"laws.h5: .*strictly increasing closure"):
+    with pytest.raises(InputError, match=r"laws.h5: .*closure that increases from"):
         read_laws(path)
 
 

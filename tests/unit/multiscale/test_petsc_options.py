@@ -70,6 +70,6 @@ def test_failure_exits_3_and_names_step_and_remedy(patchlaw, tmp_path):
     done = patchlaw("-snes_max_it", "1", "-snes_rtol", "1e-14")
     assert done.returncode == 3
     assert "load step 1" in done.stderr
-    assert "raise load.steps" in done.stderr
+    assert "take more load steps (load.steps)" in done.stderr
     assert "Traceback" not in done.stderr
     assert not (tmp_path / "history.csv").exists()  # no step was accepted

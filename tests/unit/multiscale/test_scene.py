@@ -37,7 +37,17 @@ REFUSED = {
     "no patches": ("patches.grid=[0, 4]", "patches.grid.0 = 0: must be greater than or equal to 1"),
     "short grid": ("patches.grid=[4]", "patches.grid.1: is required and missing"),
     "not a section": ("block=3", "block = 3: must be a section"),
-    "unknown coupling": ("coupling.kind='magic'", "coupling.kind = 'magic': must be 'isolated' or"),
+    "unknown coupling": ("coupling.kind='magic'", "coupling.kind = 'magic': must be 'isolated', "),
+    "no turning point": ("load.approach=[]", "load.approach = []: is an empty list (allowed: a qu"),
+    "turn below zero": ("load.approach=['8 um', -1]", "['8 um', -1]: must not turn below 0"),
+    "no first leg": ("load.approach=[0, '8 um']", "load.approach = [0, '8 um']: must be greater"),
+    "no leg": ("load.approach=[1, 1]", "load.approach = [1, 1]: repeats a turning point"),
+    "approach as force": ("load.force='8 um'", "load.force = '8 um': has the wrong unit"),
+    "two loads": ("load.force=1", "load: needs exactly one load (allowed: either 'approach' or"),
+    "no tilt": ("load.tilt=fre", "load.tilt = 'fre': is not a tilt (allowed: two slopes"),
+    "half a tilt": ("load.tilt=[0.1]", "load.tilt = [0.1]: is not a tilt"),
+    "tilt in kg": ("load.tilt=['1 kg', 0]", "load.tilt = ['1 kg', 0]: has the wrong unit"),
+    "change of force": ("load.force_change=0", "load.force_change = 0: must be greater than"),
     "two sources": ("surface.file='a.npy'", "surface: needs exactly one source"),
     "two amplitudes": ("surface.spectrum.rms_height=1", "surface.spectrum: "),
     "empty band": ("surface.spectrum.waves=[10, 2]", "waves is not a band"),
@@ -48,6 +58,73 @@ REFUSED = {
 def test_refusal_names_file_key_and_value(override, text):
     with pytest.raises(InputError, match=re.escape(str(PAPER)) + ".*" + re.escape(text)):
         Scene.load(PAPER, [override])
+
+
+@pytest.mark.parametrize(
+    ("overrides", "text"),
+    [
+        (["kind=consistent", "love=centre"], "love = 'centre' does not go with kind = 'con"),
+        (["kind=concurrent", "love=centre"], "love = 'centre' does not go with kind = 'con"),
+        (["kind=concurrent", "newton=full"], "newton = 'full' does not go with kind = 'con"),
+        (
+            ["kind=concurrent", "compliance=finite-element"],
+            "compliance = 'finite-element' does not go with kind = 'concurrent' (allowed: complian",
+        ),
+        (
+            ["kind=concurrent", "interface=pointwise"],
+            "interface = 'pointwise' does not go with kind = 'concurrent' (allowed: interface = 'p",
+        ),
+        (
+            ["compliance=decomposed", "newton=full"],
+            "newton = 'full' does not go with compliance = 'decomposed' (allowed: newton = 'conden",
+        ),
+        (
+            ["compliance=decomposed", "interface=pointwise"],
+            "compliance = 'decomposed' does not go with interface = 'pointwise' (allowed: complian",
+        ),
+        (
+            ["newton=condensed", "interface=pointwise"],
+            "newton = 'condensed' does not go with interface = 'pointwise' (allowed: newton = 'ful",
+        ),
+    ],
+)
+def test_keys_that_contradict_each_other_are_refused(overrides, text):
+    with pytest.raises(InputError, match=re.escape(f"{PAPER}: coupling: {text}")):
+        Scene.load(PAPER, [f"coupling.{text}" for text in overrides])
+
+
+@pytest.mark.parametrize(
+    ("overrides", "decomposed"),
+    [
+        (["kind=isolated"], False),
+        (["kind=isolated", "compliance=decomposed"], True),
+        (["kind=consistent"], True),
+        (["kind=consistent", "newton=condensed"], True),
+        (["kind=consistent", "newton=full"], False),
+        (["kind=consistent", "interface=pointwise"], False),
+        (["kind=consistent", "compliance=finite-element"], False),
+        (["kind=concurrent"], True),
+        (["kind=analytic", "newton=full", "compliance=decomposed"], False),
+    ],
+)
+def test_which_block_stands_under_the_patches(overrides, decomposed):
+    scene = Scene.load(PAPER, [f"coupling.{text}" for text in overrides])
+    assert scene.coupling.decomposed == decomposed
+
+
+def test_loads_in_newtons_up_and_down():
+    data = Scene.load(PAPER).model_dump(by_alias=True)
+    data["load"] = {"force": ["5 N", "1000 mN", 0, "2 N"], "steps": 2, "tilt": "free"}
+    programme = Scene.from_dict(data).loading.programme
+    assert (programme.quantity, programme.tilt) == ("force", None)
+    assert programme.targets == pytest.approx([2.5, 5, 3, 1, 0.5, 0, 1, 2], rel=1e-14)  # rounding
+
+
+def test_no_load_is_refused():
+    data = Scene.load(PAPER).model_dump(by_alias=True)
+    data["load"] = {"steps": 2}
+    with pytest.raises(InputError, match="load: needs exactly one load"):
+        Scene.from_dict(data)
 
 
 def test_override_needs_an_equals_sign():
@@ -88,7 +165,7 @@ def test_missing_file(tmp_path):
 def test_quantities_become_millimetres(override, value):
     scene = Scene.load(PAPER, [f"load.approach={override}"])
     # one rounding of the unit's factor
-    assert scene.loading.approach == pytest.approx(value, rel=1e-15)
+    assert scene.loading.approach == pytest.approx((value,), rel=1e-15)
 
 
 def test_stress_and_slope_units():

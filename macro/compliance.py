@@ -1,0 +1,40 @@
+"""The compliance of a block under its patches, from one plain solve per patch."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from macro.block import Block
+from macro.interface import Interface
+
+Array = NDArray[np.float64]
+
+
+def plain_compliance(block: Block, interface: Interface) -> Array:
+    """Return the mean downward displacement of patch i by unit pressure on patch j.
+
+    By reciprocity the matrix is symmetric for patches of equal area; what the linear solver's
+    tolerance leaves is averaged out.
+
+    Args:
+        block: The elastic block.
+        interface: Patches on its top.
+
+    Returns:
+        The compliance, the same on every rank, shape (N, N) [mm/MPa].
+
+    Raises:
+        NotConverged: When a linear solve fails.
+
+    Note:
+        Collective.
+    """
+    columns = []
+    work = block.stiffness.createVecRight()
+    for pressures in np.eye(interface.patches.count):
+        displacement = block.solve(interface.load(pressures))
+        work.array[:] = displacement.x.array[: block.owned_dofs]
+        columns.append(interface.patch_displacements(work))
+    compliance = np.column_stack(columns)
+    return np.asarray(0.5 * (compliance + compliance.T))

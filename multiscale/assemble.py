@@ -1,0 +1,94 @@
+"""Builds what a scene asks for: laws, the block or its compliance, and the coupling of them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from geometry.patches import PatchGrid
+from multiscale.blocks import embedding, patch_compliance, smooth_correction
+from multiscale.concurrent import ConcurrentCoupling
+from multiscale.condensed import CondensedCoupling
+from multiscale.consistent import consistent_laws
+from multiscale.coupling import AnalyticCoupling, EmbeddedCoupling
+from multiscale.law_files import LawTable
+from multiscale.laws import ExtendedLaw
+from multiscale.loading import Coupling
+from multiscale.newton_choice import newton_choice
+from multiscale.stage import Stage
+from multiscale.tabulate import isolated_laws
+
+if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
+    from macro import Interface
+
+_LOADS = 8  # rectangles along a side, at least, that a smooth field is told the contacts' forces by
+
+
+def make_table(stage: Stage, comm: Any) -> LawTable:
+    """Tabulate the laws of all patches, alone or of the whole surface.
+
+    Args:
+        stage: The scene's ingredients.
+        comm: MPI communicator; None for this process alone.
+
+    Note:
+        Collective.
+    """
+    if stage.scene.coupling.kind == "consistent":
+        return consistent_laws(
+            stage.model,
+            stage.patches,
+            mean_heights=stage.mean_heights,
+            approach_end=stage.approach_end,
+            tolerance=stage.table_tolerance,
+            comm=comm,
+        )
+    return isolated_laws(
+        stage.model,
+        stage.patches,
+        mean_heights=stage.mean_heights,
+        closure_ends=stage.closure_ends,
+        love=stage.scene.coupling.love,
+        tolerance=stage.table_tolerance,
+        comm=comm,
+    )
+
+
+def assemble(stage: Stage, table: LawTable | None, comm: Any) -> tuple[Coupling, Interface | None]:
+    """Put micro and macro model together as the scene asks.
+
+    Args:
+        stage: The scene's ingredients.
+        table: The patch laws, of couplings that use them.
+        comm: MPI communicator; None for this process alone.
+
+    Returns:
+        The coupling, and the interface of the block that it presses itself.
+
+    Note:
+        Collective.
+    """
+    if table is not None:
+        return _with_laws(stage, table, comm)
+    if stage.embedded:
+        return _concurrent(stage, comm), None
+    return AnalyticCoupling(stage.model, stage.patches, stage.mean_heights), None
+
+
+def _with_laws(stage: Stage, table: LawTable, comm: Any) -> tuple[Coupling, Interface | None]:
+    if newton_choice(stage).condensed:
+        return CondensedCoupling(table, patch_compliance(stage, comm)), None
+    from macro import PressedBlock
+
+    interface = embedding(stage, comm)
+    laws = [ExtendedLaw(law) for law in table.laws]
+    mode = stage.scene.coupling.interface
+    pressed = PressedBlock(interface.block, interface, laws, mode=mode)
+    return EmbeddedCoupling(pressed, table), interface
+
+
+def _concurrent(stage: Stage, comm: Any) -> Coupling:
+    """Gather forces on rectangles that divide the patches, several along each side."""
+    nx, ny = (count * -(-_LOADS // count) for count in stage.patches.grid)
+    loads = PatchGrid(grid=(nx, ny), lengths=stage.patches.lengths)
+    correction = smooth_correction(stage, loads, comm)
+    return ConcurrentCoupling(stage.model, stage.patches, stage.mean_heights, correction)

@@ -1,0 +1,56 @@
+"""Chooses between a dense Newton of the patches and the full Newton of the mesh, by cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from multiscale.stage import Stage
+
+CYCLES_PER_STEP = 8
+"""Multigrid cycles that a load step of the full Newton takes, starts from earlier steps included
+(the paper's cube with 4 × 4 patches: 65 in 8 steps)."""
+
+CYCLES_PER_PATCH = 21
+"""Multigrid cycles that the compliance of one patch takes (likewise, and with 8 × 8 patches)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NewtonChoice:
+    """Which Newton solves the load steps, and why.
+
+    Attributes:
+        condensed: Whether the dense one of the patches does.
+        why: The reason, in words.
+    """
+
+    condensed: bool
+    why: str
+
+
+def newton_choice(stage: Stage) -> NewtonChoice:
+    """Choose as the scene asks, or what is predicted to take fewer multigrid cycles.
+
+    The full Newton spends cycles on load steps until its basis of earlier solutions spans what
+    the patches can do; the condensed one spends them on the compliance, before the first step.
+
+    Args:
+        stage: The scene's ingredients, of a coupling with laws.
+    """
+    coupling = stage.scene.coupling
+    if coupling.decomposed:
+        return NewtonChoice(condensed=True, why="the decomposed block is its compliance")
+    if coupling.interface == "pointwise":
+        return NewtonChoice(condensed=False, why="laws at points need the whole mesh")
+    if coupling.newton != "auto":
+        return NewtonChoice(condensed=coupling.newton == "condensed", why="as the scene asks")
+    patches, steps = stage.patches.count, len(stage.scene.loading.programme.targets)
+    compliance = CYCLES_PER_PATCH * patches
+    full = CYCLES_PER_STEP * steps
+    fewer = "fewer" if compliance < full else "more"
+    return NewtonChoice(
+        condensed=compliance < full,
+        why=(
+            f"the compliance of {patches} patches takes about {compliance} multigrid cycles, "
+            f"{fewer} than {steps} load steps on the mesh with about {full}"
+        ),
+    )

@@ -1,0 +1,125 @@
+"""The condensed block against the full Newton on the same mesh and laws."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from geometry.errors import NotConverged
+from multiscale import Run, Scene, run
+from multiscale.newton_choice import newton_choice
+from multiscale.stage import make_stage
+
+PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
+SMALL = [
+    "surface.grid=[64, 64]", "block.cells=[8, 8, 5]", "patches.grid=[4, 2]", "load.steps=3",
+]  # fmt: skip
+LOADS = {
+    "level": [],
+    "tilted": ["load.tilt=['6 um/mm', '-3 um/mm']"],
+    "free": ["load.tilt=free"],
+}
+FORCES = {"approach": {}, "force": {"force": "2 N", "approach": None}}
+
+
+def scene(*overrides, **load):
+    data = Scene.load(PAPER, [*SMALL, *overrides]).model_dump(by_alias=True)
+    data["load"] |= load
+    return Scene.from_dict(data)
+
+
+@pytest.mark.parametrize("load", FORCES.values(), ids=FORCES)
+@pytest.mark.parametrize("tilt", LOADS.values(), ids=LOADS)
+def test_both_newtons_find_the_same_equilibrium(tilt, load):
+    full, condensed = (
+        run(scene(*tilt, f"coupling.newton={newton}", **load)) for newton in ("full", "condensed")
+    )
+    # residuals of the mesh are driven to 1e-10 of the load, its solver for the compliance alike
+    force = full.force_N.max()
+    np.testing.assert_allclose(condensed.force_N, full.force_N, rtol=1e-8, atol=1e-10 * force)
+    largest = full.patch_pressure_MPa.max()
+    np.testing.assert_allclose(
+        condensed.patch_pressure_MPa, full.patch_pressure_MPa, atol=1e-8 * largest
+    )
+    arms = 1e-8 * force
+    np.testing.assert_allclose(condensed.moment_x_N_mm, full.moment_x_N_mm, atol=arms)
+    np.testing.assert_allclose(condensed.moment_y_N_mm, full.moment_y_N_mm, atol=arms)
+    # a free plane that swings clear of the surface has no tilt of its own
+    loaded = full.force_N > 1e-6 * force
+    assert loaded[-1]
+    for name in ("approach_mm", "contact_area_fraction", "mean_separation_mm", "tilt_x", "tilt_y"):
+        one, other = getattr(condensed, name)[loaded], getattr(full, name)[loaded]
+        np.testing.assert_allclose(one, other, rtol=1e-7, atol=1e-12)  # Hertz: δ ~ P^(2/3), twice
+    if "force" in load:
+        np.testing.assert_allclose(condensed.force_N, [2 / 3, 4 / 3, 2.0], rtol=1e-11)
+
+
+@pytest.mark.parametrize(
+    "way", [["coupling.newton=full"], ["coupling.newton=condensed"], ["coupling.kind=analytic"]]
+)
+def test_way_down_is_the_way_up(way):
+    """The contact is elastic."""
+    history = run(scene(*way, approach=["6 um", 0, "6 um"]))
+    force = history.force_N
+    assert force[5] == 0.0
+    # residuals of 1e-10 of the load on the mesh, 1e-8 of the micro model
+    np.testing.assert_allclose(force[[4, 3, 6, 7, 8]], force[[0, 1, 0, 1, 2]], rtol=2e-8)
+
+
+def test_force_up_and_down():
+    history = run(scene("coupling.newton=condensed", approach=None, force=["1 N", 0, "1 N"]))
+    approach = history.approach_mm
+    # first touch of the highest patch, up to the rounding of a law's first row
+    assert approach[5] == pytest.approx(0.0, abs=1e-9)
+    assert history.force_N[5] == pytest.approx(0.0, abs=1e-12)
+    np.testing.assert_allclose(approach[[4, 3, 6, 7, 8]], approach[[0, 1, 0, 1, 2]], rtol=1e-9)
+
+
+def test_steps_follow_the_force():
+    whole = Run(scene("coupling.newton=condensed", "load.force_change=0.1"))
+    steps = list(whole.load_steps())
+    force = np.array([step.force_N for step in steps])
+    assert len(steps) > 3
+    # the change a step brings, relative to the largest force with it
+    assert np.max(np.diff(force) / force[1:]) <= 0.1 * (1 + 1e-9)
+
+
+def test_leaving_a_law_ends_the_run_and_keeps_what_was_accepted():
+    whole = Run(scene("coupling.newton=condensed"))
+    whole.make_laws()
+    short = Run(scene("coupling.newton=condensed", approach="4 um")).make_laws()
+    whole.table = short
+    with pytest.raises(NotConverged, match=r"load step 2 .approach 0.0053.*LAW_RANGE: patch \("):
+        list(whole.load_steps())
+    assert [step.step for step in whole.steps] == [1]
+
+
+def test_fields_are_those_of_the_patch_pressures():
+    """Without a mesh that was pressed, one is loaded by the pressures that were found."""
+    (full, condensed) = (
+        Run(scene(f"coupling.newton={newton}")) for newton in ("full", "condensed")
+    )
+    fields = []
+    for whole in (full, condensed):
+        list(whole.load_steps())
+        interface, displacement = whole.last_field()
+        fields.append(displacement)
+        assert interface.block.owned_dofs == displacement.size
+    # linear solves to 1e-10 of the load
+    np.testing.assert_allclose(fields[1], fields[0], atol=1e-8 * np.abs(fields[0]).max())
+
+
+@pytest.mark.parametrize(
+    ("overrides", "condensed", "why"),
+    [
+        ([], False, "the compliance of 8 patches takes about 168 multigrid cycles, more than 3"),
+        (["load.steps=30"], True, "fewer than 30 load steps on the mesh with about 240"),
+        (["coupling.newton=condensed"], True, "as the scene asks"),
+        (["coupling.interface=pointwise"], False, "laws at points need the whole mesh"),
+        (["coupling.compliance=decomposed"], True, "the decomposed block is its compliance"),
+    ],
+)
+def test_newton_is_chosen_by_cost(overrides, condensed, why):
+    choice = newton_choice(make_stage(scene(*overrides)))
+    assert choice.condensed == condensed
+    assert why in choice.why

@@ -1,0 +1,74 @@
+"""Consistent laws on the half-space give back the solution that they were made from."""
+
+import numpy as np
+import pytest
+
+from geometry import PatchGrid, Spectrum, patch_means, synthesise
+from geometry.control import Control
+from micro import influence_matrix, micro_model
+from multiscale.condensed import CondensedCoupling
+from multiscale.consistent import consistent_laws
+
+MODULUS = 4000.0
+END = 9e-3
+
+
+@pytest.fixture(scope="module")
+def surface():
+    spectrum = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=3)
+    return synthesise(spectrum, grid=(64, 64), lengths=(1.0, 1.0))
+
+
+def parts(surface, grid, name="circular", tolerance=1e-4):
+    model = micro_model(name, surface, contact_modulus=MODULUS)
+    patches = PatchGrid(grid=grid, lengths=surface.lengths)
+    means = patch_means(surface, patches)
+    table = consistent_laws(
+        model, patches, mean_heights=means, approach_end=END, tolerance=tolerance
+    )
+    half_space = influence_matrix(patches) / (np.pi * MODULUS)
+    return model, patches, means, table, CondensedCoupling(table, half_space)
+
+
+@pytest.mark.parametrize("name", ["circular", "half-space"])
+@pytest.mark.parametrize("grid", [(1, 1), (3, 2), (8, 8)])
+def test_whole_surface_comes_back(surface, grid, name):
+    model, patches, means, table, coupling = parts(surface, grid, name, 1e-3)
+    law = max(table.laws, key=lambda one: len(one.approach))
+    rows = law.approach[[len(law.approach) // 2, -1]]
+    for approach in (*rows, 0.537 * END):
+        step = coupling.press(Control(approach=approach))
+        whole = model.respond([approach], patches=patches, mean_heights=means)
+        # at rows the micro model's own tolerance; between them that of the tables
+        allowed = 1e-6 if approach in rows else 1e-3
+        assert step.force_N == pytest.approx(whole.force[0], rel=allowed)
+        # an untouched patch is taken to sink by its neighbours' mean pressures
+        assert step.mean_separation_mm == pytest.approx(whole.mean_separation[0], rel=5e-3)
+        np.testing.assert_allclose(
+            step.patches.pressure_MPa,
+            whole.patch_pressure[0],
+            atol=allowed * whole.patch_pressure.max(),
+        )
+
+
+def test_tables_keep_their_tolerance_and_say_so(surface):
+    model, patches, means, table, _ = parts(surface, (3, 2))
+    approach = np.random.default_rng(4).uniform(1e-3, END, 100)
+    pressure = model.respond(approach, patches=patches, mean_heights=means).patch_pressure
+    for law, found in zip(table.laws, pressure.T, strict=True):
+        scale = np.maximum(found, 0.01 * max(found.max(), 1e-9))
+        # measured half-way between rows; next to first touch, which is extrapolated, it is more
+        assert np.max(np.abs(law.along(approach).pressure - found) / scale) < 6e-4
+        assert law.interpolation_error <= 1e-4
+    assert table.made_by["coupling"] == "consistent"
+
+
+def test_surface_out_of_reach_stays_open(surface):
+    model = micro_model("circular", surface, contact_modulus=MODULUS)
+    patches = PatchGrid(grid=(2, 2), lengths=surface.lengths)
+    means = patch_means(surface, patches)
+    end = 0.5 * model.first_touch
+    if end <= 0.0:  # the highest summit is touched at once: lower all others out of reach
+        end = 1e-9
+    table = consistent_laws(model, patches, mean_heights=means, approach_end=end)
+    assert sum(not law.is_open for law in table.laws) <= 1

@@ -1,0 +1,108 @@
+"""Load programmes: legs, halving where a step fails or changes the force by too much."""
+
+import numpy as np
+import pytest
+
+from geometry.errors import NotConverged
+from multiscale.history import LoadStep, PatchState
+from multiscale.loading import BeyondLaws, Programme, load_steps
+
+
+class Spring:
+    """F = k δ^(3/2), for steps that are not too large."""
+
+    def __init__(self, largest_step=np.inf, end=np.inf):
+        self.largest_step, self.end, self.last, self.tried = largest_step, end, 0.0, []
+
+    def press(self, control):
+        approach = control.approach
+        if approach is None:
+            approach = control.force ** (2 / 3)
+        self.tried.append(approach)
+        if approach > self.end:
+            raise BeyondLaws("it", reason="LAW_RANGE: short", iterations=0, remedy="less")
+        if abs(approach - self.last) > self.largest_step:
+            raise NotConverged("it", reason="DIVERGED", iterations=2, remedy="take smaller steps")
+        self.last = approach
+        one = np.ones(1)
+        return LoadStep(
+            step=0,
+            approach_mm=approach,
+            force_N=approach**1.5,
+            mean_pressure_MPa=0.0,
+            contact_area_fraction=0.0,
+            mean_separation_mm=0.0,
+            contacts=0,
+            newton_iterations=3,
+            linear_iterations=10,
+            wall_s=0.0,
+            reason="CONVERGED",
+            patches=PatchState(closure_mm=one, pressure_MPa=one, contact_area_fraction=one),
+        )
+
+
+def programme(*points, quantity="approach", **more):
+    return Programme(quantity=quantity, points=points, **more)
+
+
+def test_legs_are_divided_evenly():
+    targets = programme(8.0, 2.0, 5.0, steps=3).targets
+    np.testing.assert_allclose(targets, [8 / 3, 16 / 3, 8, 6, 4, 2, 3, 4, 5], rtol=1e-15)
+
+
+def test_steps_are_numbered_through():
+    steps = list(load_steps(Spring(), programme(1.0, 0.5, steps=2)))
+    assert [step.step for step in steps] == [1, 2, 3, 4]
+    assert [step.approach_mm for step in steps] == [0.5, 1.0, 0.75, 0.5]
+
+
+def test_controls_carry_quantity_and_tilt():
+    control = programme(2.0, quantity="force", tilt=None).control(1.5)
+    assert (control.approach, control.force, control.tilt) == (None, 1.5, None)
+
+
+def test_failing_step_is_halved_and_its_work_is_counted():
+    spring = Spring(0.3)
+    (step,) = load_steps(spring, programme(1.0, steps=1))
+    assert spring.tried == [1.0, 0.5, 0.25, 0.5, 1.0, 0.75, 1.0]
+    assert step.newton_iterations == 3 * 2 + 4 * 3
+    assert step.linear_iterations == 40
+
+
+def test_hopeless_step_keeps_those_before_it():
+    spring, steps = Spring(0.5), []
+    with pytest.raises(NotConverged, match=r"load step 3 .approach .* DIVERGED after 2") as error:
+        for step in load_steps(spring, programme(1.2, steps=3)):
+            steps.append(step.step)
+            spring.largest_step = 0.5 if step.step < 2 else 0.0
+    assert steps == [1, 2]
+    assert error.value.exit_code == 3
+    assert "halved 8 times; take smaller steps" in str(error.value)
+
+
+def test_end_of_a_law_is_not_approached_by_halves():
+    spring = Spring(end=0.6)
+    with pytest.raises(NotConverged, match=r"load step 2 .*LAW_RANGE: short"):
+        list(load_steps(spring, programme(1.0, steps=2)))
+    assert spring.tried == [0.5, 1.0]
+
+
+@pytest.mark.parametrize("quantity", ["approach", "force"])
+def test_force_changes_by_no_more_than_asked(quantity):
+    drive = programme(1.0, 0.1, quantity=quantity, steps=2, force_change=0.2)
+    steps = list(load_steps(Spring(), drive))
+    force = np.array([step.force_N for step in steps])
+    largest = np.maximum.accumulate(force)
+    changes = np.abs(np.diff(force)) / largest[1:]
+    assert changes.max() <= 0.2 * (1 + 1e-9)  # the driver's allowance for rounding
+    assert [step.step for step in steps] == list(range(1, len(steps) + 1))
+    # no finer than halving makes it: two steps of a half would have been too much
+    assert len(steps) < 2 * (1.0 + 1.0) / 0.1
+    told = np.array([getattr(step, "force_N" if quantity == "force" else "approach_mm")
+                     for step in steps])  # fmt: skip
+    for target in drive.targets:
+        assert np.abs(told - target).min() < 1e-12
+
+
+def test_first_step_from_nothing_may_be_any():
+    assert len(list(load_steps(Spring(), programme(1.0, steps=1, force_change=0.1)))) == 1

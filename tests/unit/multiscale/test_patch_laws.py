@@ -1,0 +1,110 @@
+"""All laws at once against the laws one by one, also where they are no functions of closure."""
+
+import numpy as np
+import pytest
+
+from geometry.errors import InputError
+from multiscale.laws import PatchLaw
+from multiscale.patch_laws import PatchLaws
+
+
+def law(touch=1e-3, rows=12, own=0.0, stiffness=4e3, reach=0.02):
+    approach = np.linspace(touch, 9e-3, rows)
+    pressure = stiffness * (approach - touch) ** 1.5
+    return PatchLaw(
+        closure=approach - own * pressure,
+        pressure=pressure,
+        approach=approach,
+        contact_area_fraction=3.0 * (approach - touch),
+        contacts=np.arange(rows),
+        relief=0.5 * (approach - touch),
+        touch=touch,
+        reach=reach,
+    )
+
+
+def open_law(touch=5e-3):
+    none = np.empty(0)
+    return PatchLaw(
+        closure=none,
+        pressure=none,
+        approach=none,
+        contact_area_fraction=none,
+        contacts=np.empty(0, dtype=np.int64),
+        relief=none,
+        touch=touch,
+        reach=0.03,
+    )
+
+
+LAWS = [law(), law(2e-3, 7, own=2e-4), open_law(), law(own=6e-3, rows=40), open_law(np.inf)]
+FALLING = LAWS[3]
+
+
+@pytest.mark.parametrize("common", [-1e-3, 1e-3, 1.7e-3, 4e-3, 8.99e-3, 9e-3, 0.02])
+def test_packed_laws_are_the_laws(common):
+    packed = PatchLaws(LAWS)
+    local = common + 1e-4 * np.arange(5)
+    for together, each in zip(
+        packed.along(local),
+        zip(*(one.along(s) for one, s in zip(LAWS, local, strict=True)), strict=True),
+        strict=True,
+    ):
+        np.testing.assert_array_equal(together, np.array(each).ravel())
+    closure = packed.along(local).closure
+    for index in (0, 1):  # those whose pressure is a function of closure
+        values = [function(closure[index], extend=True) for function in
+                  (LAWS[index].area_fraction_at, LAWS[index].separation_at)]  # fmt: skip
+        found = packed.area_fraction(local)[index], packed.separation(local)[index]
+        np.testing.assert_allclose(values, found, rtol=1e-11, atol=1e-14)  # the inversion's
+    rows = [np.searchsorted(one.approach, s, side="right") - 1
+            for one, s in zip(LAWS, local, strict=True)]  # fmt: skip
+    assert packed.contacts(local).tolist() == [max(row, 0) for row in rows]
+
+
+def test_derivatives_are_exact():
+    packed, h = PatchLaws(LAWS), 1e-9
+    local = np.full(5, 6.123e-3)
+    high, low, point = packed.along(local + h), packed.along(local - h), packed.along(local)
+    # second-order differences of smooth pieces, and rounding of closures over h
+    np.testing.assert_allclose(point.dclosure, (high.closure - low.closure) / 2e-9, rtol=1e-6)
+    np.testing.assert_allclose(
+        point.dpressure, (high.pressure - low.pressure) / 2e-9, rtol=1e-5, atol=1e-9
+    )
+
+
+def test_falling_closure_is_kept_along_the_approach():
+    assert not FALLING.is_function
+    local = np.linspace(1e-3, 9e-3, 101)
+    point = FALLING.along(local)
+    # p^(2/3) is a straight line; closure is interpolated on 40 rows
+    np.testing.assert_allclose(point.pressure, 4e3 * (local - 1e-3) ** 1.5, rtol=1e-11, atol=1e-15)
+    assert point.dclosure.min() < -0.5
+    np.testing.assert_allclose(point.closure, local - 6e-3 * point.pressure, atol=3e-6)
+
+
+def test_falling_closure_ends_the_law_over_closure():
+    start, end = FALLING.range
+    assert start == 1e-3
+    assert end == FALLING.closure.max()
+    pressure, stiffness = FALLING.at(np.linspace(start, end, 50))
+    assert np.all(np.diff(pressure) > 0.0)
+    assert np.all(stiffness >= 0.0)
+    with pytest.raises(InputError, match="closure beyond the end"):
+        FALLING.at(1.01 * end)
+
+
+@pytest.mark.parametrize("one", [LAWS[0], LAWS[1]])
+def test_law_over_closure_is_the_law_along_the_approach(one):
+    local = np.random.default_rng(2).uniform(0.0, 10e-3, 500)
+    point = one.along(local)
+    pressure, stiffness = one.at(point.closure, extend=True)
+    # the inversion ends at the rounding of the closure: 1e-16 over the distance from touch
+    np.testing.assert_allclose(pressure, point.pressure, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(stiffness, point.dpressure / point.dclosure, rtol=1e-8, atol=1e-9)
+
+
+def test_ends_and_touches():
+    packed = PatchLaws(LAWS)
+    np.testing.assert_array_equal(packed.touch, [1e-3, 2e-3, 5e-3, 1e-3, np.inf])
+    np.testing.assert_allclose(packed.end, [9e-3, 9e-3, 5e-3, 9e-3, np.inf], rtol=1e-15)
