@@ -1,122 +1,295 @@
-"""The whole rough surface on a finite block, solved together at every load step, without laws."""
+"""The micro model solved inside the iteration for the block's yielding: no laws, no tables."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
+from geometry.collective import on_root
 from geometry.control import Control
-from geometry.errors import NotConverged
+from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
 from micro import MicroModel, Response, RigidPlane
-from multiscale.balance import Balance
+from multiscale.contact_stiffness import ContactStiffness, Secant, corrected
 from multiscale.coupling import response_step
 from multiscale.history import LoadStep
-
-if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro.correction import Correction
+from multiscale.loading import described
 
 Array = NDArray[np.float64]
 
-TOLERANCE = 1e-8
-"""Change of the forces on the block between iterations, relative to the whole force."""
+_MOST = 40
+_POWER = 1.5  # of Hertz
+_KEPT = 12  # secants, over load steps too
+_SMALLEST = 0.1  # of the force found, or its inverse: how far one step may go
 
-_MOST_ITERATIONS = 60
-_MEMORY = 5  # earlier iterations that the next one is extrapolated from
+
+class SmoothCorrection(Protocol):
+    """What a block's surface yields beyond the half-space."""
+
+    @property
+    def loads(self) -> PatchGrid:
+        """The M rectangles whose forces drive it."""
+
+    def sag(self, forces: Array) -> Callable[[Array, Array], Array]:
+        """Return the displacement (x, y) → [mm], linear in the forces (M,) [N]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Trial:
+    """The micro model under one plane: forces assumed for the sag, and forces found."""
+
+    plane: Array
+    assumed: Array
+    local: Array
+    response: Response
+    start: Any
+
+    @property
+    def found(self) -> Array:
+        return np.asarray(self.response.patch_force[0])
 
 
 class ConcurrentCoupling:
-    """The micro model pressed by a plane that sags by what the block yields beyond a half-space.
+    """A rough surface on a block: half-space contact under a plane less what the block yields.
 
-    The forces P of the contacts, gathered on rectangles, move the block's top by D P more than
-    the half-space that the micro model stands on; to the contacts this is a plane that has come
-    less near. P = contact(δ − D P) is solved by Anderson's accelerated iteration (Walker & Ni
-    2011, doi 10.1137/10078356X), each from the contacts of the one before.
+    The plane comes near the half-space's surface by δ(x) − D(x)[P], D linear in the forces P on the
+    correction's rectangles. P and what is free of the plane are found together, by a Newton
+    iteration whose contact stiffness is estimated from contact areas and learns from every press.
 
     Args:
         model: Micro model of the whole surface.
         patches: Partition that the results are summed over; it does not change the solution.
         mean_heights: Mean height of each patch, shape (N,) [mm].
-        correction: D.
+        correction: What the block yields beyond the half-space.
+        tolerance: Largest error left in the forces, and largest residual of a prescribed force,
+            relative to the force; moments count relative to force times half the diagonal.
+        comm: MPI communicator (mpi4py) or None; rank 0 presses for all.
+
+    Raises:
+        InputError: When the tolerance is not positive.
     """
 
     def __init__(
-        self, model: MicroModel, patches: PatchGrid, mean_heights: Array, correction: Correction
+        self,
+        model: MicroModel,
+        patches: PatchGrid,
+        mean_heights: Array,
+        correction: SmoothCorrection,
+        *,
+        tolerance: float = 1e-8,
+        comm: Any = None,
     ) -> None:
-        self._model, self._correction = model, correction
-        self._patches, self._mean_heights = patches, mean_heights
-        self._forces: Array = np.zeros(correction.loads.count)
-        self._start: Any = None
-        self._iterations = 0
-        half = 0.5 * float(np.hypot(*patches.lengths))
-        self._balance = Balance(half=half, first_touch=model.first_touch)
+        if not tolerance > 0.0:
+            raise InputError("the tolerance must be positive", value=tolerance, allowed="> 0")
+        self._model, self._patches, self._heights = model, patches, mean_heights
+        self._correction, self._tolerance, self._comm = correction, tolerance, comm
+        loads = correction.loads
+        self._middle = np.asarray(loads.origin) + 0.5 * np.asarray(loads.lengths)
+        self._shape = np.column_stack([np.ones(loads.count), loads.centres - self._middle])
+        self._half = 0.5 * float(np.hypot(*loads.lengths))
+        x, y = loads.centres.T
+        units = np.eye(loads.count)
+        self._yielding = np.column_stack([correction.sag(unit)(x, y) for unit in units])
+        self._stiffness = ContactStiffness(loads, model.contact_modulus)
+        self._last: _Trial | None = None
+        self._secants: tuple[Secant, ...] = ()
 
     def press(self, control: Control) -> LoadStep:
-        """Solve one load step; see `Coupling.press`."""
-        self._iterations = 0
-        plane, rigid = self._balance.solve(self._loads, control)
-        response = self._pressed(rigid, self._patches, self._mean_heights)
-        return response_step(
-            response,
-            self._patches,
-            plane=plane,
-            closure=rigid.means(self._patches) - response.patch_displacement[0],
-            iterations=self._iterations,
-        )
+        """Solve one load step.
 
-    def _loads(self, plane: Array) -> tuple[Array, RigidPlane]:
-        """Return force and moments of a plane on the block, and the plane as contacts see it."""
-        loads = self._correction.loads
-        forces, steps = self._forces, _Anderson(_MEMORY)
-        for _ in range(_MOST_ITERATIONS):
-            self._iterations += 1
-            rigid = self._rigid(plane, forces)
-            response = self._pressed(rigid, loads, np.zeros(loads.count))
-            found = response.patch_force[0]
-            if np.abs(found - forces).sum() <= TOLERANCE * found.sum():
-                self._forces = found
-                return np.array([response.force[0], *response.moment[0]]), rigid
-            forces = np.maximum(steps.next(forces, found), 0.0)
+        Args:
+            control: What is prescribed of the plane.
+
+        Returns:
+            The load step; its Newton iterations are presses of the micro model.
+
+        Raises:
+            NotConverged: When the iteration fails; the coupling is then as it was before.
+        """
+        secants = list(self._secants)
+        trial = self._first(control)
+        for count in range(1, _MOST + 1):
+            step = self._step(control, trial, secants)
+            if self._settled(control, trial, step):
+                result = self._accepted(trial, count)
+                self._last, self._secants = trial, tuple(secants[-_KEPT:])
+                return result
+            before, trial = trial, self._next(control, trial, step, count)
+            change = trial.local - before.local
+            if before.found.any() and trial.found.any() and change.any():
+                secants.append((change, trial.found - before.found))
+                del secants[:-_KEPT]
         raise NotConverged(
-            f"block and contacts at an approach of {plane[0]:.6g} mm",
+            f"the block's yielding at {described(control)}",
             reason="DIVERGED_MAX_IT",
-            iterations=_MOST_ITERATIONS,
-            remedy="take more load steps (load.steps)",
+            iterations=_MOST,
+            remedy="take smaller load steps (load.steps)",
         )
 
-    def _rigid(self, plane: Array, forces: Array) -> RigidPlane:
-        middle = np.add(self._patches.origin, np.multiply(0.5, self._patches.lengths))
+    def _first(self, control: Control) -> _Trial:
+        """Press where the last load step's tangent points, or without any sag."""
+        if self._last is not None and self._last.found.any():
+            step = self._step(control, self._last, list(self._secants))
+            if step is not None:
+                return self._next(control, self._last, step, 2)
+        tilt = control.tilt or (0.0, 0.0)
+        approach = control.approach
+        if approach is None:
+            approach = self._model.first_touch
+            if control.force:
+                approach += control.force / (self._model.contact_modulus * self._half)
+        plane = np.array([approach, *tilt])
+        return self._pressed(plane, np.zeros(self._correction.loads.count), self._last)
+
+    def _step(
+        self, control: Control, trial: _Trial, secants: list[Secant]
+    ) -> tuple[Array, Array] | None:
+        """Return the Newton step of plane and forces, from the forces found; None off contact."""
+        found = trial.found
+        if not found.any():
+            return None
+        stiffness = corrected(self._stiffness.estimate(trial.response), secants)
+        target, free = self._targets(control, trial)
+        prescribed = target - trial.plane
+        prescribed[free] = 0.0
+        lag = self._yielding @ (found - trial.assumed)
+        rows = self._shape[:, free].T
+        matrix = np.block(
+            [
+                [
+                    np.eye(found.size) + stiffness @ self._yielding,
+                    -stiffness @ self._shape[:, free],
+                ],
+                [rows, np.zeros((rows.shape[0], rows.shape[0]))],
+            ]
+        )
+        right = np.concatenate(
+            [stiffness @ (self._shape @ prescribed - lag), -self._excess(control, trial)[free]]
+        )
+        try:
+            solution = np.linalg.solve(matrix, right)
+        except np.linalg.LinAlgError:
+            solution = np.linalg.lstsq(matrix, right, rcond=None)[0]
+        prescribed[free] = solution[found.size :]
+        return prescribed, solution[: found.size]
+
+    def _targets(self, control: Control, trial: _Trial) -> tuple[Array, NDArray[np.bool_]]:
+        """Return the prescribed plane and which parts of it are free."""
+        target, free = (
+            trial.plane.copy(),
+            np.array([control.approach is None] + 2 * [control.tilt is None]),
+        )
+        if control.approach is not None:
+            target[0] = control.approach
+        if control.tilt is not None:
+            target[1:] = control.tilt
+        return target, free
+
+    def _excess(self, control: Control, trial: _Trial) -> Array:
+        """Return force and moments beyond those prescribed, shape (3,)."""
+        response = trial.response
+        return np.array([response.force[0] - (control.force or 0.0), *response.moment[0]])
+
+    def _settled(self, control: Control, trial: _Trial, step: tuple[Array, Array] | None) -> bool:
+        """Whether the forces would change no more and the prescribed loads are met."""
+        target, free = self._targets(control, trial)
+        if not np.array_equal(target, trial.plane):
+            return False
+        if step is None:
+            return not control.force and not trial.assumed.any()
+        force = float(trial.response.force[0])
+        scale = force * np.array([1.0, self._half, self._half])
+        excess = np.abs(self._excess(control, trial)) / scale
+        change = float(np.abs(step[1]).sum()) / force
+        return change <= self._tolerance and bool(np.all(excess[free] <= self._tolerance))
+
+    def _next(
+        self, control: Control, trial: _Trial, step: tuple[Array, Array] | None, count: int
+    ) -> _Trial:
+        """Press where the Newton step leads, within bounds."""
+        if step is None:
+            return self._sought(control, trial, count)
+        total = float(trial.found.sum())
+        if count == 1 and not trial.assumed.any():
+            level = self._level(control, trial)
+            if level is not None:
+                return level
+        forces = trial.found + step[1]
+        ratio = float(forces.sum()) / total
+        if not _SMALLEST <= ratio <= 1.0 / _SMALLEST:
+            part = float(np.clip(ratio, _SMALLEST, 1.0 / _SMALLEST) - 1.0) / (ratio - 1.0)
+            forces = trial.found + part * step[1]
+            _, free = self._targets(control, trial)
+            step[0][free] *= part
+        return self._pressed(trial.plane + step[0], forces, trial)
+
+    def _sought(self, control: Control, trial: _Trial, count: int) -> _Trial:
+        """Press nearer, as there was no contact: with less sag, then by a lower plane."""
+        plane, _ = self._targets(control, trial)
+        if not trial.assumed.any() and control.force:
+            reach = control.force / (self._model.contact_modulus * self._half)
+            plane[0] += reach * 2.0**count
+        less = 0.5 * trial.assumed if count < _MOST // 4 else np.zeros_like(trial.assumed)
+        return self._pressed(plane, less, trial)
+
+    def _level(self, control: Control, trial: _Trial) -> _Trial | None:
+        """Press by the law P ~ h^(3/2) of all contacts as one; None where it says nothing."""
+        found = trial.found
+        total = float(found.sum())
+        mean = float(found @ self._yielding @ found) / total**2
+        depth = _POWER * total / float(self._stiffness.estimate(trial.response).sum())
+        plane = trial.plane.copy()
+        if control.force:
+            part = (control.force / total) ** (1.0 / _POWER)
+            plane[0] += (part - 1.0) * depth + mean * control.force
+        elif mean > 0.0:
+            part = brentq(lambda t: t * depth + mean * total * t**_POWER - depth, 0.0, 1.0)
+        else:
+            return None
+        return self._pressed(plane, found * part**_POWER, trial)
+
+    def _pressed(self, plane: Array, assumed: Array, before: _Trial | None) -> _Trial:
+        """Press the micro model on rank 0, the sag by assumed forces."""
+        loads = self._correction.loads
+        rigid = self._rigid(plane, assumed)
+        start = None if before is None else before.start
+        kept: list[Any] = [None]
+
+        def work() -> Response:
+            zeros = np.zeros(loads.count)
+            response, kept[0] = self._model.press(
+                rigid, patches=loads, mean_heights=zeros, start=start
+            )
+            return response
+
+        response = on_root(self._comm, work)
+        local = self._shape @ plane - self._yielding @ assumed
+        return _Trial(plane=plane, assumed=assumed, local=local, response=response, start=kept[0])
+
+    def _rigid(self, plane: Array, assumed: Array) -> RigidPlane:
         return RigidPlane(
             approach=float(plane[0]),
             tilt=(float(plane[1]), float(plane[2])),
-            centre=(float(middle[0]), float(middle[1])),
-            sag=self._correction.sag(forces),
+            centre=(float(self._middle[0]), float(self._middle[1])),
+            sag=self._correction.sag(assumed) if assumed.any() else None,
         )
 
-    def _pressed(self, rigid: RigidPlane, patches: PatchGrid, mean_heights: Array) -> Response:
-        response, self._start = self._model.press(
-            rigid, patches=patches, mean_heights=mean_heights, start=self._start
+    def _accepted(self, trial: _Trial, count: int) -> LoadStep:
+        """Sum the solution over the scene's patches."""
+        rigid = self._rigid(trial.plane, trial.assumed)
+
+        def work() -> tuple[Response, Array]:
+            response = self._model.press(
+                rigid, patches=self._patches, mean_heights=self._heights, start=trial.start
+            ).response
+            return response, rigid.means(self._patches) - response.patch_displacement[0]
+
+        response, closure = on_root(self._comm, work)
+        return response_step(
+            response, self._patches, plane=trial.plane, closure=closure, iterations=count
         )
-        return response
-
-
-class _Anderson:
-    """Anderson's acceleration of a fixed-point iteration x = g(x)."""
-
-    def __init__(self, memory: int) -> None:
-        self._memory = memory
-        self._tried: list[Array] = []
-        self._found: list[Array] = []
-
-    def next(self, tried: Array, found: Array) -> Array:
-        """Return the next x from all pairs (x, g(x)) so far."""
-        self._tried = [*self._tried, tried][-self._memory :]
-        self._found = [*self._found, found][-self._memory :]
-        if len(self._tried) == 1:
-            return found
-        values = np.array(self._found)
-        misses = values - np.array(self._tried)
-        share, *_ = np.linalg.lstsq(np.diff(misses, axis=0).T, misses[-1], rcond=1e-10)
-        return np.asarray(found - share @ np.diff(values, axis=0))
