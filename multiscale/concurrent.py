@@ -23,9 +23,10 @@ from multiscale.loading import described
 Array = NDArray[np.float64]
 
 _MOST = 40
-_POWER = 1.5  # of Hertz
-_KEPT = 12  # secants, over load steps too
-_SMALLEST = 0.1  # of the force found, or its inverse: how far one step may go
+_POWER = 1.5  # exponent of Hertz' law
+_COARSE = 3  # presses that may bring a prescribed force within a factor of two
+_KEPT = 6  # secants, over load steps too
+_FARTHEST = 1.0  # of the contacts' depth, that one step may change any local approach
 
 
 class SmoothCorrection(Protocol):
@@ -215,18 +216,22 @@ class ConcurrentCoupling:
         if step is None:
             return self._sought(control, trial, count)
         total = float(trial.found.sum())
-        if count == 1 and not trial.assumed.any():
+        force = control.force or total
+        rough = count <= _COARSE and not 0.5 <= total / force <= 2.0
+        if not trial.assumed.any() or rough:
             level = self._level(control, trial)
             if level is not None:
                 return level
-        forces = trial.found + step[1]
-        ratio = float(forces.sum()) / total
-        if not _SMALLEST <= ratio <= 1.0 / _SMALLEST:
-            part = float(np.clip(ratio, _SMALLEST, 1.0 / _SMALLEST) - 1.0) / (ratio - 1.0)
-            forces = trial.found + part * step[1]
-            _, free = self._targets(control, trial)
-            step[0][free] *= part
-        return self._pressed(trial.plane + step[0], forces, trial)
+        turn, lag = step[0], trial.found + step[1] - trial.assumed
+        change = np.abs(self._shape @ turn - self._yielding @ lag).max()
+        part = min(1.0, _FARTHEST * self._depth(trial) / change) if change > 0.0 else 1.0
+        plane = trial.plane + np.where(self._targets(control, trial)[1], part, 1.0) * turn
+        return self._pressed(plane, trial.assumed + part * lag, trial)
+
+    def _depth(self, trial: _Trial) -> float:
+        """Return the depth of all contacts taken as one [mm]."""
+        stiffness = self._stiffness.estimate(trial.response).sum()
+        return _POWER * float(trial.found.sum() / stiffness)
 
     def _sought(self, control: Control, trial: _Trial, count: int) -> _Trial:
         """Press nearer, as there was no contact: with less sag, then by a lower plane."""
@@ -239,16 +244,16 @@ class ConcurrentCoupling:
 
     def _level(self, control: Control, trial: _Trial) -> _Trial | None:
         """Press by the law P ~ h^(3/2) of all contacts as one; None where it says nothing."""
-        found = trial.found
+        found, depth = trial.found, self._depth(trial)
         total = float(found.sum())
-        mean = float(found @ self._yielding @ found) / total**2
-        depth = _POWER * total / float(self._stiffness.estimate(trial.response).sum())
+        mean = float(found @ self._yielding @ found) / total
+        known = float(found @ self._yielding @ trial.assumed) / total
         plane = trial.plane.copy()
         if control.force:
             part = (control.force / total) ** (1.0 / _POWER)
-            plane[0] += (part - 1.0) * depth + mean * control.force
-        elif mean > 0.0:
-            part = brentq(lambda t: t * depth + mean * total * t**_POWER - depth, 0.0, 1.0)
+            plane[0] += (part - 1.0) * depth + mean * part**_POWER - known
+        elif mean > known:
+            part = brentq(lambda t: t * depth + mean * t**_POWER - depth - known, 0.0, 1.0)
         else:
             return None
         return self._pressed(plane, found * part**_POWER, trial)

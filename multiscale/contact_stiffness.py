@@ -16,7 +16,7 @@ Secant = tuple[Array, Array]
 """Change of the local approaches [mm] and the change of the forces with it [N], (M,) each."""
 
 _LEAST_OWN = 1.05  # of a rectangle's mean compliance: its contacts are softer than all of it
-_INDEPENDENT = 1e-3  # part of a secant that the later ones must leave over for it to be heard
+_LEAST_WORK = 1e-2  # of that expected, which a secant must do to be heard
 
 
 class ContactStiffness:
@@ -56,24 +56,22 @@ class ContactStiffness:
 
 
 def corrected(stiffness: Array, secants: Sequence[Secant]) -> Array:
-    """Return the stiffness changed least so that it meets the secants, the latest first.
+    """Return the stiffness changed to meet the latest secant, and the earlier ones nearly.
 
-    A secant that hardly differs from a combination of later ones is left out.
+    The forces derive from a convex energy: the stiffness stays symmetric and semi-definite.
 
     Args:
         stiffness: An estimate, shape (M, M) [N/mm].
         secants: Secants, the earliest first.
 
     Source:
-        Fang & Saad 2009, doi 10.1002/nla.617, section 2 (multisecant updates).
+        Nocedal & Wright 2006, doi 10.1007/978-0-387-40065-5, eq. 6.19 (BFGS).
     """
     result = stiffness.copy()
-    basis: list[Array] = []
-    for change, force in reversed(secants):
-        rest = change - sum((b * (b @ change) for b in basis), np.zeros_like(change))
-        rest -= sum((b * (b @ rest) for b in basis), np.zeros_like(change))
-        if np.linalg.norm(rest) <= _INDEPENDENT * np.linalg.norm(change):
+    for change, force in secants:
+        expected = result @ change
+        before, now = float(change @ expected), float(change @ force)
+        if before <= 0.0 or now <= _LEAST_WORK * before:
             continue
-        result += np.outer(force - result @ change, rest) / (rest @ change)
-        basis.append(rest / np.linalg.norm(rest))
+        result += np.outer(force, force) / now - np.outer(expected, expected) / before
     return result
