@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from geometry.collective import on_root
 from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
-from micro import MicroModel, Response, RigidPlane
+from micro import MicroModel
 from multiscale.contact_stiffness import ContactStiffness, Secant, corrected
-from multiscale.coupling import response_step
 from multiscale.history import LoadStep
 from multiscale.loading import described
+from multiscale.sagging import SaggingContact, SmoothCorrection, Trial
 
 Array = NDArray[np.float64]
 
@@ -26,33 +23,8 @@ _MOST = 40
 _POWER = 1.5  # exponent of Hertz' law
 _COARSE = 3  # presses that may bring a prescribed force within a factor of two
 _KEPT = 6  # secants, over load steps too
+_CLEAR = 1e-12  # of contact, where no force is wanted [mm]
 _FARTHEST = 1.0  # of the contacts' depth, that one step may change any local approach
-
-
-class SmoothCorrection(Protocol):
-    """What a block's surface yields beyond the half-space."""
-
-    @property
-    def loads(self) -> PatchGrid:
-        """The M rectangles whose forces drive it."""
-
-    def sag(self, forces: Array) -> Callable[[Array, Array], Array]:
-        """Return the displacement (x, y) → [mm], linear in the forces (M,) [N]."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Trial:
-    """The micro model under one plane: forces assumed for the sag, and forces found."""
-
-    plane: Array
-    assumed: Array
-    local: Array
-    response: Response
-    start: Any
-
-    @property
-    def found(self) -> Array:
-        return np.asarray(self.response.patch_force[0])
 
 
 class ConcurrentCoupling:
@@ -87,17 +59,12 @@ class ConcurrentCoupling:
     ) -> None:
         if not tolerance > 0.0:
             raise InputError("the tolerance must be positive", value=tolerance, allowed="> 0")
-        self._model, self._patches, self._heights = model, patches, mean_heights
-        self._correction, self._tolerance, self._comm = correction, tolerance, comm
+        self._model, self._tolerance = model, tolerance
+        self._contact = SaggingContact(model, patches, mean_heights, correction, comm)
         loads = correction.loads
-        self._middle = np.asarray(loads.origin) + 0.5 * np.asarray(loads.lengths)
-        self._shape = np.column_stack([np.ones(loads.count), loads.centres - self._middle])
         self._half = 0.5 * float(np.hypot(*loads.lengths))
-        x, y = loads.centres.T
-        units = np.eye(loads.count)
-        self._yielding = np.column_stack([correction.sag(unit)(x, y) for unit in units])
         self._stiffness = ContactStiffness(loads, model.contact_modulus)
-        self._last: _Trial | None = None
+        self._last: Trial | None = None
         self._secants: tuple[Secant, ...] = ()
 
     def press(self, control: Control) -> LoadStep:
@@ -117,7 +84,7 @@ class ConcurrentCoupling:
         for count in range(1, _MOST + 1):
             step = self._step(control, trial, secants)
             if self._settled(control, trial, step):
-                result = self._accepted(trial, count)
+                result = self._contact.summed(trial, count)
                 self._last, self._secants = trial, tuple(secants[-_KEPT:])
                 return result
             before, trial = trial, self._next(control, trial, step, count)
@@ -132,9 +99,9 @@ class ConcurrentCoupling:
             remedy="take smaller load steps (load.steps)",
         )
 
-    def _first(self, control: Control) -> _Trial:
+    def _first(self, control: Control) -> Trial:
         """Press where the last load step's tangent points, or without any sag."""
-        if self._last is not None and self._last.found.any():
+        if control.force != 0.0 and self._last is not None and self._last.found.any():
             step = self._step(control, self._last, list(self._secants))
             if step is not None:
                 return self._next(control, self._last, step, 2)
@@ -144,11 +111,13 @@ class ConcurrentCoupling:
             approach = self._model.first_touch
             if control.force:
                 approach += control.force / (self._model.contact_modulus * self._half)
+            else:
+                approach -= self._half * float(np.hypot(*tilt)) + _CLEAR
         plane = np.array([approach, *tilt])
-        return self._pressed(plane, np.zeros(self._correction.loads.count), self._last)
+        return self._contact.press(plane, np.zeros(len(self._contact.shape)), self._last)
 
     def _step(
-        self, control: Control, trial: _Trial, secants: list[Secant]
+        self, control: Control, trial: Trial, secants: list[Secant]
     ) -> tuple[Array, Array] | None:
         """Return the Newton step of plane and forces, from the forces found; None off contact."""
         found = trial.found
@@ -158,19 +127,22 @@ class ConcurrentCoupling:
         target, free = self._targets(control, trial)
         prescribed = target - trial.plane
         prescribed[free] = 0.0
-        lag = self._yielding @ (found - trial.assumed)
-        rows = self._shape[:, free].T
+        lag = self._contact.yielding @ (found - trial.assumed)
+        rows = self._contact.shape[:, free].T
         matrix = np.block(
             [
                 [
-                    np.eye(found.size) + stiffness @ self._yielding,
-                    -stiffness @ self._shape[:, free],
+                    np.eye(found.size) + stiffness @ self._contact.yielding,
+                    -stiffness @ self._contact.shape[:, free],
                 ],
                 [rows, np.zeros((rows.shape[0], rows.shape[0]))],
             ]
         )
         right = np.concatenate(
-            [stiffness @ (self._shape @ prescribed - lag), -self._excess(control, trial)[free]]
+            [
+                stiffness @ (self._contact.shape @ prescribed - lag),
+                -self._excess(control, trial)[free],
+            ]
         )
         try:
             solution = np.linalg.solve(matrix, right)
@@ -179,7 +151,7 @@ class ConcurrentCoupling:
         prescribed[free] = solution[found.size :]
         return prescribed, solution[: found.size]
 
-    def _targets(self, control: Control, trial: _Trial) -> tuple[Array, NDArray[np.bool_]]:
+    def _targets(self, control: Control, trial: Trial) -> tuple[Array, NDArray[np.bool_]]:
         """Return the prescribed plane and which parts of it are free."""
         target, free = (
             trial.plane.copy(),
@@ -191,12 +163,12 @@ class ConcurrentCoupling:
             target[1:] = control.tilt
         return target, free
 
-    def _excess(self, control: Control, trial: _Trial) -> Array:
+    def _excess(self, control: Control, trial: Trial) -> Array:
         """Return force and moments beyond those prescribed, shape (3,)."""
         response = trial.response
         return np.array([response.force[0] - (control.force or 0.0), *response.moment[0]])
 
-    def _settled(self, control: Control, trial: _Trial, step: tuple[Array, Array] | None) -> bool:
+    def _settled(self, control: Control, trial: Trial, step: tuple[Array, Array] | None) -> bool:
         """Whether the forces would change no more and the prescribed loads are met."""
         target, free = self._targets(control, trial)
         if not np.array_equal(target, trial.plane):
@@ -210,8 +182,8 @@ class ConcurrentCoupling:
         return change <= self._tolerance and bool(np.all(excess[free] <= self._tolerance))
 
     def _next(
-        self, control: Control, trial: _Trial, step: tuple[Array, Array] | None, count: int
-    ) -> _Trial:
+        self, control: Control, trial: Trial, step: tuple[Array, Array] | None, count: int
+    ) -> Trial:
         """Press where the Newton step leads, within bounds."""
         if step is None:
             return self._sought(control, trial, count)
@@ -223,31 +195,31 @@ class ConcurrentCoupling:
             if level is not None:
                 return level
         turn, lag = step[0], trial.found + step[1] - trial.assumed
-        change = np.abs(self._shape @ turn - self._yielding @ lag).max()
+        change = np.abs(self._contact.shape @ turn - self._contact.yielding @ lag).max()
         part = min(1.0, _FARTHEST * self._depth(trial) / change) if change > 0.0 else 1.0
         plane = trial.plane + np.where(self._targets(control, trial)[1], part, 1.0) * turn
-        return self._pressed(plane, trial.assumed + part * lag, trial)
+        return self._contact.press(plane, trial.assumed + part * lag, trial)
 
-    def _depth(self, trial: _Trial) -> float:
+    def _depth(self, trial: Trial) -> float:
         """Return the depth of all contacts taken as one [mm]."""
         stiffness = self._stiffness.estimate(trial.response).sum()
         return _POWER * float(trial.found.sum() / stiffness)
 
-    def _sought(self, control: Control, trial: _Trial, count: int) -> _Trial:
+    def _sought(self, control: Control, trial: Trial, count: int) -> Trial:
         """Press nearer, as there was no contact: with less sag, then by a lower plane."""
         plane, _ = self._targets(control, trial)
         if not trial.assumed.any() and control.force:
             reach = control.force / (self._model.contact_modulus * self._half)
             plane[0] += reach * 2.0**count
         less = 0.5 * trial.assumed if count < _MOST // 4 else np.zeros_like(trial.assumed)
-        return self._pressed(plane, less, trial)
+        return self._contact.press(plane, less, trial)
 
-    def _level(self, control: Control, trial: _Trial) -> _Trial | None:
+    def _level(self, control: Control, trial: Trial) -> Trial | None:
         """Press by the law P ~ h^(3/2) of all contacts as one; None where it says nothing."""
         found, depth = trial.found, self._depth(trial)
         total = float(found.sum())
-        mean = float(found @ self._yielding @ found) / total
-        known = float(found @ self._yielding @ trial.assumed) / total
+        mean = float(found @ self._contact.yielding @ found) / total
+        known = float(found @ self._contact.yielding @ trial.assumed) / total
         plane = trial.plane.copy()
         if control.force:
             part = (control.force / total) ** (1.0 / _POWER)
@@ -256,45 +228,4 @@ class ConcurrentCoupling:
             part = brentq(lambda t: t * depth + mean * t**_POWER - depth - known, 0.0, 1.0)
         else:
             return None
-        return self._pressed(plane, found * part**_POWER, trial)
-
-    def _pressed(self, plane: Array, assumed: Array, before: _Trial | None) -> _Trial:
-        """Press the micro model on rank 0, the sag by assumed forces."""
-        loads = self._correction.loads
-        rigid = self._rigid(plane, assumed)
-        start = None if before is None else before.start
-        kept: list[Any] = [None]
-
-        def work() -> Response:
-            zeros = np.zeros(loads.count)
-            response, kept[0] = self._model.press(
-                rigid, patches=loads, mean_heights=zeros, start=start
-            )
-            return response
-
-        response = on_root(self._comm, work)
-        local = self._shape @ plane - self._yielding @ assumed
-        return _Trial(plane=plane, assumed=assumed, local=local, response=response, start=kept[0])
-
-    def _rigid(self, plane: Array, assumed: Array) -> RigidPlane:
-        return RigidPlane(
-            approach=float(plane[0]),
-            tilt=(float(plane[1]), float(plane[2])),
-            centre=(float(self._middle[0]), float(self._middle[1])),
-            sag=self._correction.sag(assumed) if assumed.any() else None,
-        )
-
-    def _accepted(self, trial: _Trial, count: int) -> LoadStep:
-        """Sum the solution over the scene's patches."""
-        rigid = self._rigid(trial.plane, trial.assumed)
-
-        def work() -> tuple[Response, Array]:
-            response = self._model.press(
-                rigid, patches=self._patches, mean_heights=self._heights, start=trial.start
-            ).response
-            return response, rigid.means(self._patches) - response.patch_displacement[0]
-
-        response, closure = on_root(self._comm, work)
-        return response_step(
-            response, self._patches, plane=trial.plane, closure=closure, iterations=count
-        )
+        return self._contact.press(plane, found * part**_POWER, trial)

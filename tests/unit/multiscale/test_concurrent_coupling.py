@@ -88,3 +88,11 @@ def test_a_failure_leaves_the_coupling_as_it_was(monkeypatch):
 def test_a_tolerance_must_be_positive():
     with pytest.raises(InputError, match="the tolerance must be positive"):
         coupling(0.0, tolerance=0.0)
+
+
+@pytest.mark.parametrize("tilt", [(0.0, 0.0), (0.01, 0.0), None])
+def test_without_force_nothing_touches(tilt):
+    pressed = coupling(1e-3)
+    pressed.press(Control(force=1.0))
+    step = pressed.press(Control(force=0.0, tilt=tilt))
+    assert (step.force_N, step.contacts) == (0.0, 0)
