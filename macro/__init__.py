@@ -6,8 +6,10 @@ BlockShape → block_mesh → Block (with a Material) → Interface (with a Patc
 
 from macro.block import Block
 from macro.compliance import plain_compliance
+from macro.correction import Correction, HalfSpaceField, Sag, make_correction
 from macro.elasticity import Material
 from macro.interface import ContactLaw, Interface
+from macro.kept import cached_correction
 from macro.mesh import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
 from macro.output import write_fields
 from macro.pressed import PressedBlock, PressState
@@ -19,11 +21,16 @@ __all__ = [
     "Block",
     "BlockMesh",
     "ContactLaw",
+    "Correction",
+    "HalfSpaceField",
     "Interface",
     "Material",
     "PressState",
     "PressedBlock",
+    "Sag",
     "block_mesh",
+    "cached_correction",
+    "make_correction",
     "plain_compliance",
     "write_fields",
 ]

@@ -2,33 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from geometry.collective import together
 from macro.block import Block
-from macro.interface import ContactLaw, Sampling
+from macro.contact import Contact
+from macro.interface import Sampling
 
 Array = NDArray[np.float64]
 
 
 class Equilibrium:
-    """The equations K u = B p(δ − Bᵀu / w) for given rigid approaches δ of the samples.
+    """The equations K u = B p(c(u)) of a block in contact with a rigid plane.
 
-    The residual K u − B p is the gradient of a convex energy when no law softens. Its derivative
-    K + B diag(p'/w) Bᵀ is applied without being assembled: B has few columns (patches) or few
-    rows (nodes of the interface) with entries.
+    Closures are c = δ − Bᵀu / w; what of the plane's approaches δ is not prescribed follows from u
+    (see `Contact`). The residual K u − B p is the gradient of a convex energy when no law softens.
+    Its derivative K + B (diag(p'/w) − E Eᵀ) Bᵀ is applied without being assembled: B has few
+    columns (patches) or few rows (nodes of the interface) with entries, E a column for every motion
+    of the plane that follows from u. It lies between K and the derivative under a fixed plane.
 
     Args:
         block: The elastic block.
         sampling: Where the laws are evaluated.
-        laws: One law per patch, the same on every rank.
+        contact: The laws and the plane.
 
     Attributes:
-        approach: Rigid approach at this rank's samples, shape (n,) [mm]; set it before a solve.
         tangent: The derivative at the displacement last given to ``update_tangent``, a PETSc
             matrix without entries.
         scale: Norm of the interface's load at the displacement last given to ``residual`` [N].
@@ -37,9 +37,8 @@ class Equilibrium:
         Every method is collective.
     """
 
-    def __init__(self, block: Block, sampling: Sampling, laws: Sequence[ContactLaw]) -> None:
-        self.block, self._sampling, self._laws = block, sampling, laws
-        self.approach: Array = np.zeros(len(sampling.weight))
+    def __init__(self, block: Block, sampling: Sampling, contact: Contact) -> None:
+        self.block, self.contact, self._sampling = block, contact, sampling
         self.scale = 0.0
         stiffness = block.stiffness
         self._load = stiffness.createVecLeft()
@@ -51,20 +50,9 @@ class Equilibrium:
         self.tangent.setUp()
 
     def closure(self, displacement: PETSc.Vec) -> Array:
-        """Return the closures of this rank's samples, shape (n,) [mm]."""
+        """Balance the plane, and return the closures of this rank's samples, shape (n,) [mm]."""
         self._sampling.operator.multTranspose(displacement, self._samples)
-        return self.approach - self._samples.array_r / self._sampling.weight
-
-    def pressure(self, closure: Array) -> Array:
-        """Return the laws' pressures at this rank's samples, shape (n,) [MPa].
-
-        What a law raises on one rank is raised on all.
-        """
-        return together(self.block.mesh.comm, lambda: self._sampling.pressure(self._laws, closure))
-
-    def stiffness(self, closure: Array) -> Array:
-        """Return the laws' stiffnesses dp/dc likewise, shape (n,) [MPa/mm]."""
-        return together(self.block.mesh.comm, lambda: self._sampling.stiffness(self._laws, closure))
+        return self.contact.closure(self._samples.array_r / self._sampling.weight)
 
     def residual(self, displacement: PETSc.Vec, residual: PETSc.Vec) -> None:
         """Write the residual K u − B p(closure(u)) at a displacement u.
@@ -73,8 +61,7 @@ class Equilibrium:
             displacement: u [mm].
             residual: Receives the residual [N].
         """
-        pressure = self.pressure(self.closure(displacement))
-        self._samples.array[:] = pressure
+        self._samples.array[:] = self.contact.pressure(self.closure(displacement))
         self._sampling.operator.mult(self._samples, self._load)
         self.scale = self._load.norm()
         self.block.stiffness.mult(displacement, residual)
@@ -82,8 +69,9 @@ class Equilibrium:
 
     def update_tangent(self, displacement: PETSc.Vec) -> None:
         """Move the tangent to a displacement."""
-        stiffness = self.stiffness(self.closure(displacement))
-        self._action.slope.array[:] = stiffness / self._sampling.weight
+        stiffness = self.contact.stiffness(self.closure(displacement))
+        self._action.slope = stiffness / self._sampling.weight
+        self._action.border = self.contact.border(stiffness)
 
 
 class _TangentAction:
@@ -94,14 +82,20 @@ class _TangentAction:
 
     def __init__(self, stiffness: PETSc.Mat, sampling: Sampling) -> None:
         self._stiffness, self._operator = stiffness, sampling.operator
-        self.slope = sampling.operator.createVecRight()  # p'/w
-        self._stretch = self.slope.duplicate()
+        self._comm = stiffness.comm.tompi4py()
+        self._stretch = sampling.operator.createVecRight()
+        self.slope = np.zeros(len(sampling.weight))  # p'/w
+        self.border = np.zeros((len(sampling.weight), 0))  # E
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Write K x + B diag(p'/w) Bᵀ x."""
+        """Write K x + B (diag(p'/w) − E Eᵀ) Bᵀ x."""
         self._stiffness.mult(x, y)
         self._operator.multTranspose(x, self._stretch)
-        self._stretch.pointwiseMult(self._stretch, self.slope)
+        stretch = self._stretch.array_r
+        pressure = self.slope * stretch
+        if self.border.shape[1]:
+            pressure -= self.border @ self._comm.allreduce(self.border.T @ stretch, op=MPI.SUM)
+        self._stretch.array[:] = pressure
         self._operator.multAdd(self._stretch, y, y)
 
     multTranspose = mult

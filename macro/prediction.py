@@ -68,7 +68,7 @@ class DisplacementBasis:
         self._sampled = np.vstack([self._sampled, sampled.array_r])[first:]
 
     def start(self, into: PETSc.Vec) -> None:
-        """Write the state of least energy in the basis at the equilibrium's approach."""
+        """Write the state of least energy in the basis under what is prescribed of the plane."""
         into.array[:] = self._coefficients() @ self._vectors
 
     def _coefficients(self) -> Array:
@@ -92,13 +92,17 @@ class DisplacementBasis:
 
     def _projected(self, y: Array) -> tuple[Array, Array]:
         """Return the equilibrium's residual and tangent in the basis."""
-        weight, columns = self._sampling.weight, self._sampled
-        closure = self._equilibrium.approach - (y @ columns) / weight
-        pressure = self._equilibrium.pressure(closure)
-        stiffness = self._equilibrium.stiffness(closure)
-        parts = np.vstack([-columns @ pressure, (columns * (stiffness / weight)) @ columns.T])
+        contact, weight, columns = self._equilibrium.contact, self._sampling.weight, self._sampled
+        closure = contact.closure((y @ columns) / weight)
+        pressure, stiffness = contact.pressure(closure), contact.stiffness(closure)
+        parts = np.vstack([
+            -columns @ pressure,
+            (columns * (stiffness / weight)) @ columns.T,
+            (columns @ contact.border(stiffness)).T,
+        ])  # fmt: skip
         parts = self._sum(parts)
-        return y + parts[0], np.eye(len(y)) + parts[1:]
+        stiff, border = parts[1 : len(y) + 1], parts[len(y) + 1 :]
+        return y + parts[0], np.eye(len(y)) + stiff - border.T @ border
 
     def _sum(self, values: Any) -> Any:
         return self._comm.allreduce(values, op=MPI.SUM)

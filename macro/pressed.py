@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.collective import together
+from geometry.control import Control
 from geometry.errors import InputError
 from macro.block import Block
+from macro.contact import Contact
 from macro.equilibrium import Equilibrium
 from macro.interface import ContactLaw, Interface, Mode
 from macro.newton import NewtonReport, NewtonSolver
@@ -24,14 +26,17 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PressState:
-    """Equilibrium of the block at one approach; the same on every rank but for the displacement.
+    """Equilibrium of the block at one load step; the same on every rank but for the displacement.
 
     Args:
-        approach: Approach of the rigid plane at the middle of the interface [mm].
+        approach: Approach of the rigid plane at the middle of the patches [mm].
+        tilt: Change of the approach along x and y [mm/mm].
         displacement: This rank's owned displacements, dof by dof [mm].
         closure: Mean closure of the patches, shape (N,) [mm].
         pressure: Mean pressure of the patches, shape (N,) [MPa].
         force: Force on the interface [N].
+        moment: First moments of the pressures along x and y, about the middle of the patches,
+            shape (2,) [N mm].
         reaction: Force that the bottom bears [N]; equals ``force`` in equilibrium.
         newton_iterations: Newton steps.
         linear_iterations: Iterations of the linear solver, all Newton steps together.
@@ -42,10 +47,12 @@ class PressState:
     """
 
     approach: float
+    tilt: tuple[float, float]
     displacement: Array
     closure: Array
     pressure: Array
     force: float
+    moment: Array
     reaction: float
     newton_iterations: int
     linear_iterations: int
@@ -55,8 +62,10 @@ class PressState:
 
 
 class PressedBlock:
-    """A block under a rigid plane, solved for one approach after the other by Newton's method.
+    """A block under a rigid plane, solved for one load step after the other by Newton's method.
 
+    The plane's approach or force, and its tilt or no moment, are prescribed: both ways are one
+    Newton's method in the displacements, with as many linear solves.
     The tangent is the exact derivative; conjugate gradients are preconditioned by the multigrid of
     the block alone, which is made once. A load step starts from the best combination of all
     earlier solutions.
@@ -87,36 +96,38 @@ class PressedBlock:
                 "every patch needs a law", value=len(laws), allowed=f"{interface.patches.count}"
             )
         self._interface, self._sampling = interface, interface.sampling(mode)
-        self.equilibrium = Equilibrium(block, self._sampling, laws)
+        contact = Contact(interface, self._sampling, laws)
+        self.equilibrium = Equilibrium(block, self._sampling, contact)
         self.newton = NewtonSolver(self.equilibrium, block.solver)
         self._basis = DisplacementBasis(self.equilibrium, self._sampling)
+        self._plane: Array = np.zeros(3)
         self._closure: Array = np.zeros(len(self._sampling.weight))
 
-    def press(self, approach: float, tilt: tuple[float, float] = (0.0, 0.0)) -> PressState:
-        """Find the equilibrium at an approach.
+    def press(self, control: Control) -> PressState:
+        """Find the equilibrium of one load step.
+
+        A force and a moment of zero are met to `macro.settle.TOLERANCE`. Without any force the
+        plane just touches the highest patch, as it is tilted or was last.
 
         Args:
-            approach: Approach of the plane at the middle of the patches [mm].
-            tilt: Change of the approach along x and y [mm/mm].
+            control: What is prescribed of the plane.
 
         Raises:
-            NotConverged: When Newton's method fails; the earlier solutions stay what they were,
-                so that a smaller step can be tried.
+            NotConverged: When Newton's method fails, or nothing can hold the plane; the earlier
+                solutions stay what they were, so that a smaller step can be tried.
         """
         began = time.perf_counter()
         equilibrium = self.equilibrium
-        equilibrium.approach = self._rigid_approach(approach, tilt)
+        equilibrium.contact.prescribe(control, self._plane)
         solution = equilibrium.block.stiffness.createVecRight()
         self._basis.start(solution)
         report = self.newton.solve(
-            solution,
-            what=f"the block at an approach of {approach:g} mm",
-            remedy="take more load steps (load.steps)",
+            solution, what=_described(control), remedy="take more load steps (load.steps)"
         )
         self._basis.add(solution)
         comm = equilibrium.block.mesh.comm
         seconds = comm.allreduce(time.perf_counter() - began, op=MPI.MAX)
-        return self._state(approach, solution, report, seconds)
+        return self._state(solution, report, seconds)
 
     def patch_means(self, functions: Sequence[Callable[[Array], Array]]) -> Array:
         """Average functions of closure over the patches, at the latest equilibrium.
@@ -137,24 +148,21 @@ class PressedBlock:
         values = together(comm, lambda: sampling.by_patch(functions, self._closure))
         return sampling.patch_sums(values) / self._interface.areas
 
-    def _rigid_approach(self, approach: float, tilt: tuple[float, float]) -> Array:
-        """Return the plane's approach at this rank's samples, shape (n,) [mm]."""
-        patches, sampling = self._interface.patches, self._sampling
-        middle = np.add(patches.origin, np.multiply(0.5, patches.lengths))
-        return approach + tilt[0] * (sampling.x - middle[0]) + tilt[1] * (sampling.y - middle[1])
-
-    def _state(
-        self, approach: float, solution: PETSc.Vec, report: NewtonReport, wall_s: float
-    ) -> PressState:
+    def _state(self, solution: PETSc.Vec, report: NewtonReport, wall_s: float) -> PressState:
+        contact, sampling = self.equilibrium.contact, self._sampling
         self._closure = closure = self.equilibrium.closure(solution)
-        forces = self._sampling.patch_sums(self.equilibrium.pressure(closure))
+        self._plane = plane = contact.plane.copy()
+        pressure = contact.pressure(closure)
+        forces, load = sampling.patch_sums(pressure), contact.loads(pressure)
         areas = self._interface.areas
         return PressState(
-            approach=approach,
+            approach=float(plane[0]),
+            tilt=(float(plane[1]), float(plane[2])),
             displacement=solution.array_r.copy(),
-            closure=self._sampling.patch_sums(closure) / areas,
+            closure=sampling.patch_sums(closure) / areas,
             pressure=forces / areas,
             force=float(forces.sum()),
+            moment=load[1:],
             reaction=self.equilibrium.block.reaction(solution),
             newton_iterations=report.iterations,
             linear_iterations=report.linear_iterations,
@@ -162,3 +170,9 @@ class PressedBlock:
             reason=report.reason,
             wall_s=wall_s,
         )
+
+
+def _described(control: Control) -> str:
+    if control.force is not None:
+        return f"the block under a force of {control.force:g} N"
+    return f"the block at an approach of {control.approach:g} mm"

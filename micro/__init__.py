@@ -8,6 +8,7 @@ of pressure move the half-space.
 
 from micro.asperity_models import MODELS, SOLVERS, AsperityModel, ModelKind, asperity_model
 from micro.asperity_state import AsperityState
+from micro.boussinesq import HalfSpace
 from micro.contacts import Contacts, find_contacts
 from micro.ellipse import (
     area_factor,
@@ -41,6 +42,7 @@ __all__ = [
     "AsperityState",
     "Contacts",
     "Field",
+    "HalfSpace",
     "HalfSpaceModel",
     "HalfSpaceState",
     "HertzContact",

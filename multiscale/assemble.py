@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from multiscale.blocks import embedding, patch_compliance, smooth_correction
 from multiscale.concurrent import ConcurrentCoupling
@@ -30,9 +31,20 @@ def make_table(stage: Stage, comm: Any) -> LawTable:
         stage: The scene's ingredients.
         comm: MPI communicator; None for this process alone.
 
+    Raises:
+        InputError: When the coupling has no laws.
+
     Note:
         Collective.
     """
+    if stage.scene.coupling.kind == "concurrent":
+        raise InputError(
+            "has no laws",
+            key="coupling.kind",
+            value="concurrent",
+            allowed="isolated, consistent",
+            file=stage.scene.file,
+        )
     if stage.scene.coupling.kind == "consistent":
         return consistent_laws(
             stage.model,
@@ -91,4 +103,6 @@ def _concurrent(stage: Stage, comm: Any) -> Coupling:
     nx, ny = (count * -(-_LOADS // count) for count in stage.patches.grid)
     loads = PatchGrid(grid=(nx, ny), lengths=stage.patches.lengths)
     correction = smooth_correction(stage, loads, comm)
-    return ConcurrentCoupling(stage.model, stage.patches, stage.mean_heights, correction)
+    return ConcurrentCoupling(
+        stage.model, stage.patches, stage.mean_heights, correction, comm=comm
+    )

@@ -12,9 +12,8 @@ from micro import influence_matrix
 from multiscale.stage import Stage
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro.correction import Correction
-
     from macro import Interface
+    from macro.correction import Correction
 
 Array = NDArray[np.float64]
 
@@ -70,11 +69,11 @@ def smooth_correction(stage: Stage, loads: PatchGrid, comm: Any) -> Correction:
     Note:
         Collective.
     """
-    from macro.correction import make_correction
-    from micro.boussinesq import HalfSpace
     from mpi4py import MPI
 
     from macro import Material
+    from macro.correction import make_correction
+    from micro.boussinesq import HalfSpace
 
     e, nu = stage.scene.block.young_modulus, stage.scene.block.poisson_ratio
     return make_correction(

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 _FIRST_ROWS = 9
 _MOST_ROWS = 400  # solutions of the micro model
-_LEAST_SCALE = 0.01  # of a patch's largest pressure: below it an error counts as one of this much
+_LEAST_SCALE = 0.01  # of the largest pressure: below it an error counts as one of this much
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,7 +68,7 @@ class WholeSurface:
         Args:
             approach_end: Largest approach.
             tolerance: Error of the interpolated pressure half-way between rows, relative to the
-                pressure there, or to a hundredth of the patch's largest where that is more.
+                pressure there, or to a hundredth of the largest on any patch where that is more.
         """
         first = min(self.model.first_touch, approach_end)
         rows = self.rows(np.linspace(first, approach_end, _FIRST_ROWS, dtype=np.float64))
@@ -91,14 +91,11 @@ class WholeSurface:
 
     def _errors(self, laws: list[PatchLaw], new: Array) -> Array:
         """Return the errors of laws at new rows, shape (n, N)."""
-        errors = np.empty((len(new), len(laws)))
-        for index, law in enumerate(laws):
-            approach, pressure = new[:, 0, index], new[:, 2, index]
-            largest = float(law.pressure[-1]) if not law.is_open else float(pressure.max())
-            scale = np.maximum(pressure, _LEAST_SCALE * largest)
-            missing = np.abs(law.along(approach).pressure - pressure)
-            errors[:, index] = np.divide(missing, scale, out=np.zeros_like(scale), where=scale > 0)
-        return errors
+        largest = max((law.pressure[-1] for law in laws if not law.is_open), default=0.0)
+        scale = np.maximum(new[:, 2], _LEAST_SCALE * max(float(largest), float(new[:, 2].max())))
+        made = [law.along(new[:, 0, index]).pressure for index, law in enumerate(laws)]
+        missing = np.abs(np.column_stack(made) - new[:, 2])
+        return np.divide(missing, scale, out=np.zeros_like(missing), where=scale > 0.0)
 
     def _made(self, rows: Array) -> list[PatchLaw]:
         """Return the laws through rows."""

@@ -22,8 +22,6 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
 
 Array = NDArray[np.float64]
 
-_BALANCE = 1e-10  # of a plane on the mesh, whose residual is driven to as much of the load
-
 
 class AnalyticCoupling:
     """The micro model alone: the whole surface on one elastic half-space.
@@ -80,10 +78,6 @@ class EmbeddedCoupling:
     def __init__(self, pressed: PressedBlock, table: LawTable) -> None:
         self._pressed, self._table = pressed, table
         self._last: PressState | None = None
-        self._newton = self._linear = 0
-        half = 0.5 * float(np.hypot(*table.patches.lengths))
-        touch = float(min(law.touch for law in table.laws))
-        self._balance = Balance(half=half, first_touch=touch, tolerance=_BALANCE)
 
     @property
     def displacement(self) -> Array:
@@ -98,26 +92,12 @@ class EmbeddedCoupling:
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `Coupling.press`."""
-        self._newton = self._linear = 0
-        plane, state = self._balance.solve(self._loads, control)
-        step = self._step(control, plane, state)
+        state = self._pressed.press(control)
+        step = self._step(control, state)
         self._last = state
         return step
 
-    def _loads(self, plane: Array) -> tuple[Array, PressState]:
-        """Return force and moments of a plane, and the block's equilibrium."""
-        state = self._pressed.press(float(plane[0]), (float(plane[1]), float(plane[2])))
-        self._newton += state.newton_iterations
-        self._linear += state.linear_iterations
-        return np.array([state.force, *self._moment(state.pressure)]), state
-
-    def _moment(self, pressure: Array) -> Array:
-        """Return the first moments of the patches' forces about the middle, shape (2,) [N mm]."""
-        patches = self._table.patches
-        middle = np.add(patches.origin, np.multiply(0.5, patches.lengths))
-        return patches.area * (patches.centres - middle).T @ pressure
-
-    def _step(self, control: Control, plane: Array, press: PressState) -> LoadStep:
+    def _step(self, control: Control, press: PressState) -> LoadStep:
         """Read area, contacts and separation off the laws at the converged closures."""
         laws = self._table.laws
         try:
@@ -129,14 +109,14 @@ class EmbeddedCoupling:
         contacts = sum(int(law.contacts_at(c, extend=True)) for law, c in mean_closures)
         return embedded_step(
             self._table.patches,
-            approach=plane[0],
-            tilt=plane[1:],
-            moment=self._moment(press.pressure),
+            approach=press.approach,
+            tilt=press.tilt,
+            moment=press.moment,
             force=press.force,
             mean_separation_mm=float(np.mean(gaps)),
             contacts=contacts,
-            newton_iterations=self._newton,
-            linear_iterations=self._linear,
+            newton_iterations=press.newton_iterations,
+            linear_iterations=press.linear_iterations,
             reason=press.reason,
             patches=PatchState(
                 closure_mm=press.closure, pressure_MPa=press.pressure, contact_area_fraction=area

@@ -141,9 +141,10 @@ def _block(stage: Stage) -> str:
     )
     kind = "hexahedra" if shape.element.startswith("Q") else "hexahedra split into tetrahedra"
     way = (
-        "half-space exactly, finite elements for the smooth rest (decomposed): "
+        "decomposed, for contacts feel the half-space's own near field: finite elements only for "
+        "the smooth rest, "
         if stage.scene.coupling.decomposed
-        else "finite elements under the patches: "
+        else "finite elements under the patches, "
     )
     return (
         f"{way}{nx} × {ny} × {nz} {kind} ({shape.element}) under the interface, grading "

@@ -21,6 +21,8 @@ _FIRST_ROWS = 9
 _MOST_ROWS = 400  # solutions of the micro model spent on one law
 _LEAST_SCALE = 0.01  # of the largest pressure: below it an error counts as one of this much
 _MOST_TRIALS = 40  # in search of the approach that gives a closure
+_BEYOND_FALL = 0.25  # of a patch's own displacement, by which a block may be the softer under it
+_UNEVEN = 1e-3  # of the range of closures: a fall below is no fall
 _LOVE = {"mean": love_mean, "centre": love_centre}
 
 
@@ -76,7 +78,7 @@ class IsolatedPatch:
 
         Rows are added half-way between rows until the interpolated pressure agrees there with
         the micro model. Where the law stops being a function of closure (the patch's stiffness
-        dp/dδ exceeds the inverse of its own compliance) the table ends.
+        dp/dδ exceeds the inverse of its own compliance) it goes on over the approach.
 
         Args:
             closure_end: Largest closure that will be asked for [mm].
@@ -95,7 +97,7 @@ class IsolatedPatch:
         rows = self.rows(np.linspace(self.touch, end, _FIRST_ROWS, dtype=np.float64))
         rows[0, 1:] = self.touch, 0.0, 0.0, 0.0, 0.0  # whatever round-off makes of first touch
         rows = _increasing(rows)
-        if len(rows) < 2:
+        if len(rows) < 2 or rows[1, 1] <= rows[0, 1]:
             raise NotConverged(
                 f"the law of the patch at {self.patch.origin} mm",
                 reason="STIFFER_THAN_ITS_HALF_SPACE",
@@ -115,8 +117,9 @@ class IsolatedPatch:
             if reached <= self.touch:
                 break
             approach += 1.05 * (closure - reached) + 1e-3 * closure
-        trials = self.rows(np.linspace(self.touch, closure, _MOST_TRIALS, dtype=np.float64))
-        return float(trials[np.argmax(trials[:, 1]), 0])
+        # closure falls again before it: go as far as the block lets the patch's surface sink
+        pressure = self.rows(np.array([closure]))[0, 2]
+        return float(closure + _BEYOND_FALL * self.compliance * pressure)
 
     def _refined(self, rows: Array, tolerance: float) -> tuple[Array, float]:
         """Halve intervals until the pressure half-way is met within the tolerance."""
@@ -126,9 +129,10 @@ class IsolatedPatch:
         while halfway.size and spent < _MOST_ROWS:
             new = self.rows(halfway)
             spent += len(new)
-            pressure, _ = _law(rows, self.touch, self.reach, 0.0).at(new[:, 1], extend=True)
+            point = _law(rows, self.touch, self.reach, 0.0).along(new[:, 0])
             scale = np.maximum(new[:, 2], _LEAST_SCALE * rows[-1, 2])
-            error = np.abs(pressure - new[:, 2]) / scale
+            shifted = point.dpressure * np.abs(point.closure - new[:, 1])
+            error = (np.abs(point.pressure - new[:, 2]) + shifted) / scale
             bad = error > tolerance
             worst = max(worst, float(error[~bad].max(initial=0.0)))
             missed = float(error.max())
@@ -138,15 +142,19 @@ class IsolatedPatch:
 
 
 def _increasing(rows: Array) -> Array:
-    """Sort rows by approach and keep those that exceed all before in closure and pressure.
+    """Sort rows by approach and keep those whose pressure exceeds all before.
 
-    Where closure falls for good, the patch's stiffness has outgrown its own half-space and the
-    table ends; a single row below those before is an unevenness of the micro model.
+    A closure that falls for good is kept: the patch's stiffness has outgrown its own half-space.
+    One a little below those before is an unevenness of the micro model, and left out.
     """
     rows = rows[np.argsort(rows[:, 0])]
     highest = np.maximum.accumulate(rows[:, 1:3], axis=0)
-    keep = np.all(highest[1:] > highest[:-1], axis=1)
-    return rows[np.concatenate(([True], keep))]
+    fall = highest[:, 0] - rows[:, 1]
+    uneven = (fall > 0.0) & (fall < _UNEVEN * np.ptp(rows[:, 1]))
+    uneven |= np.concatenate(([False], (np.diff(highest[:, 0]) == 0.0) & (fall[1:] == 0.0)))
+    uneven &= np.arange(len(rows)) < np.argmax(rows[:, 1])
+    rising = np.concatenate(([True], highest[1:, 1] > highest[:-1, 1]))
+    return rows[rising & ~uneven]
 
 
 def _around(points: Array, centres: Array) -> Array:

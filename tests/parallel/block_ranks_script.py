@@ -13,6 +13,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "verification"))
 from block_cases import PowerLaw, block_of, interface_of, uneven_laws
 
 import macro.mesh
+from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from geometry.meshes import BlockShape
 from macro import PressedBlock, block_mesh
@@ -34,7 +35,9 @@ def run(case, mode):
     shape, grid = SHAPES[case]
     interface = interface_of(block_of(comm=COMM, **shape), grid)
     pressed = PressedBlock(interface.block, interface, uneven_laws(np.prod(grid)), mode)
-    states = [pressed.press(approach, tilt=(1e-3, 5e-4)) for approach in (4e-3, 8e-3)]
+    states = [
+        pressed.press(Control(approach=approach, tilt=(1e-3, 5e-4))) for approach in (4e-3, 8e-3)
+    ]
     numbers = {
         "force": [state.force for state in states],
         "closure": states[-1].closure.tolist(),
@@ -79,7 +82,9 @@ def fail_in_law(mode):
     shape, grid = SHAPES["one facet"]
     interface = interface_of(block_of(comm=COMM, **shape), grid)
     laws = [*uneven_laws(3), RefusingLaw(1.0)]
-    return error_of(lambda: PressedBlock(interface.block, interface, laws, mode).press(1e-3))
+    return error_of(
+        lambda: PressedBlock(interface.block, interface, laws, mode).press(Control(approach=1e-3))
+    )
 
 
 def fail_to_converge():
@@ -87,7 +92,7 @@ def fail_to_converge():
     interface = interface_of(block_of(comm=COMM), (2, 2))
     pressed = PressedBlock(interface.block, interface, uneven_laws(4))
     pressed.newton.snes.setTolerances(max_it=1)
-    return error_of(lambda: pressed.press(8e-3))
+    return error_of(lambda: pressed.press(Control(approach=8e-3)))
 
 
 def error_of(action):

@@ -22,9 +22,11 @@ SCENES = {
         "block.cells=[8, 8, 5]", "patches.grid=[4, 2]", "coupling.newton=condensed",
         "load.approach=['8 um', '2 um']", "load.tilt=[0.002, 0.001]", "output.fields=true",
     ],
-    "consistent, under a force": [
-        "block.cells=[8, 8, 5]", "coupling.kind=consistent", "coupling.newton=full",
-        "micro.model=half-space",
+    "consistent, decomposed": [
+        "block.cells=[8, 8, 5]", "coupling.kind=consistent", "micro.model=half-space",
+    ],
+    "concurrent": [
+        "block.cells=[8, 8, 5]", "coupling.kind=concurrent", "micro.model=half-space",
     ],
     "laws of the half-space": ["block.cells=[8, 8, 5]", "micro.model=half-space"],
 }  # fmt: skip

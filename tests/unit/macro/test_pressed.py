@@ -9,6 +9,7 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from geometry.meshes import BlockShape
 from geometry.patches import PatchGrid
@@ -53,7 +54,9 @@ def test_every_patch_needs_a_law(interface):
 
 
 def test_open_interface_is_solved_at_once(interface):
-    state = PressedBlock(interface.block, interface, [Spring(touch=1.0)] * 4).press(5e-3)
+    state = PressedBlock(interface.block, interface, [Spring(touch=1.0)] * 4).press(
+        Control(approach=5e-3)
+    )
     assert (state.newton_iterations, state.force, state.reaction) == (0, 0.0, 0.0)
     assert np.abs(state.displacement).max() == 0.0
     np.testing.assert_allclose(state.closure, 5e-3, rtol=1e-14)
@@ -65,12 +68,12 @@ def test_linear_laws_take_one_newton_step(interface, mode):
     pressed = PressedBlock(interface.block, interface, [Spring()] * 4, mode)
     pressed.newton.snes.ksp.setTolerances(rtol=1e-12)
     pressed.newton._forcing = False
-    assert pressed.press(5e-3).newton_iterations == 1
+    assert pressed.press(Control(approach=5e-3)).newton_iterations == 1
 
 
 def test_tilt_is_about_the_middle(interface):
     press = PressedBlock(interface.block, interface, [Spring()] * 4).press
-    level, tilted = press(5e-3), press(5e-3, tilt=(2e-3, 0.0))
+    level, tilted = press(Control(approach=5e-3)), press(Control(approach=5e-3, tilt=(2e-3, 0.0)))
     assert tilted.force == pytest.approx(level.force, rel=1e-7)  # exact for linear laws
     np.testing.assert_array_equal(tilted.pressure > level.pressure, [False, False, True, True])
 
@@ -78,19 +81,19 @@ def test_tilt_is_about_the_middle(interface):
 def test_failure_is_named_and_keeps_what_was_known(interface):
     laws = [Spring(k=1e3 * (i + 1), touch=1e-3 * i) for i in range(4)]
     pressed = PressedBlock(interface.block, interface, laws)
-    before = pressed.press(2e-3)
+    before = pressed.press(Control(approach=2e-3))
     known = len(pressed._basis)
     pressed.newton.snes.setTolerances(max_it=1)
     with pytest.raises(NotConverged, match=r"approach of 0\.008 mm .* DIVERGED_MAX_IT after 1"):
-        pressed.press(8e-3)
+        pressed.press(Control(approach=8e-3))
     assert len(pressed._basis) == known
     pressed.newton.snes.setTolerances(max_it=20)
-    assert pressed.press(2e-3).force == pytest.approx(before.force, rel=1e-9)
+    assert pressed.press(Control(approach=2e-3)).force == pytest.approx(before.force, rel=1e-9)
 
 
 def test_a_pressed_block_is_freed(interface):
     pressed = PressedBlock(interface.block, interface, [Spring()] * 4)
-    pressed.press(1e-3)
+    pressed.press(Control(approach=1e-3))
     gone = [weakref.ref(part) for part in (pressed, pressed.equilibrium, pressed.newton)]
     del pressed
     gc.collect()
@@ -99,7 +102,7 @@ def test_a_pressed_block_is_freed(interface):
 
 def test_pressure_without_value_is_a_failure(interface):
     with pytest.raises(NotConverged, match="DIVERGED_F"):
-        PressedBlock(interface.block, interface, [Broken()] * 4).press(1e-3)
+        PressedBlock(interface.block, interface, [Broken()] * 4).press(Control(approach=1e-3))
 
 
 def test_the_users_tolerances_win(interface):
@@ -107,7 +110,7 @@ def test_the_users_tolerances_win(interface):
     options["snes_rtol"], options["ksp_rtol"] = 1e-4, 1e-3
     try:
         pressed = PressedBlock(interface.block, interface, [Spring()] * 4)
-        state = pressed.press(5e-3)
+        state = pressed.press(Control(approach=5e-3))
     finally:
         options.delValue("snes_rtol"), options.delValue("ksp_rtol")
     assert 1e-10 < state.residuals[-1] <= 1e-4
@@ -133,7 +136,7 @@ def test_fields_are_written_for_paraview(element, tmp_path):
         block_mesh(shape, MPI.COMM_SELF), Material(young_modulus=4000.0, poisson_ratio=0.15)
     )
     interface = Interface(block, PatchGrid(grid=(2, 1), lengths=(1.0, 1.0)))
-    state = PressedBlock(block, interface, [Spring(), Spring(k=5e3)]).press(1e-3)
+    state = PressedBlock(block, interface, [Spring(), Spring(k=5e3)]).press(Control(approach=1e-3))
     write_fields(tmp_path / "fields.xdmf", interface, state.displacement, state.pressure)
     h5py = pytest.importorskip("h5py")
     with h5py.File(tmp_path / "fields.h5") as file:

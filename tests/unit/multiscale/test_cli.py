@@ -127,6 +127,31 @@ def test_schema_is_json(capsys):
     assert "surface" in json.loads(shown)["properties"]
 
 
+def test_laws_of_a_coupling_without_laws_are_refused(capsys, tmp_path):
+    words = ("laws", PAPER, "--out", str(tmp_path), "--set", "coupling.kind=concurrent")
+    code, _, err = call(capsys, *words)
+    assert code == 2
+    assert "coupling.kind = 'concurrent': has no laws (allowed: isolated, consistent)" in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_concurrent_run_from_scene_to_fields(capsys, tmp_path):
+    extra = ["coupling.kind=concurrent", "load.approach=['6 um', '3 um']", "output.fields=true"]
+    words = ("run", PAPER, "--out", str(tmp_path), "--set", *SMALL, *extra, "output.report=false")
+    code, shown, err = call(capsys, *words)
+    assert (code, err) == (0, "")
+    assert "no laws" in " ".join(shown.split())
+    names = {path.name for path in tmp_path.iterdir()}
+    assert {"history.csv", "fields.xdmf", "fields.h5"} <= names
+    assert "laws.h5" not in names
+    with (tmp_path / "history.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    force = [float(row["force_N"]) for row in rows]
+    # down again: the iteration's 1e-8
+    assert force[3] == pytest.approx(force[0], rel=1e-6)
+    assert {"tilt_x", "tilt_y", "moment_x_N_mm", "moment_y_N_mm"} <= set(rows[0])
+
+
 @pytest.mark.parametrize(
     ("words", "text"),
     [

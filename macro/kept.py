@@ -1,0 +1,47 @@
+"""The smooth correction of a block, solved for once and kept on disk."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from geometry.meshes import BlockShape
+from geometry.patches import PatchGrid
+from macro.block import Sides
+from macro.compliance_cache import Arrays, cached
+from macro.correction import Correction, HalfSpaceField, make_correction
+from macro.elasticity import Material
+
+
+def cached_correction(
+    shape: BlockShape,
+    material: Material,
+    sides: Sides,
+    loads: PatchGrid,
+    half_space: HalfSpaceField,
+    comm: Any,
+) -> Correction:
+    """Return `make_correction` of the same arguments, from the cache where it was made before.
+
+    Args:
+        shape: The block and its division.
+        material: Elastic constants.
+        sides: Support of the block's sides.
+        loads: Rectangles under pressure, on the interface.
+        half_space: The half-space of the same material, which the key therefore leaves out.
+        comm: MPI communicator.
+
+    Raises:
+        InputError: When a rectangle reaches beyond the block's top.
+
+    Note:
+        Collective.
+    """
+
+    def compute() -> Arrays:
+        made = make_correction(shape, material, sides, loads, half_space, comm)
+        return {"x": made.x, "y": made.y, "values": made.values}
+
+    # the correction always takes trilinear elements
+    key = (replace(shape, element="Q1"), material, sides, loads)
+    return Correction(loads=loads, **cached("correction", key, compute, comm))
