@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +23,18 @@ _MOST = 40
 _POWER = 1.5  # exponent of Hertz' law
 _COARSE = 3  # presses that may bring a prescribed force within a factor of two
 _KEPT = 6  # secants, over load steps too
+_GUESSED = 1e-4  # tolerance on the coarse model
 _CLEAR = 1e-12  # of contact, where no force is wanted [mm]
 _FARTHEST = 1.0  # of the contacts' depth, that one step may change any local approach
+
+
+class _Found(NamedTuple):
+    """Where an iteration ended, and what the next one may start from."""
+
+    trial: Trial
+    secants: tuple[Secant, ...]
+    presses: int
+    coarse: _Found | None
 
 
 class ConcurrentCoupling:
@@ -54,6 +64,7 @@ class ConcurrentCoupling:
         mean_heights: Array,
         correction: SmoothCorrection,
         *,
+        coarse: MicroModel | None = None,
         tolerance: float = 1e-8,
         comm: Any = None,
     ) -> None:
@@ -64,8 +75,12 @@ class ConcurrentCoupling:
         loads = correction.loads
         self._half = 0.5 * float(np.hypot(*loads.lengths))
         self._stiffness = ContactStiffness(loads, model.contact_modulus)
-        self._last: Trial | None = None
-        self._secants: tuple[Secant, ...] = ()
+        self._last: _Found | None = None
+        self._coarse = None
+        if coarse is not None:
+            self._coarse = ConcurrentCoupling(
+                coarse, patches, mean_heights, correction, tolerance=_GUESSED, comm=comm
+            )
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step.
@@ -79,15 +94,21 @@ class ConcurrentCoupling:
         Raises:
             NotConverged: When the iteration fails; the coupling is then as it was before.
         """
-        secants = list(self._secants)
-        trial = self._first(control)
+        found = self._found(control, self._last)
+        result = self._contact.summed(found.trial, found.presses)
+        self._last = found
+        return result
+
+    def _found(self, control: Control, last: _Found | None) -> _Found:
+        """Iterate to equilibrium from the last load step."""
+        coarse = self._guessed(control, last)
+        secants = list((coarse or last).secants) if coarse or last else []
+        trial = self._first(control, last, coarse)
         for count in range(1, _MOST + 1):
             step = self._step(control, trial, secants)
             if self._settled(control, trial, step):
-                result = self._contact.summed(trial, count)
-                self._last, self._secants = trial, tuple(secants[-_KEPT:])
-                return result
-            before, trial = trial, self._next(control, trial, step, count)
+                return _Found(trial, tuple(secants[-_KEPT:]), count, coarse)
+            before, trial = trial, self._next(control, trial, step, count, coarse is not None)
             change = trial.local - before.local
             if before.found.any() and trial.found.any() and change.any():
                 secants.append((change, trial.found - before.found))
@@ -99,12 +120,31 @@ class ConcurrentCoupling:
             remedy="take smaller load steps (load.steps)",
         )
 
-    def _first(self, control: Control) -> Trial:
-        """Press where the last load step's tangent points, or without any sag."""
-        if control.force != 0.0 and self._last is not None and self._last.found.any():
-            step = self._step(control, self._last, list(self._secants))
+    def _guessed(self, control: Control, last: _Found | None) -> _Found | None:
+        """Return what the coarse model finds; None without one."""
+        if self._coarse is None or control.force == 0.0:
+            return None
+        try:
+            found = self._coarse._found(control, None if last is None else last.coarse)
+        except NotConverged:
+            return None
+        return found if found.trial.found.any() else None
+
+    def _first(self, control: Control, last: _Found | None, coarse: _Found | None) -> Trial:
+        """Press where coarse model or last load step's tangent point, or without any sag."""
+        if coarse is not None:
+            plane, assumed = coarse.trial.plane, coarse.trial.found
+            before = None
+            if last is not None and last.coarse is not None and last.trial.found.any():
+                before = last.trial
+                plane = plane + before.plane - last.coarse.trial.plane
+                assumed = assumed + before.found - last.coarse.trial.found
+            plane = np.where(self._free(control), plane, self._prescribed(control))
+            return self._contact.press(plane, assumed, before)
+        if control.force != 0.0 and last is not None and last.trial.found.any():
+            step = self._step(control, last.trial, list(last.secants))
             if step is not None:
-                return self._next(control, self._last, step, 2)
+                return self._next(control, last.trial, step, 2)
         tilt = control.tilt or (0.0, 0.0)
         approach = control.approach
         if approach is None:
@@ -114,7 +154,14 @@ class ConcurrentCoupling:
             else:
                 approach -= self._half * float(np.hypot(*tilt)) + _CLEAR
         plane = np.array([approach, *tilt])
-        return self._contact.press(plane, np.zeros(len(self._contact.shape)), self._last)
+        start = None if last is None else last.trial
+        return self._contact.press(plane, np.zeros(len(self._contact.shape)), start)
+
+    def _free(self, control: Control) -> NDArray[np.bool_]:
+        return np.array([control.approach is None] + 2 * [control.tilt is None])
+
+    def _prescribed(self, control: Control) -> Array:
+        return np.array([control.approach or 0.0, *(control.tilt or (0.0, 0.0))])
 
     def _step(
         self, control: Control, trial: Trial, secants: list[Secant]
@@ -153,14 +200,8 @@ class ConcurrentCoupling:
 
     def _targets(self, control: Control, trial: Trial) -> tuple[Array, NDArray[np.bool_]]:
         """Return the prescribed plane and which parts of it are free."""
-        target, free = (
-            trial.plane.copy(),
-            np.array([control.approach is None] + 2 * [control.tilt is None]),
-        )
-        if control.approach is not None:
-            target[0] = control.approach
-        if control.tilt is not None:
-            target[1:] = control.tilt
+        free = self._free(control)
+        target = np.where(free, trial.plane, self._prescribed(control))
         return target, free
 
     def _excess(self, control: Control, trial: Trial) -> Array:
@@ -182,15 +223,20 @@ class ConcurrentCoupling:
         return change <= self._tolerance and bool(np.all(excess[free] <= self._tolerance))
 
     def _next(
-        self, control: Control, trial: Trial, step: tuple[Array, Array] | None, count: int
+        self,
+        control: Control,
+        trial: Trial,
+        step: tuple[Array, Array] | None,
+        count: int,
+        guided: bool = False,
     ) -> Trial:
         """Press where the Newton step leads, within bounds."""
         if step is None:
             return self._sought(control, trial, count)
         total = float(trial.found.sum())
         force = control.force or total
-        rough = count <= _COARSE and not 0.5 <= total / force <= 2.0
-        if not trial.assumed.any() or rough:
+        rough = not guided and count <= _COARSE and not 0.5 <= total / force <= 2.0
+        if (not trial.assumed.any() and not guided) or rough:
             level = self._level(control, trial)
             if level is not None:
                 return level
