@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.collective import on_root
+from geometry.control import Control
 from geometry.patches import PatchGrid
 from micro import MicroModel, Response, RigidPlane
 from multiscale.coupling import response_step
@@ -52,6 +53,11 @@ class Trial:
         """Forces found on the load rectangles, shape (M,) [N]."""
         return np.asarray(self.response.patch_force[0])
 
+    def excess(self, control: Control) -> Array:
+        """Return force and moments beyond those prescribed, shape (3,) [N, N mm]."""
+        force = self.response.force[0] - (control.force or 0.0)
+        return np.array([force, *self.response.moment[0]])
+
 
 class SaggingContact:
     """A micro model pressed by rank 0 for all ranks, and the yielding at its load rectangles.
@@ -64,6 +70,7 @@ class SaggingContact:
         comm: MPI communicator (mpi4py) or None.
 
     Attributes:
+        loads: The load rectangles.
         shape: Approach at the load rectangles by unit approach and slopes, shape (M, 3).
         yielding: Sag at the load rectangles by unit forces on them, shape (M, M) [mm/N].
     """
@@ -78,7 +85,7 @@ class SaggingContact:
     ) -> None:
         self._model, self._patches, self._heights = model, patches, mean_heights
         self._correction, self._comm = correction, comm
-        loads = correction.loads
+        self.loads = loads = correction.loads
         self._middle = np.asarray(loads.origin) + 0.5 * np.asarray(loads.lengths)
         self.shape = np.column_stack([np.ones(loads.count), loads.centres - self._middle])
         x, y = loads.centres.T
@@ -93,8 +100,7 @@ class SaggingContact:
             assumed: Forces on the load rectangles, shape (M,) [N].
             before: A trial nearby to start from.
         """
-        loads = self._correction.loads
-        rigid = self._rigid(plane, assumed)
+        loads, rigid = self.loads, self._rigid(plane, assumed)
         start = None if before is None else before.start
         kept: list[Any] = [None]
 
