@@ -132,15 +132,15 @@ class ConcurrentCoupling:
         if self._coarse is None or control.force == 0.0:
             return None
         try:
-            found = self._coarse._found(control, last.coarse if last else None)
+            return self._coarse._found(control, last.coarse if last else None)
         except NotConverged:
             return None
-        return found if found.trial.found.any() else None
 
     def _follow(self, control: Control, last: _Found | None, ahead: _Found) -> Trial:
         """Press where the coarse model is, or as far from the last load step as it went."""
         plane, forces, start = ahead.trial.plane, ahead.trial.found, None
-        if last is not None and last.coarse is not None and last.trial.found.any():
+        touching = forces.any() and last is not None and last.trial.found.any()
+        if touching and last is not None and last.coarse is not None:
             start, behind = last.trial, last.coarse.trial
             plane = start.plane + plane - behind.plane
             forces = np.maximum(start.found + forces - behind.found, 0.0)

@@ -17,6 +17,9 @@ Array = NDArray[np.float64]
 _POWER = 1.5  # exponent of Hertz' law
 _COARSE = 3  # presses that may bring a prescribed force within a factor of two
 _FARTHEST = 1.0  # of the contacts' depth, that one step may change any local approach
+_LOST = 0.75  # of the force, that a step is to lose before the plane is turned to part
+_PARTING = 1.1 * _POWER  # Newton steps to where P ~ h^(3/2) ends, and some
+_TURNED = 0.3  # of the depth of a level plane, that the way to parting may change
 _PATIENCE = 10  # presses without contact before the sag is given up
 
 
@@ -96,11 +99,25 @@ class ConcurrentNewton:
             if level is not None:
                 return level
         turn, lag = step[0], trial.found + step[1] - trial.assumed
+        if self._leaves(control, trial, step[1]):
+            plane = trial.plane + self._parting(trial, turn) * turn
+            return self._contact.press(plane, np.zeros_like(trial.assumed), trial)
         change = np.abs(self._contact.shape @ turn - self._contact.yielding @ lag).max()
         part = min(1.0, _FARTHEST * self._depth(trial) / change) if change > 0.0 else 1.0
         plane = trial.plane + part * turn
         plane = np.where(free(control), plane, prescribed(control))
         return self._contact.press(plane, trial.assumed + part * lag, trial)
+
+    def _leaves(self, control: Control, trial: Trial, change: Array) -> bool:
+        """Whether a plane free to turn seems to turn clear of the surface."""
+        turns = control.approach is not None and control.tilt is None
+        return turns and float(change.sum()) < -_LOST * float(trial.found.sum())
+
+    def _parting(self, trial: Trial, turn: Array) -> float:
+        """Return how far to turn to part, as P ~ h^(3/2) reaches 0 beyond Newton's step."""
+        most = max(self._depth(trial), _TURNED * (trial.plane[0] - self._contact.first_touch))
+        change = float(np.abs(self._contact.shape @ turn).max())
+        return min(_PARTING, most / change) if change > 0.0 else 1.0
 
     def _depth(self, trial: Trial) -> float:
         """Return the depth of all contacts taken as one [mm]."""
@@ -112,7 +129,8 @@ class ConcurrentNewton:
         plane = np.where(free(control), trial.plane, prescribed(control))
         if not trial.assumed.any() and control.force:
             plane[0] += control.force * self._reach * 2.0**count
-        less = 0.5 * trial.assumed if count < _PATIENCE else np.zeros_like(trial.assumed)
+        patient = count < _PATIENCE and not (control.approach is not None and control.tilt is None)
+        less = 0.5 * trial.assumed if patient else np.zeros_like(trial.assumed)
         return self._contact.press(plane, less, trial)
 
     def _level(self, control: Control, trial: Trial) -> Trial | None:

@@ -92,6 +92,11 @@ class SaggingContact:
         units = np.eye(loads.count)
         self.yielding = np.column_stack([correction.sag(unit)(x, y) for unit in units])
 
+    @property
+    def first_touch(self) -> float:
+        """Approach of a level plane at first contact [mm]."""
+        return self._model.first_touch
+
     def press(self, plane: Array, assumed: Array, before: Trial | None) -> Trial:
         """Press the micro model, the sag by assumed forces.
 
