@@ -12,7 +12,7 @@ from micro import influence_matrix
 from multiscale.stage import Stage
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import Interface
+    from macro import Interface, Material
     from macro.correction import Correction
 
 Array = NDArray[np.float64]
@@ -30,12 +30,11 @@ def embedding(stage: Stage, comm: Any) -> Interface:
     """
     from mpi4py import MPI
 
-    from macro import Block, Interface, Material, block_mesh
+    from macro import Block, Interface, block_mesh
 
     section = stage.scene.block
     mesh = block_mesh(stage.shape, comm or MPI.COMM_SELF)
-    material = Material(young_modulus=section.young_modulus, poisson_ratio=section.poisson_ratio)
-    return Interface(Block(mesh, material, sides=section.sides), stage.patches)
+    return Interface(Block(mesh, _material(stage), sides=section.sides), stage.patches)
 
 
 def patch_compliance(stage: Stage, comm: Any) -> Array:
@@ -52,10 +51,17 @@ def patch_compliance(stage: Stage, comm: Any) -> Array:
         correction = smooth_correction(stage, stage.patches, comm)
         half_space = influence_matrix(stage.patches) / (np.pi * stage.model.contact_modulus)
         return half_space + correction.patch_compliance(stage.patches)
-    from macro import plain_compliance
+    from mpi4py import MPI
 
-    interface = embedding(stage, comm)
-    return plain_compliance(interface.block, interface)
+    from macro import plain_compliance
+    from macro.compliance_cache import cached
+
+    def compute() -> dict[str, Array]:
+        interface = embedding(stage, comm)
+        return {"compliance": plain_compliance(interface.block, interface)}
+
+    key = (stage.shape, _material(stage), stage.scene.block.sides, stage.patches)
+    return cached("plain", key, compute, comm or MPI.COMM_SELF)["compliance"]
 
 
 def smooth_correction(stage: Stage, loads: PatchGrid, comm: Any) -> Correction:
@@ -71,19 +77,25 @@ def smooth_correction(stage: Stage, loads: PatchGrid, comm: Any) -> Correction:
     """
     from mpi4py import MPI
 
-    from macro import Material
-    from macro.correction import make_correction
+    from macro.kept import cached_correction
     from micro.boussinesq import HalfSpace
 
-    e, nu = stage.scene.block.young_modulus, stage.scene.block.poisson_ratio
-    return make_correction(
+    material = _material(stage)
+    return cached_correction(
         stage.shape,
-        Material(young_modulus=e, poisson_ratio=nu),
+        material,
         stage.scene.block.sides,
         loads,
-        HalfSpace(e, nu),
+        HalfSpace(material.young_modulus, material.poisson_ratio),
         comm or MPI.COMM_SELF,
     )
+
+
+def _material(stage: Stage) -> Material:
+    from macro import Material
+
+    section = stage.scene.block
+    return Material(young_modulus=section.young_modulus, poisson_ratio=section.poisson_ratio)
 
 
 def final_field(stage: Stage, pressure: Array, comm: Any) -> tuple[Interface, Array]:

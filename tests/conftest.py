@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+# a test computes what it tests, and leaves nothing in the home of who runs it
+os.environ["PATCHLAW_CACHE"] = "off"
+
 MPI_ENVIRONMENT = {
     "OMP_NUM_THREADS": "1",
     # containers run tests as root, and with fewer cores than ranks
