@@ -5,7 +5,7 @@
 # in everything that is usually told of a rough surface (spectrum, rms gradient, size), and differ
 # in their phases alone. One deterministic curve, such as the paper's, is one draw.
 #
-#     C = Λ/(π E*) + D   of the block: once           1000 × { surface → whole-surface micro
+#     Λ/(π E*) and D of the block: once               1000 × { surface → whole-surface micro
 #     (half-space exactly, finite elements for D)                solution → 16 laws → 8 load steps }
 #
 # Run time: two minutes on one core, half of it under `mpirun -n 2`; the surfaces are dealt to the
@@ -23,7 +23,14 @@ from mpi4py import MPI
 from geometry import BlockShape, PatchGrid, Spectrum, patch_means, synthesise
 from macro import Material, make_correction
 from micro import HalfSpace, HalfSpaceModel, influence_matrix
-from multiscale import CondensedCoupling, Programme, consistent_laws, load_steps
+from multiscale import (
+    CondensedCoupling,
+    Programme,
+    SpreadLoads,
+    consistent_laws,
+    contact_spread,
+    load_steps,
+)
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -42,11 +49,11 @@ start = time.perf_counter()
 material = Material(young_modulus=4000.0, poisson_ratio=0.15)
 patches = PatchGrid(grid=(4, 4), lengths=(1.0, 1.0))
 shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(16, 16, 8))
-loads = PatchGrid(grid=(8, 8), lengths=(1.0, 1.0))
+loads = PatchGrid(grid=(16, 16), lengths=(1.0, 1.0))
 half_space = HalfSpace(material.young_modulus, material.poisson_ratio)
 correction = make_correction(shape, material, "free", loads, half_space, comm)
-compliance = influence_matrix(patches) / (np.pi * material.contact_modulus)
-compliance += correction.patch_compliance(patches)
+under_patches = influence_matrix(patches) / (np.pi * material.contact_modulus)
+under_loads = correction.patch_compliance(loads) / loads.area
 once = time.perf_counter() - start
 
 # %% [markdown]
@@ -59,15 +66,13 @@ def curve(seed: int) -> list[float]:
     """Return the forces of one surface at all load steps [N]."""
     spectrum = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=seed)
     surface = synthesise(spectrum, grid=(64, 64), lengths=(1.0, 1.0))
-    table = consistent_laws(
-        HalfSpaceModel(surface=surface, contact_modulus=material.contact_modulus),
-        patches,
-        mean_heights=patch_means(surface, patches),
-        approach_end=1.15 * APPROACH,
-        tolerance=1e-3,
-    )
+    model = HalfSpaceModel(surface=surface, contact_modulus=material.contact_modulus)
+    end, means = 1.15 * APPROACH, patch_means(surface, patches)
+    table = consistent_laws(model, patches, mean_heights=means, approach_end=end, tolerance=3e-3)
+    spread = contact_spread(model, patches, loads, approach_end=end)
+    coupling = CondensedCoupling(table, SpreadLoads(under_patches, under_loads, spread))
     programme = Programme(quantity="approach", points=(APPROACH,), steps=STEPS)
-    return [step.force_N for step in load_steps(CondensedCoupling(table, compliance), programme)]
+    return [step.force_N for step in load_steps(coupling, programme)]
 
 
 start = time.perf_counter()
@@ -92,10 +97,12 @@ if comm.rank == 0:
         print("{:10.1f} {:16.3f} {:12.0%} {:9.3f} … {:.3f}".format(*row))
     figure = Figure(figsize=(7.0, 4.5), layout="constrained")
     axes = figure.subplots()
+    approach, forces = np.append(0.0, approach), np.insert(forces, 0, 0.0, axis=1)
+    low, median, high = np.percentile(forces, (5, 50, 95), axis=0)
     axes.plot(1e3 * approach, forces[:60].T, color="0.75", lw=0.6)
     axes.plot([], [], color="0.75", lw=0.6, label=f"{min(60, SURFACES)} of {SURFACES} surfaces")
     axes.fill_between(1e3 * approach, low, high, color="C0", alpha=0.25, label="5 to 95 %")
-    axes.plot(1e3 * approach, mean, color="C0", lw=2.0, label="mean")
+    axes.plot(1e3 * approach, forces.mean(axis=0), color="C0", lw=2.0, label="mean")
     axes.plot(1e3 * approach, median, color="C0", lw=1.2, ls="--", label="median")
     axes.set(
         xlabel="approach from first touch [µm]",

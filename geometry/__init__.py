@@ -10,6 +10,7 @@ from geometry.errors import InputError, NotConverged, PatchlawError
 from geometry.files import read_surface
 from geometry.meshes import Alignment, BlockShape, alignment, flat_block
 from geometry.patches import PatchGrid, patch_means
+from geometry.refined_block import RefinedShape, places_in_reach
 from geometry.spectrum import Spectrum, synthesise
 from geometry.statistics import PowerSpectrum, Roughness, power_spectrum, roughness
 from geometry.surface import Surface
@@ -24,6 +25,7 @@ __all__ = [
     "PatchGrid",
     "PatchlawError",
     "PowerSpectrum",
+    "RefinedShape",
     "Roughness",
     "Spectrum",
     "Surface",
@@ -31,6 +33,7 @@ __all__ = [
     "find_asperities",
     "flat_block",
     "patch_means",
+    "places_in_reach",
     "power_spectrum",
     "read_surface",
     "roughness",

@@ -19,6 +19,9 @@ _OPTIONS = {
     "Mesh.RecombineAll": 0,
     "Mesh.SubdivisionAlgorithm": 0,
     "Mesh.SaveAll": 0,
+    "Mesh.MeshSizeFromPoints": 0,
+    "Mesh.MeshSizeFromCurvature": 0,
+    "Mesh.MeshSizeExtendFromBoundary": 0,
 }
 
 

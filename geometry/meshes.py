@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -99,6 +99,10 @@ class BlockShape:
         """Number of hexahedra or tetrahedra."""
         boxes = math.prod(len(ticks) - 1 for ticks in self.ticks)
         return boxes if self.hexahedral else 6 * boxes
+
+    def meshed(self) -> AbstractContextManager[Any]:
+        """Mesh the block in gmsh for as long as the context lasts; see `flat_block`."""
+        return flat_block(self)
 
     def _across(self, axis: int) -> tuple[Segment, ...]:
         length = self.interface[axis]

@@ -6,13 +6,16 @@ BlockShape → block_mesh → Block (with a Material) → Interface (with a Patc
 
 from macro.block import Block
 from macro.compliance import plain_compliance
-from macro.correction import Correction, HalfSpaceField, Sag, make_correction
+from macro.condense import HalfSpaceField, make_correction
+from macro.correction import Correction, Sag
 from macro.elasticity import Material
 from macro.interface import ContactLaw, Interface
 from macro.kept import cached_correction
 from macro.mesh import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
+from macro.obstacle import ObstacleBlock, ObstacleState
 from macro.output import write_fields
 from macro.pressed import PressedBlock, PressState
+from macro.rough_mesh import MeshQuality, rough_block_mesh
 
 __all__ = [
     "BOTTOM",
@@ -25,6 +28,9 @@ __all__ = [
     "HalfSpaceField",
     "Interface",
     "Material",
+    "MeshQuality",
+    "ObstacleBlock",
+    "ObstacleState",
     "PressState",
     "PressedBlock",
     "Sag",
@@ -32,5 +38,6 @@ __all__ = [
     "cached_correction",
     "make_correction",
     "plain_compliance",
+    "rough_block_mesh",
     "write_fields",
 ]

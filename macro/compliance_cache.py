@@ -8,6 +8,7 @@ import tempfile
 import zipfile
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,9 @@ Arrays = Mapping[str, NDArray[np.float64]]
 
 VARIABLE = "PATCHLAW_CACHE"
 """Environment variable: the cache's directory, or ``off``."""
+
+MOST_BYTES = 500_000_000
+"""Size of all files together, beyond which those go that were not used for longest [B]."""
 
 _FORMAT = 1  # raise it when the numbers behind a key change
 
@@ -39,20 +43,23 @@ def cache_directory() -> Path | None:
 def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], comm: Any) -> Arrays:
     """Return arrays from the cache, or compute and keep them.
 
-    The first rank alone reads and writes. A file that cannot be read is computed again; one that
-    cannot be written is done without.
+    The first rank alone reads and writes, and what it has is what all ranks get. A file that
+    cannot be read is computed again; one that cannot be written is done without.
 
     Args:
         kind: Name of what is kept.
-        key: All that it depends on, with representations that tell different values apart.
-        compute: Collective; returns the same arrays on every rank.
+        key: All that it depends on: numbers, words, tuples and dataclasses of them.
+        compute: Collective; the first rank's arrays count.
         comm: MPI communicator.
+
+    Raises:
+        TypeError: When a key holds anything else.
 
     Note:
         Collective.
     """
     directory = cache_directory() if comm.rank == 0 else None
-    digest = hashlib.sha256(repr((_FORMAT, kind, key)).encode()).hexdigest()[:32]
+    digest = hashlib.sha256(repr(_spelt((_FORMAT, kind, key))).encode()).hexdigest()[:32]
     path = directory / f"{kind}-{digest}.npz" if directory else None
     found: Arrays | None = comm.bcast(_read(path) if path else None, root=0)
     if found is not None:
@@ -61,15 +68,36 @@ def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], co
     if path:
         with suppress(OSError):
             _write(path, made)
-    return made
+            _clear(path.parent)
+    kept: Arrays = comm.bcast(made, root=0)
+    return kept
+
+
+def _spelt(value: object) -> object:
+    """Return words for a value that do not depend on how numpy prints its numbers."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float):
+        return value.hex()
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, tuple | list):
+        return tuple(_spelt(part) for part in value)
+    if is_dataclass(value) and not isinstance(value, type):
+        parts = ((field.name, _spelt(getattr(value, field.name))) for field in fields(value))
+        return type(value).__name__, *parts
+    raise TypeError(f"{type(value).__name__} in a key of the cache")
 
 
 def _read(path: Path) -> Arrays | None:
     try:
         with np.load(path, allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
+            found = {name: file[name] for name in file.files}
     except (OSError, ValueError, EOFError, KeyError, AttributeError, zipfile.BadZipFile):
         return None
+    with suppress(OSError):
+        os.utime(path)  # it is in use
+    return found
 
 
 def _write(path: Path, arrays: Arrays) -> None:
@@ -83,3 +111,13 @@ def _write(path: Path, arrays: Arrays) -> None:
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
+
+
+def _clear(directory: Path) -> None:
+    """Remove the files that were not used for longest until the rest is small enough."""
+    files = sorted(directory.glob("*-*.npz"), key=lambda path: path.stat().st_mtime, reverse=True)
+    total = 0
+    for path in files:
+        total += path.stat().st_size
+        if total > MOST_BYTES:
+            path.unlink(missing_ok=True)

@@ -24,7 +24,8 @@ class Contact:
     they are free) follow from the displacement s of the samples at once: they balance the plane,
     the force is the one wanted and there is no moment about the middle of the patches. So a
     bordered Newton's method needs no unknowns beyond the displacements: the plane is eliminated
-    where it is known, at the samples, nonlinearly. With D the stiffness of the laws, W the areas of
+    where it is known, at the samples, nonlinearly, and the least energy over its motions is as
+    convex in s as the energy under a fixed plane. With D the stiffness of the laws, W the areas of
     the samples and G their levers, closures change by G dq − ds with
     (Gᵀ W D G) dq = Gᵀ W D ds.
 
@@ -120,8 +121,10 @@ class Contact:
             stiffness: D of this rank's samples, shape (n,) [MPa/mm].
         """
         columns = self.levers * stiffness[:, None]
+        if not self.free.any():
+            return columns
         values, vectors = np.linalg.eigh(self.resistance(stiffness))
-        held = values > LOOSE * max(values[-1], 0.0) if values.size else values > 0.0
+        held = values > LOOSE * max(values[-1], 0.0)
         return columns @ (vectors[:, held] / np.sqrt(values[held]))
 
     def resistance(self, stiffness: Array) -> Array:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 from geometry.meshes import BlockShape
 from geometry.patches import PatchGrid
+from geometry.smooth_shape import smooth_shape
 from macro.block import Sides
 from macro.compliance_cache import Arrays, cached
-from macro.correction import Correction, HalfSpaceField, make_correction
+from macro.condense import HalfSpaceField, make_correction
+from macro.correction import Correction
 from macro.elasticity import Material
 
 
@@ -42,6 +43,5 @@ def cached_correction(
         made = make_correction(shape, material, sides, loads, half_space, comm)
         return {"x": made.x, "y": made.y, "values": made.values}
 
-    # the correction always takes trilinear elements
-    key = (replace(shape, element="Q1"), material, sides, loads)
+    key = (smooth_shape(shape), material, sides, loads)
     return Correction(loads=loads, **cached("correction", key, compute, comm))

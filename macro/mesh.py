@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from geometry.collective import on_root
-from geometry.meshes import BlockShape, flat_block
+from geometry.meshes import BlockShape
+from geometry.refined_block import RefinedShape
 from macro import compat
 
 BOTTOM, TOP, SIDES = 1, 2, 3
@@ -26,7 +27,7 @@ class BlockMesh:
 
     mesh: Any
     facet_tags: Any
-    shape: BlockShape
+    shape: BlockShape | RefinedShape
 
     @property
     def comm(self) -> Any:
@@ -34,7 +35,7 @@ class BlockMesh:
         return self.mesh.comm
 
 
-def block_mesh(shape: BlockShape, comm: Any) -> BlockMesh:
+def block_mesh(shape: BlockShape | RefinedShape, comm: Any) -> BlockMesh:
     """Mesh a block with gmsh on rank 0 and distribute it.
 
     Args:
@@ -49,6 +50,6 @@ def block_mesh(shape: BlockShape, comm: Any) -> BlockMesh:
     """
     with ExitStack() as gmsh_session:
         models: list[Any] = []
-        on_root(comm, lambda: models.append(gmsh_session.enter_context(flat_block(shape))))
+        on_root(comm, lambda: models.append(gmsh_session.enter_context(shape.meshed())))
         mesh, facet_tags = compat.mesh_from_gmsh(models[0] if models else None, comm)
     return BlockMesh(mesh=mesh, facet_tags=facet_tags, shape=shape)

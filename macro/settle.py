@@ -13,7 +13,8 @@ from geometry.errors import NotConverged
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-10
-"""What force and moment may miss, relative to the force and to that times the plane's half size."""
+"""What force and moment may miss, relative to the force and to that times the plane's half size,
+where the rounding of closures lets a plane be placed so well."""
 
 LOOSE = 1e-11
 """Stiffness against motions of the plane, relative to the largest, that is no support at all."""
@@ -89,7 +90,7 @@ def settle(motions: Motions, start: Array) -> Array:
         largest = max(largest, found.measure)
         step, held = _direction(motions, now, found)
         if held and np.abs(step).max() <= _ULP * motions.reach(now):
-            break  # rounding
+            return now + step  # the rounding of closures allows no more
         if found.measure <= _CLEAR * largest:
             # Newton's steps alone come ever closer to a plane that is clear, and never there
             clear = now + 3.0 * step
@@ -143,7 +144,8 @@ def _searched(
     motions: Motions, now: Array, found: Excess, step: Array
 ) -> tuple[Array, Excess] | None:
     """Lengthen or shorten a step until the slope of the energy along it has fallen."""
-    slope, share, low, high = float(found.load @ step), 1.0, 0.0, np.inf
+    slope, low, high = float(found.load @ step), 0.0, np.inf
+    share = min(1.0, motions.half / float(np.abs(step).max()))
     for _ in range(_MOST_TRIALS):
         at = now + share * step
         if np.abs(at).max() > _FARTHEST * motions.half:

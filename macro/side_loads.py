@@ -12,12 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.meshes import BlockShape
 from geometry.patches import PatchGrid
+from geometry.smooth_shape import SmoothShape
 
 Array = NDArray[np.float64]
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
+ORDER = 4
+"""Gauss points in each interval."""
+
 _FINEST = 0.02
 """First step into the depth, in sides of a rectangle."""
 _GROWTH = 2.0
@@ -25,33 +27,33 @@ _GROWTH = 2.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LineRule:
-    """Quadrature along one grid line with the hat functions of its ticks.
+    """Quadrature along one grid line with the quadratic shape functions of its nodes.
 
     Args:
         points: Coordinates, shape (n,) [mm].
-        hats: Weights times hat functions, shape (n, ticks) [mm].
+        shapes: Weights times shape functions, shape (n, nodes) [mm].
     """
 
     points: Array
-    hats: Array
+    shapes: Array
 
     @classmethod
-    def between(cls, ticks: Array, breaks: Array) -> LineRule:
+    def between(cls, ticks: Array, breaks: Array, order: int = ORDER) -> LineRule:
         """Place Gauss points between all ticks and breaks.
 
         Args:
-            ticks: Grid planes, ascending [mm].
+            ticks: Grid planes, ascending [mm]; nodes lie on them and half-way between.
             breaks: Further places where the integrand may bend [mm].
+            order: Gauss points in each interval.
         """
         slack = 1e-9 * (ticks[-1] - ticks[0])
         inside = breaks[(breaks > ticks[0]) & (breaks < ticks[-1])]
         ends = np.unique(np.concatenate([ticks, inside]))
         ends = ends[np.concatenate([[True], np.diff(ends) > slack])]
+        nodes, weights = np.polynomial.legendre.leggauss(order)
         half = 0.5 * np.diff(ends)[:, None]
-        points = (0.5 * (ends[1:] + ends[:-1])[:, None] + half * _NODES).ravel()
-        weights = (half * _WEIGHTS).ravel()
-        hats = np.stack([np.interp(points, ticks, unit) for unit in np.eye(len(ticks))], axis=1)
-        return cls(points, weights[:, None] * hats)
+        points = (0.5 * (ends[1:] + ends[:-1])[:, None] + half * nodes).ravel()
+        return cls(points, (half * weights).reshape(-1, 1) * _quadratics(ticks, points))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +66,7 @@ class Side:
         along: Rule along the top's edge.
         down: Rule along z.
         place: Coordinate of the plane [mm].
-        nodes: Grid indices (i, j, k) of its nodes, shape (ticks along, ticks in z, 3).
+        nodes: Grid indices (i, j, k) of its nodes, shape (nodes along, nodes in z, 3).
     """
 
     axis: int
@@ -83,37 +85,46 @@ class Side:
         return x, y, -down.ravel()
 
     def nodal(self, values: Array) -> Array:
-        """Integrate values at the points, shape (n, m), against the nodes' hats.
+        """Integrate values at the points, shape (n, m), against the nodes' shape functions.
 
         Returns:
-            Integrals, shape (ticks along, ticks in z, m).
+            Integrals, shape (nodes along, nodes in z, m).
         """
         shape = len(self.along.points), len(self.down.points), -1
-        part = np.tensordot(self.along.hats, values.reshape(shape), axes=(0, 0))
-        return np.asarray(np.tensordot(part, self.down.hats, axes=(1, 0)).transpose(0, 2, 1))
+        part = np.tensordot(self.along.shapes, values.reshape(shape), axes=(0, 0))
+        return np.asarray(np.tensordot(part, self.down.shapes, axes=(1, 0)).transpose(0, 2, 1))
 
 
-def sides(shape: BlockShape, loads: PatchGrid) -> list[Side]:
+def sides(shape: SmoothShape, loads: PatchGrid, order: int = ORDER) -> list[Side]:
     """Return the four side planes of a block, with rules for loads on its top.
 
     Args:
         shape: The block.
         loads: The rectangles under pressure.
+        order: Gauss points in each interval.
     """
-    ticks = shape.ticks
-    smallest = min(loads.size)
-    steps = smallest * _FINEST * _GROWTH ** np.arange(64)
-    depths = steps[steps < shape.height]
-    down = LineRule.between(ticks[2], -depths)
+    ticks, counts = shape.ticks, [len(nodes) for nodes in shape.nodes]
+    steps = min(loads.size) * _FINEST * _GROWTH ** np.arange(64)
+    down = LineRule.between(ticks[2], -steps[steps < shape.height], order)
     found = []
     for axis in (0, 1):
-        edge = ticks[1 - axis]
         borders = loads.borders_y if axis == 0 else loads.borders_x
-        along = LineRule.between(edge, borders)
-        for end, outward in ((0, -1.0), (len(ticks[axis]) - 1, 1.0)):
-            grid = np.meshgrid(np.arange(len(edge)), np.arange(len(ticks[2])), indexing="ij")
-            across = np.full_like(grid[0], end)
-            nodes = (across, *grid) if axis == 0 else (grid[0], across, grid[1])
-            place = float(ticks[axis][end])
+        along = LineRule.between(ticks[1 - axis], borders, order)
+        for end, outward in ((0, -1.0), (counts[axis] - 1, 1.0)):
+            edge, depth = np.indices((counts[1 - axis], counts[2]))
+            across = np.full_like(edge, end)
+            nodes = (across, edge, depth) if axis == 0 else (edge, across, depth)
+            place = float(shape.nodes[axis][end])
             found.append(Side(axis, outward, along, down, place, np.stack(nodes, axis=2)))
     return found
+
+
+def _quadratics(ticks: Array, points: Array) -> Array:
+    """Return the quadratic shape functions of all nodes at points, shape (n, nodes)."""
+    cell = np.clip(np.searchsorted(ticks, points) - 1, 0, len(ticks) - 2)
+    t = (points - ticks[cell]) / np.diff(ticks)[cell]
+    values = np.zeros((len(points), 2 * len(ticks) - 1))
+    parts = ((1.0 - t) * (1.0 - 2.0 * t), 4.0 * t * (1.0 - t), t * (2.0 * t - 1.0))
+    for place, part in enumerate(parts):
+        values[np.arange(len(points)), 2 * cell + place] = part
+    return values

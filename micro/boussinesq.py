@@ -36,7 +36,7 @@ class HalfSpace:
         InputError: When a constant is out of its range.
 
     Source:
-        Love 1929, doi 10.1098/rsta.1929.0006.
+        Love 1929, doi 10.1098/rsta.1929.0009.
     """
 
     young_modulus: float

@@ -33,7 +33,7 @@ def influence_matrix(patches: PatchGrid) -> Array:
         patches: The N patches.
 
     Source:
-        Love 1929, doi 10.1098/rsta.1929.0006; Waddad et al. 2016, eq. 29-30 for one point.
+        Love 1929, doi 10.1098/rsta.1929.0009; Waddad et al. 2016, eq. 29-30 for one point.
     """
     (nx, ny), (sx, sy), (a, b) = patches.grid, patches.size, patches.half_sizes
     table = mutual_influence(np.arange(nx)[:, None] * sx, np.arange(ny) * sy, a, b)

@@ -5,24 +5,41 @@ patch its law, the laws go onto the flat interface of an elastic block, and load
 `History`.
 """
 
+from multiscale.concurrent import ConcurrentCoupling
+from multiscale.condensed import CondensedCoupling
+from multiscale.consistent import consistent_laws
 from multiscale.history import History, LoadStep, PatchState
 from multiscale.law_files import LawTable, read_laws, write_laws
 from multiscale.laws import PatchLaw
+from multiscale.loading import Programme, load_steps
+from multiscale.patch_laws import PatchLaws
 from multiscale.run import Run, run
 from multiscale.scene import Scene
+from multiscale.spread import ContactSpread, contact_spread
 from multiscale.stage import Stage, make_stage
 from multiscale.tabulate import isolated_laws
+from multiscale.yielding import SpreadLoads, UniformLoads
 
 __all__ = [
+    "ConcurrentCoupling",
+    "CondensedCoupling",
+    "ContactSpread",
     "History",
     "LawTable",
     "LoadStep",
     "PatchLaw",
+    "PatchLaws",
     "PatchState",
+    "Programme",
     "Run",
     "Scene",
+    "SpreadLoads",
     "Stage",
+    "UniformLoads",
+    "consistent_laws",
+    "contact_spread",
     "isolated_laws",
+    "load_steps",
     "make_stage",
     "read_laws",
     "run",

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from geometry.errors import InputError
-from geometry.patches import PatchGrid
 from micro import HalfSpaceModel, MicroModel
-from multiscale.blocks import embedding, patch_compliance, smooth_correction
+from multiscale.blocks import embedding, fine_loads, smooth_correction, yielding
 from multiscale.concurrent import TOLERANCE, ConcurrentCoupling
 from multiscale.condensed import CondensedCoupling
 from multiscale.consistent import consistent_laws
@@ -25,9 +24,6 @@ from multiscale.tabulate import isolated_laws
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import Interface
 
-_LOADS = (
-    16  # rectangles along a side, at least, that a smooth field is told the contacts' forces by
-)
 _COARSE = 64  # cells along a side, at most, of the surface that goes ahead
 
 
@@ -59,6 +55,8 @@ def make_table(stage: Stage, comm: Any) -> LawTable:
             mean_heights=stage.mean_heights,
             approach_end=stage.approach_end,
             tolerance=stage.table_tolerance,
+            most_rows=stage.table_rows,
+            tilt=stage.furthest[1],
             comm=comm,
         )
     return isolated_laws(
@@ -68,6 +66,7 @@ def make_table(stage: Stage, comm: Any) -> LawTable:
         closure_ends=stage.closure_ends,
         love=stage.scene.coupling.love,
         tolerance=stage.table_tolerance,
+        most_rows=stage.table_rows,
         comm=comm,
     )
 
@@ -95,7 +94,7 @@ def assemble(stage: Stage, table: LawTable | None, comm: Any) -> tuple[Coupling,
 
 def _with_laws(stage: Stage, table: LawTable, comm: Any) -> tuple[Coupling, Interface | None]:
     if newton_choice(stage).condensed:
-        return CondensedCoupling(table, patch_compliance(stage, comm)), None
+        return CondensedCoupling(table, yielding(stage, comm)), None
     from macro import PressedBlock
 
     interface = embedding(stage, comm)
@@ -106,9 +105,6 @@ def _with_laws(stage: Stage, table: LawTable, comm: Any) -> tuple[Coupling, Inte
 
 
 def _concurrent(stage: Stage, comm: Any) -> Coupling:
-    """Gather forces on rectangles that divide the patches, several along each side."""
-    nx, ny = (count * -(-_LOADS // count) for count in stage.patches.grid)
-    loads = PatchGrid(grid=(nx, ny), lengths=stage.patches.lengths)
     model = stage.model
     if isinstance(model, HalfSpaceModel):
         model = replace(model, tolerance=1e-2 * TOLERANCE)
@@ -116,7 +112,7 @@ def _concurrent(stage: Stage, comm: Any) -> Coupling:
         model,
         stage.patches,
         stage.mean_heights,
-        smooth_correction(stage, loads, comm),
+        smooth_correction(stage, fine_loads(stage), comm),
         coarse=None if stage.by_summits else _coarse_model(stage),
         comm=comm,
     )

@@ -17,6 +17,10 @@ Array = NDArray[np.float64]
 T = TypeVar("T")
 Evaluate = Callable[[Array], tuple[Array, T]]
 
+TOLERANCE = 1e-8
+"""What force and moment may miss, relative to the force and to that times half the diagonal of the
+interface; no finer than the loads are told."""
+
 _MOST_EVALUATIONS = 200
 _MOST_DOUBLINGS = 60
 _ENOUGH = 0.9  # share of a slope that a step may leave, or it is lengthened or shortened
@@ -35,15 +39,12 @@ class Balance:
     Attributes:
         half: Half the diagonal of the interface [mm].
         first_touch: Approach of a level plane at first touch [mm].
-        tolerance: What force and moment may miss, relative to the force and to that times half
-            the diagonal; no finer than the loads are told.
         plane: The latest plane: approach at the middle [mm], slopes along x and y; shape (3,).
         force: The latest force [N].
     """
 
     half: float
     first_touch: float
-    tolerance: float = 1e-8
     plane: Array = field(default_factory=lambda: np.zeros(3))
     force: float = 0.0
 
@@ -83,7 +84,7 @@ class Balance:
 
         def root(approach: float) -> float:
             force = float(evaluate(np.array([approach, *plane[1:]]))[0][0])
-            if wanted > 0.0 and abs(force - wanted) <= self.tolerance * wanted:
+            if wanted > 0.0 and abs(force - wanted) <= TOLERANCE * wanted:
                 return 0.0
             return force ** (2 / 3) - wanted ** (2 / 3) if wanted else float(force > 0.0) - 0.5
 
@@ -123,7 +124,7 @@ class Balance:
         stiffness = np.diag(np.array([1.0, 1 / 6, 1 / 6])[free]) * 1.5 * (largest or 1.0) / depth
         for _ in range(_MOST_EVALUATIONS):
             largest = max(float(load[0]), control.force or 0.0)
-            if np.abs(excess).max() <= self.tolerance * largest:
+            if np.abs(excess).max() <= TOLERANCE * largest:
                 return plane, load, known
             step = -np.linalg.solve(stiffness, excess)
             step *= min(1.0, 0.5 * depth / np.abs(step).max()) if self.force == 0.0 else 1.0

@@ -9,13 +9,17 @@ from numpy.typing import NDArray
 
 from geometry.patches import PatchGrid
 from micro import influence_matrix
+from multiscale.spread import contact_spread
 from multiscale.stage import Stage
+from multiscale.yielding import SpreadLoads, UniformLoads, Yielding
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import Interface, Material
     from macro.correction import Correction
 
 Array = NDArray[np.float64]
+
+_LOADS = 16  # rectangles along a side, at least, that tell a smooth field the contacts' forces
 
 
 def embedding(stage: Stage, comm: Any) -> Interface:
@@ -49,8 +53,7 @@ def patch_compliance(stage: Stage, comm: Any) -> Array:
     """
     if stage.scene.coupling.decomposed:
         correction = smooth_correction(stage, stage.patches, comm)
-        half_space = influence_matrix(stage.patches) / (np.pi * stage.model.contact_modulus)
-        return half_space + correction.patch_compliance(stage.patches)
+        return _half_space(stage) + correction.patch_compliance(stage.patches)
     from mpi4py import MPI
 
     from macro import plain_compliance
@@ -62,6 +65,44 @@ def patch_compliance(stage: Stage, comm: Any) -> Array:
 
     key = (stage.shape, _material(stage), stage.scene.block.sides, stage.patches)
     return cached("plain", key, compute, comm or MPI.COMM_SELF)["compliance"]
+
+
+def yielding(stage: Stage, comm: Any) -> Yielding:
+    """Return how a scene's block yields to the pressures of patch laws.
+
+    Consistent laws come with the contacts' places: the correction counts where they are.
+
+    Args:
+        stage: The scene's ingredients.
+        comm: MPI communicator; None for this process alone.
+
+    Note:
+        Collective.
+    """
+    coupling = stage.scene.coupling
+    if not (coupling.decomposed and coupling.kind == "consistent"):
+        return UniformLoads(patch_compliance(stage, comm))
+    loads = fine_loads(stage)
+    spread = contact_spread(
+        stage.model,
+        stage.patches,
+        loads,
+        approach_end=stage.approach_end,
+        tilt=stage.furthest[1],
+        comm=comm,
+    )
+    correction = smooth_correction(stage, loads, comm).patch_compliance(loads) / loads.area
+    return SpreadLoads(_half_space(stage), correction, spread)
+
+
+def fine_loads(stage: Stage) -> PatchGrid:
+    """Return rectangles that divide the patches of a scene, several along each side."""
+    nx, ny = (count * -(-_LOADS // count) for count in stage.patches.grid)
+    return PatchGrid(grid=(nx, ny), lengths=stage.patches.lengths)
+
+
+def _half_space(stage: Stage) -> Array:
+    return np.asarray(influence_matrix(stage.patches) / (np.pi * stage.model.contact_modulus))
 
 
 def smooth_correction(stage: Stage, loads: PatchGrid, comm: Any) -> Correction:

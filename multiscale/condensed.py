@@ -11,6 +11,7 @@ from multiscale.dense_newton import DenseNewton, DenseState
 from multiscale.history import LoadStep, PatchState
 from multiscale.law_files import LawTable
 from multiscale.patch_laws import PatchLaws
+from multiscale.yielding import Yielding
 
 Array = NDArray[np.float64]
 
@@ -22,16 +23,17 @@ class CondensedCoupling:
 
     Args:
         table: The laws.
-        compliance: Mean displacement of patch i by unit pressure on patch j, (N, N) [mm/MPa].
+        block: How the block yields, or its compliance: mean displacement of patch i by unit
+            pressure on patch j, (N, N) [mm/MPa].
 
     Raises:
-        InputError: When the compliance does not fit the patches.
+        InputError: When the block does not fit the patches.
     """
 
-    def __init__(self, table: LawTable, compliance: Array) -> None:
+    def __init__(self, table: LawTable, block: Array | Yielding) -> None:
         self._patches = table.patches
         self._laws = PatchLaws(table.laws)
-        self._newton = DenseNewton(self._laws, compliance, table.patches)
+        self._newton = DenseNewton(self._laws, block, table.patches)
         self._last: DenseState | None = None
 
     def press(self, control: Control) -> LoadStep:

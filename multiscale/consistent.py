@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,94 +15,101 @@ from geometry.patches import PatchGrid
 from micro import MicroModel, influence_matrix
 from multiscale.law_files import LawTable
 from multiscale.laws import PatchLaw
+from multiscale.refinement import MOST_ROWS, law_of, refined
 
 Array = NDArray[np.float64]
 
-_FIRST_ROWS = 9
-_MOST_ROWS = 400  # solutions of the micro model
-_LEAST_SCALE = 0.01  # of the largest pressure: below it an error counts as one of this much
+_TOUCH = 1e-3  # first touch under a tilt, relative to what the tilt adds to the approach
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class WholeSurface:
-    """A rough surface pressed as a whole by a level plane, seen patch by patch.
+    """A rough surface pressed as a whole by a rigid plane, seen patch by patch.
 
-    The closure of a patch is the approach less the mean displacement of the patch by the mean
-    pressures of all patches, c_i = δ − Σ_j Λ_ij p_j / (π E*): what a block answers with. What a
+    The closure of a patch is its local approach less the mean displacement of the patch by the mean
+    pressures of all patches, c_i = s_i − Σ_j Λ_ij p_j / (π E*): what a block answers with. What a
     patch sinks beyond that (`PatchLaw.relief`) is told from its first touch on; before, by that
-    there.
+    there. Laws made under a tilt know how it shares the load.
 
     Attributes:
         model: Micro model of the whole surface.
         patches: Its partition.
         mean_heights: Mean height of each patch, shape (N,) [mm].
         compliance: Λ / (π E*), shape (N, N) [mm/MPa].
+        tilt: Slopes of the plane.
     """
 
     model: MicroModel
     patches: PatchGrid
     mean_heights: Array
     compliance: Array
+    tilt: tuple[float, float] = (0.0, 0.0)
+
+    @cached_property
+    def lean(self) -> Array:
+        """Local approach of every patch over that at the middle, shape (N,) [mm]."""
+        middle = np.add(self.patches.origin, np.multiply(0.5, self.patches.lengths))
+        return np.asarray((self.patches.centres - middle) @ np.asarray(self.tilt))
+
+    @cached_property
+    def first_touch(self) -> float:
+        """Approach at the middle at first contact under the tilt [mm]."""
+        if self.tilt == (0.0, 0.0):
+            return self.model.first_touch
+        reach = 0.5 * float(np.abs(self.tilt) @ np.asarray(self.patches.lengths))
+        below = self.model.first_touch - reach
+        return below + _first_loaded(lambda way: self._force(below + way), 2.0 * reach)
 
     def rows(self, approaches: Array) -> Array:
-        """Return, for every approach, columns of all patches, shape (n, 6, N).
+        """Return rows of all patches at increasing approaches of the first, shape (m, N, 6).
 
-        The columns are approach, closure, pressure, area fraction, contacts, relief.
+        The columns are local approach, closure, pressure, area fraction, contacts, relief.
         """
+        middle = approaches - self.lean[0]
         response = self.model.respond(
-            approaches, patches=self.patches, mean_heights=self.mean_heights
+            middle, patches=self.patches, mean_heights=self.mean_heights, tilt=self.tilt
         )
-        pressure = response.patch_pressure
+        pressure = response.patch_pressure.copy()
+        pressure[middle <= self.first_touch] = 0.0  # whatever round-off makes of it
+        local = middle[:, None] + self.lean
         displacement = pressure @ self.compliance
+        touched = pressure > 0.0
         columns = (
-            np.broadcast_to(approaches[:, None], pressure.shape),
-            approaches[:, None] - displacement,
+            local,
+            local - displacement,
             pressure,
-            response.patch_contact_area / self.patches.area,
-            response.patch_contacts,
+            np.where(touched, response.patch_contact_area / self.patches.area, 0.0),
+            np.where(touched, response.patch_contacts, 0),
             response.patch_displacement - displacement,
         )
-        return np.stack(columns, axis=1).astype(np.float64)
+        return np.stack(columns, axis=2).astype(np.float64)
 
-    def laws(self, approach_end: float, tolerance: float) -> tuple[PatchLaw, ...]:
-        """Tabulate all laws up to an approach; rows are added half-way between rows.
+    def laws(self, rows: Array) -> list[PatchLaw]:
+        """Return the laws of all patches through rows (m, N, 6), sorted by approach."""
+        reaches = self.model.datum - self.mean_heights
+        return [_law(rows[:, index], float(reach)) for index, reach in enumerate(reaches)]
 
-        Args:
-            approach_end: Largest approach.
-            tolerance: Error of the interpolated pressure half-way between rows, relative to the
-                pressure there, or to a hundredth of the largest on any patch where that is more.
-        """
-        first = min(self.model.first_touch, approach_end)
-        rows = self.rows(np.linspace(first, approach_end, _FIRST_ROWS, dtype=np.float64))
-        rows[0, 2:] = 0.0  # whatever round-off makes of first touch
-        halfway = 0.5 * (rows[:-1, 0, 0] + rows[1:, 0, 0])
-        errors = np.zeros(self.patches.count)
-        while halfway.size and len(rows) < _MOST_ROWS:
-            new = self.rows(halfway)
-            error = self._errors(self._made(rows), new)
-            bad = error.max(axis=1) > tolerance
-            errors = np.maximum(errors, error[~bad].max(axis=0, initial=0.0))
-            rows = np.concatenate((rows, new))
-            rows = rows[np.argsort(rows[:, 0, 0])]
-            halfway = _around(rows[:, 0, 0], new[bad, 0, 0])
-            missed = error.max(axis=0)
-        if halfway.size:
-            errors = np.maximum(errors, missed)
-        made = zip(self._made(rows), errors, strict=True)
-        return tuple(replace(law, interpolation_error=float(error)) for law, error in made)
+    def tabulated(
+        self, approach_end: float, tolerance: float, most_rows: int
+    ) -> tuple[list[PatchLaw], float]:
+        """Return all laws up to an approach, and the error of the force; see `refined`."""
+        if approach_end <= self.first_touch:
+            return self.laws(self.rows(np.array([approach_end]) + self.lean[0])), 0.0
+        return refined(
+            self.rows,
+            self.laws,
+            self.first_touch + self.lean[0],
+            approach_end + self.lean[0],
+            compliance=self.compliance,
+            tolerance=tolerance,
+            most_rows=most_rows,
+        )
 
-    def _errors(self, laws: list[PatchLaw], new: Array) -> Array:
-        """Return the errors of laws at new rows, shape (n, N)."""
-        largest = max((law.pressure[-1] for law in laws if not law.is_open), default=0.0)
-        scale = np.maximum(new[:, 2], _LEAST_SCALE * max(float(largest), float(new[:, 2].max())))
-        made = [law.along(new[:, 0, index]).pressure for index, law in enumerate(laws)]
-        missing = np.abs(np.column_stack(made) - new[:, 2])
-        return np.divide(missing, scale, out=np.zeros_like(missing), where=scale > 0.0)
-
-    def _made(self, rows: Array) -> list[PatchLaw]:
-        """Return the laws through rows."""
-        reach = self.model.datum - self.mean_heights
-        return [_law(rows[:, :, index], float(reach[index])) for index in range(len(reach))]
+    def _force(self, approach: float) -> float:
+        response = self.model.respond(
+            [approach], patches=self.patches, mean_heights=self.mean_heights, tilt=self.tilt
+        )
+        return float(response.force[0])
 
 
 def consistent_laws(
@@ -109,80 +118,91 @@ def consistent_laws(
     *,
     mean_heights: Array,
     approach_end: float,
-    tolerance: float = 1e-4,
+    tolerance: float = 1e-3,
+    most_rows: int = MOST_ROWS,
+    tilt: tuple[float, float] = (0.0, 0.0),
     comm: Any = None,
 ) -> LawTable:
     """Tabulate the laws of all patches of one surface that is pressed as a whole.
 
     On a block whose compliance is that of the half-space they give back the solution they were
-    made from, whatever the partition.
+    made from, whatever the partition: to rounding at their rows, and between them to the error
+    that the table states.
 
     Args:
         model: Micro model of the whole surface.
         patches: Its partition.
         mean_heights: Mean height of the surface over each patch, shape (N,) [mm].
-        approach_end: Largest local approach that the laws will be asked for [mm].
-        tolerance: Interpolation error of the pressure, see `WholeSurface.laws`.
-        comm: MPI communicator.
+        approach_end: Largest approach at the middle that the laws will be asked for [mm];
+            patches that are not touched up to it are open.
+        tolerance: Interpolation error of the force, see `refinement.refined`.
+        most_rows: Rows that are solved at most.
+        tilt: Slopes of the plane that presses the surface; laws serve other planes less well.
+        comm: MPI communicator; its first rank solves, so that the table is the same to the bit on
+            any number of ranks.
 
     Returns:
         All laws, on every rank.
 
+    Raises:
+        NotConverged: When the micro model does not converge.
+
     Note:
         Collective.
     """
+    means = np.asarray(mean_heights, dtype=float)
     whole = WholeSurface(
         model=model,
         patches=patches,
-        mean_heights=mean_heights,
+        mean_heights=means,
         compliance=influence_matrix(patches) / (np.pi * model.contact_modulus),
+        tilt=tilt,
     )
+    laws, error = on_root(comm, lambda: whole.tabulated(approach_end, tolerance, most_rows))
     return LawTable(
         patches=patches,
-        laws=on_root(comm, lambda: whole.laws(approach_end, tolerance)),
-        made_by={"coupling": "consistent", "model": model.name, "tolerance": f"{tolerance:g}"},
+        laws=tuple(laws),
+        made_by={
+            "coupling": "consistent",
+            "model": model.name,
+            "love": "mean",
+            "tolerance": f"{tolerance:g}",
+        },
+        force_error=error,
     )
+
+
+def _first_loaded(force: Callable[[float], float], way: float) -> float:
+    """Return the way on which a force appears, to a thousandth below."""
+    low, high = 0.0, way
+    while high - low > _TOUCH * way:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if force(middle) <= 0.0 else (low, middle)
+    return low
 
 
 def _law(rows: Array, reach: float) -> PatchLaw:
-    """Return the law of one patch through rows of its own, shape (n, 6)."""
+    """Return the law of one patch out of all rows (m, 6), those before its touch included."""
     loaded = np.flatnonzero(rows[:, 2] > 0.0)
     if not loaded.size:
-        touch = float(rows[-1, 1])  # not touched as far as the table goes
-        rows = rows[:0]
-    else:
-        rows = _from_touch(rows, int(loaded[0]))
-        touch = float(rows[0, 1])
-    return PatchLaw(
-        approach=rows[:, 0],
-        closure=rows[:, 1],
-        pressure=rows[:, 2],
-        contact_area_fraction=rows[:, 3],
-        contacts=rows[:, 4].astype(np.int64),
-        relief=rows[:, 5],
-        touch=touch,
-        reach=reach,
-    )
+        return law_of(rows[:0], float(rows[:, 1].max()), reach)
+    first = max(int(loaded[0]), 1)
+    start = _touch(rows[first - 1 :])
+    return law_of(np.vstack((start, rows[first:])), float(start[1]), reach)
 
 
-def _from_touch(rows: Array, first: int) -> Array:
-    """Begin rows at first touch, where p^(2/3) goes to zero, and keep those that rise."""
-    rows, before = rows[first:], rows[max(first - 1, 0)]
-    highest = np.maximum.accumulate(rows[:, 2])
-    rows = rows[np.concatenate(([True], highest[1:] > highest[:-1]))]
-    touch = before.copy()
-    if len(rows) > 1:
-        root = rows[:2, 2] ** (2 / 3)
-        straight = rows[0, 0] - root[0] * (rows[1, 0] - rows[0, 0]) / (root[1] - root[0])
-        share = (straight - before[0]) / (rows[0, 0] - before[0]) if first else 1.0
-        touch = before + np.clip(share, 0.0, 1.0 - 1e-6) * (rows[0] - before)
-    touch[2:5] = 0.0
-    return np.vstack((touch, rows))
+def _touch(rows: Array) -> Array:
+    """Return the row of first touch, between an open row and the first one in contact.
 
-
-def _around(points: Array, centres: Array) -> Array:
-    """Return the middles of the intervals on either side of some of the points."""
-    index = np.searchsorted(points, centres)
-    return np.unique(
-        np.concatenate((points[index - 1] + points[index], points[index] + points[index + 1])) / 2
-    )
+    The straight line of p^(2/3) through the first two rows in contact tells the approach (Hertz'
+    law); closure and relief are taken between the open row and the first in contact.
+    """
+    before, after = rows[:2]
+    share = 0.0
+    if len(rows) > 2 and rows[2, 2] > after[2]:
+        root, later = rows[1:3, 2] ** (2 / 3)
+        back = root / (later - root) * (rows[2, 0] - after[0])
+        share = np.clip(1.0 - back / (after[0] - before[0]), 0.0, 0.99)
+    start = before + share * (after - before)
+    start[2:5] = 0.0
+    return np.asarray(start)

@@ -12,6 +12,7 @@ from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
 from multiscale.loading import described
+from multiscale.yielding import UniformLoads, Yielding
 
 if TYPE_CHECKING:
     from multiscale.laws import LawPoint
@@ -57,7 +58,8 @@ class DenseEquations:
 
     Args:
         laws: The laws.
-        compliance: C, mean displacement of patch i by unit pressure on patch j, (N, N) [mm/MPa].
+        block: How the block yields, or its compliance: mean displacement of patch i by unit
+            pressure on patch j, (N, N) [mm/MPa].
         patches: The partition.
 
     Attributes:
@@ -69,15 +71,9 @@ class DenseEquations:
         InputError: When the compliance is not a finite matrix of the size of the partition.
     """
 
-    def __init__(self, laws: Laws, compliance: Array, patches: PatchGrid) -> None:
+    def __init__(self, laws: Laws, block: Array | Yielding, patches: PatchGrid) -> None:
+        self.laws, self.block = laws, _yielding(block, patches.count)
         count = patches.count
-        if compliance.shape != (count, count) or not np.all(np.isfinite(compliance)):
-            raise InputError(
-                "the compliance does not fit the patches",
-                value=compliance.shape,
-                allowed=f"a finite matrix of shape {(count, count)}",
-            )
-        self.laws, self.compliance = laws, compliance
         middle = np.add(patches.origin, np.multiply(0.5, patches.lengths))
         self.lever: Array = np.column_stack((np.ones(count), patches.centres - middle))
         self.area = patches.area
@@ -86,14 +82,14 @@ class DenseEquations:
     def at(self, local: Array, plane: Array) -> Iterate:
         """Evaluate a trial state."""
         point = self.laws.along(local)
-        missing = self.lever @ plane - point.closure - self.compliance @ point.pressure
+        missing = self.lever @ plane - point.closure - self.block.displacement(local, point)
         load = self.area * (self.lever.T @ point.pressure)
         return Iterate(local, plane, point, missing, load)
 
-    def tangent(self, point: LawPoint) -> Array:
-        """Return the derivative of closure + C p over the local approaches, shape (N, N)."""
-        matrix = self.compliance * point.dpressure
-        matrix[np.diag_indices_from(matrix)] += point.dclosure
+    def tangent(self, now: Iterate) -> Array:
+        """Return the derivative of closure + displacement over the local approaches, (N, N)."""
+        matrix = self.block.slope(now.local, now.point)
+        matrix[np.diag_indices_from(matrix)] += now.point.dclosure
         return matrix
 
 
@@ -165,7 +161,7 @@ class LoadCase:
                 return -1.0
             if self.control.force is not None:
                 return self._equations.area * float(point.pressure.sum()) - self.control.force
-            return self._mean_approach(point, lean) - plane[0]
+            return self._mean_approach(common + lean, point, lean) - plane[0]
 
         below, above = -self._equations.half, 1e-6 * self._equations.half
         while excess(above) < 0.0:
@@ -178,7 +174,8 @@ class LoadCase:
             middle = 0.5 * (below + above)
             below, above = (middle, above) if excess(middle) < 0.0 else (below, middle)
         if self.control.force is not None:
-            plane[0] = self._mean_approach(self._equations.laws.along(above + lean), lean)
+            local = above + lean
+            plane[0] = self._mean_approach(local, self._equations.laws.along(local), lean)
         return above + lean, plane
 
     def failure(self, reason: str, iterations: int) -> NotConverged:
@@ -190,7 +187,24 @@ class LoadCase:
             remedy="take more load steps (load.steps)",
         )
 
-    def _mean_approach(self, point: LawPoint, lean: Array) -> float:
+    def _mean_approach(self, local: Array, point: LawPoint, lean: Array) -> float:
         """Return the plane's approach that the pressures see on their average [mm]."""
-        sink = point.closure + self._equations.compliance @ point.pressure - lean
+        sink = point.closure + self._equations.block.displacement(local, point) - lean
         return float(sink @ point.pressure / point.pressure.sum())
+
+
+def _yielding(block: Array | Yielding, count: int) -> Yielding:
+    """Take a compliance for what it stands for, and check that it fits N patches."""
+    if isinstance(block, np.ndarray):
+        if block.shape != (count, count) or not np.all(np.isfinite(block)):
+            raise InputError(
+                "the compliance does not fit the patches",
+                value=block.shape,
+                allowed=f"a finite matrix of shape {(count, count)}",
+            )
+        return UniformLoads(block)
+    if block.count != count:
+        raise InputError(
+            "the block does not fit the patches", value=block.count, allowed=f"{count} patches"
+        )
+    return block

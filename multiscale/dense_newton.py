@@ -12,6 +12,7 @@ from geometry.control import Control
 from geometry.errors import NotConverged
 from geometry.patches import PatchGrid
 from multiscale.dense_equations import DenseEquations, Iterate, Laws, LoadCase
+from multiscale.yielding import Yielding
 
 Array = NDArray[np.float64]
 
@@ -64,15 +65,16 @@ class DenseNewton:
 
     Args:
         laws: The laws.
-        compliance: C, mean displacement of patch i by unit pressure on patch j, (N, N) [mm/MPa].
+        block: How the block yields, or its compliance: mean displacement of patch i by unit
+            pressure on patch j, (N, N) [mm/MPa].
         patches: The partition.
 
     Raises:
         InputError: When the compliance is not a finite matrix of the size of the partition.
     """
 
-    def __init__(self, laws: Laws, compliance: Array, patches: PatchGrid) -> None:
-        self._equations = DenseEquations(laws, compliance, patches)
+    def __init__(self, laws: Laws, block: Array | Yielding, patches: PatchGrid) -> None:
+        self._equations = DenseEquations(laws, block, patches)
 
     def solve(self, control: Control, start: DenseState | None = None) -> DenseState:
         """Find the equilibrium of one load step.
@@ -118,7 +120,7 @@ class DenseNewton:
         equations, unit = self._equations, case.unit[case.free]
         lever = equations.lever[:, case.free] * unit
         right = np.column_stack((now.missing, lever))
-        solved = np.linalg.solve(equations.tangent(now.point), right)
+        solved = np.linalg.solve(equations.tangent(now), right)
         step, columns = solved[:, 0], solved[:, 1:]
         change = np.zeros(3)
         if not case.free.any():

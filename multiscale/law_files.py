@@ -22,7 +22,8 @@ _COLUMNS = {
     "contacts": "1",
     "relief": "mm",
 }
-_SCALARS = {"touch": "mm", "reach": "mm", "interpolation_error": "1"}
+_SCALARS = {"touch": "mm", "reach": "mm", "interpolation_error": "1", "stiffness_error": "1"}
+_UNKNOWN = float("nan")  # errors that older files lack
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,12 +33,15 @@ class LawTable:
     Attributes:
         patches: The partition.
         laws: One law per patch, in the order of the flat patch index.
-        made_by: How they were made: micro model, Love's displacement, tolerance.
+        made_by: How they were made: coupling, micro model, Love's displacement, tolerance.
+        force_error: Estimated error of the force between the rows, see `refinement.Errors`: of
+            all patches together, or of the worst where each was tabulated alone.
     """
 
     patches: PatchGrid
     laws: tuple[PatchLaw, ...]
     made_by: dict[str, str]
+    force_error: float = float("nan")
 
     def __post_init__(self) -> None:
         if len(self.laws) != self.patches.count:
@@ -59,6 +63,7 @@ def write_laws(path: Path, table: LawTable) -> None:
         file.attrs["patch_grid"] = table.patches.grid
         file.attrs["lengths_mm"] = table.patches.lengths
         file.attrs["origin_mm"] = table.patches.origin
+        file.attrs["force_error"] = table.force_error
         for name, text in table.made_by.items():
             file.attrs[f"made_by_{name}"] = text
         for index, law in enumerate(table.laws):
@@ -90,7 +95,12 @@ def read_laws(path: Path) -> LawTable:
                 for name, text in file.attrs.items()
                 if name.startswith("made_by_")
             }
-            return LawTable(patches=patches, laws=tuple(map(_law, groups)), made_by=made_by)
+            return LawTable(
+                patches=patches,
+                laws=tuple(map(_law, groups)),
+                made_by=made_by,
+                force_error=float(file.attrs.get("force_error", _UNKNOWN)),
+            )
     except (OSError, KeyError) as error:
         raise InputError(f"is not a readable law file: {error}", file=str(path)) from None
     except InputError as error:
@@ -99,7 +109,9 @@ def read_laws(path: Path) -> LawTable:
 
 def _law(group: Any) -> PatchLaw:
     content: dict[str, Any] = {name: np.asarray(group[name][()]) for name in _COLUMNS}
-    content.update({name: float(group.attrs[name]) for name in _SCALARS})
+    for name in _SCALARS:
+        later = name == "stiffness_error"
+        content[name] = float(group.attrs.get(name, _UNKNOWN) if later else group.attrs[name])
     return PatchLaw(**content)
 
 

@@ -10,12 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geometry.errors import InputError
-from multiscale.law_curves import Curves
+from multiscale.law_curves import FLATTEST, Curves
 
 Array = NDArray[np.float64]
-
-_FLATTEST = 1e-9  # slope of a closure that is as good as at the end of its rise
-_MOST_STEPS = 80  # of an inversion; bisection alone takes 53
 
 
 class LawPoint(NamedTuple):
@@ -57,7 +54,7 @@ class PatchLaw:
     Attributes:
         closure: Closures from the first touch on, shape (n,) [mm]; empty for a patch that stays
             open: such a law is zero as far as it goes.
-        pressure: Mean pressures, increasing from zero, shape (n,) [MPa].
+        pressure: Mean pressures, the first zero, shape (n,) [MPa].
         approach: Local rigid approaches s, increasing, shape (n,) [mm].
         contact_area_fraction: Real over nominal contact area, shape (n,).
         contacts: Number of asperities in contact, shape (n,).
@@ -67,9 +64,9 @@ class PatchLaw:
             first, or infinite when it has no asperity.
         reach: Rigid plane's height over the patch's mean plane at zero approach [mm]; the mean
             separation is reach − c + relief.
-        interpolation_error: Largest error of the interpolated pressure against the micro model
-            half-way between rows, relative to the pressure there, or to a hundredth of the
-            table's largest where that is more.
+        interpolation_error: Estimated error of the interpolated pressure against the micro model,
+            see `refinement.Errors`.
+        stiffness_error: The same of the stiffness; NaN where nobody estimated it.
     """
 
     closure: Array
@@ -81,21 +78,22 @@ class PatchLaw:
     touch: float
     reach: float
     interpolation_error: float = 0.0
+    stiffness_error: float = float("nan")
 
     def __post_init__(self) -> None:
-        columns = (
-            self.pressure, self.approach, self.contact_area_fraction, self.contacts, self.relief,
-        )  # fmt: skip
-        if any(column.shape != self.closure.shape for column in columns):
-            raise InputError("a patch law needs columns of one length")
+        names = ("closure", "pressure", "approach", "contact_area_fraction", "contacts", "relief")
+        for name in names:
+            column = getattr(self, name)
+            if column.shape != self.closure.shape:
+                raise InputError("a patch law needs columns of one length")
+            if not np.all(np.isfinite(column)):
+                raise InputError(f"a patch law needs a finite {name}")
         if self.closure.size == 1:
             raise InputError("a patch law needs no row (open patch) or at least two")
-        for name in ("approach", "pressure"):
-            column = getattr(self, name)
-            if not np.all(np.isfinite(column)) or np.any(np.diff(column) <= 0):
-                raise InputError(f"a patch law needs a finite, strictly increasing {name}")
-        if not np.all(np.isfinite(self.closure)) or np.any(np.diff(self.closure[:2]) <= 0.0):
-            raise InputError("a patch law needs a finite closure that increases from first touch")
+        if np.any(np.diff(self.approach) <= 0.0):
+            raise InputError("a patch law needs a strictly increasing approach")
+        if np.any(self.pressure < 0.0):
+            raise InputError("a patch law needs a pressure without tension")
         if self.closure.size and self.pressure[0] != 0.0:
             raise InputError("a patch law starts at zero pressure", value=self.pressure[0])
 
@@ -129,9 +127,8 @@ class PatchLaw:
             approach: Local rigid approaches of any shape [mm].
         """
         given = np.asarray(approach, dtype=float)
-        values, slopes = self.curves.of_one(given.ravel())
-        shape = (len(values), *given.shape)
-        return LawPoint.of(values.reshape(shape), slopes.reshape(shape))
+        values, slopes = self.curves.of_one(*self.curves.placed(given.ravel()))
+        return LawPoint.of(values.reshape(-1, *given.shape), slopes.reshape(-1, *given.shape))
 
     def at(self, closure: ArrayLike, *, extend: bool = False) -> tuple[Array, Array]:
         """Return pressure and stiffness, the exact derivative of the same interpolant.
@@ -146,8 +143,9 @@ class PatchLaw:
         Raises:
             InputError: When a closure lies beyond the law's range and `extend` is false.
         """
-        point = self.along(self._local(closure, extend))
-        return point.pressure, point.dpressure / np.maximum(point.dclosure, _FLATTEST)
+        closures = self._checked(closure, extend)
+        point = LawPoint.of(*self._over_closure(closures))
+        return point.pressure, point.dpressure / np.maximum(point.dclosure, FLATTEST)
 
     def area_fraction_at(self, closure: ArrayLike, *, extend: bool = False) -> Array:
         """Return the real contact area over the nominal one.
@@ -159,7 +157,8 @@ class PatchLaw:
         Raises:
             InputError: When a closure lies beyond the table and `extend` is false.
         """
-        return np.asarray(np.clip(self._read(2, closure, extend), 0.0, 1.0))
+        area = self._over_closure(self._checked(closure, extend))[0][2]
+        return np.asarray(np.clip(area, 0.0, 1.0))
 
     def contacts_at(self, closure: ArrayLike, *, extend: bool = False) -> NDArray[np.int64]:
         """Return the number of contacts of the table row at or before each closure.
@@ -185,8 +184,8 @@ class PatchLaw:
         Raises:
             InputError: When a closure lies beyond the table and `extend` is false.
         """
-        closures = np.asarray(closure, dtype=float)
-        return np.asarray(self.reach - closures + self._read(3, closure, extend))
+        closures = self._checked(closure, extend)
+        return np.asarray(self.reach - closures + self._over_closure(closures)[0][3])
 
     @cached_property
     def _rising(self) -> int:
@@ -194,54 +193,36 @@ class PatchLaw:
         stops = np.flatnonzero(np.diff(self.closure) <= 0.0)
         return int(stops[0]) + 1 if stops.size else len(self.closure)
 
-    def _read(self, function: int, closure: ArrayLike, extend: bool) -> Array:
-        local = self._local(closure, extend)
-        values, _ = self.curves.of_one(local.ravel())
-        return values[function].reshape(local.shape)
+    @cached_property
+    def _risen(self) -> Curves:
+        """The curves up to where closure stops to rise, and their tangents there."""
+        return self.curves.cut(self._rising)
 
-    def _local(self, closure: ArrayLike, extend: bool) -> Array:
-        """Return the local approaches of closures."""
-        closures = self._checked(closure, extend)
-        if self.is_open:
-            return closures
-        first, last = self.closure[0], self.closure[self._rising - 1]
-        end = self.approach[self._rising - 1]
-        slope = max(float(self.along(end).dclosure), _FLATTEST)
-        local = np.where(
-            closures <= first,
-            self.approach[0] - (first - closures),
-            end + (closures - last) / slope,
-        )
-        between = (closures > first) & (closures < last)
-        local[between] = self._inverted(closures[between])
-        return local
-
-    def _inverted(self, closures: Array) -> Array:
-        """Invert the rising part of the closure's interpolant by bracketed Newton steps."""
-        rows, ends = self.approach[: self._rising], self.closure[: self._rising]
-        piece = np.searchsorted(ends, closures, side="right") - 1
-        low, high = rows[piece], rows[piece + 1]
-        share = (closures - ends[piece]) / (ends[piece + 1] - ends[piece])
-        local = low + share * (high - low)
-        for _ in range(_MOST_STEPS):
-            point = self.along(local)
-            error = point.closure - closures
-            low, high = np.where(error < 0.0, local, low), np.where(error > 0.0, local, high)
-            newton = local - error / np.maximum(point.dclosure, _FLATTEST)
-            inside = (newton >= low) & (newton <= high)
-            step = np.where(inside, newton, 0.5 * (low + high))
-            if np.all(np.abs(step - local) <= 4e-16 * np.abs(step)):
-                break
-            local = step
-        return step if closures.size else closures
+    def _over_closure(self, closures: Array) -> tuple[Array, Array]:
+        """Return values and derivatives over the approach at closures (…), shapes (f, …)."""
+        given = closures.ravel()
+        piece, into = np.zeros(given.size, dtype=np.intp), given.copy()
+        if not self.is_open:
+            rows = self.closure[: self._rising]
+            into -= rows[0]
+            beyond = given >= rows[-1]
+            slope = max(float(self._risen.coefficients[0, -1, 2, 0]), FLATTEST)
+            piece[beyond], into[beyond] = len(rows), (given[beyond] - rows[-1]) / slope
+            within = (given > rows[0]) & ~beyond
+            piece[within], into[within] = self._risen.inverted(0, rows, given[within])
+        values, slopes = self._risen.of_one(piece, into)
+        return values.reshape(-1, *closures.shape), slopes.reshape(-1, *closures.shape)
 
     def _checked(self, closure: ArrayLike, extend: bool) -> Array:
         closures = np.asarray(closure, dtype=float)
         start, end = self.range
         # The end of a table is reached up to round-off of the closure's own computation.
         if not extend and np.any(closures > end * (1 + 1e-12)):
+            problem = "closure beyond the end of the patch law"
+            if not self.is_function:
+                problem += ", where pressure stops being a function of closure"
             raise InputError(
-                "closure beyond the end of the patch law",
+                problem,
                 value=float(np.max(closures)),
                 allowed=f"closure up to {end:.6g} mm (first touch at {start:.6g} mm)",
             )

@@ -12,6 +12,8 @@ from multiscale.laws import LawPoint, PatchLaw
 
 Array = NDArray[np.float64]
 
+_POINT = slice(0, 2)  # closure and p^(2/3) among the curves
+
 
 class PatchLaws:
     """N patch laws, evaluated together at one local approach each.
@@ -36,7 +38,7 @@ class PatchLaws:
 
     def along(self, approach: Array) -> LawPoint:
         """Return closures, pressures and their derivatives at local approaches, shape (N,)."""
-        return LawPoint.of(*self._curves.at(approach))
+        return LawPoint.of(*self._curves.at(approach, _POINT))
 
     def area_fraction(self, approach: Array) -> Array:
         """Return real over nominal contact areas at local approaches, shape (N,)."""

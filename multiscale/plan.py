@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from geometry.meshes import alignment
 from geometry.statistics import roughness
+from multiscale.block_plan import block_statement, block_warnings
 from multiscale.newton_choice import newton_choice
 from multiscale.stage import Stage
 
@@ -17,7 +17,7 @@ def statements(stage: Stage) -> Iterator[tuple[str, str]]:
     yield "micro model", _model(stage)
     yield "coupling", _coupling(stage)
     if stage.embedded:
-        yield "block", _block(stage)
+        yield "block", block_statement(stage)
     if stage.by_laws:
         yield "newton", _newton(stage)
     yield "load", _load(stage)
@@ -28,8 +28,8 @@ def warnings(stage: Stage) -> Iterator[str]:
     yield from _surface_warnings(stage)
     if stage.by_laws:
         yield from _patch_warnings(stage)
-    if stage.embedded and not stage.scene.coupling.decomposed:
-        yield from _block_warnings(stage)
+    if stage.embedded:
+        yield from block_warnings(stage)
 
 
 def _surface_warnings(stage: Stage) -> Iterator[str]:
@@ -66,18 +66,6 @@ def _patch_warnings(stage: Stage) -> Iterator[str]:
             "the patches are not small against the block: the half-space correction (Love) inside "
             "their laws is an approximation there"
         )
-
-
-def _block_warnings(stage: Stage) -> Iterator[str]:
-    cells = min(c / n for c, n in zip(stage.shape.cells[:2], stage.patches.grid, strict=True))
-    if cells * stage.shape.degree < 4:
-        yield (
-            f"{cells:.3g} cells along a patch: fewer than four linear (two quadratic) ones make "
-            "the block stiffer by several per cent under a patch's pressure; refine block.cells"
-        )
-    fit = alignment(stage.shape, stage.patches)
-    if not fit:
-        yield fit.sentence
 
 
 def _surface(stage: Stage) -> str:
@@ -130,26 +118,6 @@ def _newton(stage: Stage) -> str:
     choice = newton_choice(stage)
     return (
         f"{'condensed to the patches' if choice.condensed else 'full, on the mesh'}: {choice.why}"
-    )
-
-
-def _block(stage: Stage) -> str:
-    shape, block = stage.shape, stage.scene.block
-    nx, ny, nz = shape.cells
-    margin = (
-        f"{shape.margin:g} mm beyond it in {shape.margin_cells} cells, " if shape.margin else ""
-    )
-    kind = "hexahedra" if shape.element.startswith("Q") else "hexahedra split into tetrahedra"
-    way = (
-        "decomposed, for contacts feel the half-space's own near field: finite elements only for "
-        "the smooth rest, "
-        if stage.scene.coupling.decomposed
-        else "finite elements under the patches, "
-    )
-    return (
-        f"{way}{nx} × {ny} × {nz} {kind} ({shape.element}) under the interface, grading "
-        f"{shape.grading:g}, {margin}{block.sides} sides, contact modulus "
-        f"{stage.model.contact_modulus:.6g} MPa"
     )
 
 

@@ -80,9 +80,10 @@ class Run:
         """Return the load steps accepted so far, with times and notes."""
         notes = []
         if self.table is not None:
-            error = max(law.interpolation_error for law in self.table.laws)
+            errors = [law.interpolation_error for law in self.table.laws]
             notes.append(
-                f"interpolation error of the laws half-way between their rows: {error:.1e}"
+                f"interpolation error of the laws between their rows: {self.table.force_error:.1e} "
+                f"of the force, {max(errors):.1e} of a patch's pressure or the mean, if more"
             )
         imbalances = [abs(step.imbalance) for step in self.steps if step.imbalance is not None]
         if imbalances:

@@ -15,11 +15,13 @@ from geometry.errors import InputError
 from geometry.files import read_surface
 from geometry.meshes import BlockShape
 from geometry.patches import PatchGrid, patch_means
+from geometry.smooth_shape import smooth_shape
 from geometry.spectrum import synthesise
 from geometry.surface import Surface
 from micro import MODELS, MicroModel, contact_modulus, micro_model
 from multiscale.coupling import AnalyticCoupling, tilted_approaches
 from multiscale.loading import Programme
+from multiscale.refinement import MOST_ROWS
 from multiscale.scene import Scene
 from multiscale.stage_checks import block_cells, check_patches, check_size
 
@@ -78,6 +80,11 @@ class Stage:
         return self.scene.coupling.table_tolerance or (1e-4 if self.by_summits else 1e-3)
 
     @property
+    def table_rows(self) -> int:
+        """Rows that laws may take to get there; models that see cells pay for each."""
+        return 400 if self.by_summits else MOST_ROWS
+
+    @property
     def closure_ends(self) -> NDArray[np.float64]:
         """Largest closure that each patch's law is made for, shape (N,) [mm].
 
@@ -95,14 +102,17 @@ class Stage:
 
     @property
     def approach_end(self) -> float:
-        """Largest local approach that laws of the whole surface are made for [mm].
+        """Largest approach at the middle that laws of the whole surface are made for [mm].
 
         Under a patch that is closed further than its neighbours, or on a block that is stiffer
         than the half-space, the law's own surface moves away under more load than is there; the
         laws go further by what all of its displacement is worth.
         """
-        end = float(self.closure_ends.max())
-        response = self.model.respond([end], patches=self.patches, mean_heights=self.mean_heights)
+        tilt = self.furthest[1]
+        end = float(np.max(self.closure_ends - tilted_approaches(self.patches, 0.0, tilt)))
+        response = self.model.respond(
+            [end], patches=self.patches, mean_heights=self.mean_heights, tilt=tilt
+        )
         return end + float(response.patch_displacement.mean())
 
     @property
@@ -214,7 +224,7 @@ def make_surface(scene: Scene) -> Surface:
 
 def _block_shape(scene: Scene, surface: Surface) -> BlockShape:
     block = scene.block
-    return BlockShape(
+    shape = BlockShape(
         interface=surface.lengths,
         height=block.height,
         cells=block_cells(scene),
@@ -224,6 +234,9 @@ def _block_shape(scene: Scene, surface: Surface) -> BlockShape:
         margin_cells=block.margin_cells if block.margin else 0,
         margin_grading=block.margin_grading if block.margin else 1.0,
     )
+    if scene.coupling.kind != "analytic" and scene.coupling.decomposed:
+        _located(scene, "block.cells", lambda: smooth_shape(shape))
+    return shape
 
 
 def _located(scene: Scene, key: str, make: Callable[[], Any]) -> Any:

@@ -9,17 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.collective import together
-from geometry.errors import NotConverged
 from geometry.patches import PatchGrid
 from micro import MicroModel
 from micro.love import love_centre, love_mean
 from multiscale.law_files import LawTable
 from multiscale.laws import PatchLaw
+from multiscale.refinement import MOST_ROWS, law_of, refined
 
 Array = NDArray[np.float64]
-_FIRST_ROWS = 9
-_MOST_ROWS = 400  # solutions of the micro model spent on one law
-_LEAST_SCALE = 0.01  # of the largest pressure: below it an error counts as one of this much
 _MOST_TRIALS = 40  # in search of the approach that gives a closure
 _BEYOND_FALL = 0.25  # of a patch's own displacement, by which a block may be the softer under it
 _UNEVEN = 1e-3  # of the range of closures: a fall below is no fall
@@ -73,39 +70,41 @@ class IsolatedPatch:
         relief = response.patch_displacement[:, 0] - mean * pressure
         return np.column_stack((approaches, closure, pressure, area, response.contacts, relief))
 
-    def law(self, closure_end: float, tolerance: float) -> PatchLaw:
+    def law(self, closure_end: float, tolerance: float, most_rows: int = MOST_ROWS) -> PatchLaw:
         """Tabulate the law from first touch to a closure.
 
-        Rows are added half-way between rows until the interpolated pressure agrees there with
-        the micro model. Where the law stops being a function of closure (the patch's stiffness
-        dp/dδ exceeds the inverse of its own compliance) it goes on over the approach.
+        Where the law stops being a function of closure (the patch's stiffness dp/dδ exceeds the
+        inverse of its own compliance) it goes on over the approach.
 
         Args:
             closure_end: Largest closure that will be asked for [mm].
-            tolerance: Error of the interpolated pressure half-way between rows, relative to the
-                pressure there, or to a hundredth of the table's largest where that is more.
+            tolerance: Interpolation error of the pressure, see `refinement.refined`.
+            most_rows: Rows that are solved at most.
 
         Returns:
             The law; open when first touch lies beyond `closure_end`.
-
-        Raises:
-            NotConverged: When the pressure is a function of closure nowhere.
         """
         if self.touch >= closure_end:
-            return _law(np.empty((0, 6)), self.touch, self.reach, 0.0)
-        end = self._approach_at(closure_end)
-        rows = self.rows(np.linspace(self.touch, end, _FIRST_ROWS, dtype=np.float64))
-        rows[0, 1:] = self.touch, 0.0, 0.0, 0.0, 0.0  # whatever round-off makes of first touch
-        rows = _increasing(rows)
-        if len(rows) < 2 or rows[1, 1] <= rows[0, 1]:
-            raise NotConverged(
-                f"the law of the patch at {self.patch.origin} mm",
-                reason="STIFFER_THAN_ITS_HALF_SPACE",
-                iterations=_FIRST_ROWS,
-                remedy="choose another micro.model or larger patches (patches.grid)",
-            )
-        rows, error = self._refined(rows, tolerance)
-        return _law(rows, self.touch, self.reach, error)
+            return law_of(np.empty((0, 6)), self.touch, self.reach)
+
+        def rows(approaches: Array) -> Array:
+            made = self.rows(approaches)
+            made[approaches <= self.touch, 1:] = self.touch, 0.0, 0.0, 0.0, 0.0  # not round-off's
+            return made[:, None]
+
+        def laws(made: Array) -> list[PatchLaw]:
+            return [law_of(_even(made[:, 0]), self.touch, self.reach)]
+
+        made, _ = refined(
+            rows,
+            laws,
+            self.touch,
+            self._approach_at(closure_end),
+            compliance=np.array([[self.compliance]]),
+            tolerance=tolerance,
+            most_rows=most_rows,
+        )
+        return made[0]
 
     def _approach_at(self, closure: float) -> float:
         """Find the approach that closes the patch by `closure`, or by as much as it can be."""
@@ -121,33 +120,13 @@ class IsolatedPatch:
         pressure = self.rows(np.array([closure]))[0, 2]
         return float(closure + _BEYOND_FALL * self.compliance * pressure)
 
-    def _refined(self, rows: Array, tolerance: float) -> tuple[Array, float]:
-        """Halve intervals until the pressure half-way is met within the tolerance."""
-        halfway = 0.5 * (rows[:-1, 0] + rows[1:, 0])
-        worst = missed = 0.0
-        spent = len(rows)
-        while halfway.size and spent < _MOST_ROWS:
-            new = self.rows(halfway)
-            spent += len(new)
-            point = _law(rows, self.touch, self.reach, 0.0).along(new[:, 0])
-            scale = np.maximum(new[:, 2], _LEAST_SCALE * rows[-1, 2])
-            shifted = point.dpressure * np.abs(point.closure - new[:, 1])
-            error = (np.abs(point.pressure - new[:, 2]) + shifted) / scale
-            bad = error > tolerance
-            worst = max(worst, float(error[~bad].max(initial=0.0)))
-            missed = float(error.max())
-            rows = _increasing(np.vstack((rows, new)))
-            halfway = _around(rows[:, 0], new[bad, 0])
-        return rows, max(worst, missed) if halfway.size else worst
 
-
-def _increasing(rows: Array) -> Array:
-    """Sort rows by approach and keep those whose pressure exceeds all before.
+def _even(rows: Array) -> Array:
+    """Keep rows whose pressure exceeds all before, and whose closure is not a little below those.
 
     A closure that falls for good is kept: the patch's stiffness has outgrown its own half-space.
     One a little below those before is an unevenness of the micro model, and left out.
     """
-    rows = rows[np.argsort(rows[:, 0])]
     highest = np.maximum.accumulate(rows[:, 1:3], axis=0)
     fall = highest[:, 0] - rows[:, 1]
     uneven = (fall > 0.0) & (fall < _UNEVEN * np.ptp(rows[:, 1]))
@@ -157,29 +136,6 @@ def _increasing(rows: Array) -> Array:
     return rows[rising & ~uneven]
 
 
-def _around(points: Array, centres: Array) -> Array:
-    """Return the middles of the intervals on either side of some of the points."""
-    index = np.searchsorted(points, centres[centres < points[-1]])
-    return np.unique(
-        0.5 * np.concatenate((points[index - 1], points[index + 1]))
-        + 0.5 * np.tile(points[index], 2)
-    )
-
-
-def _law(rows: Array, touch: float, reach: float, error: float) -> PatchLaw:
-    return PatchLaw(
-        approach=rows[:, 0],
-        closure=rows[:, 1],
-        pressure=rows[:, 2],
-        contact_area_fraction=rows[:, 3],
-        contacts=rows[:, 4].astype(np.int64),
-        relief=rows[:, 5],
-        touch=touch,
-        reach=reach,
-        interpolation_error=error,
-    )
-
-
 def isolated_laws(
     model: MicroModel,
     patches: PatchGrid,
@@ -187,7 +143,8 @@ def isolated_laws(
     mean_heights: Array,
     closure_ends: Array,
     love: str = "mean",
-    tolerance: float = 1e-4,
+    tolerance: float = 1e-3,
+    most_rows: int = MOST_ROWS,
     comm: Any = None,
 ) -> LawTable:
     """Tabulate the isolated laws of all patches.
@@ -198,8 +155,10 @@ def isolated_laws(
         mean_heights: Mean height of the surface over each patch, shape (N,) [mm].
         closure_ends: Largest closure each law will be asked for, shape (N,) [mm].
         love: Displacement in the closure, ``mean`` or ``centre``.
-        tolerance: Interpolation error of the pressure, see `IsolatedPatch.law`.
-        comm: MPI communicator; the patches are dealt to its ranks.
+        tolerance: Interpolation error of the pressure, see `refinement.refined`.
+        most_rows: Rows that are solved at most for one law.
+        comm: MPI communicator; the patches are dealt to its ranks by predicted work. A patch is
+            solved alone, so that its law does not depend on the number of ranks.
 
     Returns:
         All laws, on every rank.
@@ -216,11 +175,10 @@ def isolated_laws(
         isolated = IsolatedPatch(
             model=alone, patch=patch, mean_height=float(mean_heights[index]), love=love
         )
-        return isolated.law(float(closure_ends[index]), tolerance)
+        return isolated.law(float(closure_ends[index]), tolerance, most_rows)
 
     rank, size = (0, 1) if comm is None else (comm.rank, comm.size)
-    # dealt in turn: neighbours, which tend to be as high as each other, go to different ranks
-    mine = range(rank, patches.count, size)
+    mine = _dealt(_work(model, patches, closure_ends), size)[rank]
     made = together(comm, lambda: {index: make(index) for index in mine})
     parts = [made] if comm is None else comm.allgather(made)
     laws = {index: law for part in parts for index, law in part.items()}
@@ -233,4 +191,31 @@ def isolated_laws(
             "love": love,
             "tolerance": f"{tolerance:g}",
         },
+        force_error=max(law.interpolation_error for law in laws.values()),
     )
+
+
+def _work(model: MicroModel, patches: PatchGrid, closure_ends: Array) -> Array:
+    """Return the number of cells or summits that each law can touch, shape (N,)."""
+    surface, summits = getattr(model, "surface", None), getattr(model, "asperities", None)
+    if surface is not None:
+        x, y = (part.ravel() for part in np.meshgrid(surface.x, surface.y, indexing="ij"))
+        z = surface.heights.ravel()
+    elif summits is not None:
+        x, y, z = summits.x, summits.y, summits.z
+    else:
+        return np.ones(patches.count)
+    owner = patches.index_of(x, y)
+    reached = model.datum - z < closure_ends[owner]
+    return np.bincount(owner[reached], minlength=patches.count).astype(float)
+
+
+def _dealt(work: Array, ranks: int) -> list[list[int]]:
+    """Deal patches to ranks, the heaviest first, each to the rank with the least so far."""
+    hands: list[list[int]] = [[] for _ in range(ranks)]
+    loads = np.zeros(ranks)
+    for index in np.argsort(-work, kind="stable"):
+        rank = int(np.argmin(loads))
+        hands[rank].append(int(index))
+        loads[rank] += work[index] + 1.0
+    return hands

@@ -38,8 +38,12 @@ def run(case, mode):
     states = [
         pressed.press(Control(approach=approach, tilt=(1e-3, 5e-4))) for approach in (4e-3, 8e-3)
     ]
+    # enough for more than two patches: a plane on an edge has no tilt of its own
+    force = 20.0 * float(interface.areas.sum())
+    states.append(pressed.press(Control(force=force, tilt=None)))
     numbers = {
         "force": [state.force for state in states],
+        "plane": [states[-1].approach, *states[-1].tilt],
         "closure": states[-1].closure.tolist(),
         "pressure": states[-1].pressure.tolist(),
     }
@@ -95,6 +99,15 @@ def fail_to_converge():
     return error_of(lambda: pressed.press(Control(approach=8e-3)))
 
 
+def fail_to_hold(mode):
+    """Return the error that every rank meets when a free plane has supports on one side only."""
+    shape, grid = SHAPES["one facet"]
+    interface = interface_of(block_of(comm=COMM, **shape), grid)
+    laws = [*[PowerLaw(3e4, touch=np.inf)] * 2, *uneven_laws(2)]
+    pressed = PressedBlock(interface.block, interface, laws, mode)
+    return error_of(lambda: pressed.press(Control(force=1.0, tilt=None)))
+
+
 def error_of(action):
     """Return type and text of the error that an action raises on every rank."""
     try:
@@ -109,6 +122,7 @@ if __name__ == "__main__":
     modes = ("patchwise", "pointwise")
     result = {f"{case}, {mode}": run(case, mode) for case in SHAPES for mode in modes}
     result |= {f"law, {mode}": fail_in_law(mode) for mode in modes}
+    result |= {f"plane, {mode}": fail_to_hold(mode) for mode in modes}
     result |= {"newton": fail_to_converge(), "gmsh": fail_in_gmsh()}
     if COMM.rank == 0:
         print(json.dumps(result))

@@ -55,9 +55,18 @@ def test_the_cases_are_what_they_claim():
     assert any(0 < missing < 16 for missing in shared["patches_missing_on_ranks"])
 
 
+HELD_BY_NOTHING = (
+    "NotConverged: the balance of the plane did not converge: NO_SUPPORT after 0 iterations; no "
+    "further patch can be touched that would hold the plane: prescribe its tilt (load.tilt) or "
+    "take more patches (patches.grid)"
+)
+
+
 @pytest.mark.parametrize(
     ("case", "text"),
     [
+        ("plane, patchwise", HELD_BY_NOTHING),
+        ("plane, pointwise", HELD_BY_NOTHING),
         ("gmsh", "InputError: 3: gmsh gave up (allowed: better luck)"),
         ("law, patchwise", "InputError: 0.25: closure beyond the table"),
         ("law, pointwise", "InputError: 0.25: closure beyond the table"),

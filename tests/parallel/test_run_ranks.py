@@ -22,6 +22,9 @@ SCENES = {
         "block.cells=[8, 8, 5]", "patches.grid=[4, 2]", "coupling.newton=condensed",
         "load.approach=['8 um', '2 um']", "load.tilt=[0.002, 0.001]", "output.fields=true",
     ],
+    "free to turn, on the mesh": [
+        "block.cells=[8, 8, 5]", "patches.grid=[4, 2]", "coupling.newton=full", "load.tilt=free",
+    ],
     "consistent, decomposed": [
         "block.cells=[8, 8, 5]", "coupling.kind=consistent", "micro.model=half-space",
     ],

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geometry import PatchGrid, Spectrum, patch_means, synthesise
+from geometry import PatchGrid, Spectrum, Surface, patch_means, synthesise
 from geometry.control import Control
 from geometry.meshes import BlockShape
 from macro import Material
@@ -41,9 +41,10 @@ def _correction(height, sides):
     return make_correction(shape, material, sides, LOADS, half_space, mpi.COMM_SELF)
 
 
-def _coupling(correction):
+def _coupling(correction, coarse=None):
     model = HalfSpaceModel(surface=SURFACE, contact_modulus=MODULUS, tolerance=1e-10)
-    return ConcurrentCoupling(model, SCENE, patch_means(SURFACE, SCENE), correction)
+    means = patch_means(SURFACE, SCENE)
+    return ConcurrentCoupling(model, SCENE, means, correction, coarse=coarse)
 
 
 @pytest.mark.parametrize("tilt", [(0.005, -0.002), None], ids=["tilted", "balanced"])
@@ -67,6 +68,18 @@ def test_a_prescribed_force_is_the_approach_that_gives_it(corrections, block):
     other = _coupling(corrections[block]).press(Control(force=one.force_N, tilt=(0.002, 0.001)))
     # 1e-8 in the force is less in the approach, which it grows with
     assert other.approach_mm == pytest.approx(one.approach_mm, rel=3e-8)
+
+
+def test_a_plane_that_may_turn_clear_does(corrections):
+    """Below the approach at which summits all about the middle stop it nothing is pressed."""
+    x = (np.arange(32) + 0.5) / 32
+    fewer = Surface(heights=SURFACE.height_at(x[:, None], x), lengths=SURFACE.lengths)
+    coarse = HalfSpaceModel(surface=fewer, contact_modulus=MODULUS)
+    stopped = _coupling(corrections["cube"], coarse).press(Control(force=0.2, tilt=None))
+    assert stopped.approach_mm > 0.0  # where a level plane would touch
+    clear = Control(approach=0.2 * stopped.approach_mm, tilt=None)
+    step = _coupling(corrections["cube"], coarse).press(clear)
+    assert (step.force_N, step.contacts) == (0.0, 0)
 
 
 @pytest.fixture(scope="module")

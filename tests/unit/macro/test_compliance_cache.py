@@ -1,9 +1,13 @@
 """The cache on disk: hits, misses, damaged files and the switch."""
 
+import os
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 
+from geometry import PatchGrid
+from macro import compliance_cache
 from macro.compliance_cache import cache_directory, cached
 
 
@@ -46,6 +50,45 @@ def test_damaged_file_is_replaced(counted, content):
     np.testing.assert_array_equal(again["c"], compute()["c"])
     assert [file.name for file in cache_directory().iterdir()] == [path.name]
     assert path.read_bytes() != content
+
+
+def test_key_does_not_depend_on_how_numpy_prints(counted):
+    calls, compute = counted
+    for value in (0.1, np.float64(0.1)):
+        for count in (2, np.int64(2)):
+            cached(
+                "kind",
+                (PatchGrid(grid=(1, 1), lengths=(value, 1.0)), count),
+                compute,
+                MPI.COMM_SELF,
+            )
+    assert len(calls) == 1
+    cached("kind", (PatchGrid(grid=(1, 1), lengths=(0.2, 1.0)), 2), compute, MPI.COMM_SELF)
+    assert len(calls) == 2
+
+
+def test_key_of_unknown_kind_is_refused(counted):
+    with pytest.raises(TypeError, match="ndarray in a key"):
+        cached("kind", (np.ones(3),), counted[1], MPI.COMM_SELF)
+
+
+def test_what_was_not_used_for_longest_goes_first(counted, monkeypatch):
+    calls, compute = counted
+    for key in range(3):
+        cached("kind", (key,), compute, MPI.COMM_SELF)
+    for age, path in enumerate(
+        sorted(cache_directory().iterdir(), key=lambda p: p.stat().st_mtime)
+    ):
+        os.utime(path, (1e6 + age, 1e6 + age))
+    cached("kind", (0,), compute, MPI.COMM_SELF)  # a hit makes it the youngest
+    size = path.stat().st_size
+    monkeypatch.setattr(compliance_cache, "MOST_BYTES", 2.5 * size)
+    cached("kind", (3,), compute, MPI.COMM_SELF)
+    assert len(list(cache_directory().iterdir())) == 2
+    before = len(calls)
+    for key in (0, 3):
+        cached("kind", (key,), compute, MPI.COMM_SELF)
+    assert len(calls) == before
 
 
 def test_off_keeps_nothing(counted, monkeypatch):

@@ -24,7 +24,7 @@ def parts(surface, grid, name="circular", tolerance=1e-4):
     patches = PatchGrid(grid=grid, lengths=surface.lengths)
     means = patch_means(surface, patches)
     table = consistent_laws(
-        model, patches, mean_heights=means, approach_end=END, tolerance=tolerance
+        model, patches, mean_heights=means, approach_end=END, tolerance=tolerance, most_rows=400
     )
     half_space = influence_matrix(patches) / (np.pi * MODULUS)
     return model, patches, means, table, CondensedCoupling(table, half_space)
@@ -55,11 +55,15 @@ def test_tables_keep_their_tolerance_and_say_so(surface):
     model, patches, means, table, _ = parts(surface, (3, 2))
     approach = np.random.default_rng(4).uniform(1e-3, END, 100)
     pressure = model.respond(approach, patches=patches, mean_heights=means).patch_pressure
-    for law, found in zip(table.laws, pressure.T, strict=True):
-        scale = np.maximum(found, 0.01 * pressure.max())
-        # measured half-way between rows; next to first touch, which is extrapolated, it is more
-        assert np.max(np.abs(law.along(approach).pressure - found) / scale) < 6e-4
-        assert law.interpolation_error <= 1e-4
+    load = np.maximum(pressure.mean(axis=1), 0.01 * pressure.mean(axis=1).max())
+    made = np.column_stack([law.along(approach).pressure for law in table.laws])
+    # what the tables say is measured half-way between rows; elsewhere it may be a little more
+    assert np.max(np.abs((made - pressure).mean(axis=1)) / load) < 3e-4
+    assert table.force_error <= 1e-4
+    for law, wrong, found in zip(table.laws, (made - pressure).T, pressure.T, strict=True):
+        assert np.max(np.abs(wrong) / np.maximum(found, load)) < 3e-3
+        assert law.interpolation_error <= 1e-3  # ten times as large as the force's
+        assert law.is_open or 0.0 < law.stiffness_error < 0.1
     assert table.made_by["coupling"] == "consistent"
 
 

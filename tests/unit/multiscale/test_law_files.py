@@ -29,26 +29,36 @@ def table():
             touch=rising[0, 0] if rows else np.inf,
             reach=random.random(),
             interpolation_error=1 / 3,
+            stiffness_error=1 / 7,
         )
 
     patches = PatchGrid(grid=(2, 3), lengths=(0.1, 1 / 3))
     laws = tuple(law(rows) for rows in (7, 0, 2, 3, 4, 5))
-    return LawTable(patches=patches, laws=laws, made_by={"model": "elliptic", "love": "mean"})
+    made_by = {"model": "elliptic", "love": "mean"}
+    return LawTable(patches=patches, laws=laws, made_by=made_by, force_error=1 / 9)
 
 
 def test_round_trip_is_exact(table, tmp_path):
     write_laws(tmp_path / "laws.h5", table)
     back = read_laws(tmp_path / "laws.h5")
     assert back.patches == table.patches
-    assert back.made_by == table.made_by
+    assert (back.made_by, back.force_error) == (table.made_by, table.force_error)
     for law, copy in zip(table.laws, back.laws, strict=True):
         for name in COLUMNS:
             assert getattr(law, name).tobytes() == getattr(copy, name).tobytes()
-        assert (law.touch, law.reach, law.interpolation_error) == (
-            copy.touch,
-            copy.reach,
-            copy.interpolation_error,
-        )
+        for name in ("touch", "reach", "interpolation_error", "stiffness_error"):
+            assert getattr(law, name) == getattr(copy, name)
+
+
+def test_files_from_before_some_errors_were_told(table, tmp_path):
+    path = tmp_path / "laws.h5"
+    write_laws(path, table)
+    with h5py.File(path, "a") as file:
+        del file.attrs["force_error"]
+        for index in range(6):
+            del file[f"patch_{index // 3}_{index % 3}"].attrs["stiffness_error"]
+    back = read_laws(path)
+    assert np.isnan([back.force_error, *(law.stiffness_error for law in back.laws)]).all()
 
 
 def test_every_column_says_its_unit(table, tmp_path):
@@ -86,7 +96,7 @@ def test_damaged_law_is_refused(table, tmp_path):
     write_laws(path, table)
     with h5py.File(path, "a") as file:
         file["patch_0_0/closure"][3] = np.nan
-    with pytest.raises(InputError, match=r"laws.h5: .*closure that increases from"):
+    with pytest.raises(InputError, match=r"laws.h5: .*needs a finite closure"):
         read_laws(path)
 
 

@@ -106,11 +106,11 @@ def test_area_and_separation():
     [
         ({"closure": np.linspace(1e-3, 9e-3, 11)}, "columns of one length"),
         (
-            {"closure": np.r_[np.full(2, 1e-3), np.linspace(2e-3, 9e-3, 10)]},
-            "closure that increases from first touch",
+            {"approach": np.r_[np.full(2, 1e-3), np.linspace(2e-3, 9e-3, 10)]},
+            "increasing approach",
         ),
-        ({"approach": np.r_[2e-3, np.linspace(1e-3, 9e-3, 11)]}, "increasing approach"),
-        ({"pressure": np.r_[0.0, np.full(11, np.nan)]}, "increasing pressure"),
+        ({"pressure": np.r_[0.0, np.full(11, np.nan)]}, "finite pressure"),
+        ({"pressure": np.r_[0.0, -1.0, np.ones(10)]}, "without tension"),
         ({"pressure": np.linspace(1, 2, 12)}, "starts at zero pressure"),
     ],
 )

@@ -90,8 +90,22 @@ def test_falling_closure_ends_the_law_over_closure():
     pressure, stiffness = FALLING.at(np.linspace(start, end, 50))
     assert np.all(np.diff(pressure) > 0.0)
     assert np.all(stiffness >= 0.0)
-    with pytest.raises(InputError, match="closure beyond the end"):
+    with pytest.raises(InputError, match=r"beyond the end .* stops being a function of closure"):
         FALLING.at(1.01 * end)
+
+
+def test_newton_may_look_beyond_where_closure_turns():
+    """The law over closure goes on steeply there, and never onto the branch that falls."""
+    _, end = FALLING.range
+    turn = FALLING.pressure[np.argmax(FALLING.closure)]
+    beyond = end + np.array([0.0, 1e-9, 1e-8, 1e-3])
+    pressure, stiffness = FALLING.at(beyond, extend=True)
+    assert pressure[0] == pytest.approx(turn, rel=1e-12)
+    assert np.all(np.diff(pressure) > 0.0)
+    h = 1e-3 * (beyond[1:] - end)
+    higher, lower = (FALLING.at(beyond[1:] + way * h, extend=True)[0] for way in (1, -1))
+    # second-order differences of a power of 3/2
+    np.testing.assert_allclose(stiffness[1:], (higher - lower) / (2 * h), rtol=1e-5)
 
 
 @pytest.mark.parametrize("one", [LAWS[0], LAWS[1]])

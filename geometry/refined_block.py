@@ -1,0 +1,143 @@
+"""The flat block meshed with tetrahedra that are small only where contact can occur."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.checks import positive_lengths
+from geometry.errors import InputError
+from geometry.lattice import gmsh_session
+from geometry.surface import Surface
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RefinedShape:
+    """A block whose tetrahedra grow with the distance from places on its top.
+
+    Args:
+        interface: Sides (Lx, Ly) of the top [mm].
+        height: Height of the block [mm].
+        places: Places on the top around which elements are small, shape (n, 2) [mm].
+        fine: Edge length there [mm].
+        coarse: Edge length far from them [mm].
+        growth: Increase of the edge length per distance.
+        element: ``P1`` or ``P2``.
+
+    Raises:
+        InputError: When a value is out of its range.
+    """
+
+    interface: tuple[float, float]
+    height: float
+    places: Array
+    fine: float
+    coarse: float
+    growth: float = 0.25
+    element: str = "P1"
+    margin: float = field(default=0.0, init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "interface", positive_lengths(self.interface, "the interface"))
+        if self.element not in ("P1", "P2"):
+            raise InputError("this element is unknown", value=self.element, allowed="P1, P2")
+        if not 0.0 < self.fine <= self.coarse < math.inf:
+            raise InputError(
+                "the edge lengths are out of range",
+                value=(self.fine, self.coarse),
+                allowed="0 < fine ≤ coarse",
+            )
+        if not (self.height > 0.0 and self.growth > 0.0):
+            raise InputError("height and growth must be positive", value=(self.height, self.growth))
+
+    @property
+    def hexahedral(self) -> bool:
+        """Whether the cells are hexahedra."""
+        return False
+
+    @property
+    def degree(self) -> int:
+        """Polynomial degree of the element."""
+        return int(self.element[1])
+
+    @contextmanager
+    def meshed(self) -> Iterator[Any]:
+        """Mesh the block in gmsh for as long as the context lasts; faces as in `flat_block`."""
+        with gmsh_session("patchlaw refined block") as gmsh:
+            box = gmsh.model.occ.addBox(0.0, 0.0, -self.height, *self.interface, self.height)
+            gmsh.model.occ.synchronize()
+            _name_faces(gmsh, box, self.height)
+            _set_sizes(gmsh, self)
+            gmsh.model.mesh.generate(3)
+            yield gmsh.model
+
+
+def places_in_reach(surface: Surface, approach: float, *, spacing: float) -> Array:
+    """Return places that a level plane can touch: where the surface is above z_M − approach.
+
+    The half-space only moves away under pressure, so that nothing below can come into contact.
+
+    Args:
+        surface: The rough surface.
+        approach: Largest approach, with what a tilt adds to it [mm].
+        spacing: Distance between places [mm].
+
+    Returns:
+        Points of a square lattice, shape (n, 2) [mm]; at least the highest point.
+    """
+    x, y = (
+        np.linspace(0.0, length, max(2, math.ceil(length / spacing) + 1))
+        for length in surface.lengths
+    )
+    grid = np.meshgrid(x, y, indexing="ij")
+    inside = surface.height_at(*grid) > surface.highest - approach
+    found = np.stack([part[inside] for part in grid], axis=1)
+    return np.vstack([found, np.reshape(surface.highest_point, (1, 2))])
+
+
+def _name_faces(gmsh: Any, box: int, height: float) -> None:
+    faces = [tag for _, tag in gmsh.model.getBoundary([(3, box)], oriented=False)]
+    level = {tag: gmsh.model.occ.getCenterOfMass(2, tag)[2] / height for tag in faces}
+    groups = {
+        "bottom": [tag for tag in faces if level[tag] < -0.99],
+        "top": [tag for tag in faces if level[tag] > -0.01],
+        "sides": [tag for tag in faces if -0.99 <= level[tag] <= -0.01],
+    }
+    gmsh.model.addPhysicalGroup(3, [box], 1)
+    gmsh.model.setPhysicalName(3, 1, "block")
+    for tag, (name, members) in enumerate(groups.items(), start=1):
+        gmsh.model.addPhysicalGroup(2, members, tag)
+        gmsh.model.setPhysicalName(2, tag, name)
+
+
+def _set_sizes(gmsh: Any, shape: RefinedShape) -> None:
+    """Let the edge length grow linearly with the distance from the places."""
+    points = [gmsh.model.occ.addPoint(x, y, 0.0) for x, y in shape.places]
+    gmsh.model.occ.synchronize()
+    fields = gmsh.model.mesh.field
+    near = fields.add("Distance")
+    # gmsh renamed the option between its releases 4.8 and 4.9
+    try:
+        fields.setNumbers(near, "PointsList", points)
+    except Exception:
+        fields.setNumbers(near, "NodesList", points)
+    size = fields.add("Threshold")
+    reach = 2.0 * shape.fine
+    values = {
+        "DistMin": reach,
+        "DistMax": reach + (shape.coarse - shape.fine) / shape.growth,
+        "SizeMin": shape.fine,
+        "SizeMax": shape.coarse,
+        "InField": near,
+    }
+    for option, value in values.items():
+        fields.setNumber(size, option, value)
+    fields.setAsBackgroundMesh(size)

@@ -1,0 +1,70 @@
+"""Tetrahedra that are small only where contact can occur."""
+
+import numpy as np
+import pytest
+
+from geometry import InputError, Surface
+from geometry.refined_block import RefinedShape, places_in_reach
+
+
+def shape(**changes):
+    content = {
+        "interface": (1.0, 0.8),
+        "height": 0.5,
+        "places": np.array([[0.3, 0.4]]),
+        "fine": 0.02,
+        "coarse": 0.2,
+    }
+    return RefinedShape(**(content | changes))
+
+
+def edges_of(model):
+    """Return midpoints and lengths of the edges of all tetrahedra."""
+    tags, coordinates, _ = model.mesh.getNodes()
+    place = dict(zip(tags, coordinates.reshape(-1, 3), strict=True))
+    _, nodes = model.mesh.getElementsByType(4)
+    corners = np.array([place[node] for node in nodes]).reshape(-1, 4, 3)
+    pairs = [(i, j) for i in range(4) for j in range(i)]
+    ends = np.concatenate([corners[:, [i, j]] for i, j in pairs])
+    return ends.mean(axis=1), np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
+
+
+def test_sizes_follow_the_distance():
+    with shape().meshed() as model:
+        middle, length = edges_of(model)
+        volumes = model.getPhysicalGroups()
+        names = {model.getPhysicalName(*group) for group in volumes}
+    assert names == {"block", "bottom", "top", "sides"}
+    distance = np.linalg.norm(middle - [0.3, 0.4, 0.0], axis=1)
+    near, far = length[distance < 0.03], length[distance > 0.6]
+    # gmsh keeps sizes on average, single edges within a factor
+    assert np.median(near) == pytest.approx(0.02, rel=0.35)
+    assert 0.08 < np.median(far) < 0.3
+    wanted = np.minimum(0.02 + 0.25 * np.maximum(distance - 0.04, 0.0), 0.2)
+    assert np.median(length / wanted) == pytest.approx(1.0, abs=0.3)
+
+
+def test_places_are_where_the_plane_can_come():
+    x = (np.arange(32) + 0.5) / 32
+    heights = -0.5 * ((x[:, None] - 0.5) ** 2 + (x - 0.25) ** 2)
+    surface = Surface(heights=heights, lengths=(1.0, 1.0))
+    places = places_in_reach(surface, 5e-3, spacing=0.01)
+    radius = np.hypot(places[:, 0] - 0.5, places[:, 1] - 0.25)
+    assert radius.max() == pytest.approx(0.1, abs=0.01)  # r² / 2 = 5e-3
+    assert len(places) == pytest.approx(np.pi * 10**2, rel=0.1)
+    assert len(places_in_reach(surface, 0.0, spacing=0.3)) == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"element": "Q1"}, "element is unknown"),
+        ({"fine": 0.3}, "edge lengths are out of range"),
+        ({"fine": 0.0}, "edge lengths are out of range"),
+        ({"growth": 0.0}, "must be positive"),
+        ({"interface": (1.0, -1.0)}, "interface"),
+    ],
+)
+def test_impossible_shapes_are_refused(changes, text):
+    with pytest.raises(InputError, match=text):
+        shape(**changes)

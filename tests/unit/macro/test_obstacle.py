@@ -1,0 +1,78 @@
+"""The rough block under a rigid plane: complementarity, balance, history, refusals."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from geometry import InputError, Spectrum, Surface, synthesise
+from geometry.meshes import BlockShape
+from macro import Block, Material
+from macro.obstacle import ObstacleBlock
+from macro.rough_mesh import rough_block_mesh
+
+MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.3)
+SURFACE = synthesise(
+    Spectrum(hurst=0.9, waves=(2, 4), rms_slope=0.15, seed=2), grid=(64, 64), lengths=(1.0, 1.0)
+)
+SHAPE = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(16, 16, 6), grading=4.0)
+
+
+def obstacle(surface=SURFACE, sides="free"):
+    mesh, _ = rough_block_mesh(SHAPE, surface, MPI.COMM_SELF)
+    block = Block(mesh, MATERIAL, sides=sides)
+    return ObstacleBlock(block, surface.highest - surface.mean_height)
+
+
+def test_top_is_the_surface():
+    found = obstacle()
+    expected = SURFACE.height_at(found.x, found.y) - SURFACE.mean_height
+    np.testing.assert_allclose(found.height, expected, atol=1e-12)
+    assert found.area.sum() == pytest.approx(1.0, rel=1e-12)
+
+
+def test_contact_conditions_and_balance():
+    found = obstacle()
+    state = found.press(10e-3)
+    gap = SURFACE.highest - SURFACE.mean_height - 10e-3 - found.height
+    moved = state.displacement[found.dofs]
+    assert state.force > 0.0
+    assert np.all(moved <= gap + 1e-15)
+    assert np.all(state.pressing >= 0.0)
+    np.testing.assert_allclose(moved[state.pressing > 0.0], gap[state.pressing > 0.0], atol=1e-15)
+    assert state.complementarity <= 1e-10
+    # the bottom bears what the nodes press, to the tolerance of the linear solver
+    assert state.reaction == pytest.approx(state.force, rel=1e-8)
+
+
+def test_unloading_and_direct_loading_lead_to_the_same_contact():
+    one, other = obstacle(), obstacle()
+    for approach in (4e-3, 12e-3, 8e-3):
+        state = one.press(approach, tilt=(2e-3, -1e-3))
+    direct = other.press(8e-3, tilt=(2e-3, -1e-3))
+    assert state.nodes == direct.nodes
+    assert state.force == pytest.approx(direct.force, rel=1e-8)
+
+
+def test_plane_apart_finds_nothing():
+    state = obstacle().press(-1e-3)
+    assert (state.force, state.nodes, state.contact_area) == (0.0, 0, 0.0)
+
+
+def test_flat_top_on_rollers_is_a_column():
+    flat = Surface(heights=np.zeros((8, 8)), lengths=(1.0, 1.0))
+    state = obstacle(flat, sides="roller").press(1e-3)
+    # uniform strain: exact for any mesh
+    assert state.force == pytest.approx(MATERIAL.confined_modulus * 1e-3, rel=1e-8)
+    assert state.contact_area == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("surface", "text"),
+    [
+        (Surface(heights=np.zeros((8, 8)), lengths=(2.0, 1.0)), "must cover the block's top"),
+        (SURFACE.scaled(40.0), "cells would turn inside out"),
+    ],
+)
+def test_what_does_not_fit_is_refused(surface, text):
+    with pytest.raises(InputError, match=text):
+        rough_block_mesh(SHAPE, surface, MPI.COMM_SELF)

@@ -1,0 +1,121 @@
+"""Where rows are put, and what errors are told, on laws of closed forms."""
+
+import numpy as np
+import pytest
+
+from multiscale.refinement import Errors, law_of, refined
+
+STIFFNESS = 4e3
+COMPLIANCE = np.array([[2e-4, 5e-5], [5e-5, 2e-4]])
+KINK = 5.2e-3
+
+
+def pressures(approach):
+    """Two patches: a Hertz contact, and one that a second contact joins."""
+    first = STIFFNESS * approach**1.5
+    return np.column_stack((first, first + 3 * STIFFNESS * np.maximum(approach - KINK, 0) ** 1.5))
+
+
+class Solver:
+    def __init__(self):
+        self.asked = []
+
+    def __call__(self, approach):
+        assert np.all(np.diff(approach) > 0.0)
+        self.asked.extend(approach)
+        pressure = pressures(approach)
+        rows = np.zeros((len(approach), 2, 6))
+        rows[:, :, 0] = approach[:, None]
+        rows[:, :, 1] = approach[:, None] - pressure @ COMPLIANCE
+        rows[:, :, 2] = pressure
+        return rows
+
+
+def laws(rows):
+    return [law_of(rows[:, index], 0.0, 0.02) for index in range(2)]
+
+
+def made(tolerance, **given):
+    solver = Solver()
+    made, error = refined(
+        solver, laws, 0.0, 9e-3, compliance=COMPLIANCE, tolerance=tolerance, **given
+    )
+    return made, error, np.array(solver.asked)
+
+
+def found(some, approach):
+    """Errors of laws on the half-space at approaches, by Newton's method itself."""
+    errors = []
+    for delta in approach:
+        local = np.full(2, delta)
+        for _ in range(12):  # Newton's steps, from afar
+            points = [law.along(s) for law, s in zip(some, local, strict=True)]
+            c, p, dc, dp = np.array(points).T
+            local = local - np.linalg.solve(
+                np.diag(dc) + COMPLIANCE * dp, c + COMPLIANCE @ p - delta
+            )
+        errors.append(p - pressures(np.array([delta]))[0])
+    return np.array(errors)
+
+
+def test_rows_gather_at_a_kink():
+    _, _, asked = made(1e-5)
+    steps = np.diff(np.sort(asked))
+    middle = 0.5 * (np.sort(asked)[1:] + np.sort(asked)[:-1])
+    near = np.abs(middle - KINK) < 2e-4
+    assert steps[near].max() < 0.2 * steps[~near].max()
+    assert len(np.unique(asked)) == len(asked)
+
+
+def test_errors_told_are_those_of_the_laws():
+    some, force_error, _ = made(1e-4)
+    assert force_error <= 1e-4
+    approach = np.linspace(1e-4, 9e-3, 300)
+    wrong, true = found(some, approach), pressures(approach)
+    load = np.maximum(true.mean(axis=1), 0.01 * true[-1].mean())
+    # measured half-way between rows; elsewhere it may be a little more
+    assert np.max(np.abs(wrong.mean(axis=1)) / load) < 2 * force_error
+    for law, error in zip(some, (np.abs(wrong) / np.maximum(true, load[:, None])).T, strict=True):
+        assert error.max() < 2 * law.interpolation_error <= 2e-3
+        assert law.interpolation_error < 10 * error.max()  # nor much less than told
+
+
+def test_errors_are_what_the_half_space_makes_of_them():
+    rows = Solver()(9e-3 * np.linspace(0.0, 1.0, 9))
+    new = Solver()(np.array([3.3e-3, 5.6e-3]))
+    before = laws(rows)
+    every = np.concatenate((rows, new))
+    after = laws(every[np.argsort(every[:, 0, 0])])
+    errors = Errors.of(before, after, new, COMPLIANCE, 0.0)
+    wrong, true = found(before, new[:, 0, 0]), new[:, :, 2]
+    # first order against Newton's method: errors of 1 % leave 1 % of them
+    expected = 0.5 * np.abs(wrong.mean(axis=1)) / true.mean(axis=1)
+    np.testing.assert_allclose(errors.force, expected, rtol=0.02)
+    expected = 0.5 * np.abs(wrong) / np.maximum(true, true.mean(axis=1)[:, None])
+    np.testing.assert_allclose(errors.pressure, expected, rtol=0.02, atol=1e-9)
+
+
+@pytest.mark.parametrize("most", [33, 50, 90])
+def test_budget_is_kept_and_the_error_told(most):
+    some, error, asked = made(1e-9, most_rows=most)
+    assert len(asked) == most
+    assert 1e-9 < error < 1e-2
+    assert some[0].approach.size == most
+
+
+def test_nothing_to_refine_without_contact():
+    def open_rows(approach):
+        rows = np.zeros((len(approach), 2, 6))
+        rows[:, :, :2] = approach[:, None, None]
+        return rows
+
+    some, error = refined(
+        open_rows,
+        lambda rows: [law_of(rows[:0, 0], 1.0, 0.0)] * 2,
+        0.0,
+        1e-3,
+        compliance=COMPLIANCE,
+        tolerance=1e-3,
+    )
+    assert error == 0.0
+    assert all(law.is_open and law.interpolation_error == 0.0 for law in some)
