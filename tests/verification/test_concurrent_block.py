@@ -6,8 +6,7 @@ import pytest
 from geometry import PatchGrid, Spectrum, Surface, patch_means, synthesise
 from geometry.control import Control
 from geometry.meshes import BlockShape
-from macro import Material
-from macro.correction import make_correction
+from macro import Material, make_correction
 from micro import HalfSpaceModel, contact_modulus, influence_matrix
 from micro.boussinesq import HalfSpace
 from multiscale.concurrent import ConcurrentCoupling
