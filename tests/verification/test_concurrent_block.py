@@ -92,12 +92,13 @@ def laws():
 
 @pytest.mark.parametrize(
     ("block", "force", "pressure"),
-    [("pancake", 1.22e-2, 2e-2), ("cube", 1.5e-3, 1e-2), ("column", 1.4e-3, 1.6e-3)],
+    [("pancake", 1.2e-2, 2.3e-2), ("cube", 3.2e-3, 1.0e-2), ("column", 1.9e-3, 3.8e-3)],
 )
 def test_laws_on_the_same_block_come_close(corrections, laws, block, force, pressure):
     """Laws see the correction's mean over patches; contacts see it where they are.
 
     Twice the differences measured are allowed; on the pancake u_c varies most within a patch.
+    The laws are tabulated to 1e-3.
     """
     correction = corrections[block]
     compliance = influence_matrix(LOADS) / (np.pi * MODULUS)
