@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from geometry.errors import InputError
+from micro import HalfSpaceModel, MicroModel
 from multiscale.blocks import embedding, fine_loads, smooth_correction, yielding
-from multiscale.concurrent import ConcurrentCoupling
+from multiscale.concurrent import TOLERANCE, ConcurrentCoupling
 from multiscale.condensed import CondensedCoupling
 from multiscale.consistent import consistent_laws
 from multiscale.coupling import AnalyticCoupling, EmbeddedCoupling
@@ -19,6 +23,8 @@ from multiscale.tabulate import isolated_laws
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import Interface
+
+_COARSE = 64  # cells along a side, at most, of the surface that goes ahead
 
 
 def make_table(stage: Stage, comm: Any) -> LawTable:
@@ -99,5 +105,29 @@ def _with_laws(stage: Stage, table: LawTable, comm: Any) -> tuple[Coupling, Inte
 
 
 def _concurrent(stage: Stage, comm: Any) -> Coupling:
-    correction = smooth_correction(stage, fine_loads(stage), comm)
-    return ConcurrentCoupling(stage.model, stage.patches, stage.mean_heights, correction)
+    model = stage.model
+    if isinstance(model, HalfSpaceModel):
+        model = replace(model, tolerance=1e-2 * TOLERANCE)
+    return ConcurrentCoupling(
+        model,
+        stage.patches,
+        stage.mean_heights,
+        smooth_correction(stage, fine_loads(stage), comm),
+        coarse=None if stage.by_summits else _coarse_model(stage),
+        comm=comm,
+    )
+
+
+def _coarse_model(stage: Stage) -> MicroModel | None:
+    """Return a half-space of fewer cells; None where the surface itself has no more."""
+    surface = stage.surface
+    nx, ny = (min(count, _COARSE) for count in surface.grid)
+    if (nx, ny) == surface.grid:
+        return None
+    x, y = (
+        (np.arange(count) + 0.5) * side / count
+        for count, side in zip((nx, ny), surface.lengths, strict=True)
+    )
+    heights = surface.height_at(x[:, None], y)
+    coarse = replace(surface, heights=heights)
+    return HalfSpaceModel(surface=coarse, contact_modulus=stage.model.contact_modulus)

@@ -19,9 +19,7 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
 
 Array = NDArray[np.float64]
 
-_LOADS = (
-    16  # rectangles along a side, at least, that a smooth field is told the contacts' forces by
-)
+_LOADS = 16  # rectangles along a side, at least, that tell a smooth field the contacts' forces
 
 
 def embedding(stage: Stage, comm: Any) -> Interface:

@@ -1,140 +1,206 @@
-"""The whole rough surface on a finite block, solved together at every load step, without laws."""
+"""The micro model solved inside the iteration for the block's yielding: no laws, no tables."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.control import Control
-from geometry.errors import NotConverged
+from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
-from micro import MicroModel, Response, RigidPlane
-from multiscale.balance import Balance
-from multiscale.coupling import response_step
+from micro import MicroModel
+from multiscale.concurrent_newton import ConcurrentNewton, free, prescribed
+from multiscale.contact_stiffness import Secant
 from multiscale.history import LoadStep
-
-if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro.correction import Correction
+from multiscale.loading import described
+from multiscale.sagging import SaggingContact, SmoothCorrection, Trial
 
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-8
-"""Change of the whole force between iterations, relative to it; what moves from one rectangle to
-another may be ten times as much."""
 
-_MOST_ITERATIONS = 60
-_MEMORY = 5  # earlier iterations that the next one is extrapolated from
+_MOST = 40
+_KEPT = 6  # secants, over load steps too
+_LESS = 0.2  # of the force tried before
+_GUESSED = 1e-4  # tolerance with the coarse model
+_CLEAR = 1e-12  # of contact, where no force is wanted [mm]
+
+
+class _Found(NamedTuple):
+    """Where an iteration ended, and what the next one may start from."""
+
+    trial: Trial
+    secants: tuple[Secant, ...]
+    presses: int
+    coarse: _Found | None
 
 
 class ConcurrentCoupling:
-    """The micro model pressed by a plane that sags by what the block yields beyond a half-space.
+    """A rough surface on a block: half-space contact under a plane less what the block yields.
 
-    The forces P of the contacts, gathered on rectangles, move the block's top by D P more than
-    the half-space that the micro model stands on; to the contacts this is a plane that has come
-    less near. P = contact(δ − D P) is solved by Anderson's accelerated iteration (Walker & Ni
-    2011, doi 10.1137/10078356X), each from the contacts of the one before.
+    The plane comes near the half-space's surface by δ(x) − D(x)[P], D linear in the forces P on the
+    correction's rectangles. P and what is free of the plane are found together, by a Newton
+    iteration whose contact stiffness is estimated from contact areas and learns from every press.
+    A coarse model of the surface may go ahead: every load step then starts from its plane, forces
+    and stiffness, in which later steps correct the change alone.
 
     Args:
-        model: Micro model of the whole surface.
+        model: Micro model of the whole surface; its own error is to lie well below the tolerance.
         patches: Partition that the results are summed over; it does not change the solution.
         mean_heights: Mean height of each patch, shape (N,) [mm].
-        correction: D.
+        correction: What the block yields beyond the half-space.
+        coarse: Cheaper micro model of the same surface to start from; it does not change the
+            solution.
+        tolerance: Largest error left in the forces, and largest residual of a prescribed force,
+            relative to the force; moments count relative to force times half the diagonal.
+        comm: MPI communicator (mpi4py) or None; rank 0 presses for all.
+
+    Raises:
+        InputError: When the tolerance is not positive.
     """
 
     def __init__(
-        self, model: MicroModel, patches: PatchGrid, mean_heights: Array, correction: Correction
+        self,
+        model: MicroModel,
+        patches: PatchGrid,
+        mean_heights: Array,
+        correction: SmoothCorrection,
+        *,
+        coarse: MicroModel | None = None,
+        tolerance: float = TOLERANCE,
+        comm: Any = None,
     ) -> None:
-        self._model, self._correction = model, correction
-        self._patches, self._mean_heights = patches, mean_heights
-        self._forces: Array = np.zeros(correction.loads.count)
-        self._start: Any = None
-        self._iterations = 0
-        half = 0.5 * float(np.hypot(*patches.lengths))
-        self._balance = Balance(half=half, first_touch=model.first_touch)
+        if not tolerance > 0.0:
+            raise InputError("the tolerance must be positive", value=tolerance, allowed="> 0")
+        self._model, self._tolerance = model, tolerance
+        self._contact = SaggingContact(model, patches, mean_heights, correction, comm)
+        self._half = 0.5 * float(np.hypot(*correction.loads.lengths))
+        self._newton = ConcurrentNewton(self._contact, model.contact_modulus, self._half)
+        self._last: _Found | None = None
+        self._coarse: ConcurrentCoupling | None = None
+        if coarse is not None:
+            self._coarse = ConcurrentCoupling(
+                coarse, patches, mean_heights, correction, tolerance=_GUESSED, comm=comm
+            )
 
     def press(self, control: Control) -> LoadStep:
-        """Solve one load step; see `Coupling.press`."""
-        self._iterations = 0
-        plane, rigid = self._balance.solve(self._loads, control)
-        response = self._pressed(rigid, self._patches, self._mean_heights)
-        return response_step(
-            response,
-            self._patches,
-            plane=plane,
-            closure=rigid.means(self._patches) - response.patch_displacement[0],
-            iterations=self._iterations,
-        )
+        """Solve one load step.
 
-    def _loads(self, plane: Array) -> tuple[Array, RigidPlane]:
-        """Return force and moments of a plane on the block, and the plane as contacts see it."""
-        loads = self._correction.loads
-        forces, steps = self._forces, _Anderson(_MEMORY)
-        for _ in range(_MOST_ITERATIONS):
-            self._iterations += 1
-            rigid = self._rigid(plane, forces)
-            response = self._pressed(rigid, loads, np.zeros(loads.count))
-            found = response.patch_force[0]
-            change = found - forces
-            allowed = TOLERANCE * float(found.sum())
-            if abs(change.sum()) <= allowed and np.abs(change).sum() <= 10.0 * allowed:
-                self._forces = found
-                return np.array([response.force[0], *response.moment[0]]), rigid
-            ahead = forces + self._share(rigid, found) * (found - forces)
-            forces = np.maximum(steps.next(forces, ahead), 0.0)
-        raise NotConverged(
-            f"block and contacts at an approach of {plane[0]:.6g} mm",
-            reason="DIVERGED_MAX_IT",
-            iterations=_MOST_ITERATIONS,
-            remedy="take more load steps (load.steps)",
-        )
+        Args:
+            control: What is prescribed of the plane.
 
-    def _share(self, rigid: RigidPlane, found: Array) -> float:
-        """Return how far to go towards the forces found: Newton's step if all were one contact.
+        Returns:
+            The load step; its Newton iterations are presses of the micro model, without those of
+            the coarse one and without the last, which sums the solution over the patches.
 
-        With F = k d^(3/2) and a depth d that falls by D F, F grows towards its end by
-        1 / (1 + 3/2 D F/d) of what a half-space would add.
+        Raises:
+            NotConverged: When the iteration fails; the coupling is then as it was before.
         """
-        total = float(found.sum())
-        if total == 0.0:
-            return 0.5
-        x, y = self._correction.loads.centres.T
-        sink = float(found @ self._correction.sag(found)(x, y)) / total
-        depth = float(found @ rigid.at(x, y)) / total
-        return 1.0 / (1.0 + max(1.5 * sink / depth, -0.5)) if depth > 0.0 else 0.5
+        found = self._solved(control, self._last)
+        step = self._contact.summed(found.trial, found.presses)
+        self._last = found
+        return step
 
-    def _rigid(self, plane: Array, forces: Array) -> RigidPlane:
-        middle = np.add(self._patches.origin, np.multiply(0.5, self._patches.lengths))
-        return RigidPlane(
-            approach=float(plane[0]),
-            tilt=(float(plane[1]), float(plane[2])),
-            centre=(float(middle[0]), float(middle[1])),
-            sag=self._correction.sag(forces),
+    def _solved(self, control: Control, last: _Found | None) -> _Found:
+        """Iterate; where a plane free to turn hardly touches, from a force that holds it there."""
+        try:
+            return self._found(control, last)
+        except NotConverged:
+            if control.approach is None or control.tilt is not None:
+                raise
+            near = self._held(control.approach, last)
+            found = self._found(control, near._replace(coarse=None), led=False)
+            return found._replace(presses=found.presses + near.presses)
+
+    def _held(self, approach: float, last: _Found | None) -> _Found:
+        """Return a balanced plane near an approach, or one turned the same way without contact."""
+        presses = 0
+        force = abs(approach - self._model.first_touch) * self._model.contact_modulus * self._half
+        while True:
+            last = self._found(Control(force=force, tilt=None), last)
+            above = last.trial.plane[0] - approach
+            plane = np.array([approach, *last.trial.plane[1:]])
+            trial = self._contact.press(plane, np.zeros_like(last.trial.assumed), last.trial)
+            presses += last.presses + 1
+            if above <= 0.0:
+                return last._replace(presses=presses)
+            if not trial.found.any():
+                return last._replace(trial=trial, presses=presses)
+            force *= _LESS
+
+    def _found(self, control: Control, last: _Found | None, *, led: bool = True) -> _Found:
+        """Iterate from the last load step, or from where the coarse model has come from it."""
+        ahead = self._ahead(control, last) if led else None
+        known = ahead or last
+        secants = list(known.secants) if known else []
+        trial = (
+            self._first(control, last, secants)
+            if ahead is None
+            else self._follow(control, last, ahead)
+        )
+        for count in range(1, _MOST + 1):
+            step = self._newton.step(control, trial, secants)
+            if self._settled(control, trial, step):
+                return _Found(trial, tuple(secants), count, ahead)
+            before, trial = trial, self._newton.next(control, trial, step, count)
+            change = trial.local - before.local
+            if before.found.any() and trial.found.any() and change.any():
+                secants = [*secants, (change, trial.found - before.found)][-_KEPT:]
+        raise NotConverged(
+            f"the block's yielding at {described(control)}",
+            reason="DIVERGED_MAX_IT",
+            iterations=_MOST,
+            remedy="take smaller load steps (load.steps)",
         )
 
-    def _pressed(self, rigid: RigidPlane, patches: PatchGrid, mean_heights: Array) -> Response:
-        response, self._start = self._model.press(
-            rigid, patches=patches, mean_heights=mean_heights, start=self._start
-        )
-        return response
+    def _ahead(self, control: Control, last: _Found | None) -> _Found | None:
+        """Return what the coarse model finds; None where that says nothing."""
+        if self._coarse is None or control.force == 0.0:
+            return None
+        try:
+            return self._coarse._solved(control, last.coarse if last else None)
+        except NotConverged:
+            return None
 
+    def _follow(self, control: Control, last: _Found | None, ahead: _Found) -> Trial:
+        """Press where the coarse model is, or as far from the last load step as it went."""
+        plane, forces, start = ahead.trial.plane, ahead.trial.found, None
+        touching = forces.any() and last is not None and last.trial.found.any()
+        if touching and last is not None and last.coarse is not None:
+            start, behind = last.trial, last.coarse.trial
+            plane = start.plane + plane - behind.plane
+            forces = np.maximum(start.found + forces - behind.found, 0.0)
+        plane = np.where(free(control), plane, prescribed(control))
+        return self._contact.press(plane, forces, start)
 
-class _Anderson:
-    """Anderson's acceleration of a fixed-point iteration x = g(x)."""
+    def _first(self, control: Control, last: _Found | None, secants: list[Secant]) -> Trial:
+        """Press where the last load step's tangent points, or without any sag."""
+        start = last.trial if last else None
+        if start is not None and control.force != 0.0 and start.found.any():
+            step = self._newton.step(control, start, secants)
+            return self._newton.next(control, start, step, 2)
+        plane = prescribed(control)
+        if start is not None:
+            plane[1:] = np.where(free(control)[1:], start.plane[1:], plane[1:])
+        if control.approach is None:
+            plane[0] = self._model.first_touch
+            if control.force:
+                plane[0] += control.force / (self._model.contact_modulus * self._half)
+            else:
+                plane[0] -= self._half * float(np.hypot(*plane[1:])) + _CLEAR
+        return self._contact.press(plane, np.zeros(len(self._contact.shape)), start)
 
-    def __init__(self, memory: int) -> None:
-        self._memory = memory
-        self._tried: list[Array] = []
-        self._found: list[Array] = []
-
-    def next(self, tried: Array, found: Array) -> Array:
-        """Return the next x from all pairs (x, g(x)) so far."""
-        self._tried = [*self._tried, tried][-self._memory :]
-        self._found = [*self._found, found][-self._memory :]
-        if len(self._tried) == 1:
-            return found
-        values = np.array(self._found)
-        misses = values - np.array(self._tried)
-        share, *_ = np.linalg.lstsq(np.diff(misses, axis=0).T, misses[-1], rcond=1e-10)
-        return np.asarray(found - share @ np.diff(values, axis=0))
+    def _settled(self, control: Control, trial: Trial, step: tuple[Array, Array] | None) -> bool:
+        """Whether the forces would change no more and the prescribed loads are met."""
+        moves = free(control)
+        if np.any(~moves & (trial.plane != prescribed(control))):
+            return False
+        if step is None:
+            return not control.force and not trial.assumed.any()
+        force = float(trial.response.force[0])
+        scale = force * np.array([1.0, self._half, self._half])
+        excess = np.abs(trial.excess(control)) / scale
+        change = float(np.abs(step[1]).sum()) / force
+        return change <= self._tolerance and bool(np.all(excess[moves] <= self._tolerance))

@@ -31,6 +31,10 @@ SCENES = {
     "concurrent": [
         "block.cells=[8, 8, 5]", "coupling.kind=concurrent", "micro.model=half-space",
     ],
+    "concurrent, coarse half-space ahead, balanced": [
+        "surface.grid=[96, 96]", "block.cells=[8, 8, 5]", "coupling.kind=concurrent",
+        "micro.model=half-space", "load.tilt=free",
+    ],
     "laws of the half-space": ["block.cells=[8, 8, 5]", "micro.model=half-space"],
 }  # fmt: skip
 NUMBERS = (
