@@ -1,5 +1,5 @@
 # %% [markdown]
-# # Couplings against each other: how many patches, how fine a block, how tilted a plane
+# # Couplings against each other: how many patches, how tilted a plane
 #
 # What one learns: what each coupling of contacts and block costs in accuracy, on the paper's cube
 # with Set 1 surfaces. `concurrent` solves contacts and block together and serves as the measure;
@@ -116,38 +116,6 @@ for axes, name in zip(figure.subplots(1, 2, sharey=True), TILTS, strict=True):
 figure.axes[0].set_ylabel("largest error of the force [%]")
 figure.axes[0].legend(frameon=False)
 figure.savefig(choice.out / "couplings.png", dpi=130)
-
-# %% [markdown]
-# The block's mesh: the half-space exactly and finite elements for the rest, against finite elements
-# for everything. Consistent laws of 4 × 4 patches in both.
-
-# %%
-coarse = [(8, 8, 5), (16, 16, 8)]
-by_way = {
-    "decomposed": coarse if choice.quick else [*coarse, (24, 24, 12)],
-    "finite-element": coarse if choice.quick else [*coarse, (32, 32, 16), (64, 64, 24)],
-}
-print("force at 8 µm with isolated laws of 4 × 4 patches [N]")
-found = {}
-for way, meshes in by_way.items():
-    for cells in meshes:
-        laws = ["coupling.kind=isolated", f"coupling.compliance={way}"]
-        more = [*laws, "coupling.newton=condensed", f"block.cells={list(cells)}"]
-        found[way, cells] = forces(SEEDS[0], 0.0, 4, *more)[-1]
-        print("  {:15s} {:3d} × {:2d} × {:2d} {:9.5f}".format(way, *cells, found[way, cells]))
-
-# %%
-figure = Figure(figsize=(5.5, 4.2), layout="constrained")
-axes = figure.subplots()
-limit = found["decomposed", by_way["decomposed"][-1]]
-for mark, (way, meshes) in zip("so", by_way.items(), strict=True):
-    shown = meshes[:-1] if way == "decomposed" else meshes  # its last one is the measure
-    error = [100.0 * abs(found[way, cells] / limit - 1.0) for cells in shown]
-    axes.loglog([np.prod(cells) for cells in shown], error, mark + "-", label=way)
-axes.set(xlabel="number of hexahedra", ylabel="error of the force at 8 µm [%]")
-axes.grid(alpha=0.3)
-axes.legend(frameon=False)
-figure.savefig(choice.out / "block_mesh.png", dpi=130)
 
 # %% [markdown]
 # The concurrent coupling does not know of patches; consistent laws come close to it with any
