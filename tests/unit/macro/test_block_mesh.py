@@ -9,7 +9,6 @@ from mpi4py import MPI
 from geometry.errors import InputError
 from geometry.meshes import BlockShape
 from macro import BOTTOM, SIDES, TOP, block_mesh, compat
-from macro import mesh as module
 
 
 @pytest.mark.parametrize("element", ["Q1", "P2"])
@@ -36,7 +35,7 @@ def test_error_of_gmsh_is_passed_on(monkeypatch):
     def broken(_shape):
         raise InputError("gmsh gave up")
 
-    monkeypatch.setattr(module, "flat_block", broken)
+    monkeypatch.setattr("geometry.meshes.flat_block", broken)
     shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(1, 1, 1))
     with pytest.raises(InputError, match="gmsh gave up"):
         block_mesh(shape, MPI.COMM_SELF)
