@@ -8,6 +8,7 @@ import os
 os.environ["OMP_NUM_THREADS"] = "1"
 os.environ["PATCHLAW_CACHE"] = "off"
 
+import math
 import statistics
 import time
 
@@ -32,12 +33,12 @@ MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 LOADS = PatchGrid(grid=(16, 16), lengths=(1.0, 1.0))
 
 
-def median(action):
+def median(action, *given, **options):
     """Return the median time of an action [s], and what it returned last."""
     times = []
     for _ in range(REPEATS):
         start = time.perf_counter()
-        result = action()
+        result = action(*given, **options)
         times.append(time.perf_counter() - start)
     return statistics.median(times), result
 
@@ -53,51 +54,60 @@ def surface_of(cells):
     return synthesise(spectrum, grid=(cells, cells), lengths=(1.0, 1.0))
 
 
+def condensed(table, yielding):
+    """Press a hundred steps."""
+    programme = Programme(quantity="approach", points=(APPROACH,), steps=100)
+    return list(load_steps(CondensedCoupling(table, yielding), programme))
+
+
+def by_laws(rest, count):
+    """Print the times of laws and of load steps with them."""
+    surface = surface_of(256)
+    model = HalfSpaceModel(surface=surface, contact_modulus=MATERIAL.contact_modulus)
+    patches = PatchGrid(grid=(count, count), lengths=surface.lengths)
+    given = {"mean_heights": patch_means(surface, patches), "approach_end": 1.2 * APPROACH}
+    for rows in (33, 65):
+        spent, table = median(consistent_laws, model, patches, most_rows=rows, **given)
+        used = max(law.approach.size for law in table.laws)
+        print(f"laws of {count**2} patches, 256² heights, {used} rows: {spent:.2f} s")
+    spread = contact_spread(model, patches, LOADS, approach_end=1.2 * APPROACH)
+    under_patches = influence_matrix(patches) / (math.pi * model.contact_modulus)
+    under_loads = rest.patch_compliance(LOADS) / LOADS.area
+    for name, yielding in (
+        ("mean over patches", under_patches + rest.patch_compliance(patches)),
+        ("where contacts are", SpreadLoads(under_patches, under_loads, spread)),
+    ):
+        spent, _ = median(condensed, table, yielding)
+        print(f"100 condensed load steps, {count**2} patches, rest {name}: {spent:.3f} s")
+
+
+def together(rest, model, patches, means):
+    """Press eight steps; return how often contacts were solved for in each."""
+    coupling = ConcurrentCoupling(model, patches, means, rest)
+    steps = [coupling.press(Control(approach=APPROACH * k / 8)) for k in range(1, 9)]
+    return [step.newton_iterations for step in steps]
+
+
+def by_contacts(rest, cells):
+    """Print the times of the concurrent coupling, and of its contacts alone."""
+    surface, patches = surface_of(cells), PatchGrid(grid=(4, 4), lengths=(1.0, 1.0))
+    modulus = MATERIAL.contact_modulus
+    model = HalfSpaceModel(surface=surface, contact_modulus=modulus, tolerance=1e-10)
+    alone, _ = median(model.solve, APPROACH)
+    spent, presses = median(together, rest, model, patches, patch_means(surface, patches))
+    print(
+        f"8 concurrent load steps, {cells}² heights: {spent:.2f} s, presses {presses}; "
+        f"contacts alone, one cold solution: {alone:.3f} s"
+    )
+
+
 def main():
     spent, rest = median(correction)
     print(f"smooth rest of the block, 256 loads, 16 × 16 × 12 cells: {spent:.2f} s")
-    surface = surface_of(256)
-    model = HalfSpaceModel(surface=surface, contact_modulus=MATERIAL.contact_modulus)
     for count in (4, 16):
-        patches = PatchGrid(grid=(count, count), lengths=surface.lengths)
-        means = patch_means(surface, patches)
-        given = {"mean_heights": means, "approach_end": 1.2 * APPROACH}
-        for rows in (33, 65):
-            spent, table = median(
-                lambda rows=rows: consistent_laws(model, patches, most_rows=rows, **given)
-            )
-            used = max(law.approach.size for law in table.laws)
-            print(f"laws of {count**2} patches, 256² heights, {used} rows: {spent:.2f} s")
-        spread = contact_spread(model, patches, LOADS, approach_end=1.2 * APPROACH)
-        under_patches = influence_matrix(patches) / (3.141592653589793 * model.contact_modulus)
-        under_loads = rest.patch_compliance(LOADS) / LOADS.area
-        block = SpreadLoads(under_patches, under_loads, spread)
-        plain = under_patches + rest.patch_compliance(patches)
-        programme = Programme(quantity="approach", points=(APPROACH,), steps=100)
-        for name, yielding in (("mean over patches", plain), ("where contacts are", block)):
-            spent, _ = median(
-                lambda y=yielding: list(load_steps(CondensedCoupling(table, y), programme))
-            )
-            print(f"100 condensed load steps, {count**2} patches, rest {name}: {spent:.3f} s")
+        by_laws(rest, count)
     for cells in (64, 128, 256):
-        surface = surface_of(cells)
-        model = HalfSpaceModel(
-            surface=surface, contact_modulus=MATERIAL.contact_modulus, tolerance=1e-10
-        )
-        patches = PatchGrid(grid=(4, 4), lengths=surface.lengths)
-        means = patch_means(surface, patches)
-        alone, _ = median(lambda: model.solve(APPROACH))
-
-        def pressed():
-            coupling = ConcurrentCoupling(model, patches, means, rest)
-            steps = [coupling.press(Control(approach=APPROACH * k / 8)) for k in range(1, 9)]
-            return [step.newton_iterations for step in steps]
-
-        spent, presses = median(pressed)
-        print(
-            f"8 concurrent load steps, {cells}² heights: {spent:.2f} s, presses {presses}; "
-            f"contacts alone, one cold solution: {alone:.3f} s"
-        )
+        by_contacts(rest, cells)
 
 
 if __name__ == "__main__":
