@@ -20,6 +20,7 @@ from micro.ellipse import (
     eccentricity_approximate,
     force_factor,
 )
+from micro.finite_slope import finite_slope_effect
 from micro.half_space import HalfSpaceModel
 from micro.half_space_state import HalfSpaceState
 from micro.hertz import HertzContact, contact_modulus
@@ -67,6 +68,7 @@ __all__ = [
     "eccentricity",
     "eccentricity_approximate",
     "find_contacts",
+    "finite_slope_effect",
     "force_factor",
     "influence_matrix",
     "love_centre",
