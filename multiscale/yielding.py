@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,31 +72,42 @@ class SpreadLoads:
     def __init__(self, half_space: Array, correction: Array, spread: ContactSpread) -> None:
         self._half_space, self._correction, self._spread = half_space, correction, spread
         self._area = spread.patches.area
-        # which rectangle is whose, as a matrix: sums over patches are products
-        self._belongs = np.equal.outer(spread.owner, np.arange(len(half_space))).astype(float)
+        self._at: tuple[Any, Any, Any, Any] = (None, None, None, None)
+        patches = np.arange(len(half_space))
+        self._belongs = np.equal.outer(spread.owner, patches).astype(float)
+        # the columns of one patch side by side: their sums are the bulk of a Newton step
+        self._order = np.argsort(spread.owner, kind="stable")
+        self._by_owner = np.ascontiguousarray(correction[:, self._order])
+        self._starts = np.searchsorted(spread.owner[self._order], patches)
         self.count = len(half_space)
 
     def displacement(self, local: Array, point: LawPoint) -> Array:
         """Return Λ p / (π E*) + weighted D; see `Yielding.displacement`."""
-        shares = self._spread.shares(local)
-        below = self._below(shares, point)
+        shares, below = self._under(local, point)
         return self._half_space @ point.pressure + self._by_patch(shares.stiffness * below)
 
     def slope(self, local: Array, point: LawPoint) -> Array:
         """Return the derivative; see `Yielding.slope`."""
-        shares, owner = self._spread.shares(local), self._spread.owner
+        (shares, sunk), owner = self._under(local, point), self._spread.owner
         rise = shares.dforce * point.pressure[owner] + shares.force * point.dpressure[owner]
-        below = (self._correction * (self._area * rise)) @ self._belongs
+        columns = self._by_owner * (self._area * rise[self._order])
+        below = np.add.reduceat(columns, self._starts, axis=1)
         matrix = self._half_space * point.dpressure
         matrix += self._belongs.T @ (shares.stiffness[:, None] * below)
-        own = self._by_patch(shares.dstiffness * self._below(shares, point))
+        own = self._by_patch(shares.dstiffness * sunk)
         matrix[np.diag_indices_from(matrix)] += own
         return matrix
 
-    def _below(self, shares: Shares, point: LawPoint) -> Array:
-        """Return what the rectangles sink by D, shape (M,) [mm]."""
-        forces = self._area * shares.force * point.pressure[self._spread.owner]
-        return np.asarray(self._correction @ forces)
+    def _under(self, local: Array, point: LawPoint) -> tuple[Shares, Array]:
+        """Return the shares, and what the rectangles sink by D, shape (M,) [mm].
+
+        Newton's method asks for the slope where it has asked for the displacement.
+        """
+        if local is not self._at[0] or point is not self._at[1]:
+            shares = self._spread.shares(local)
+            forces = self._area * shares.force * point.pressure[self._spread.owner]
+            self._at = (local, point, shares, np.asarray(self._correction @ forces))
+        return self._at[2:]
 
     def _by_patch(self, values: Array) -> Array:
         return np.asarray(values @ self._belongs)
