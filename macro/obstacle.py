@@ -18,7 +18,6 @@ from dataclasses import dataclass
 import numpy as np
 import ufl
 from dolfinx import fem
-from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
@@ -37,7 +36,7 @@ _LOOSE = 1e-3  # relative residual while the active set still changes
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ObstacleState:
-    """Contact at one approach; arrays hold this rank's part.
+    """Contact at one approach, whose conditions hold exactly; arrays hold this rank's part.
 
     Attributes:
         approach: Rigid approach at the middle of the interface [mm].
@@ -49,8 +48,6 @@ class ObstacleState:
         nodes: Number of nodes in contact.
         active_sets: Active sets that were solved for.
         linear_iterations: Iterations of the linear solver.
-        complementarity: Largest penetration or tension, relative to the approach or the largest
-            nodal force.
     """
 
     approach: float
@@ -62,7 +59,6 @@ class ObstacleState:
     nodes: int
     active_sets: int
     linear_iterations: int
-    complementarity: float
 
 
 class ObstacleBlock:
@@ -118,7 +114,7 @@ class ObstacleBlock:
             new = np.where(active, forces > 0.0, touching)
             changed, total = self._count(new != active), self._count(active)
             if not changed and tolerance <= _TOLERANCE:
-                return self._state(approach, displacement, active, gap, sets, spent)
+                return self._state(approach, displacement, active, sets, spent)
             # a settled or nearly settled set is worth solving for well
             tolerance = _TOLERANCE if changed <= max(1, total // 200) else _LOOSE
             active = new
@@ -169,17 +165,12 @@ class ObstacleBlock:
         approach: float,
         displacement: PETSc.Vec,
         active: NDArray[np.bool_],
-        gap: Array,
         sets: int,
         spent: int,
     ) -> ObstacleState:
         values = displacement.array_r.copy()
         self._last = [*self._last[-1:], (approach, values, active)]
         pressing = np.where(active, self._forces(displacement), 0.0)
-        comm = self.block.mesh.comm
-        peak = comm.allreduce(float(pressing.max(initial=0.0)), op=MPI.MAX) or 1.0
-        over = float(np.max(values[self.dofs] - gap, initial=0.0)) / max(abs(approach), 1e-300)
-        tension = float(np.max(-pressing, initial=0.0)) / peak
         return ObstacleState(
             approach=approach,
             displacement=values,
@@ -190,7 +181,6 @@ class ObstacleBlock:
             nodes=self._count(active),
             active_sets=sets,
             linear_iterations=spent,
-            complementarity=comm.allreduce(max(over, tension), op=MPI.MAX),
         )
 
     def _areas(self) -> Array:
