@@ -55,8 +55,9 @@ class RefinedShape:
                 value=(self.fine, self.coarse),
                 allowed="0 < fine ≤ coarse",
             )
-        if not (self.height > 0.0 and self.growth > 0.0):
+        if not (0.0 < self.height < math.inf and 0.0 < self.growth < math.inf):
             raise InputError("height and growth must be positive", value=(self.height, self.growth))
+        self._check_places()
 
     @property
     def hexahedral(self) -> bool:
@@ -67,6 +68,20 @@ class RefinedShape:
     def degree(self) -> int:
         """Polynomial degree of the element."""
         return int(self.element[1])
+
+    def _check_places(self) -> None:
+        places = np.asarray(self.places, float)
+        object.__setattr__(self, "places", places)
+        if places.ndim != 2 or places.shape[1] != 2 or not len(places):
+            raise InputError("places have two coordinates", value=places.shape, allowed="(n, 2)")
+        # gmsh ends the process when it gets what is no number
+        away = ~((places >= 0.0) & (places <= self.interface)).all(axis=1)
+        if away.any():
+            raise InputError(
+                "a place lies outside the interface",
+                value=tuple(places[away][0].tolist()),
+                allowed=f"0 … {self.interface} mm",
+            )
 
     @contextmanager
     def meshed(self) -> Iterator[Any]:
@@ -124,11 +139,7 @@ def _set_sizes(gmsh: Any, shape: RefinedShape) -> None:
     gmsh.model.occ.synchronize()
     fields = gmsh.model.mesh.field
     near = fields.add("Distance")
-    # gmsh renamed the option between its releases 4.8 and 4.9
-    try:
-        fields.setNumbers(near, "PointsList", points)
-    except Exception:
-        fields.setNumbers(near, "NodesList", points)
+    fields.setNumbers(near, "PointsList", points)
     size = fields.add("Threshold")
     reach = 2.0 * shape.fine
     values = {

@@ -1,7 +1,10 @@
 """The elastic block in dolfinx, pressed by a rigid plane through one contact law per patch.
 
 BlockShape → block_mesh → Block (with a Material) → Interface (with a PatchGrid)
-→ PressedBlock (with one ContactLaw per patch) → PressState for every approach.
+→ PressedBlock (with one ContactLaw per patch) → PressState for every load step.
+
+`make_correction` gives what a finite block adds to the half-space; rough_block_mesh → Block
+→ ObstacleBlock meshes the roughness itself, as a reference.
 """
 
 from macro.block import Block

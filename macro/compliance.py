@@ -5,21 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from macro.block import Block
 from macro.interface import Interface
 
 Array = NDArray[np.float64]
 
 
-def plain_compliance(block: Block, interface: Interface) -> Array:
+def plain_compliance(interface: Interface) -> Array:
     """Return the mean downward displacement of patch i by unit pressure on patch j.
 
     By reciprocity the matrix is symmetric for patches of equal area; what the linear solver's
     tolerance leaves is averaged out.
 
     Args:
-        block: The elastic block.
-        interface: Patches on its top.
+        interface: Patches on the block's top.
 
     Returns:
         The compliance, the same on every rank, shape (N, N) [mm/MPa].
@@ -30,7 +28,7 @@ def plain_compliance(block: Block, interface: Interface) -> Array:
     Note:
         Collective.
     """
-    columns = []
+    block, columns = interface.block, []
     work = block.stiffness.createVecRight()
     for pressures in np.eye(interface.patches.count):
         displacement = block.solve(interface.load(pressures))

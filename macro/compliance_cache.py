@@ -27,7 +27,7 @@ _FORMAT = 1  # raise it when the numbers behind a key change
 
 
 def cache_directory() -> Path | None:
-    """Return where results are kept, None when the user switched the cache off.
+    """Return where results are kept, None when the user switched the cache off or has no home.
 
     ``PATCHLAW_CACHE`` wins, then ``XDG_CACHE_HOME/patchlaw``, then ``~/.cache/patchlaw``.
     """
@@ -37,7 +37,10 @@ def cache_directory() -> Path | None:
     if chosen:
         return Path(chosen)
     home = os.environ.get("XDG_CACHE_HOME", "")
-    return (Path(home) if home else Path.home() / ".cache") / "patchlaw"
+    try:
+        return (Path(home) if home else Path.home() / ".cache") / "patchlaw"
+    except RuntimeError:
+        return None
 
 
 def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], comm: Any) -> Arrays:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_array
 
+from geometry.collective import together
 from geometry.errors import InputError
 from geometry.meshes import BlockShape
 from geometry.patches import PatchGrid
@@ -76,9 +77,14 @@ def make_correction(
     """
     _check_place(shape, loads)
     smooth = smooth_shape(shape)
-    block = Block(block_mesh(smooth, MPI.COMM_SELF), material, sides)
     mine = np.arange(comm.rank, loads.count, comm.size)
-    parts = comm.allgather(_Solver(block, smooth, half_space, loads).top(mine))
+
+    def solved() -> Array:
+        block = Block(block_mesh(smooth, MPI.COMM_SELF), material, sides)
+        return _Solver(block, smooth, half_space, loads).top(mine)
+
+    # one rank's factors may not fit in its memory
+    parts = comm.allgather(together(comm, solved))
     x, y, _ = smooth.nodes
     values = np.empty((len(x), len(y), loads.count))
     for rank, part in enumerate(parts):

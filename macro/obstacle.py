@@ -14,33 +14,29 @@ of freedom with the multigrid of the block without contact.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import ufl
 from dolfinx import fem
-from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.errors import NotConverged
 from macro import compat
 from macro.block import Block
+from macro.free_solver import FreeSolver
 from macro.mesh import TOP
-from macro.solvers import reason_name
 
 Array = NDArray[np.float64]
 
-TOLERANCE = 1e-9
-"""Residual of the free degrees of freedom relative to the contact forces, at a solution."""
-
+_TOLERANCE = 1e-9  # residual relative to the contact forces, at a solution
 _MOST_SETS = 60
 _LOOSE = 1e-3  # relative residual while the active set still changes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ObstacleState:
-    """Contact at one approach; arrays hold this rank's part.
+    """Contact at one approach, whose conditions hold exactly; arrays hold this rank's part.
 
     Attributes:
         approach: Rigid approach at the middle of the interface [mm].
@@ -52,8 +48,6 @@ class ObstacleState:
         nodes: Number of nodes in contact.
         active_sets: Active sets that were solved for.
         linear_iterations: Iterations of the linear solver.
-        complementarity: Largest penetration or tension, relative to the approach or the largest
-            nodal force.
     """
 
     approach: float
@@ -65,7 +59,6 @@ class ObstacleState:
     nodes: int
     active_sets: int
     linear_iterations: int
-    complementarity: float
 
 
 class ObstacleBlock:
@@ -94,10 +87,8 @@ class ObstacleBlock:
         self.dofs = 3 * found + 2
         self.x, self.y, self.height = space.tabulate_dof_coordinates()[found].T.copy()
         self.area = self._areas()
-        stiffness = block.stiffness
-        self._free = stiffness.createVecRight()
-        self._work = stiffness.createVecRight()
-        self._solver = self._make_solver()
+        self._solver = FreeSolver(block.stiffness, block.solver.pc)
+        self._work = block.stiffness.createVecRight()
         self._last: list[tuple[float, Array, NDArray[np.bool_]]] = []
 
     def press(self, approach: float, tilt: tuple[float, float] = (0.0, 0.0)) -> ObstacleState:
@@ -122,10 +113,10 @@ class ObstacleBlock:
             touching = displacement.array_r[self.dofs] > gap
             new = np.where(active, forces > 0.0, touching)
             changed, total = self._count(new != active), self._count(active)
-            if not changed and tolerance <= TOLERANCE:
-                return self._state(approach, displacement, active, gap, sets, spent)
+            if not changed and tolerance <= _TOLERANCE:
+                return self._state(approach, displacement, active, sets, spent)
             # a settled or nearly settled set is worth solving for well
-            tolerance = TOLERANCE if changed <= max(1, total // 200) else _LOOSE
+            tolerance = _TOLERANCE if changed <= max(1, total // 200) else _LOOSE
             active = new
         raise NotConverged(
             f"the contact of the rough block at an approach of {approach:.6g} mm",
@@ -150,28 +141,15 @@ class ObstacleBlock:
         self, displacement: PETSc.Vec, active: NDArray[np.bool_], gap: Array, tolerance: float
     ) -> int:
         """Solve with the active nodes on the plane; return the linear iterations."""
-        self._free.set(1.0)
-        self._free.array[self.dofs[active]] = 0.0
-        displacement.array[self.dofs[active]] = gap[active]
-        residual = self._residual(displacement)
-        scale = np.sqrt(self._sum(float(np.sum(residual.array_r[self.dofs[active]] ** 2))))
-        residual.pointwiseMult(residual, self._free)
-        norm = residual.norm()
-        if norm <= 0.5 * tolerance * scale:
+        if not self._count(active):
+            displacement.set(0.0)
             return 0
-        step = self.block.stiffness.createVecRight()
-        relative = max(0.5 * tolerance * scale / norm, 1e-14) if scale else tolerance
-        self._solver.setTolerances(rtol=min(relative, 0.5))
-        self._solver.solve(residual, step)
-        if self._solver.reason < 0:
-            raise NotConverged(
-                "the linear solve of the rough block",
-                reason=reason_name(PETSc.KSP.ConvergedReason, self._solver.reason),
-                iterations=self._solver.its,
-                remedy="see PETSc's options -patchlaw_ksp_* and -patchlaw_pc_*",
-            )
-        displacement.axpy(1.0, step)
-        return int(self._solver.its)
+        held = self.dofs[active]
+        displacement.array[held] = gap[active]
+        residual = self._residual(displacement)
+        scale = np.sqrt(self._sum(float(np.sum(residual.array_r[held] ** 2))))
+        self._solver.hold(held)
+        return self._solver.improve(displacement, residual, 0.5 * tolerance * scale)
 
     def _residual(self, displacement: PETSc.Vec) -> PETSc.Vec:
         """Return −K u, whose entries at the top are the contact forces with their sign turned."""
@@ -187,17 +165,12 @@ class ObstacleBlock:
         approach: float,
         displacement: PETSc.Vec,
         active: NDArray[np.bool_],
-        gap: Array,
         sets: int,
         spent: int,
     ) -> ObstacleState:
         values = displacement.array_r.copy()
         self._last = [*self._last[-1:], (approach, values, active)]
         pressing = np.where(active, self._forces(displacement), 0.0)
-        comm = self.block.mesh.comm
-        peak = comm.allreduce(float(pressing.max(initial=0.0)), op=MPI.MAX) or 1.0
-        over = float(np.max(values[self.dofs] - gap, initial=0.0)) / max(abs(approach), 1e-300)
-        tension = float(np.max(-pressing, initial=0.0)) / peak
         return ObstacleState(
             approach=approach,
             displacement=values,
@@ -208,7 +181,6 @@ class ObstacleBlock:
             nodes=self._count(active),
             active_sets=sets,
             linear_iterations=spent,
-            complementarity=comm.allreduce(max(over, tension), op=MPI.MAX),
         )
 
     def _areas(self) -> Array:
@@ -225,37 +197,3 @@ class ObstacleBlock:
 
     def _sum(self, value: float) -> float:
         return float(self.block.mesh.comm.allreduce(value))
-
-    def _make_solver(self) -> PETSc.KSP:
-        stiffness = self.block.stiffness
-        operator = PETSc.Mat().createPython(
-            stiffness.getSizes(), _Restricted(stiffness.mult, self._free), comm=stiffness.comm
-        )
-        operator.setUp()
-        solver = PETSc.KSP().create(stiffness.comm)
-        solver.setOperators(operator)
-        solver.setType("cg")
-        solver.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
-        solver.setTolerances(max_it=1000)
-        base = self.block.solver.pc
-        solver.pc.setType("python")
-        solver.pc.setPythonContext(_Restricted(base.apply, self._free))
-        return solver
-
-
-class _Restricted:
-    """A linear map on the free degrees of freedom, the identity on the others."""
-
-    def __init__(self, apply: Any, free: PETSc.Vec) -> None:
-        self._apply, self._free = apply, free
-        self._part = free.duplicate()
-
-    def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Write P A P x + (1 − P) x."""
-        self._part.pointwiseMult(self._free, x)
-        self._apply(self._part, y)
-        y.pointwiseMult(y, self._free)
-        y.axpy(1.0, x)
-        y.axpy(-1.0, self._part)
-
-    apply = mult

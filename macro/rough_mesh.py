@@ -21,13 +21,20 @@ Array = NDArray[np.float64]
 _DECAY = 3.0
 """Power of the distance from the bottom with which the roughness fades into the depth."""
 
+_LEAST_VOLUME = 0.05
+"""Volume relative to that of the flat block, below which cells are refused."""
+
+_CORNERS = {4: [(0, 1, 2, 3)], 8: [(i, i ^ 1, i ^ 2, i ^ 4) for i in range(8)]}
+"""Vertices of tetrahedra and hexahedra: a corner and the ends of the edges that leave it."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeshQuality:
     """How far the roughness has deformed the cells.
 
     Attributes:
-        thinnest: Smallest height of a vertical edge relative to that of the flat block.
+        thinnest: Smallest volume that the edges of a cell's corner span, relative to that of the
+            flat block; negative in a cell turned inside out.
         steepest: Largest slope of an edge of the top.
     """
 
@@ -65,20 +72,35 @@ def rough_block_mesh(
     points = flat.mesh.geometry.x
     x, y = (np.clip(points[:, k], 0.0, surface.lengths[k]) for k in (0, 1))
     rise = surface.height_at(x, y) - surface.mean_height if len(points) else np.empty(0)
-    # the vertical strain of the movement is largest at the top
-    lowest = np.min(1.0 + _DECAY * rise / shape.height, initial=1.0)
+    moved = points.copy()
+    moved[:, 2] += rise * (1.0 + points[:, 2] / shape.height) ** _DECAY
     quality = MeshQuality(
-        thinnest=float(comm.allreduce(float(lowest), op=MPI.MIN)),
+        thinnest=float(comm.allreduce(_thinnest(flat, moved), op=MPI.MIN)),
         steepest=float(comm.allreduce(_steepest(flat, rise), op=MPI.MAX)),
     )
-    if quality.thinnest <= 0.05:
+    if quality.thinnest <= _LEAST_VOLUME:
         raise InputError(
-            "the roughness is too high for the block: cells would turn inside out",
+            "the roughness turns cells inside out: it is too high for the block, or for cells "
+            "that are much longer than its waves",
             value=float(np.ptp(surface.heights)),
-            allowed=f"heights well below {shape.height / _DECAY:g} mm below their mean",
+            allowed=f"valleys not {shape.height / _DECAY:g} mm below the mean, or finer cells",
         )
-    points[:, 2] += rise * (1.0 + points[:, 2] / shape.height) ** _DECAY
+    points[:] = moved
     return flat, quality
+
+
+def _thinnest(flat: BlockMesh, moved: Array) -> float:
+    """Return the smallest ratio of the volumes at corners of cells after and before a movement."""
+    cells, points = compat.cell_vertices(flat.mesh), flat.mesh.geometry.x
+    thinnest = 1.0
+    for corner in _CORNERS[cells.shape[1]] if len(cells) else ():
+        at, *ends = (cells[:, vertex] for vertex in corner)
+        before, after = (
+            np.linalg.det(np.stack([place[end] - place[at] for end in ends], axis=1))
+            for place in (points, moved)
+        )
+        thinnest = min(thinnest, float(np.min(after / before)))
+    return thinnest
 
 
 def _steepest(flat: BlockMesh, rise: Array) -> float:

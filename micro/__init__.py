@@ -24,7 +24,7 @@ from micro.finite_slope import finite_slope_effect
 from micro.half_space import HalfSpaceModel
 from micro.half_space_state import HalfSpaceState
 from micro.hertz import HertzContact, contact_modulus
-from micro.influence import influence_matrix, mutual_influence, rectangle_influence
+from micro.influence import influence_matrix, mutual_influence
 from micro.island_state import IslandState
 from micro.islands import IslandModel
 from micro.love import love_centre, love_integral, love_mean, love_mutual
@@ -77,6 +77,5 @@ __all__ = [
     "love_mutual",
     "micro_model",
     "mutual_influence",
-    "rectangle_influence",
     "resampled",
 ]

@@ -7,14 +7,12 @@ antiderivative of 1/ρ; far away, where these cancel, the expansion of 1/ρ in t
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import toeplitz
 
 from geometry.patches import PatchGrid
-from micro.love import fourfold_integral, love_mutual
+from micro.love import love_mutual
 
 Array = NDArray[np.float64]
 
@@ -60,31 +58,6 @@ def mutual_influence(dx: ArrayLike, dy: ArrayLike, a: float, b: float) -> Array:
     far = np.hypot(dx, dy) > _FAR * 2.0 * max(a, b)
     result[far] = _expansion(dx[far], dy[far], a, b)
     return result
-
-
-def rectangle_influence(
-    centre: ArrayLike,
-    half_sizes: tuple[float, float],
-    loaded_centre: ArrayLike,
-    loaded_half_sizes: tuple[float, float],
-) -> Array:
-    """Return the mean of L of one rectangle over another of any size [mm].
-
-    Rounding grows as 1e-16 r⁴/(A A') with the distance r and the areas.
-
-    Args:
-        centre: Centre of the rectangle that is displaced, shape (..., 2) [mm].
-        half_sizes: Its half-sides along x and y [mm].
-        loaded_centre: Centre of the rectangle under unit pressure, shape (..., 2) [mm].
-        loaded_half_sizes: Its half-sides [mm].
-    """
-    apart = np.asarray(centre, float) - np.asarray(loaded_centre, float)
-    total = np.zeros(apart.shape[:-1])
-    for i, j, k, m in product((-1, 1), repeat=4):
-        u = apart[..., 0] + i * half_sizes[0] + k * loaded_half_sizes[0]
-        v = apart[..., 1] + j * half_sizes[1] + m * loaded_half_sizes[1]
-        total += (i * k) * (j * m) * fourfold_integral(u, v)
-    return total / (4.0 * half_sizes[0] * half_sizes[1])
 
 
 def _expansion(dx: Array, dy: Array, a: float, b: float) -> Array:

@@ -70,8 +70,9 @@ def love_mean(a: ArrayLike, b: ArrayLike) -> Array:
 def love_mutual(dx: ArrayLike, dy: ArrayLike, a: ArrayLike, b: ArrayLike) -> Array:
     """Return the mean of L over an equal rectangle whose centre is (dx, dy) away [mm].
 
-    It is the second difference, in x and in y, of `fourfold_integral`. Rounding
-    grows as 1e-16 (distance/side)⁴; `micro.influence` goes on from there.
+    It is the second difference, in x and in y, of the fourfold antiderivative of 1/ρ,
+    ½ u² v asinh(v/u) + ½ u v² asinh(u/v) − ρ³/6. Rounding grows as 1e-16 (distance/side)⁴;
+    `micro.influence` goes on from there.
 
     Args:
         dx: Distance of the centres along x [mm]; all arguments broadcast.
@@ -85,7 +86,7 @@ def love_mutual(dx: ArrayLike, dy: ArrayLike, a: ArrayLike, b: ArrayLike) -> Arr
     dx, dy, a, b = np.asarray(dx, float), np.asarray(dy, float), *_half_sides(a, b)
     total = np.zeros(np.broadcast_shapes(dx.shape, dy.shape, a.shape, b.shape))
     for (i, p), (j, q) in product(((-1, 1.0), (0, -2.0), (1, 1.0)), repeat=2):
-        total += p * q * fourfold_integral(dx + 2 * i * a, dy + 2 * j * b)
+        total += p * q * _fourfold(dx + 2 * i * a, dy + 2 * j * b)
     return total / (4.0 * a * b)
 
 
@@ -102,8 +103,7 @@ def corner_integral(u: ArrayLike, v: ArrayLike) -> Array:
     return u * _asinh_ratio(v, u) + v * _asinh_ratio(u, v)
 
 
-def fourfold_integral(u: Array, v: Array) -> Array:
-    """Return ½ u² v asinh(v/u) + ½ u v² asinh(u/v) − ρ³/6: 1/ρ integrated twice in u and v."""
+def _fourfold(u: Array, v: Array) -> Array:
     logs = u * _asinh_ratio(v, u) + v * _asinh_ratio(u, v)
     return 0.5 * u * v * logs - np.hypot(u, v) ** 3 / 6.0
 

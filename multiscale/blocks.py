@@ -60,8 +60,7 @@ def patch_compliance(stage: Stage, comm: Any) -> Array:
     from macro.compliance_cache import cached
 
     def compute() -> dict[str, Array]:
-        interface = embedding(stage, comm)
-        return {"compliance": plain_compliance(interface.block, interface)}
+        return {"compliance": plain_compliance(embedding(stage, comm))}
 
     key = (stage.shape, _material(stage), stage.scene.block.sides, stage.patches)
     return cached("plain", key, compute, comm or MPI.COMM_SELF)["compliance"]

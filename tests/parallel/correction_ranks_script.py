@@ -22,6 +22,27 @@ def made(make, grid, sides):
     return values.tolist()
 
 
+class Failing(HalfSpace):
+    """A half-space that the last rank has no memory for."""
+
+    def displacements(self, *_points):
+        if COMM.rank == COMM.size - 1:
+            raise MemoryError("no room")
+        return super().displacements(*_points)
+
+
+def failed():
+    """Return the error that every rank meets when one fails."""
+    loads = PatchGrid(grid=(3, 1), lengths=SHAPE.interface)
+    material = Material(young_modulus=1.0, poisson_ratio=0.3)
+    try:
+        make_correction(SHAPE, material, "free", loads, Failing(1.0, 0.3), COMM)
+        found = "none"
+    except MemoryError as error:
+        found = str(error)
+    return COMM.allgather(found)
+
+
 if __name__ == "__main__":
     result = {
         "more loads than ranks": made(make_correction, (3, 2), "free"),
@@ -30,5 +51,6 @@ if __name__ == "__main__":
         "kept, first": made(cached_correction, (2, 1), "free"),
         "kept, again": made(cached_correction, (2, 1), "free"),
     }
+    errors = failed()
     if COMM.rank == 0:
-        print(json.dumps(result))
+        print(json.dumps({"values": result, "errors": errors}))

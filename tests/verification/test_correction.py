@@ -102,7 +102,7 @@ def test_single_patches_are_the_limit_of_quadratic_elements_without_decompositio
         block_mesh(replace(shape, cells=(8, 8, 6), element="Q2", grading=4.0), MPI.COMM_SELF),
         Material(young_modulus=1.0, poisson_ratio=0.3),
     )
-    found = plain_compliance(plain, Interface(plain, PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))))
+    found = plain_compliance(Interface(plain, PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))))
     # elements are stiff below a patch's own edges: 0.33 % here, 0.16 % with 16, 16, 8
     assert np.all(np.diag(found) < np.diag(whole))
     np.testing.assert_allclose(found, whole, atol=0.005 * whole.max())

@@ -1,5 +1,6 @@
 """Tetrahedra that are small only where contact can occur."""
 
+import gmsh
 import numpy as np
 import pytest
 
@@ -44,6 +45,20 @@ def test_sizes_follow_the_distance():
     assert np.median(length / wanted) == pytest.approx(1.0, abs=0.3)
 
 
+def test_sizes_of_the_callers_session_do_not_count():
+    with shape().meshed() as model:
+        expected = len(model.mesh.getNodes()[0])
+    gmsh.initialize()
+    try:
+        gmsh.option.setNumber("Mesh.MeshSizeFactor", 3.0)
+        gmsh.option.setNumber("Mesh.MeshSizeMin", 0.1)
+        with shape().meshed() as model:
+            assert len(model.mesh.getNodes()[0]) == expected
+        assert gmsh.option.getNumber("Mesh.MeshSizeFactor") == 3.0
+    finally:
+        gmsh.finalize()
+
+
 def test_places_are_where_the_plane_can_come():
     x = (np.arange(32) + 0.5) / 32
     heights = -0.5 * ((x[:, None] - 0.5) ** 2 + (x - 0.25) ** 2)
@@ -62,6 +77,11 @@ def test_places_are_where_the_plane_can_come():
         ({"fine": 0.3}, "edge lengths are out of range"),
         ({"fine": 0.0}, "edge lengths are out of range"),
         ({"growth": 0.0}, "must be positive"),
+        ({"height": np.inf}, "must be positive"),
+        ({"places": np.empty((0, 2))}, "places have two coordinates"),
+        ({"places": np.zeros((4, 3))}, "places have two coordinates"),
+        ({"places": np.array([[0.3, 0.4], [0.3, 0.9]])}, "lies outside the interface"),
+        ({"places": np.array([[np.nan, 0.4]])}, "lies outside the interface"),
         ({"interface": (1.0, -1.0)}, "interface"),
     ],
 )

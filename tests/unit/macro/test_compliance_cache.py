@@ -103,3 +103,13 @@ def test_directory_that_cannot_be_made_does_not_stop_the_run(counted, monkeypatc
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("PATCHLAW_CACHE", str(tmp_path / "file" / "below"))
     assert "c" in cached("kind", (), counted[1], MPI.COMM_SELF)
+
+
+def test_nobody_at_home_keeps_nothing(monkeypatch):
+    def homeless():
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(compliance_cache.Path, "home", homeless)
+    for variable in ("PATCHLAW_CACHE", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(variable, raising=False)
+    assert cache_directory() is None

@@ -1,10 +1,12 @@
-"""The rough block under a rigid plane: complementarity, balance, history, refusals."""
+"""The rough block under a rigid plane: complementarity, balance, history."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
-from geometry import InputError, Spectrum, Surface, synthesise
+from geometry import Spectrum, Surface, synthesise
 from geometry.meshes import BlockShape
 from macro import Block, Material
 from macro.obstacle import ObstacleBlock
@@ -17,8 +19,8 @@ SURFACE = synthesise(
 SHAPE = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(16, 16, 6), grading=4.0)
 
 
-def obstacle(surface=SURFACE, sides="free"):
-    mesh, _ = rough_block_mesh(SHAPE, surface, MPI.COMM_SELF)
+def obstacle(surface=SURFACE, sides="free", shape=SHAPE):
+    mesh, _ = rough_block_mesh(shape, surface, MPI.COMM_SELF)
     block = Block(mesh, MATERIAL, sides=sides)
     return ObstacleBlock(block, surface.highest - surface.mean_height)
 
@@ -39,7 +41,6 @@ def test_contact_conditions_and_balance():
     assert np.all(moved <= gap + 1e-15)
     assert np.all(state.pressing >= 0.0)
     np.testing.assert_allclose(moved[state.pressing > 0.0], gap[state.pressing > 0.0], atol=1e-15)
-    assert state.complementarity <= 1e-10
     # the bottom bears what the nodes press, to the tolerance of the linear solver
     assert state.reaction == pytest.approx(state.force, rel=1e-8)
 
@@ -54,25 +55,21 @@ def test_unloading_and_direct_loading_lead_to_the_same_contact():
 
 
 def test_plane_apart_finds_nothing():
-    state = obstacle().press(-1e-3)
-    assert (state.force, state.nodes, state.contact_area) == (0.0, 0, 0.0)
+    found = obstacle()
+    found.press(10e-3)
+    for block in (obstacle(), found):
+        state = block.press(-1e-3)
+        assert (state.force, state.nodes, state.contact_area) == (0.0, 0, 0.0)
+        assert not state.displacement.any()
 
 
-def test_flat_top_on_rollers_is_a_column():
+@pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2"])
+def test_flat_top_on_rollers_is_a_column(element):
     flat = Surface(heights=np.zeros((8, 8)), lengths=(1.0, 1.0))
-    state = obstacle(flat, sides="roller").press(1e-3)
+    # on quadratic triangles a uniform pressure has no force at the vertices
+    state = obstacle(
+        flat, sides="roller", shape=replace(SHAPE, cells=(6, 5, 3), element=element)
+    ).press(1e-3)
     # uniform strain: exact for any mesh
     assert state.force == pytest.approx(MATERIAL.confined_modulus * 1e-3, rel=1e-8)
     assert state.contact_area == pytest.approx(1.0, rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("surface", "text"),
-    [
-        (Surface(heights=np.zeros((8, 8)), lengths=(2.0, 1.0)), "must cover the block's top"),
-        (SURFACE.scaled(40.0), "cells would turn inside out"),
-    ],
-)
-def test_what_does_not_fit_is_refused(surface, text):
-    with pytest.raises(InputError, match=text):
-        rough_block_mesh(SHAPE, surface, MPI.COMM_SELF)

@@ -1,3 +1,5 @@
+"""The choice among micro models: promises kept, checks made, reasons told."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Measures of the contacts that a plane cuts off, on shapes whose measures are known."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from geometry import PatchGrid
-from micro import influence_matrix, love_mean, mutual_influence, rectangle_influence
+from micro import influence_matrix, love_mean, mutual_influence
 from micro.elastic_grid import ElasticGrids
 
 
@@ -73,13 +73,3 @@ def test_means_over_patches_agree_with_the_cell_kernel():
     error = [np.abs(found / expected - 1.0).max() for found in displaced]
     assert error[1] < 1e-3
     assert error[1] < 0.4 * error[0]
-
-
-def test_rectangles_of_two_sizes_are_sums_of_equal_ones():
-    half = (0.1, 0.2)
-    wide = rectangle_influence((0.9, 0.3), half, (0.1, 0.0), (0.2, 0.2))
-    parts = [mutual_influence(0.9 - x, 0.3, *half) for x in (0.0, 0.2)]
-    assert wide == pytest.approx(sum(parts), rel=1e-11)
-    # reciprocity: mean displacement per unit force does not depend on which is loaded
-    back = rectangle_influence((0.1, 0.0), (0.2, 0.2), (0.9, 0.3), half)
-    assert wide / 0.16 == pytest.approx(back / 0.08, rel=1e-11)

@@ -1,3 +1,5 @@
+"""The choice of a micro model in a scene: what is asked for, told, refused and recorded."""
+
 from __future__ import annotations
 
 import pytest

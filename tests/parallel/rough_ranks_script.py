@@ -1,0 +1,88 @@
+"""Press rough blocks on all ranks and print what was found as JSON; for test_rough_ranks.py."""
+
+import json
+
+import numpy as np
+from mpi4py import MPI
+
+from geometry import (
+    BlockShape,
+    InputError,
+    RefinedShape,
+    Spectrum,
+    Surface,
+    places_in_reach,
+    synthesise,
+)
+from macro import Block, Material, ObstacleBlock, rough_block_mesh
+
+COMM = MPI.COMM_WORLD
+TILT = (4e-3, -2e-3)
+MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.3)
+SURFACE = synthesise(
+    Spectrum(hurst=0.9, waves=(2, 4), rms_slope=0.1, seed=3), grid=(64, 48), lengths=(1.0, 0.8)
+)
+
+
+FLAT = Surface(heights=np.zeros((8, 8)), lengths=SURFACE.lengths)
+
+
+def refined(element, **changes):
+    """Return tetrahedra that are small where the surface is high."""
+    places = places_in_reach(SURFACE, 12e-3, spacing=0.05)
+    sizes = {"fine": 0.06, "coarse": 0.3, "growth": 0.5} | changes
+    return RefinedShape(
+        interface=SURFACE.lengths, height=0.6, places=places, element=element, **sizes
+    )
+
+
+def hexahedra(cells):
+    """Return a regular block below the surface."""
+    return BlockShape(interface=SURFACE.lengths, height=0.6, cells=cells)
+
+
+CASES = {
+    "hexahedra": (hexahedra((12, 10, 4)), SURFACE, "roller"),
+    # one rank alone has any of the top
+    "one facet": (hexahedra((1, 1, 6)), FLAT, "free"),
+    "linear": (refined("P1"), SURFACE, "free"),
+    "quadratic": (refined("P2", fine=0.12), SURFACE, "free"),
+}
+
+
+def run(shape, surface, sides):
+    """Press a rough block and return what must not depend on the number of ranks."""
+    mesh, quality = rough_block_mesh(shape, surface, COMM)
+    block = ObstacleBlock(Block(mesh, MATERIAL, sides), surface.highest - surface.mean_height)
+    states = [block.press(approach, TILT) for approach in (6e-3, 10e-3, 8e-3)]
+    numbers = {
+        "force": [state.force for state in states],
+        "area": [state.contact_area for state in states],
+        "nodes": [state.nodes for state in states],
+        "quality": [quality.thinnest, quality.steepest],
+    }
+    reaction = [state.reaction for state in states]
+    everyone = COMM.allgather((numbers, reaction))
+    assert all(other == everyone[0] for other in everyone), "ranks disagree"
+    return {
+        "numbers": numbers,
+        "reaction": reaction,
+        "top_nodes_of_ranks": COMM.allgather(len(block.dofs)),
+    }
+
+
+def fail_inside_out():
+    """Return the error that every rank meets when the roughness turns cells inside out."""
+    try:
+        rough_block_mesh(hexahedra((4, 4, 6)), SURFACE.scaled(40.0), COMM)
+        found = "none"
+    except InputError as error:
+        found = str(error)
+    return COMM.allgather(found)
+
+
+if __name__ == "__main__":
+    result = {name: run(*case) for name, case in CASES.items()}
+    result["inside out"] = fail_inside_out()
+    if COMM.rank == 0:
+        print(json.dumps(result))

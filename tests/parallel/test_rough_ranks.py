@@ -1,0 +1,46 @@
+"""The meshed rough block gives the same contact, and the same errors, on 1, 2 and 3 ranks."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+SCRIPT = Path(__file__).with_name("rough_ranks_script.py")
+
+
+@pytest.fixture(scope="module")
+def found(mpirun, root):
+    """Return what was found on every number of ranks."""
+    results = {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", str(root))
+        for ranks in (1, 2, 3):
+            done = mpirun(ranks, SCRIPT)
+            assert done.returncode == 0, done.stdout + done.stderr
+            results[ranks] = json.loads(done.stdout.splitlines()[-1])
+    return results
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+@pytest.mark.parametrize("case", ["hexahedra", "one facet", "linear", "quadratic"])
+def test_contact_does_not_depend_on_the_ranks(found, case, ranks):
+    serial, parallel = (found[n][case] for n in (1, ranks))
+    assert parallel["numbers"]["nodes"] == serial["numbers"]["nodes"]
+    assert min(serial["numbers"]["nodes"]) > 0
+    for name, value in serial["numbers"].items():
+        # residuals of 1e-9 of the contact forces on both sides
+        np.testing.assert_allclose(parallel["numbers"][name], value, rtol=1e-8, err_msg=name)
+    assert parallel["reaction"] == pytest.approx(parallel["numbers"]["force"], rel=1e-8)
+
+
+def test_the_cases_are_what_they_claim(found):
+    assert sorted(found[3]["one facet"]["top_nodes_of_ranks"]) == [0, 0, 4]
+    assert min(found[3]["linear"]["top_nodes_of_ranks"]) > 0
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_refusal_reaches_every_rank(found, ranks):
+    texts = found[ranks]["inside out"]
+    assert texts == found[1]["inside out"] * ranks
+    assert "turns cells inside out" in texts[0]

@@ -1,0 +1,47 @@
+"""Solves on a part of the degrees of freedom against a dense matrix."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from geometry import BlockShape, NotConverged
+from macro import Block, Material, block_mesh
+from macro.free_solver import FreeSolver
+
+RANDOM = np.random.default_rng(4)
+
+
+@pytest.fixture(scope="module")
+def block():
+    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(3, 3, 2))
+    return Block(block_mesh(shape, MPI.COMM_SELF), Material(young_modulus=4e3, poisson_ratio=0.2))
+
+
+def vector_of(values):
+    return PETSc.Vec().createWithArray(values.copy(), comm=PETSc.COMM_SELF)
+
+
+def test_what_is_free_solves_and_what_is_held_stays(block):
+    count = block.dofs
+    every = np.arange(count, dtype=PETSc.IntType)
+    matrix = block.stiffness.getValues(every, every)
+    held = RANDOM.choice(count, count // 4, replace=False)
+    start, right = RANDOM.standard_normal((2, count))
+    solver, found = FreeSolver(block.stiffness, block.solver.pc), vector_of(start)
+    solver.hold(np.arange(5))  # forgotten by the next
+    solver.hold(held)
+    assert solver.improve(found, vector_of(right - matrix @ start), 1e-8) > 0
+    residual = right - matrix @ found.array_r
+    free = np.setdiff1d(np.arange(count), held)
+    assert np.array_equal(found.array_r[held], start[held])
+    assert np.linalg.norm(residual[free]) <= 1.1e-8  # what rounding adds to the recursion
+    assert solver.improve(found, vector_of(residual), 1e-7) == 0
+
+
+def test_numbers_that_are_none_do_not_converge(block):
+    solver, found = FreeSolver(block.stiffness, block.solver.pc), block.stiffness.createVecRight()
+    residual = found.duplicate()
+    residual.set(np.inf)
+    with pytest.raises(NotConverged, match="the linear solve of the rough block"):
+        solver.improve(found, residual, 1e-8)
