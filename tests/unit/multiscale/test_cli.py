@@ -37,6 +37,7 @@ def test_run_writes_everything(capsys, tmp_path):
     code, shown, err = call(capsys, "run", PAPER, "--out", str(out), "--set", *SMALL)
     assert (code, err) == (0, "")
     assert "results in" in shown
+    assert {"[µm]", "[N]", "[s]"} <= set(shown.split())  # no unit is taken for markup
     names = {path.name for path in out.iterdir()}
     assert names == {
         "history.csv", "patches.csv", "laws.h5", "provenance.json", "report.html",
