@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
+from geometry.collective import on_root
 from geometry.errors import InputError
-from micro import HalfSpaceModel, MicroModel
+from micro import HalfSpaceModel, MicroModel, resampled
 from multiscale.blocks import embedding, fine_loads, smooth_correction, yielding
 from multiscale.concurrent import TOLERANCE, ConcurrentCoupling
 from multiscale.condensed import CondensedCoupling
@@ -53,7 +52,7 @@ def make_table(stage: Stage, comm: Any) -> LawTable:
             stage.model,
             stage.patches,
             mean_heights=stage.mean_heights,
-            approach_end=stage.approach_end,
+            approach_end=on_root(comm, lambda: stage.approach_end),
             tolerance=stage.table_tolerance,
             most_rows=stage.table_rows,
             tilt=stage.furthest[1],
@@ -121,13 +120,11 @@ def _concurrent(stage: Stage, comm: Any) -> Coupling:
 def _coarse_model(stage: Stage) -> MicroModel | None:
     """Return a half-space of fewer cells; None where the surface itself has no more."""
     surface = stage.surface
-    nx, ny = (min(count, _COARSE) for count in surface.grid)
-    if (nx, ny) == surface.grid:
+    cells = min(surface.grid[0], _COARSE), min(surface.grid[1], _COARSE)
+    if cells == surface.grid:
         return None
-    x, y = (
-        (np.arange(count) + 0.5) * side / count
-        for count, side in zip((nx, ny), surface.lengths, strict=True)
+    return HalfSpaceModel(
+        surface=resampled(surface, cells),
+        contact_modulus=stage.model.contact_modulus,
+        highest=surface.highest,
     )
-    heights = surface.height_at(x[:, None], y)
-    coarse = replace(surface, heights=heights)
-    return HalfSpaceModel(surface=coarse, contact_modulus=stage.model.contact_modulus)

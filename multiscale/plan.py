@@ -34,7 +34,7 @@ def warnings(stage: Stage) -> Iterator[str]:
 
 def _surface_warnings(stage: Stage) -> Iterator[str]:
     excess = stage.surface.highest - stage.surface.heights.max()
-    if excess > 0.1 * stage.furthest[0]:
+    if excess > 0.1 * stage.deepest:
         x, y = stage.surface.highest_point
         yield (
             f"the approach counts from the interpolant's highest point, {1e3 * excess:.3g} µm "

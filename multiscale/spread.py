@@ -18,6 +18,7 @@ from micro import MicroModel
 Array = NDArray[np.float64]
 
 _ROWS = 17  # the contacts' places change slowly with the load
+_SHORTEST = 1e-9  # of the diagonal, that the rows reach over
 
 
 class Shares(NamedTuple):
@@ -156,7 +157,8 @@ def contact_spread(
     """
     middle = np.add(patches.origin, np.multiply(0.5, patches.lengths))
     lean = (patches.centres - middle) @ np.asarray(tilt)
-    lowest = min(model.first_touch, approach_end) - float(np.abs(lean).max())
+    below = approach_end - _SHORTEST * float(np.hypot(*patches.lengths))  # a touch may lie beyond
+    lowest = min(model.first_touch, below) - float(np.abs(lean).max())
     rows = np.linspace(lowest, approach_end, _ROWS)
 
     def forces() -> Array:
