@@ -20,6 +20,7 @@ from multiscale.sagging import SaggingContact, SmoothCorrection, Trial
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-8
+"""What forces may be off by, and a prescribed force be missed by, relative to the force."""
 
 _MOST = 40
 _KEPT = 6  # secants, over load steps too
