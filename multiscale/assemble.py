@@ -27,7 +27,7 @@ _COARSE = 64  # cells along a side, at most, of the surface that goes ahead
 
 
 def make_table(stage: Stage, comm: Any) -> LawTable:
-    """Tabulate the laws of all patches, alone or of the whole surface.
+    """Tabulate the laws of all patches: each alone, or all from the whole surface under its plane.
 
     Args:
         stage: The scene's ingredients.
@@ -35,19 +35,21 @@ def make_table(stage: Stage, comm: Any) -> LawTable:
 
     Raises:
         InputError: When the coupling has no laws.
+        NotConverged: When the micro model does not converge.
 
     Note:
         Collective.
     """
-    if stage.scene.coupling.kind == "concurrent":
+    kind = stage.scene.coupling.kind
+    if not stage.by_laws:
         raise InputError(
             "has no laws",
             key="coupling.kind",
-            value="concurrent",
+            value=kind,
             allowed="isolated, consistent",
             file=stage.scene.file,
         )
-    if stage.scene.coupling.kind == "consistent":
+    if kind == "consistent":
         return consistent_laws(
             stage.model,
             stage.patches,

@@ -169,6 +169,7 @@ def consistent_laws(
             "model": model.name,
             "love": "mean",
             "tolerance": f"{tolerance:g}",
+            "tilt": f"{tilt[0]:g}, {tilt[1]:g}",
         },
         force_error=error,
     )

@@ -128,11 +128,13 @@ def test_schema_is_json(capsys):
     assert "surface" in json.loads(shown)["properties"]
 
 
-def test_laws_of_a_coupling_without_laws_are_refused(capsys, tmp_path):
-    words = ("laws", PAPER, "--out", str(tmp_path), "--set", "coupling.kind=concurrent")
+@pytest.mark.parametrize("kind", ["concurrent", "analytic"])
+def test_laws_of_a_coupling_without_laws_are_refused(capsys, tmp_path, kind):
+    words = ("laws", PAPER, "--out", str(tmp_path), "--set", f"coupling.kind={kind}")
     code, _, err = call(capsys, *words)
     assert code == 2
-    assert "coupling.kind = 'concurrent': has no laws (allowed: isolated, consistent)" in err
+    assert "has no laws (allowed: isolated, consistent)" in err
+    assert not list(tmp_path.iterdir())
     assert not list(tmp_path.iterdir())
 
 

@@ -71,6 +71,10 @@ def test_refusal_names_file_key_and_value(override, text):
             "compliance = 'finite-element' does not go with kind = 'concurrent' (allowed: complian",
         ),
         (
+            ["kind=concurrent", "table_tolerance=0.001"],
+            "table_tolerance = 0.001 does not go with kind = 'concurrent' (allowed: leave it out",
+        ),
+        (
             ["kind=concurrent", "interface=pointwise"],
             "interface = 'pointwise' does not go with kind = 'concurrent' (allowed: interface = 'p",
         ),

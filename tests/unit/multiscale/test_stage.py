@@ -7,6 +7,7 @@ import pytest
 
 from geometry.errors import NotConverged
 from multiscale import Scene, make_stage, run
+from multiscale.plan import statements
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 
@@ -37,6 +38,20 @@ def test_plane_that_does_not_touch_carries_nothing(coupling):
     assert make_stage(asked).model.first_touch > 1e-5  # cells miss the interpolant's highest point
     history = run(asked)
     assert (history.force_N[-1], history.contacts[-1]) == (0.0, 0)
+
+
+@pytest.mark.parametrize(
+    ("tilt", "coupling", "load"),
+    [
+        ([0.01, -0.0025], "under the load's tilt;", "tilted by 10 and -2.5 µm/mm along x and y"),
+        ("free", "under the tilt that it takes on a half-space, ", "the plane free to tilt"),
+        ([0.0, 0.0], "one solution of the whole surface;", "an approach of 8 µm"),
+    ],
+)
+def test_plan_says_under_which_tilt_laws_are_made(tilt, coupling, load):
+    said = dict(statements(make_stage(scene(approach=8e-3, tilt=tilt))))
+    assert coupling in said["coupling"]
+    assert load in said["load"]
 
 
 def test_laws_that_do_not_go_far_enough_name_what_needs_none():
