@@ -120,7 +120,7 @@ def _under_tilt(stage: Stage) -> str:
     """Say under which plane the laws of the whole surface are made."""
     tilt = stage.furthest[1]
     if stage.scene.loading.tilt == "free":
-        return f" under the tilt that it takes on a half-space, {_slopes(tilt)}"
+        return f" under the tilt that the plane takes on a half-space, {_slopes(tilt)}"
     return " under the load's tilt" if any(tilt) else ""
 
 

@@ -161,7 +161,7 @@ def test_concurrent_run_from_scene_to_fields(capsys, tmp_path):
         (("run", "nowhere.toml"), "nowhere.toml: cannot be read"),
         (("run", PAPER, "--set", "block.young=3"), "did you mean 'young_modulus'"),
         (("run", PAPER, "--set", "patches.grid=[41, 2]"), "patches.grid = [41, 2]: more patches"),
-        (("run", PAPER, "--set", "surface.grid=[1, 256]"), "surface.spectrum"),
+        (("run", PAPER, "--set", "surface.grid=[1, 256]"), "surface.grid.0 = 1: must be greater"),
         (("run", PAPER, "--set", "surface.spectrum.waves=[2, 200]"), "surface.spectrum"),
         (("run", PAPER, "--out", PAPER), "is not a folder"),
         (("run", PAPER, "--out", PAPER + "/x"), "is not a folder"),

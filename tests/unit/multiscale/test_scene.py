@@ -36,6 +36,10 @@ REFUSED = {
     "fraction for an integer": ("load.steps=1.5", "load.steps = 1.5: must be a valid integer"),
     "no patches": ("patches.grid=[0, 4]", "patches.grid.0 = 0: must be greater than or equal to 1"),
     "short grid": ("patches.grid=[4]", "patches.grid.1: is required and missing"),
+    "few heights": (
+        "surface.grid=[64, 3]",
+        "surface.grid.1 = 3: must be greater than or equal to 4",
+    ),
     "not a section": ("block=3", "block = 3: must be a section"),
     "unknown coupling": ("coupling.kind='magic'", "coupling.kind = 'magic': must be 'isolated', "),
     "no turning point": ("load.approach=[]", "load.approach = []: is an empty list (allowed: a qu"),

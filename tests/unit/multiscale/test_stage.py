@@ -44,7 +44,7 @@ def test_plane_that_does_not_touch_carries_nothing(coupling):
     ("tilt", "coupling", "load"),
     [
         ([0.01, -0.0025], "under the load's tilt;", "tilted by 10 and -2.5 µm/mm along x and y"),
-        ("free", "under the tilt that it takes on a half-space, ", "the plane free to tilt"),
+        ("free", "under the tilt that the plane takes on a half-space, ", "the plane free to tilt"),
         ([0.0, 0.0], "one solution of the whole surface;", "an approach of 8 µm"),
     ],
 )
