@@ -14,6 +14,7 @@ from geometry.collective import on_root
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from micro import MicroModel
+from multiscale.coupling import tilted_approaches
 
 Array = NDArray[np.float64]
 
@@ -148,15 +149,14 @@ def contact_spread(
         model: Micro model of the surface.
         patches: Its patches.
         loads: Rectangles that divide them.
-        approach_end: Largest approach [mm].
+        approach_end: Largest approach at the middle [mm].
         tilt: Slopes of the plane.
-        comm: MPI communicator.
+        comm: MPI communicator (mpi4py) or None; its first rank solves for all.
 
     Note:
         Collective.
     """
-    middle = np.add(patches.origin, np.multiply(0.5, patches.lengths))
-    lean = (patches.centres - middle) @ np.asarray(tilt)
+    lean = tilted_approaches(patches, 0.0, tilt)
     below = approach_end - _SHORTEST * float(np.hypot(*patches.lengths))  # a touch may lie beyond
     lowest = min(model.first_touch, below) - float(np.abs(lean).max())
     rows = np.linspace(lowest, approach_end, _ROWS)
