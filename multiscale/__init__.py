@@ -8,6 +8,7 @@ patch its law, the laws go onto the flat interface of an elastic block, and load
 from multiscale.concurrent import ConcurrentCoupling
 from multiscale.condensed import CondensedCoupling
 from multiscale.consistent import consistent_laws
+from multiscale.coupling import AnalyticCoupling, EmbeddedCoupling
 from multiscale.history import History, LoadStep, PatchState
 from multiscale.law_files import LawTable, read_laws, write_laws
 from multiscale.laws import PatchLaw
@@ -21,9 +22,11 @@ from multiscale.tabulate import isolated_laws
 from multiscale.yielding import SpreadLoads, UniformLoads
 
 __all__ = [
+    "AnalyticCoupling",
     "ConcurrentCoupling",
     "CondensedCoupling",
     "ContactSpread",
+    "EmbeddedCoupling",
     "History",
     "LawTable",
     "LoadStep",

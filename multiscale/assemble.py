@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
+from geometry.collective import on_root
 from geometry.errors import InputError
-from micro import HalfSpaceModel, MicroModel
+from micro import HalfSpaceModel, MicroModel, resampled
 from multiscale.blocks import embedding, fine_loads, smooth_correction, yielding
 from multiscale.concurrent import TOLERANCE, ConcurrentCoupling
 from multiscale.condensed import CondensedCoupling
@@ -28,7 +27,7 @@ _COARSE = 64  # cells along a side, at most, of the surface that goes ahead
 
 
 def make_table(stage: Stage, comm: Any) -> LawTable:
-    """Tabulate the laws of all patches, alone or of the whole surface.
+    """Tabulate the laws of all patches: each alone, or all from the whole surface under its plane.
 
     Args:
         stage: The scene's ingredients.
@@ -36,24 +35,26 @@ def make_table(stage: Stage, comm: Any) -> LawTable:
 
     Raises:
         InputError: When the coupling has no laws.
+        NotConverged: When the micro model does not converge.
 
     Note:
         Collective.
     """
-    if stage.scene.coupling.kind == "concurrent":
+    kind = stage.scene.coupling.kind
+    if not stage.by_laws:
         raise InputError(
             "has no laws",
             key="coupling.kind",
-            value="concurrent",
+            value=kind,
             allowed="isolated, consistent",
             file=stage.scene.file,
         )
-    if stage.scene.coupling.kind == "consistent":
+    if kind == "consistent":
         return consistent_laws(
             stage.model,
             stage.patches,
             mean_heights=stage.mean_heights,
-            approach_end=stage.approach_end,
+            approach_end=on_root(comm, lambda: stage.approach_end),
             tolerance=stage.table_tolerance,
             most_rows=stage.table_rows,
             tilt=stage.furthest[1],
@@ -121,13 +122,11 @@ def _concurrent(stage: Stage, comm: Any) -> Coupling:
 def _coarse_model(stage: Stage) -> MicroModel | None:
     """Return a half-space of fewer cells; None where the surface itself has no more."""
     surface = stage.surface
-    nx, ny = (min(count, _COARSE) for count in surface.grid)
-    if (nx, ny) == surface.grid:
+    cells = min(surface.grid[0], _COARSE), min(surface.grid[1], _COARSE)
+    if cells == surface.grid:
         return None
-    x, y = (
-        (np.arange(count) + 0.5) * side / count
-        for count, side in zip((nx, ny), surface.lengths, strict=True)
+    return HalfSpaceModel(
+        surface=resampled(surface, cells),
+        contact_modulus=stage.model.contact_modulus,
+        highest=surface.highest,
     )
-    heights = surface.height_at(x[:, None], y)
-    coarse = replace(surface, heights=heights)
-    return HalfSpaceModel(surface=coarse, contact_modulus=stage.model.contact_modulus)

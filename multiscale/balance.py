@@ -122,7 +122,7 @@ class Balance:
         largest = max(float(load[0]), control.force or 0.0)
         depth = max(abs(plane[0]) - self.first_touch, 1e-6 * self.half)
         stiffness = np.diag(np.array([1.0, 1 / 6, 1 / 6])[free]) * 1.5 * (largest or 1.0) / depth
-        for _ in range(_MOST_EVALUATIONS):
+        for count in range(_MOST_EVALUATIONS):
             largest = max(float(load[0]), control.force or 0.0)
             if np.abs(excess).max() <= TOLERANCE * largest:
                 return plane, load, known
@@ -130,7 +130,7 @@ class Balance:
             step *= min(1.0, 0.5 * depth / np.abs(step).max()) if self.force == 0.0 else 1.0
             share, found = self._searched(evaluate, plane, excess, free, unit, wanted, step)
             if found is None:
-                break
+                raise _failure(control, "NO_BALANCE", count)
             load, known, after = found
             change = share * step
             plane = plane.copy()

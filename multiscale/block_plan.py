@@ -57,8 +57,8 @@ def _smooth_warnings(stage: Stage) -> Iterator[str]:
     if seconds > 5.0:
         yield (
             f"the smooth rest of the block has {unknowns} unknowns, and takes about {seconds:.2g} "
-            f"s and {MEMORY * unknowns**1.5 / 1e9:.2g} GB on every rank: {DECOMPOSED_CELLS} cells "
-            "give the compliance of a cube to 0.05 %"
+            f"s and {MEMORY * unknowns**1.5 / 1e9:.2g} GB on every rank: "
+            f"{_times(DECOMPOSED_CELLS)} cells give the compliance of a cube to 0.05 %"
         )
 
 

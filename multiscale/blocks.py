@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.collective import on_root
 from geometry.patches import PatchGrid
-from micro import influence_matrix
+from micro import HalfSpace, influence_matrix
 from multiscale.spread import contact_spread
 from multiscale.stage import Stage
 from multiscale.yielding import SpreadLoads, UniformLoads, Yielding
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import Interface, Material
-    from macro.correction import Correction
+    from macro import Correction, Interface, Material
 
 Array = NDArray[np.float64]
 
@@ -86,7 +86,7 @@ def yielding(stage: Stage, comm: Any) -> Yielding:
         stage.model,
         stage.patches,
         loads,
-        approach_end=stage.approach_end,
+        approach_end=on_root(comm, lambda: stage.approach_end),
         tilt=stage.furthest[1],
         comm=comm,
     )
@@ -117,8 +117,7 @@ def smooth_correction(stage: Stage, loads: PatchGrid, comm: Any) -> Correction:
     """
     from mpi4py import MPI
 
-    from macro.kept import cached_correction
-    from micro.boussinesq import HalfSpace
+    from macro import cached_correction
 
     material = _material(stage)
     return cached_correction(

@@ -20,6 +20,7 @@ from multiscale.sagging import SaggingContact, SmoothCorrection, Trial
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-8
+"""What forces may be off by, and a prescribed force be missed by, relative to the force."""
 
 _MOST = 40
 _KEPT = 6  # secants, over load steps too
@@ -118,7 +119,7 @@ class ConcurrentCoupling:
         """Return a balanced plane near an approach, or one turned the same way without contact."""
         presses = 0
         force = abs(approach - self._model.first_touch) * self._model.contact_modulus * self._half
-        while True:
+        for _ in range(_MOST):
             last = self._found(Control(force=force, tilt=None), last)
             above = last.trial.plane[0] - approach
             plane = np.array([approach, *last.trial.plane[1:]])
@@ -129,6 +130,7 @@ class ConcurrentCoupling:
             if not trial.found.any():
                 return last._replace(trial=trial, presses=presses)
             force *= _LESS
+        raise _unsettled(Control(approach=approach, tilt=None))
 
     def _found(self, control: Control, last: _Found | None, *, led: bool = True) -> _Found:
         """Iterate from the last load step, or from where the coarse model has come from it."""
@@ -148,12 +150,7 @@ class ConcurrentCoupling:
             change = trial.local - before.local
             if before.found.any() and trial.found.any() and change.any():
                 secants = [*secants, (change, trial.found - before.found)][-_KEPT:]
-        raise NotConverged(
-            f"the block's yielding at {described(control)}",
-            reason="DIVERGED_MAX_IT",
-            iterations=_MOST,
-            remedy="take smaller load steps (load.steps)",
-        )
+        raise _unsettled(control)
 
     def _ahead(self, control: Control, last: _Found | None) -> _Found | None:
         """Return what the coarse model finds; None where that says nothing."""
@@ -204,3 +201,12 @@ class ConcurrentCoupling:
         excess = np.abs(trial.excess(control)) / scale
         change = float(np.abs(step[1]).sum()) / force
         return change <= self._tolerance and bool(np.all(excess[moves] <= self._tolerance))
+
+
+def _unsettled(control: Control) -> NotConverged:
+    return NotConverged(
+        f"the block's yielding at {described(control)}",
+        reason="DIVERGED_MAX_IT",
+        iterations=_MOST,
+        remedy="take more load steps (load.steps)",
+    )

@@ -31,7 +31,7 @@ class CondensedCoupling:
     """
 
     def __init__(self, table: LawTable, block: Array | Yielding) -> None:
-        self._patches = table.patches
+        self._patches, self._made_for = table.patches, table.made_by.get("coupling")
         self._laws = PatchLaws(table.laws)
         self._newton = DenseNewton(self._laws, block, table.patches)
         self._last: DenseState | None = None
@@ -52,6 +52,7 @@ class CondensedCoupling:
                 control,
                 f"patch {self._patches.unravel(worst)} at a local approach of "
                 f"{local[worst]:.6g} mm (allowed: up to {self._laws.end[worst]:.6g} mm)",
+                self._made_for,
             )
 
     def _step(self, state: DenseState) -> LoadStep:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from geometry.collective import on_root
 from geometry.patches import PatchGrid
 from micro import MicroModel, influence_matrix
+from multiscale.coupling import tilted_approaches
 from multiscale.law_files import LawTable
 from multiscale.laws import PatchLaw
 from multiscale.refinement import MOST_ROWS, law_of, refined
@@ -48,8 +49,7 @@ class WholeSurface:
     @cached_property
     def lean(self) -> Array:
         """Local approach of every patch over that at the middle, shape (N,) [mm]."""
-        middle = np.add(self.patches.origin, np.multiply(0.5, self.patches.lengths))
-        return np.asarray((self.patches.centres - middle) @ np.asarray(self.tilt))
+        return tilted_approaches(self.patches, 0.0, self.tilt)
 
     @cached_property
     def first_touch(self) -> float:
@@ -169,6 +169,7 @@ def consistent_laws(
             "model": model.name,
             "love": "mean",
             "tolerance": f"{tolerance:g}",
+            "tilt": f"{tilt[0]:g}, {tilt[1]:g}",
         },
         force_error=error,
     )

@@ -104,7 +104,7 @@ class EmbeddedCoupling:
             area = self._pressed.patch_means([law.area_fraction_at for law in laws])
             gaps = self._pressed.patch_means([law.separation_at for law in laws])
         except InputError as error:
-            raise beyond_law(control, str(error)) from error
+            raise beyond_law(control, str(error), self._table.made_by.get("coupling")) from error
         mean_closures = zip(laws, press.closure, strict=True)
         contacts = sum(int(law.contacts_at(c, extend=True)) for law, c in mean_closures)
         return embedded_step(
@@ -209,20 +209,26 @@ def tilted_approaches(patches: PatchGrid, approach: float, tilt: tuple[float, fl
     return approach + (patches.centres - centre) @ np.asarray(tilt)
 
 
-def beyond_law(control: Control, problem: str) -> BeyondLaws:
+def beyond_law(control: Control, problem: str, coupling: str | None) -> BeyondLaws:
     """Return the error of a patch that left its law's range.
 
     Args:
         control: The load step.
         problem: Which patch, and how far its law goes.
+        coupling: The coupling that the laws were made for.
     """
+    alone = (
+        "near full contact a patch taken alone has no pressure as a function of closure: take "
+        "coupling.kind = 'consistent' or 'concurrent', larger patches (patches.grid) or a smaller "
+        "load"
+    )
+    whole = (
+        "the block lets the plane come or turn further than the half-space that the laws were "
+        "made for: take coupling.kind = 'concurrent', which needs none"
+    )
     return BeyondLaws(
         f"the patches at {described(control)}",
         reason=f"LAW_RANGE: {problem}",
         iterations=0,
-        remedy=(
-            "near full contact a patch taken alone has no pressure as a function of closure: "
-            "take coupling.kind = 'consistent' or 'concurrent', larger patches (patches.grid) or "
-            "a smaller load"
-        ),
+        remedy=whole if coupling == "consistent" else alone,
     )

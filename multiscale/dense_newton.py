@@ -84,7 +84,8 @@ class DenseNewton:
             start: A solution nearby.
 
         Raises:
-            NotConverged: When neither the start nor an unloaded interface leads to a solution.
+            NotConverged: When neither the start nor one common approach of all laws leads to a
+                solution.
         """
         case = LoadCase(self._equations, control)
         plane = None if start is None else start.plane

@@ -40,7 +40,8 @@ class LawTable:
     Attributes:
         patches: The partition.
         laws: One law per patch, in the order of the flat patch index.
-        made_by: How they were made: coupling, micro model, Love's displacement, tolerance.
+        made_by: How they were made: coupling, micro model, Love's displacement, tolerance, and the
+            slopes of the plane that pressed the whole surface.
         force_error: Estimated error of the force between the rows, see `refinement.Errors`: of
             all patches together, or of the worst where each was tabulated alone.
     """

@@ -34,7 +34,7 @@ def warnings(stage: Stage) -> Iterator[str]:
 
 def _surface_warnings(stage: Stage) -> Iterator[str]:
     excess = stage.surface.highest - stage.surface.heights.max()
-    if excess > 0.1 * stage.furthest[0]:
+    if excess > 0.1 * stage.deepest:
         x, y = stage.surface.highest_point
         yield (
             f"the approach counts from the interpolant's highest point, {1e3 * excess:.3g} µm "
@@ -108,12 +108,20 @@ def _coupling(stage: Stage) -> str:
     reached = stage.reached_patches
     made = {
         "isolated": f"every patch alone, Love's {coupling.love} displacement",
-        "consistent": "all from one solution of the whole surface",
+        "consistent": "all from one solution of the whole surface" + _under_tilt(stage),
     }
     return (
         f"{coupling.kind}: {grid}, {reached} get a law, {patches.count - reached} stay open; "
         f"{made[coupling.kind]}; {coupling.interface} closure"
     )
+
+
+def _under_tilt(stage: Stage) -> str:
+    """Say under which plane the laws of the whole surface are made."""
+    tilt = stage.furthest[1]
+    if stage.scene.loading.tilt == "free":
+        return f" under the tilt that the plane takes on a half-space, {_slopes(tilt)}"
+    return " under the load's tilt" if any(tilt) else ""
 
 
 def _newton(stage: Stage) -> str:
@@ -133,10 +141,14 @@ def _load(stage: Stage) -> str:
     if programme.tilt is None:
         text += ", the plane free to tilt"
     elif any(programme.tilt):
-        text += f", tilt {programme.tilt}"
+        text += f", tilted by {_slopes(programme.tilt)}"
     if programme.quantity == "force":
         text += f"; on a half-space its approach is {1e3 * stage.furthest[0]:.4g} µm"
     return text
+
+
+def _slopes(tilt: tuple[float, float]) -> str:
+    return f"{1e3 * tilt[0]:.3g} and {1e3 * tilt[1]:.3g} µm/mm along x and y"
 
 
 def _article(quantity: str) -> str:

@@ -19,6 +19,7 @@ Flag = Annotated[bool, Field(strict=True)]
 PositiveLength = Annotated[Length, Field(gt=0)]
 Count = Annotated[int, Field(ge=1, strict=True)]
 Pair = Annotated[tuple[Count, Count], Field(description="x, y")]
+Heights = Annotated[int, Field(ge=4, strict=True)]  # fewer have no cubic interpolant
 Band = Annotated[tuple[Number, Number], Field(description="lower, upper number of waves per side")]
 
 
@@ -49,7 +50,7 @@ class SurfaceSection(Section):
 
     spectrum: SpectrumSection | None = None
     file: str | None = None
-    grid: Annotated[Pair, Field(description="heights in x, y")] | None = None
+    grid: Annotated[tuple[Heights, Heights], Field(description="heights in x, y")] | None = None
     lengths: tuple[PositiveLength, PositiveLength] | None = None
     detrend: Literal["none", "mean", "plane", "quadratic"] = "none"
 

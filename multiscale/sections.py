@@ -31,9 +31,10 @@ class CouplingSection(Section):
     """How micro and macro model are put together.
 
     ``kind``: ``isolated`` takes every patch's law from what lies in it alone (Waddad et al. 2016);
-    ``consistent`` takes all laws from one solution of the whole surface; ``concurrent`` solves the
-    whole surface on the block at every load step, without laws; ``analytic`` is the micro model
-    alone on a half-space.
+    ``consistent`` takes all laws from one solution of the whole surface under the tilt of the load
+    (where the plane is free, that which it takes on a half-space at the largest load);
+    ``concurrent`` solves the whole surface on the block at every load step, without laws;
+    ``analytic`` is the micro model alone on a half-space.
 
     ``compliance`` of the block under its patches: ``finite-element`` from the plain mesh under the
     laws; ``decomposed`` is the half-space exactly and finite elements for the smooth rest. By
@@ -41,6 +42,11 @@ class CouplingSection(Section):
 
     ``newton``: ``condensed`` solves for the patches alone, with the compliance computed once;
     ``full`` for all displacements of the mesh. By default what is predicted to cost less.
+
+    ``love``: an isolated patch's own displacement by its pressure, its ``mean`` or that at its
+    ``centre``. ``interface``: the closure is a mean over each patch, or taken at each point.
+    ``table_tolerance``: interpolation error of the laws, relative to the force; by default 1e-4,
+    and 1e-3 with micro models that see cells.
     """
 
     kind: Literal["isolated", "consistent", "concurrent", "analytic"] = "consistent"
@@ -66,6 +72,11 @@ class CouplingSection(Section):
             self.kind != "isolated" and self.love == "centre",
             f"love = 'centre' does not go with {kind}",
             "love = 'mean', or kind = 'isolated'",
+        )
+        yield (
+            self.kind == "concurrent" and self.table_tolerance is not None,
+            f"table_tolerance = {self.table_tolerance} does not go with {kind}",
+            "leave it out: there are no laws",
         )
         for key, value, meant in (
             ("compliance", self.compliance, "decomposed"),

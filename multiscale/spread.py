@@ -14,10 +14,12 @@ from geometry.collective import on_root
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from micro import MicroModel
+from multiscale.coupling import tilted_approaches
 
 Array = NDArray[np.float64]
 
 _ROWS = 17  # the contacts' places change slowly with the load
+_SHORTEST = 1e-9  # of the diagonal, that the rows reach over
 
 
 class Shares(NamedTuple):
@@ -147,16 +149,16 @@ def contact_spread(
         model: Micro model of the surface.
         patches: Its patches.
         loads: Rectangles that divide them.
-        approach_end: Largest approach [mm].
+        approach_end: Largest approach at the middle [mm].
         tilt: Slopes of the plane.
-        comm: MPI communicator.
+        comm: MPI communicator (mpi4py) or None; its first rank solves for all.
 
     Note:
         Collective.
     """
-    middle = np.add(patches.origin, np.multiply(0.5, patches.lengths))
-    lean = (patches.centres - middle) @ np.asarray(tilt)
-    lowest = min(model.first_touch, approach_end) - float(np.abs(lean).max())
+    lean = tilted_approaches(patches, 0.0, tilt)
+    below = approach_end - _SHORTEST * float(np.hypot(*patches.lengths))  # a touch may lie beyond
+    lowest = min(model.first_touch, below) - float(np.abs(lean).max())
     rows = np.linspace(lowest, approach_end, _ROWS)
 
     def forces() -> Array:

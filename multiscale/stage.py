@@ -2,33 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.asperities import Asperities, find_asperities
 from geometry.errors import InputError
-from geometry.files import read_surface
 from geometry.meshes import BlockShape
 from geometry.patches import PatchGrid, patch_means
-from geometry.smooth_shape import smooth_shape
-from geometry.spectrum import synthesise
 from geometry.surface import Surface
 from micro import MODELS, AsperityModel, Choice, MicroModel, ScaledModel
 from multiscale.coupling import tilted_approaches
+from multiscale.ingredients import make_shape, make_surface
 from multiscale.micro_choice import chosen_model, furthest_plane, stated_model
 from multiscale.refinement import MOST_ROWS
 from multiscale.scene import Scene
-from multiscale.stage_checks import block_cells, check_patches, check_size
+from multiscale.stage_checks import check_patches, check_size
+
+Array = NDArray[np.float64]
 
 CLOSURE_RESERVE = 0.15
-"""Closure beyond the largest approach that laws are made for, relative to load.approach."""
-
-_DETREND_ORDER = {"mean": 0, "plane": 1, "quadratic": 2}
+"""Closure beyond the largest approach that laws are made for, relative to the deepest overlap."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +49,7 @@ class Stage:
     asperities: Asperities
     model: MicroModel
     patches: PatchGrid
-    mean_heights: NDArray[np.float64]
+    mean_heights: Array
     shape: BlockShape
     furthest: tuple[float, tuple[float, float]]
     choice: Choice | None = None
@@ -94,29 +90,45 @@ class Stage:
         """Rows that laws may take to get there; models that see cells pay for each."""
         return 400 if self.by_summits else MOST_ROWS
 
+    @cached_property
+    def deepest(self) -> float:
+        """Deepest overlap of plane and undeformed surface at the largest load [mm].
+
+        A level plane overlaps by its approach; the approach at the middle of a tilted one may be
+        negative though its lower side touches.
+        """
+        overlap = self._overlap(*self._cells)
+        return max(self.furthest[0], float(overlap.max()))
+
     @property
-    def closure_ends(self) -> NDArray[np.float64]:
+    def closure_ends(self) -> Array:
         """Largest closure that each patch's law is made for, shape (N,) [mm].
 
         It is the largest approach there, and a reserve: the surface of a bent block may rise
         between its loads, and a free plane may turn further than on a half-space. Laws that hold
-        at points see the approach at the patch's corners.
+        at points see the approach at the patch's corners; so does a level patch alone that has to
+        carry a force, for under the tilted plane its contacts may lie at a corner.
         """
         approach, tilt = self.furthest
         ends = tilted_approaches(self.patches, approach, tilt)
-        if self.scene.coupling.interface == "pointwise":
+        coupling, loading = self.scene.coupling, self.scene.loading
+        alone_by_force = coupling.kind == "isolated" and loading.force is not None
+        if coupling.interface == "pointwise" or alone_by_force:
             ends = ends + 0.5 * float(np.abs(np.multiply(self.patches.size, tilt)).sum())
-        if self.scene.loading.tilt == "free":
+        if loading.tilt == "free":
             ends = ends + 0.5 * (ends.max() - approach)
-        return ends + CLOSURE_RESERVE * approach
+        return ends + CLOSURE_RESERVE * self.deepest
 
-    @property
+    @cached_property
     def approach_end(self) -> float:
         """Largest approach at the middle that laws of the whole surface are made for [mm].
 
         Under a patch that is closed further than its neighbours, or on a block that is stiffer
         than the half-space, the law's own surface moves away under more load than is there; the
-        laws go further by what all of its displacement is worth.
+        laws go further by what all of its displacement is worth. Solves the micro model once.
+
+        Raises:
+            NotConverged: When the micro model does not converge.
         """
         tilt = self.furthest[1]
         end = float(np.max(self.closure_ends - tilted_approaches(self.patches, 0.0, tilt)))
@@ -128,35 +140,37 @@ class Stage:
     @property
     def reached(self) -> NDArray[np.bool_]:
         """Which summits lie within the largest approach, shape (n,)."""
-        return self._within(self.asperities.x, self.asperities.y, self.asperities.z)
+        return self._overlap(self.asperities.x, self.asperities.y, self.asperities.z) > 0.0
 
     @property
     def reached_at_border(self) -> int:
         """Number of the border's maxima within the largest approach."""
         cut = self.asperities
-        return int(np.sum(self._within(cut.border_x, cut.border_y, cut.border_z)))
+        return int(np.sum(self._overlap(cut.border_x, cut.border_y, cut.border_z) > 0.0))
 
     @property
     def reached_cells(self) -> NDArray[np.bool_]:
         """Which cells of the surface lie within the largest approach, shape (nx ny,)."""
-        x, y = np.meshgrid(self.surface.x, self.surface.y, indexing="ij")
-        return self._within(x.ravel(), y.ravel(), self.surface.heights.ravel())
+        return self._overlap(*self._cells) > 0.0
 
     @property
     def reached_patches(self) -> int:
         """Number of patches with anything that the largest closure of their laws can touch."""
-        x, y = (part.ravel() for part in np.meshgrid(self.surface.x, self.surface.y, indexing="ij"))
-        z = self.surface.heights.ravel()
-        if self.ignores_border:
-            x, y, z = self.asperities.x, self.asperities.y, self.asperities.z
+        summits = self.asperities.x, self.asperities.y, self.asperities.z
+        x, y, z = summits if self.ignores_border else self._cells
         owner = self.patches.index_of(x, y)
         return int(np.unique(owner[self.closure_ends[owner] > self.surface.highest - z]).size)
 
-    def _within(self, x: NDArray, y: NDArray, z: NDArray) -> NDArray[np.bool_]:
+    @property
+    def _cells(self) -> tuple[Array, Array, Array]:
+        x, y = np.meshgrid(self.surface.x, self.surface.y, indexing="ij")
+        return x.ravel(), y.ravel(), self.surface.heights.ravel()
+
+    def _overlap(self, x: Array, y: Array, z: Array) -> Array:
+        """Return how far the plane at the largest load lies below points of the surface [mm]."""
         approach, tilt = self.furthest
         from_centre = np.column_stack((x, y)) - 0.5 * np.asarray(self.surface.lengths)
-        approach = approach + from_centre @ np.asarray(tilt)
-        return np.asarray(approach > self.surface.highest - z)
+        return np.asarray(approach + from_centre @ np.asarray(tilt) - (self.surface.highest - z))
 
 
 def make_stage(scene: Scene) -> Stage:
@@ -179,7 +193,7 @@ def make_stage(scene: Scene) -> Stage:
             allowed="half-space, islands",
             file=scene.file,
         )
-    shape = _located(scene, "block", lambda: _block_shape(scene, surface))
+    shape = make_shape(scene, surface)
     choice = chosen_model(scene, surface, patches) if scene.micro.model == "auto" else None
     model = choice.model if choice else stated_model(scene, surface)
     mean_heights = patch_means(surface, patches)
@@ -194,47 +208,3 @@ def make_stage(scene: Scene) -> Stage:
         furthest=furthest_plane(scene.loading.programme, model, patches, mean_heights),
         choice=choice,
     )
-
-
-def make_surface(scene: Scene) -> Surface:
-    """Make or read the surface of a scene.
-
-    Raises:
-        InputError: When it cannot be made or read; names file and key.
-    """
-    section = scene.surface
-    extent: dict[str, Any] = {"grid": section.grid, "lengths": section.lengths}
-    if section.spectrum is not None:
-        spectrum = section.spectrum.spectrum()
-        surface = _located(scene, "surface.spectrum", lambda: synthesise(spectrum, **extent))
-    else:
-        path = scene.surface_path or Path()
-        surface = _located(scene, "surface.file", lambda: read_surface(path, **extent))
-    if section.detrend == "none":
-        return surface
-    return surface.detrended(_DETREND_ORDER[section.detrend])
-
-
-def _block_shape(scene: Scene, surface: Surface) -> BlockShape:
-    block = scene.block
-    shape = BlockShape(
-        interface=surface.lengths,
-        height=block.height,
-        cells=block_cells(scene),
-        element=block.element,
-        grading=block.grading,
-        margin=block.margin,
-        margin_cells=block.margin_cells if block.margin else 0,
-        margin_grading=block.margin_grading if block.margin else 1.0,
-    )
-    if scene.coupling.kind != "analytic" and scene.coupling.decomposed:
-        _located(scene, "block.cells", lambda: smooth_shape(shape))
-    return shape
-
-
-def _located(scene: Scene, key: str, make: Callable[[], Any]) -> Any:
-    """Make something; an error gets the scene's file and the key."""
-    try:
-        return make()
-    except InputError as error:
-        raise error.located(key=key, file=scene.file) from None

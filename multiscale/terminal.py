@@ -123,14 +123,14 @@ def show_history(comm: Any, history: History) -> None:
     header, rows = curve_cells(history)
     table = Table(box=None, padding=(0, 2, 0, 0))
     for name in header:
-        table.add_column(name.replace(" [", "\n["), justify="right")
+        table.add_column(escape(name.replace(" [", "\n[")), justify="right")
     for row in rows:
         table.add_row(*row)
     console.print(table)
     times = ", ".join(f"{name} {seconds:.2f} s" for name, seconds in history.seconds.items())
     console.print(f"wall time: {times}")
     for note in history.notes:
-        console.print(f"note: {note}")
+        console.print(f"note: {escape(note)}")
 
 
 def _wide_console() -> Console:

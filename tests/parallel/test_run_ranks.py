@@ -25,8 +25,9 @@ SCENES = {
     "free to turn, on the mesh": [
         "block.cells=[8, 8, 5]", "patches.grid=[4, 2]", "coupling.newton=full", "load.tilt=free",
     ],
-    "consistent, decomposed": [
+    "consistent, decomposed, free to turn": [
         "block.cells=[8, 8, 5]", "coupling.kind=consistent", "micro.model=half-space",
+        "load.tilt=free",
     ],
     "concurrent": [
         "block.cells=[8, 8, 5]", "coupling.kind=concurrent", "micro.model=half-space",

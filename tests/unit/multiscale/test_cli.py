@@ -37,6 +37,7 @@ def test_run_writes_everything(capsys, tmp_path):
     code, shown, err = call(capsys, "run", PAPER, "--out", str(out), "--set", *SMALL)
     assert (code, err) == (0, "")
     assert "results in" in shown
+    assert {"[µm]", "[N]", "[s]"} <= set(shown.split())  # no unit is taken for markup
     names = {path.name for path in out.iterdir()}
     assert names == {
         "history.csv", "patches.csv", "laws.h5", "provenance.json", "report.html",
@@ -127,11 +128,13 @@ def test_schema_is_json(capsys):
     assert "surface" in json.loads(shown)["properties"]
 
 
-def test_laws_of_a_coupling_without_laws_are_refused(capsys, tmp_path):
-    words = ("laws", PAPER, "--out", str(tmp_path), "--set", "coupling.kind=concurrent")
+@pytest.mark.parametrize("kind", ["concurrent", "analytic"])
+def test_laws_of_a_coupling_without_laws_are_refused(capsys, tmp_path, kind):
+    words = ("laws", PAPER, "--out", str(tmp_path), "--set", f"coupling.kind={kind}")
     code, _, err = call(capsys, *words)
     assert code == 2
-    assert "coupling.kind = 'concurrent': has no laws (allowed: isolated, consistent)" in err
+    assert "has no laws (allowed: isolated, consistent)" in err
+    assert not list(tmp_path.iterdir())
     assert not list(tmp_path.iterdir())
 
 
@@ -158,7 +161,7 @@ def test_concurrent_run_from_scene_to_fields(capsys, tmp_path):
         (("run", "nowhere.toml"), "nowhere.toml: cannot be read"),
         (("run", PAPER, "--set", "block.young=3"), "did you mean 'young_modulus'"),
         (("run", PAPER, "--set", "patches.grid=[41, 2]"), "patches.grid = [41, 2]: more patches"),
-        (("run", PAPER, "--set", "surface.grid=[1, 256]"), "surface.spectrum"),
+        (("run", PAPER, "--set", "surface.grid=[1, 256]"), "surface.grid.0 = 1: must be greater"),
         (("run", PAPER, "--set", "surface.spectrum.waves=[2, 200]"), "surface.spectrum"),
         (("run", PAPER, "--out", PAPER), "is not a folder"),
         (("run", PAPER, "--out", PAPER + "/x"), "is not a folder"),

@@ -172,6 +172,7 @@ def test_plan_states_what_the_smooth_rest_costs():
     assert not any("smooth rest" in note for note in notes)
     _, notes = told([40, 40, 25])
     assert any("146247 unknowns, and takes about 25 s and 2.8 GB" in note for note in notes)
+    assert any("16 × 16 × 12 cells give the compliance" in note for note in notes)
 
 
 def test_too_fine_a_smooth_rest_is_refused_with_its_key():

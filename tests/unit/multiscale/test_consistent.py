@@ -64,7 +64,7 @@ def test_tables_keep_their_tolerance_and_say_so(surface):
         assert np.max(np.abs(wrong) / np.maximum(found, load)) < 3e-3
         assert law.interpolation_error <= 1e-3  # ten times as large as the force's
         assert law.is_open or 0.0 < law.stiffness_error < 0.1
-    assert table.made_by["coupling"] == "consistent"
+    assert (table.made_by["coupling"], table.made_by["tilt"]) == ("consistent", "0, 0")
 
 
 def test_surface_out_of_reach_stays_open(surface):

@@ -36,6 +36,10 @@ REFUSED = {
     "fraction for an integer": ("load.steps=1.5", "load.steps = 1.5: must be a valid integer"),
     "no patches": ("patches.grid=[0, 4]", "patches.grid.0 = 0: must be greater than or equal to 1"),
     "short grid": ("patches.grid=[4]", "patches.grid.1: is required and missing"),
+    "few heights": (
+        "surface.grid=[64, 3]",
+        "surface.grid.1 = 3: must be greater than or equal to 4",
+    ),
     "not a section": ("block=3", "block = 3: must be a section"),
     "unknown coupling": ("coupling.kind='magic'", "coupling.kind = 'magic': must be 'isolated', "),
     "no turning point": ("load.approach=[]", "load.approach = []: is an empty list (allowed: a qu"),
@@ -69,6 +73,10 @@ def test_refusal_names_file_key_and_value(override, text):
         (
             ["kind=concurrent", "compliance=finite-element"],
             "compliance = 'finite-element' does not go with kind = 'concurrent' (allowed: complian",
+        ),
+        (
+            ["kind=concurrent", "table_tolerance=0.001"],
+            "table_tolerance = 0.001 does not go with kind = 'concurrent' (allowed: leave it out",
         ),
         (
             ["kind=concurrent", "interface=pointwise"],

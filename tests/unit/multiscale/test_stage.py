@@ -1,0 +1,60 @@
+"""How far laws are made for the loads that are near, tilted or out of reach."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from geometry.errors import NotConverged
+from multiscale import Scene, make_stage, run
+from multiscale.plan import statements
+
+PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
+
+
+def scene(seed=1, coupling="consistent", **load):
+    small = [f"surface.spectrum.seed={seed}", "surface.grid=[33, 33]", "block.cells=[8, 8, 6]"]
+    models = ["micro.model=half-space", f"coupling.kind={coupling}"]
+    data = Scene.load(PAPER, [*small, *models]).model_dump(by_alias=True)
+    return Scene.from_dict(data | {"load": {"steps": 1} | load})
+
+
+@pytest.mark.parametrize(("seed", "coupling"), [(1, "isolated"), (3, "consistent")])
+def test_small_force_on_the_lower_side_of_a_tilted_plane(seed, coupling):
+    asked = scene(seed, coupling, force=5e-3, tilt=[0.01, 0.01])
+    stage = make_stage(asked)
+    assert stage.furthest[0] < 0.0  # at the middle the plane is clear of the surface
+    x, y = np.meshgrid(stage.surface.x - 0.5, stage.surface.y - 0.5, indexing="ij")
+    below = stage.furthest[0] + 0.01 * (x + y) - (stage.surface.highest - stage.surface.heights)
+    assert stage.deepest == pytest.approx(below.max(), rel=1e-12)
+    assert stage.deepest > 0.0
+    # Newton's residual of a prescribed force is below 1e-10 on the mesh
+    assert run(asked).force_N[-1] == pytest.approx(5e-3, rel=1e-9)
+
+
+@pytest.mark.parametrize("coupling", ["isolated", "consistent", "concurrent"])
+def test_plane_that_does_not_touch_carries_nothing(coupling):
+    asked = scene(coupling=coupling, approach=1e-6)
+    assert make_stage(asked).model.first_touch > 1e-5  # cells miss the interpolant's highest point
+    history = run(asked)
+    assert (history.force_N[-1], history.contacts[-1]) == (0.0, 0)
+
+
+@pytest.mark.parametrize(
+    ("tilt", "coupling", "load"),
+    [
+        ([0.01, -0.0025], "under the load's tilt;", "tilted by 10 and -2.5 µm/mm along x and y"),
+        ("free", "under the tilt that the plane takes on a half-space, ", "the plane free to tilt"),
+        ([0.0, 0.0], "one solution of the whole surface;", "an approach of 8 µm"),
+    ],
+)
+def test_plan_says_under_which_tilt_laws_are_made(tilt, coupling, load):
+    said = dict(statements(make_stage(scene(approach=8e-3, tilt=tilt))))
+    assert coupling in said["coupling"]
+    assert load in said["load"]
+
+
+def test_laws_that_do_not_go_far_enough_name_what_needs_none():
+    # next to the block's corner the plane comes further than on the half-space
+    with pytest.raises(NotConverged, match=r"LAW_RANGE.*take coupling.kind = 'concurrent'"):
+        run(scene(1, "consistent", force=5e-3, tilt=[0.01, 0.01]))
