@@ -140,11 +140,13 @@ class ConcurrentCoupling:
             if ahead is None
             else self._follow(control, last, ahead)
         )
+        missed = 0
         for count in range(1, _MOST + 1):
             step = self._newton.step(control, trial, secants)
+            missed = missed + 1 if step is None else 0
             if self._settled(control, trial, step):
                 return _Found(trial, tuple(secants), count, ahead)
-            before, trial = trial, self._newton.next(control, trial, step, count)
+            before, trial = trial, self._newton.next(control, trial, step, count, missed)
             change = trial.local - before.local
             if before.found.any() and trial.found.any() and change.any():
                 secants = [*secants, (change, trial.found - before.found)][-_KEPT:]

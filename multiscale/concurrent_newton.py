@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 _POWER = 1.5  # exponent of Hertz' law
 _COARSE = 3  # presses that may bring a prescribed force within a factor of two
 _FARTHEST = 1.0  # of the contacts' depth, that one step may change any local approach
+_DAMPINGS = np.geomspace(1e-12, 1e3, 151)
+_FORESEEN = 0.2
 _LOST = 0.75  # of the force, that a step is to lose before the plane is turned to part
 _PARTING = 1.1 * _POWER  # Newton steps to where P ~ h^(3/2) ends, and some
 _TURNED = 0.3  # of the depth of a level plane, that the way to parting may change
@@ -45,6 +47,7 @@ class ConcurrentNewton:
     def __init__(self, contact: SaggingContact, contact_modulus: float, half: float) -> None:
         self._contact = contact
         self._reach = 1.0 / (contact_modulus * half)
+        self._arms = np.array([0.0, half, half])
         self._stiffness = ContactStiffness(contact.loads, contact_modulus)
 
     def step(
@@ -68,19 +71,41 @@ class ConcurrentNewton:
         stiffness = corrected(self._stiffness.estimate(trial.response), secants)
         turn = np.where(moves, 0.0, prescribed(control) - trial.plane)
         lag = yielding @ (found - trial.assumed)
-        rows = shape[:, moves].T
-        forces = np.eye(found.size) + stiffness @ yielding
-        matrix = np.block([[forces, -stiffness @ rows.T], [rows, np.zeros((len(rows), len(rows)))]])
-        right = np.concatenate([stiffness @ (shape @ turn - lag), -trial.excess(control)[moves]])
-        try:
-            solution = np.linalg.solve(matrix, right)
-        except np.linalg.LinAlgError:
-            solution = np.linalg.lstsq(matrix, right, rcond=None)[0]
-        turn[moves] = solution[found.size :]
-        return turn, solution[: found.size]
+        sides = np.column_stack([shape @ turn - lag, shape[:, moves]])
+        sides = np.linalg.solve(np.eye(found.size) + stiffness @ yielding, stiffness @ sides)
+        alone, by_plane = sides[:, 0], sides[:, 1:]
+        missing = -trial.excess(control)[moves] - shape[:, moves].T @ alone
+        most = self._farthest(trial)
+        if secants and np.abs(found - trial.assumed).sum() <= _FORESEEN * found.sum():
+            most = max(most, 2.0 * float(np.abs(secants[-1][0]).max()))
+        turn[moves] = self._turn(shape[:, moves].T @ by_plane, missing, moves, most)
+        return turn, alone + by_plane @ turn[moves]
+
+    def _turn(
+        self, stiffness: Array, missing: Array, moves: NDArray[np.bool_], farthest: float
+    ) -> Array:
+        """Return how a plane moves by loads, damped as it turns on contacts that hardly hold it.
+
+        One contact, or two, hold no plane that is free to turn. Slopes are damped (Levenberg and
+        Marquardt) until none of the border moves farther than the contacts are deep; others may
+        then touch.
+        """
+        if not moves.any():
+            return missing
+        arms = self._arms[moves]
+        scale = float((np.diagonal(stiffness) / np.where(arms > 0.0, arms, 1.0) ** 2).max())
+        damped = stiffness + scale * _DAMPINGS[:, None, None] * np.diag(arms**2)
+        turns = np.linalg.solve(damped, np.broadcast_to(missing, (len(damped), missing.size))[..., None])[..., 0]
+        near = np.abs(turns * arms).sum(axis=1) <= farthest
+        return turns[int(np.argmax(near))] if near.any() else turns[-1]
 
     def next(
-        self, control: Control, trial: Trial, step: tuple[Array, Array] | None, count: int
+        self,
+        control: Control,
+        trial: Trial,
+        step: tuple[Array, Array] | None,
+        count: int,
+        missed: int = 0,
     ) -> Trial:
         """Press where the Newton step leads, within bounds.
 
@@ -89,9 +114,10 @@ class ConcurrentNewton:
             trial: The latest press.
             step: The Newton step from there.
             count: Presses so far.
+            missed: How many of the last of them met no contact.
         """
         if step is None:
-            return self._sought(control, trial, count)
+            return self._sought(control, trial, missed)
         total = float(trial.found.sum())
         rough = count <= _COARSE and not 0.5 <= total / (control.force or total) <= 2.0
         if not trial.assumed.any() or rough:
@@ -102,8 +128,9 @@ class ConcurrentNewton:
         if self._leaves(control, trial, step[1]):
             plane = trial.plane + self._parting(trial, turn) * turn
             return self._contact.press(plane, np.zeros_like(trial.assumed), trial)
-        change = np.abs(self._contact.shape @ turn - self._contact.yielding @ lag).max()
-        part = min(1.0, _FARTHEST * self._depth(trial) / change) if change > 0.0 else 1.0
+        change = np.abs(self._contact.shape @ turn - self._contact.yielding @ lag)
+        change = change[trial.found > 0.0]
+        part = 1.0 / max(1.0, float(change.max()) / (_FARTHEST * self._depth(trial)))
         plane = trial.plane + part * turn
         plane = np.where(free(control), plane, prescribed(control))
         return self._contact.press(plane, trial.assumed + part * lag, trial)
@@ -115,21 +142,24 @@ class ConcurrentNewton:
 
     def _parting(self, trial: Trial, turn: Array) -> float:
         """Return how far to turn to part, as P ~ h^(3/2) reaches 0 beyond Newton's step."""
-        most = max(self._depth(trial), _TURNED * (trial.plane[0] - self._contact.first_touch))
         change = float(np.abs(self._contact.shape @ turn).max())
-        return min(_PARTING, most / change) if change > 0.0 else 1.0
+        return min(_PARTING, self._farthest(trial) / change) if change > 0.0 else 1.0
+
+    def _farthest(self, trial: Trial) -> float:
+        """Return how far the plane may turn at once where nothing touches [mm]."""
+        return max(self._depth(trial), _TURNED * (trial.plane[0] - self._contact.first_touch))
 
     def _depth(self, trial: Trial) -> float:
         """Return the depth of all contacts taken as one [mm]."""
         stiffness = self._stiffness.estimate(trial.response).sum()
         return _POWER * float(trial.found.sum() / stiffness)
 
-    def _sought(self, control: Control, trial: Trial, count: int) -> Trial:
+    def _sought(self, control: Control, trial: Trial, missed: int) -> Trial:
         """Press nearer, as there was no contact: with less sag, then by a lower plane."""
         plane = np.where(free(control), trial.plane, prescribed(control))
         if not trial.assumed.any() and control.force:
-            plane[0] += control.force * self._reach * 2.0**count
-        patient = count < _PATIENCE and not (control.approach is not None and control.tilt is None)
+            plane[0] += control.force * self._reach * 2.0**missed
+        patient = missed < _PATIENCE and not (control.approach is not None and control.tilt is None)
         less = 0.5 * trial.assumed if patient else np.zeros_like(trial.assumed)
         return self._contact.press(plane, less, trial)
 
