@@ -24,7 +24,7 @@ TOLERANCE = 1e-8
 _MOST = 40
 _KEPT = 6  # secants, over load steps too
 _LESS = 0.2  # of the force tried before
-_GUESSED = 1e-4  # tolerance with the coarse model
+_GUESSED = 1e-4  # tolerance of what another iteration starts from
 _CLEAR = 1e-12  # of contact, where no force is wanted [mm]
 
 
@@ -119,7 +119,7 @@ class ConcurrentCoupling:
         presses = 0
         force = abs(approach - self._model.first_touch) * self._model.contact_modulus * self._half
         while True:
-            last = self._found(Control(force=force, tilt=None), last)
+            last = self._found(Control(force=force, tilt=None), last, tolerance=_GUESSED)
             above = last.trial.plane[0] - approach
             plane = np.array([approach, *last.trial.plane[1:]])
             trial = self._contact.press(plane, np.zeros_like(last.trial.assumed), last.trial)
@@ -130,7 +130,14 @@ class ConcurrentCoupling:
                 return last._replace(trial=trial, presses=presses)
             force *= _LESS
 
-    def _found(self, control: Control, last: _Found | None, *, led: bool = True) -> _Found:
+    def _found(
+        self,
+        control: Control,
+        last: _Found | None,
+        *,
+        led: bool = True,
+        tolerance: float | None = None,
+    ) -> _Found:
         """Iterate from the last load step, or from where the coarse model has come from it."""
         ahead = self._ahead(control, last) if led else None
         known = ahead or last
@@ -144,7 +151,7 @@ class ConcurrentCoupling:
         for count in range(1, _MOST + 1):
             step = self._newton.step(control, trial, secants)
             missed = missed + 1 if step is None else 0
-            if self._settled(control, trial, step):
+            if self._settled(control, trial, step, tolerance or self._tolerance):
                 return _Found(trial, tuple(secants), count, ahead)
             before, trial = trial, self._newton.next(control, trial, step, count, missed)
             change = trial.local - before.local
@@ -194,7 +201,13 @@ class ConcurrentCoupling:
                 plane[0] -= self._half * float(np.hypot(*plane[1:])) + _CLEAR
         return self._contact.press(plane, np.zeros(len(self._contact.shape)), start)
 
-    def _settled(self, control: Control, trial: Trial, step: tuple[Array, Array] | None) -> bool:
+    def _settled(
+        self,
+        control: Control,
+        trial: Trial,
+        step: tuple[Array, Array] | None,
+        tolerance: float,
+    ) -> bool:
         """Whether the forces would change no more and the prescribed loads are met."""
         moves = free(control)
         if np.any(~moves & (trial.plane != prescribed(control))):
@@ -205,4 +218,4 @@ class ConcurrentCoupling:
         scale = force * np.array([1.0, self._half, self._half])
         excess = np.abs(trial.excess(control)) / scale
         change = float(np.abs(step[1]).sum()) / force
-        return change <= self._tolerance and bool(np.all(excess[moves] <= self._tolerance))
+        return change <= tolerance and bool(np.all(excess[moves] <= tolerance))

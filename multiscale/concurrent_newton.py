@@ -155,9 +155,9 @@ class ConcurrentNewton:
         return _POWER * float(trial.found.sum() / stiffness)
 
     def _sought(self, control: Control, trial: Trial, missed: int) -> Trial:
-        """Press nearer, as there was no contact: with less sag, then by a lower plane."""
+        """Press nearer, as there was no contact: with less sag, and a lower plane if it is free."""
         plane = np.where(free(control), trial.plane, prescribed(control))
-        if not trial.assumed.any() and control.force:
+        if control.force:
             plane[0] += control.force * self._reach * 2.0**missed
         patient = missed < _PATIENCE and not (control.approach is not None and control.tilt is None)
         less = 0.5 * trial.assumed if patient else np.zeros_like(trial.assumed)
