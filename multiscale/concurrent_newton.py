@@ -17,11 +17,12 @@ Array = NDArray[np.float64]
 _POWER = 1.5  # exponent of Hertz' law
 _COARSE = 3  # presses that may bring a prescribed force within a factor of two
 _FARTHEST = 1.0  # of the contacts' depth, that one step may change any local approach
-_DAMPINGS = np.geomspace(1e-12, 1e3, 151)
-_FORESEEN = 0.2
+_FORESEEN = 0.2  # of the force, by which a step worth going on with may be wrong
+_NEAREST = 0.1  # of the contacts' depth, that the plane may always turn by
+_DAMPINGS = np.geomspace(1e-12, 1e3, 151)[:, None, None]  # of the stiffness; the least is none
 _LOST = 0.75  # of the force, that a step is to lose before the plane is turned to part
 _PARTING = 1.1 * _POWER  # Newton steps to where P ~ h^(3/2) ends, and some
-_TURNED = 0.3  # of the depth of a level plane, that the way to parting may change
+_TURNED = 0.3  # of the depth of a level plane, that the plane may turn by where nothing touches
 _PATIENCE = 10  # presses without contact before the sag is given up
 
 
@@ -33,6 +34,32 @@ def free(control: Control) -> NDArray[np.bool_]:
 def prescribed(control: Control) -> Array:
     """Return approach and slopes, 0 where they are free, shape (3,)."""
     return np.array([control.approach or 0.0, *(control.tilt or (0.0, 0.0))])
+
+
+def damped_turn(stiffness: Array, missing: Array, arms: Array, farthest: float) -> Array:
+    """Return how a plane moves by loads, damped as far as it turns on too few contacts.
+
+    One contact, or two, do not hold a plane that is free to turn: the plane comes down about
+    them until others touch. The least damping of the slopes is taken that the border moves by no
+    more than it may; what the contacts hold is as Newton's step has it.
+
+    Args:
+        stiffness: Change of the k loads with the k free motions, symmetric, shape (k, k).
+        missing: Loads to be gained, shape (k,) [N, N mm].
+        arms: What a motion turns by: 0 for the approach, half the diagonal for slopes,
+            shape (k,) [mm].
+        farthest: How far the border may move as the plane turns [mm].
+
+    Source:
+        Nocedal & Wright 2006, doi 10.1007/978-0-387-40065-5, sec. 4.3 and 10.3
+        (Levenberg and Marquardt).
+    """
+    scale = float(np.abs(np.diagonal(stiffness) / np.where(arms > 0.0, arms, 1.0) ** 2).max())
+    damped = stiffness + scale * _DAMPINGS * np.diag(arms**2)
+    turns = np.linalg.pinv(damped) @ missing
+    near = np.abs(turns * arms).sum(axis=1) <= farthest
+    near[-1] = True
+    return np.asarray(turns[int(np.argmax(near))])
 
 
 class ConcurrentNewton:
@@ -72,32 +99,29 @@ class ConcurrentNewton:
         turn = np.where(moves, 0.0, prescribed(control) - trial.plane)
         lag = yielding @ (found - trial.assumed)
         sides = np.column_stack([shape @ turn - lag, shape[:, moves]])
-        sides = np.linalg.solve(np.eye(found.size) + stiffness @ yielding, stiffness @ sides)
+        matrix = np.eye(found.size) + stiffness @ yielding
+        try:
+            sides = np.linalg.solve(matrix, stiffness @ sides)
+        except np.linalg.LinAlgError:
+            sides = np.linalg.lstsq(matrix, stiffness @ sides, rcond=None)[0]
         alone, by_plane = sides[:, 0], sides[:, 1:]
-        missing = -trial.excess(control)[moves] - shape[:, moves].T @ alone
-        most = self._farthest(trial)
-        if secants and np.abs(found - trial.assumed).sum() <= _FORESEEN * found.sum():
-            most = max(most, 2.0 * float(np.abs(secants[-1][0]).max()))
-        turn[moves] = self._turn(shape[:, moves].T @ by_plane, missing, moves, most)
+        if moves.any():
+            loads = shape[:, moves].T
+            missing = -trial.excess(control)[moves] - loads @ alone
+            arms, farthest = self._arms[moves], self._trusted(trial, secants)
+            turn[moves] = damped_turn(loads @ by_plane, missing, arms, farthest)
         return turn, alone + by_plane @ turn[moves]
 
-    def _turn(
-        self, stiffness: Array, missing: Array, moves: NDArray[np.bool_], farthest: float
-    ) -> Array:
-        """Return how a plane moves by loads, damped as it turns on contacts that hardly hold it.
-
-        One contact, or two, hold no plane that is free to turn. Slopes are damped (Levenberg and
-        Marquardt) until none of the border moves farther than the contacts are deep; others may
-        then touch.
-        """
-        if not moves.any():
-            return missing
-        arms = self._arms[moves]
-        scale = float((np.diagonal(stiffness) / np.where(arms > 0.0, arms, 1.0) ** 2).max())
-        damped = stiffness + scale * _DAMPINGS[:, None, None] * np.diag(arms**2)
-        turns = np.linalg.solve(damped, np.broadcast_to(missing, (len(damped), missing.size))[..., None])[..., 0]
-        near = np.abs(turns * arms).sum(axis=1) <= farthest
-        return turns[int(np.argmax(near))] if near.any() else turns[-1]
+    def _trusted(self, trial: Trial, secants: Sequence[Secant]) -> float:
+        """Return how far the border may move as the plane turns, by the worth of the last step."""
+        farthest = self._farthest(trial)
+        if not secants:
+            return farthest
+        went = float(np.abs(secants[-1][0]).max())
+        found, assumed = trial.found, trial.assumed
+        if float(np.abs(found - assumed).sum()) <= _FORESEEN * float(found.sum()):
+            return max(farthest, 2.0 * went)
+        return min(farthest, max(0.5 * went, _NEAREST * self._depth(trial)))
 
     def next(
         self,
@@ -129,7 +153,8 @@ class ConcurrentNewton:
             plane = trial.plane + self._parting(trial, turn) * turn
             return self._contact.press(plane, np.zeros_like(trial.assumed), trial)
         change = np.abs(self._contact.shape @ turn - self._contact.yielding @ lag)
-        change = change[trial.found > 0.0]
+        if control.tilt is None:  # elsewhere the turn is bounded
+            change = change[trial.found > 0.0]
         part = 1.0 / max(1.0, float(change.max()) / (_FARTHEST * self._depth(trial)))
         plane = trial.plane + part * turn
         plane = np.where(free(control), plane, prescribed(control))
