@@ -48,9 +48,9 @@ class ConcurrentCoupling:
 
     A plane free to turn that touches at one contact or two is held by neither, so it comes down
     about them in steps as large as the estimate proves worth, until contacts lie around the
-    middle. Just above first touch that takes 20 to 35 presses from nothing, against 7 to 15 where
+    middle. Just above first touch that takes 20 to 35 presses from nothing, against 9 to 25 where
     many contacts touch; a prescribed approach, which may or may not touch in the end, can take
-    100. Where contacts lie in fewer than three rectangles, or are single cells of a coarse grid,
+    90. Where contacts lie in fewer than three rectangles, or are single cells of a coarse grid,
     it may fail: what a contact's place within a rectangle adds to the moments is not estimated.
 
     Args:
