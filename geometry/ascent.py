@@ -13,7 +13,7 @@ _NEWTON_STEPS = 8
 _WITHIN = 1.0 - 1e-9
 
 
-def constrained_summits(surface: Surface, start: Array) -> Array:
+def constrained_summits(surface: Surface, start: Array, lean: Surface | None = None) -> Array:
     """Return the highest points of the closed rectangle next to given ones.
 
     Newton's method on the smooth interpolant, projected on the rectangle: a coordinate that lies
@@ -24,22 +24,25 @@ def constrained_summits(surface: Surface, start: Array) -> Array:
     Args:
         surface: The surface; its border counts also when it is periodic.
         start: Points near the maxima, shape (n, 2) [mm].
+        lean: Surface on the same rectangle whose heights add to those of the first.
 
     Returns:
         The maxima, shape (n, 2) [mm].
     """
-    h, limit = surface.interpolant, np.array(surface.lengths)
+    parts, limit = [surface] if lean is None else [surface, lean], np.array(surface.lengths)
+
+    def h(point: Array, dx: int = 0, dy: int = 0) -> Array:
+        return np.sum([part.interpolant(*point.T, dx=dx, dy=dy) for part in parts], axis=0)
+
     reach, point = np.array(surface.spacing), start.copy()
     for _ in range(_NEWTON_STEPS):
-        slope = surface.gradient_at(*point.T)
-        curvature = np.stack(
-            [h(*point.T, dx=2), h(*point.T, dx=1, dy=1), h(*point.T, dy=2)], axis=1
-        )
+        slope = np.stack([h(point, 1, 0), h(point, 0, 1)], axis=1)
+        curvature = np.stack([h(point, 2, 0), h(point, 1, 1), h(point, 0, 2)], axis=1)
         held = ((point <= 0.0) & (slope < 0.0)) | ((point >= limit) & (slope > 0.0))
         step = np.where(held, 0.0, _ascent(slope, curvature, held, reach))
         point = np.clip(point + step, start - reach, start + reach)
         point = np.clip(point, 0.0, limit)
-    gained = surface.height_at(*point.T) > surface.height_at(*start.T)
+    gained = h(point) > h(start)
     inside = np.all(np.abs(point - start) < _WITHIN * reach, axis=1)
     return np.where((gained & inside)[:, None], point, start)
 

@@ -183,14 +183,16 @@ class IslandModel:
     def _relief(self, plane: RigidPlane) -> Relief:
         """Return the catchments that a plane and all above it need."""
         surface, small = self.surface, self.surface.heights.size <= _MOST_KEPT
+        lean = None
         level = plane.tilt == _LEVEL and plane.sag is None
         if level and small:
             return self._whole
         if not level:
-            lean = plane.at(surface.x[:, None], surface.y) - plane.approach
-            surface = replace(surface, heights=surface.heights + lean, periodic=False)
+            # apart from the heights, which may continue where a lean does not
+            heights = plane.at(surface.x[:, None], surface.y) - plane.approach
+            lean = replace(surface, heights=heights, periodic=False)
         floor = self.datum - _MARGIN * max(plane.approach, 0.0)
-        return Relief.of(surface, floor=-np.inf if small else floor)
+        return Relief.of(surface, lean=lean, floor=-np.inf if small else floor)
 
     @cached_property
     def _whole(self) -> Relief:

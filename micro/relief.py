@@ -57,20 +57,30 @@ class Relief:
     cell: float
 
     @classmethod
-    def of(cls, surface: Surface, *, floor: float = -np.inf, ceiling: float = np.inf) -> Self:
+    def of(
+        cls,
+        surface: Surface,
+        *,
+        lean: Surface | None = None,
+        floor: float = -np.inf,
+        ceiling: float = np.inf,
+    ) -> Self:
         """Divide what rises above a floor into catchments.
 
         Args:
             surface: The surface; it ends at its border, also when it is periodic.
+            lean: What adds to its heights, on the same cells; it need not be periodic.
             floor: Height below which nothing is kept [mm].
             ceiling: Height that no peak exceeds, for peaks higher by rounding [mm].
         """
-        heights = sampled(surface)
+        parts = [surface] if lean is None else [surface, lean]
+        heights = np.sum([sampled(part) for part in parts], axis=0)
         side = np.array(surface.lengths) / heights.shape
         owner, peak = catchments(heights)
         top = np.stack(np.unravel_index(peak, heights.shape), axis=1)
-        summit = constrained_summits(surface, (top + 0.5) * side)
-        z = np.maximum(surface.height_at(*summit.T), heights.flat[peak])
+        summit = constrained_summits(surface, (top + 0.5) * side, lean)
+        z = np.sum([part.height_at(*summit.T) for part in parts], axis=0)
+        z = np.maximum(z, heights.flat[peak])
         z = np.minimum(z, ceiling)
         owner = np.where(heights.ravel() > floor, owner, -1)
         return cls._sorted(heights, owner, summit, z, side)

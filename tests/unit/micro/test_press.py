@@ -47,8 +47,21 @@ def test_sag_is_a_plane_that_came_less_near(model):
         return 2e-3 - TILT[0] * (x - 0.5) - TILT[1] * (y - 0.45)
 
     direct = press(model, approach=APPROACH - 2e-3, tilt=TILT).response
-    # islands start from catchments of the sagging surface: equal up to rounding alone
+    # a sagging plane reaches the models through other sums: equal up to rounding alone
     same(press(model, sag=sag).response, direct, rel=1e-9)
+
+
+def test_a_constant_sag_is_a_lower_plane(model):
+    """Nothing leans, so neither may the border of a periodic surface seem another."""
+    level = press(model, approach=APPROACH - 2e-3).response
+    sagging = press(model, sag=lambda x, y: 2e-3 + 0.0 * np.add(x, y)).response
+    same(sagging, level, rel=1e-9)  # each model's own rounding, of heights and approaches
+
+
+def test_a_vanishing_tilt_changes_nothing(model):
+    level = press(model).response
+    # 1e-12 of tilt are 1e-10 of the approach at the border
+    same(press(model, tilt=(1e-12, 0.0)).response, level, rel=1e-9)
 
 
 def test_goes_on_from_a_plane_nearby(model):

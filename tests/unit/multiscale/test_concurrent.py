@@ -11,6 +11,7 @@ from geometry.errors import InputError, NotConverged
 from micro import HalfSpaceModel, RigidPlane, micro_model
 from multiscale import concurrent
 from multiscale.concurrent import ConcurrentCoupling
+from multiscale.concurrent_newton import damped_turn
 
 MODULUS = 4000.0
 SURFACE = synthesise(
@@ -101,6 +102,35 @@ def test_a_coarse_model_changes_the_way_but_not_the_solution(control):
 def _load(control):
     names = ("approach", "force")
     return [(name, getattr(control, name)) for name in names if getattr(control, name) is not None]
+
+
+@pytest.mark.parametrize("force", [0.1, 0.3])
+def test_a_plane_free_to_turn_comes_down_from_its_first_contact(force):
+    """First touch is at the border; the sag is a lower plane, so the micro model is the witness."""
+    block = Level(1e-3)
+    block.loads = PatchGrid(grid=(8, 8), lengths=(1.0, 1.0))
+    model = HalfSpaceModel(surface=SURFACE, contact_modulus=MODULUS, tolerance=1e-10)
+    pressed = ConcurrentCoupling(model, SCENE, MEANS, block)
+    step = pressed.press(Control(force=force, tilt=None))
+    plane = RigidPlane.above(SURFACE, step.approach_mm - 1e-3 * step.force_N, step.tilt)
+    alone = model.press(plane, patches=SCENE, mean_heights=MEANS).response
+    # the iteration's tolerance, 1e-8, and some
+    np.testing.assert_allclose(alone.force[0], force, rtol=5e-8)
+    np.testing.assert_allclose(alone.moment[0], 0.0, atol=5e-8 * force)
+    assert max(np.abs(step.tilt)) > 1e-3
+
+
+def test_too_few_contacts_damp_the_turn_alone():
+    """One contact of stiffness 3 at (0.3, 0.1) under a force that it lacks and cannot balance."""
+    place, arms = np.array([1.0, 0.3, 0.1]), np.array([0.0, 0.7, 0.7])
+    stiffness, missing = 3.0 * np.outer(place, place), np.array([0.5, 0.0, 0.0])
+    turn = damped_turn(stiffness, missing, arms, 1e-2)
+    assert 0.5e-2 < np.abs(turn * arms).sum() <= 1e-2
+    # the contact carries what the force and the damped slopes leave it: its own moment is met
+    assert (stiffness @ turn)[0] == pytest.approx(0.5, rel=1e-6)
+    held = np.diag([3.0, 0.2, 0.1])
+    exact = np.array([1.0, 1e-3, 2e-3])
+    assert damped_turn(held, held @ exact, arms, 1e-2) == pytest.approx(exact, rel=1e-9)
 
 
 def test_a_coarse_model_that_fails_is_left_out():
