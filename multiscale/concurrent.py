@@ -24,6 +24,7 @@ TOLERANCE = 1e-8
 _MOST = 40
 _KEPT = 6  # secants, over load steps too
 _LESS = 0.2  # of the force tried before
+_MOST_FORCES = 8  # that are not balanced, on the way to one
 _GUESSED = 1e-4  # tolerance with the coarse model
 _CLEAR = 1e-12  # of contact, where no force is wanted [mm]
 
@@ -105,6 +106,8 @@ class ConcurrentCoupling:
 
     def _solved(self, control: Control, last: _Found | None) -> _Found:
         """Iterate; where a plane free to turn hardly touches, from a force that holds it there."""
+        if control.force and control.tilt is None:
+            return self._balanced(control.force, last)
         try:
             return self._found(control, last)
         except NotConverged:
@@ -114,12 +117,29 @@ class ConcurrentCoupling:
             found = self._found(control, near._replace(coarse=None), led=False)
             return found._replace(presses=found.presses + near.presses)
 
+    def _balanced(self, force: float, last: _Found | None) -> _Found:
+        """Iterate; where too few summits touch to hold the plane, by way of larger forces."""
+        wanted, held, presses = [force], 0.0, 0
+        failures: list[NotConverged] = []
+        while True:
+            try:
+                last = self._found(Control(force=wanted[-1], tilt=None), last)
+            except NotConverged as failure:
+                failures.append(failure)
+                if len(failures) > _MOST_FORCES:
+                    raise failures[0] from None
+                wanted.append(float(np.sqrt(wanted[-1] * held)) if held else 2.0 * wanted[-1])
+                continue
+            held, presses = wanted.pop(), presses + last.presses
+            if not wanted:
+                return last._replace(presses=presses)
+
     def _held(self, approach: float, last: _Found | None) -> _Found:
         """Return a balanced plane near an approach, or one turned the same way without contact."""
         presses = 0
         force = abs(approach - self._model.first_touch) * self._model.contact_modulus * self._half
         while True:
-            last = self._found(Control(force=force, tilt=None), last)
+            last = self._balanced(force, last)
             above = last.trial.plane[0] - approach
             plane = np.array([approach, *last.trial.plane[1:]])
             trial = self._contact.press(plane, np.zeros_like(last.trial.assumed), last.trial)
