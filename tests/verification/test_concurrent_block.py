@@ -69,11 +69,29 @@ def test_a_prescribed_force_is_the_approach_that_gives_it(corrections, block):
     assert other.approach_mm == pytest.approx(one.approach_mm, rel=3e-8)
 
 
-def test_a_plane_that_may_turn_clear_does(corrections):
-    """Below the approach at which summits all about the middle stop it nothing is pressed."""
+@pytest.fixture(scope="module")
+def coarse():
     x = (np.arange(32) + 0.5) / 32
     fewer = Surface(heights=SURFACE.height_at(x[:, None], x), lengths=SURFACE.lengths)
-    coarse = HalfSpaceModel(surface=fewer, contact_modulus=MODULUS)
+    return HalfSpaceModel(surface=fewer, contact_modulus=MODULUS)
+
+
+@pytest.mark.parametrize("led", [True, False], ids=["coarse ahead", "alone"])
+def test_a_small_force_is_balanced_from_nothing(corrections, coarse, led):
+    """Three summits that do not touch yet are to hold the plane: as on the way down."""
+    unloading = _coupling(corrections["cube"])
+    for force in 1.6 * 0.5 ** np.arange(6):
+        above = unloading.press(Control(force=force, tilt=None))
+        if force < 0.5:
+            cold = _coupling(corrections["cube"], coarse if led else None)
+            step = cold.press(Control(force=force, tilt=None))
+            assert step.contacts == 3
+            # the tolerance, 1e-8, in force and moments; less in the approach
+            assert step.approach_mm == pytest.approx(above.approach_mm, rel=2e-8)
+
+
+def test_a_plane_that_may_turn_clear_does(corrections, coarse):
+    """Below the approach at which summits all about the middle stop it nothing is pressed."""
     stopped = _coupling(corrections["cube"], coarse).press(Control(force=0.2, tilt=None))
     assert stopped.approach_mm > 0.0  # where a level plane would touch
     clear = Control(approach=0.2 * stopped.approach_mm, tilt=None)

@@ -74,7 +74,8 @@ def test_many_patches_agree_with_another_solver():
         depth = np.maximum(closure - laws.touch, 0.0)
         return closure + matrix @ (1e5 * depth**1.5) - 8e-3 - LEVERS @ tilt
 
-    other = root(gap, np.full(16, 6e-3), method="hybr", options={"xtol": 1e-14})
+    # at 1e-14 some releases of scipy stop for want of progress, with success False
+    other = root(gap, np.full(16, 6e-3), method="hybr", options={"xtol": 1e-12})
     assert other.success
     # MINPACK's own convergence
     np.testing.assert_allclose(state.closure, other.x, rtol=1e-9)
