@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import fftconvolve
+from scipy import fft
 
 from geometry import PatchGrid
 from geometry.errors import InputError
@@ -74,11 +74,19 @@ def finite_slope_effect(
 
 def _density(half_space: HalfSpace, kernels: Array, state: HalfSpaceState) -> Array:
     """Return σ_zz ε_zz − σ_t : ε_t on all cells [MPa]."""
-    xx, yy, xy = (fftconvolve(state.pressure, kernel, mode="same") for kernel in kernels)
+    xx, yy, xy = _convolved(kernels, state.pressure)
     zz = -state.pressure
     nu = half_space.poisson_ratio
     lateral = zz * zz - xx * xx - yy * yy + 2.0 * nu * xx * yy - 2.0 * (1.0 + nu) * xy * xy
     return np.asarray(lateral / half_space.young_modulus)
+
+
+def _convolved(kernels: Array, pressure: Array) -> Array:
+    """Sum kernels of all offsets over the cells, shape (3, nx, ny)."""
+    nx, ny = pressure.shape
+    shape = [fft.next_fast_len(3 * n - 2, real=True) for n in pressure.shape]
+    product = fft.rfft2(kernels, shape) * fft.rfft2(pressure, shape)
+    return np.asarray(fft.irfft2(product, shape)[:, nx - 1 : 2 * nx - 1, ny - 1 : 2 * ny - 1])
 
 
 def _surface_stresses(
