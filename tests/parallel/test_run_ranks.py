@@ -93,7 +93,7 @@ def test_a_rank_may_own_nothing_of_the_interface(mpirun):
         ("block.young_modulus='-4 GPa'", "block.young_modulus = '-4 GPa': must be greater than 0"),
         ("block.poisson_ratio=0.5", "block.poisson_ratio = 0.5: must be less than 0.5"),
         ("load.approach='8 kg'", "load.approach = '8 kg': has the wrong unit"),
-        ("surface.grid=[1, 256]", "surface.spectrum"),
+        ("surface.grid=[1, 256]", "surface.grid.0 = 1: must be greater than or equal to 4"),
     ],
 )
 def test_wrong_input_ends_all_ranks_with_one_message(mpirun, tmp_path, override, text):
