@@ -80,8 +80,10 @@ def history_figure(histories: Mapping[str, History]) -> Figure:
             "ms": 3.5,
             "label": name,
         }
-        approach = 1e3 * np.append(0.0, history.approach_mm)
         pressure = np.append(0.0, history.mean_pressure_MPa)
+        # a tilted plane touches first at another approach at the middle than zero
+        level = not any(any(step.tilt) for step in history)
+        approach = 1e3 * np.append(0.0 if level else np.nan, history.approach_mm)
         force.plot(approach, pressure, **look)
         area.plot(pressure, 100 * np.append(0.0, history.contact_area_fraction), **look)
         gap.plot(1e3 * history.mean_separation_mm, history.mean_pressure_MPa, **look)
