@@ -28,7 +28,6 @@ from multiscale import (
     Programme,
     SpreadLoads,
     consistent_laws,
-    contact_spread,
     load_steps,
 )
 
@@ -53,7 +52,6 @@ loads = PatchGrid(grid=(16, 16), lengths=(1.0, 1.0))
 half_space = HalfSpace(material.young_modulus, material.poisson_ratio)
 correction = make_correction(shape, material, "free", loads, half_space, comm)
 under_patches = influence_matrix(patches) / (np.pi * material.contact_modulus)
-under_loads = correction.patch_compliance(loads) / loads.area
 once = time.perf_counter() - start
 
 # %% [markdown]
@@ -67,10 +65,15 @@ def curve(seed: int) -> list[float]:
     spectrum = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=seed)
     surface = synthesise(spectrum, grid=(64, 64), lengths=(1.0, 1.0))
     model = HalfSpaceModel(surface=surface, contact_modulus=material.contact_modulus)
-    end, means = 1.15 * APPROACH, patch_means(surface, patches)
-    table = consistent_laws(model, patches, mean_heights=means, approach_end=end, tolerance=3e-3)
-    spread = contact_spread(model, patches, loads, approach_end=end)
-    coupling = CondensedCoupling(table, SpreadLoads(under_patches, under_loads, spread))
+    table = consistent_laws(
+        model,
+        patches,
+        mean_heights=patch_means(surface, patches),
+        approach_end=1.15 * APPROACH,
+        tolerance=3e-3,
+        sinking=correction,
+    )
+    coupling = CondensedCoupling(table, SpreadLoads(under_patches, table.spread))
     programme = Programme(quantity="approach", points=(APPROACH,), steps=STEPS)
     return [step.force_N for step in load_steps(coupling, programme)]
 

@@ -16,7 +16,7 @@ from multiscale.loading import Programme, load_steps
 from multiscale.patch_laws import PatchLaws
 from multiscale.run import Run, run
 from multiscale.scene import Scene
-from multiscale.spread import ContactSpread, contact_spread
+from multiscale.spread import ContactSpread
 from multiscale.stage import Stage, make_stage
 from multiscale.tabulate import isolated_laws
 from multiscale.yielding import SpreadLoads, UniformLoads
@@ -40,7 +40,6 @@ __all__ = [
     "Stage",
     "UniformLoads",
     "consistent_laws",
-    "contact_spread",
     "isolated_laws",
     "load_steps",
     "make_stage",

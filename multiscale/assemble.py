@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING, Any
 from geometry.collective import on_root
 from geometry.errors import InputError
 from micro import HalfSpaceModel, MicroModel, resampled
-from multiscale.blocks import embedding, fine_loads, smooth_correction, yielding
+from multiscale.blocks import (
+    bending_block,
+    embedding,
+    fine_loads,
+    smooth_correction,
+    yielding,
+)
 from multiscale.concurrent import TOLERANCE, ConcurrentCoupling
 from multiscale.condensed import CondensedCoupling
 from multiscale.consistent import consistent_laws
@@ -58,6 +64,7 @@ def make_table(stage: Stage, comm: Any) -> LawTable:
             tolerance=stage.table_tolerance,
             most_rows=stage.table_rows,
             tilt=stage.furthest[1],
+            sinking=bending_block(stage, comm),
             comm=comm,
         )
     return isolated_laws(
@@ -95,7 +102,7 @@ def assemble(stage: Stage, table: LawTable | None, comm: Any) -> tuple[Coupling,
 
 def _with_laws(stage: Stage, table: LawTable, comm: Any) -> tuple[Coupling, Interface | None]:
     if newton_choice(stage).condensed:
-        return CondensedCoupling(table, yielding(stage, comm)), None
+        return CondensedCoupling(table, yielding(stage, table, comm)), None
     from macro import PressedBlock
 
     interface = embedding(stage, comm)

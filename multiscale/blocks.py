@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.collective import on_root
 from geometry.patches import PatchGrid
 from micro import HalfSpace, influence_matrix
-from multiscale.spread import contact_spread
+from multiscale.law_files import LawTable
 from multiscale.stage import Stage
 from multiscale.yielding import SpreadLoads, UniformLoads, Yielding
 
@@ -66,10 +65,8 @@ def patch_compliance(stage: Stage, comm: Any) -> Array:
     return cached("plain", key, compute, comm or MPI.COMM_SELF)["compliance"]
 
 
-def yielding(stage: Stage, comm: Any) -> Yielding:
-    """Return how a scene's block yields to the pressures of patch laws.
-
-    Consistent laws come with the contacts' places: the correction counts where they are.
+def bending_block(stage: Stage, comm: Any) -> Correction | None:
+    """Return what a scene's consistent laws need to know of its block; None on a plain mesh.
 
     Args:
         stage: The scene's ingredients.
@@ -80,18 +77,24 @@ def yielding(stage: Stage, comm: Any) -> Yielding:
     """
     coupling = stage.scene.coupling
     if not (coupling.decomposed and coupling.kind == "consistent"):
+        return None
+    return smooth_correction(stage, fine_loads(stage), comm)
+
+
+def yielding(stage: Stage, table: LawTable, comm: Any) -> Yielding:
+    """Return how a scene's block yields to the pressures of patch laws.
+
+    Args:
+        stage: The scene's ingredients.
+        table: The laws; those made on the block know where the contacts are.
+        comm: MPI communicator; None for this process alone.
+
+    Note:
+        Collective.
+    """
+    if table.spread is None:
         return UniformLoads(patch_compliance(stage, comm))
-    loads = fine_loads(stage)
-    spread = contact_spread(
-        stage.model,
-        stage.patches,
-        loads,
-        approach_end=on_root(comm, lambda: stage.approach_end),
-        tilt=stage.furthest[1],
-        comm=comm,
-    )
-    correction = smooth_correction(stage, loads, comm).patch_compliance(loads) / loads.area
-    return SpreadLoads(_half_space(stage), correction, spread)
+    return SpreadLoads(_half_space(stage), table.spread)
 
 
 def fine_loads(stage: Stage) -> PatchGrid:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -12,14 +12,16 @@ from numpy.typing import NDArray
 
 from geometry.collective import on_root
 from geometry.patches import PatchGrid
-from micro import MicroModel, influence_matrix
+from micro import Field, MicroModel, Response, RigidPlane, influence_matrix
 from multiscale.coupling import tilted_approaches
 from multiscale.law_files import LawTable
 from multiscale.laws import PatchLaw
 from multiscale.refinement import MOST_ROWS, law_of, refined
+from multiscale.spread import ContactSpread, Sinking, check_division
 
 Array = NDArray[np.float64]
 
+_BENT = 0.3  # of the approach: more bending is left to the load steps
 _TOUCH = 1e-3  # first touch under a tilt, relative to what the tilt adds to the approach
 
 
@@ -30,7 +32,9 @@ class WholeSurface:
     The closure of a patch is its local approach less the mean displacement of the patch by the mean
     pressures of all patches, c_i = s_i − Σ_j Λ_ij p_j / (π E*): what a block answers with. What a
     patch sinks beyond that (`PatchLaw.relief`) is told from its first touch on; before, by that
-    there. Laws made under a tilt know how it shares the load.
+    there. Laws made under a tilt know how it shares the load, and laws made on a block how it
+    bends: the surface is then pressed a second time, by a plane that sags as the block does under
+    the forces found first. What it sinks in the mean is left out, as a plane that comes less near.
 
     Attributes:
         model: Micro model of the whole surface.
@@ -38,6 +42,7 @@ class WholeSurface:
         mean_heights: Mean height of each patch, shape (N,) [mm].
         compliance: Λ / (π E*), shape (N, N) [mm/MPa].
         tilt: Slopes of the plane.
+        sinking: What the block sinks more than the half-space; None on a half-space.
     """
 
     model: MicroModel
@@ -45,6 +50,7 @@ class WholeSurface:
     mean_heights: Array
     compliance: Array
     tilt: tuple[float, float] = (0.0, 0.0)
+    sinking: Sinking | None = None
 
     @cached_property
     def lean(self) -> Array:
@@ -70,9 +76,11 @@ class WholeSurface:
         response = self.model.respond(
             middle, patches=self.patches, mean_heights=self.mean_heights, tilt=self.tilt
         )
+        return self._rows(middle, middle[:, None] + self.lean, response)
+
+    def _rows(self, middle: Array, local: Array, response: Response) -> Array:
         pressure = response.patch_pressure.copy()
         pressure[middle <= self.first_touch] = 0.0  # whatever round-off makes of it
-        local = middle[:, None] + self.lean
         displacement = pressure @ self.compliance
         touched = pressure > 0.0
         columns = (
@@ -86,6 +94,47 @@ class WholeSurface:
         )
         return np.stack(columns, axis=2).astype(np.float64)
 
+    def rows_on(self, block: Sinking, approaches: Array) -> tuple[Array, Array]:
+        """Return rows on a block that bends, and the forces on its rectangles, shape (m, M)."""
+        middle = approaches - self.lean[0]
+        nowhere: Array = np.zeros(block.loads.count)
+        responses, locals_, forces, start = [], [], [], None
+        for approach in middle:
+            plane = RigidPlane(approach=approach, tilt=self.tilt, centre=self._middle)
+            first, start = self.model.press(
+                plane, patches=block.loads, mean_heights=nowhere, start=start
+            )
+            plane = replace(plane, sag=self._bending(block, first.patch_force[0], approach))
+            found, start = self.model.press(
+                plane, patches=self.patches, mean_heights=self.mean_heights, start=start
+            )
+            responses.append(found)
+            locals_.append(plane.means(self.patches))
+            forces.append(first.patch_force[0])
+        local = np.array(locals_)
+        rows = [
+            self._rows(middle[[k]], local[[k]], response) for k, response in enumerate(responses)
+        ]
+        return np.concatenate(rows), np.array(forces)
+
+    def _bending(self, block: Sinking, forces: Array, approach: float) -> Field | None:
+        """Return what the block sinks but for its mean under the forces, within limits."""
+        total = float(forces.sum())
+        if total <= 0.0:
+            return None
+        sag = block.sag(forces)
+        sunk = sag(*block.loads.centres.T)
+        mean = float(sunk @ forces) / total
+        furthest = _BENT * (approach - self.first_touch + float(np.abs(self.lean).max()))
+        bent = float(np.abs(sunk - mean).max())
+        share = min(1.0, furthest / bent) if bent else 1.0
+        return lambda x, y: share * (sag(x, y) - mean)
+
+    @property
+    def _middle(self) -> tuple[float, float]:
+        middle = np.add(self.patches.origin, np.multiply(0.5, self.patches.lengths))
+        return float(middle[0]), float(middle[1])
+
     def laws(self, rows: Array) -> list[PatchLaw]:
         """Return the laws of all patches through rows (m, N, 7), sorted by approach."""
         reaches = self.model.datum - self.mean_heights
@@ -93,18 +142,43 @@ class WholeSurface:
 
     def tabulated(
         self, approach_end: float, tolerance: float, most_rows: int
-    ) -> tuple[list[PatchLaw], float]:
-        """Return all laws up to an approach, and the error of the force; see `refined`."""
+    ) -> tuple[list[PatchLaw], float, ContactSpread | None]:
+        """Return all laws up to an approach, the error of the force, and where the contacts are."""
+        seen: list[tuple[Array, Array]] = []
+
+        def solve(approaches: Array) -> Array:
+            if self.sinking is None:
+                return self.rows(approaches)
+            rows, forces = self.rows_on(self.sinking, approaches)
+            seen.append((rows[:, :, 0], forces))
+            return rows
+
         if approach_end <= self.first_touch:
-            return self.laws(self.rows(np.array([approach_end]) + self.lean[0])), 0.0
-        return refined(
-            self.rows,
-            self.laws,
-            self.first_touch + self.lean[0],
-            approach_end + self.lean[0],
-            compliance=self.compliance,
-            tolerance=tolerance,
-            most_rows=most_rows,
+            laws, error = self.laws(solve(np.array([approach_end]) + self.lean[0])), 0.0
+        else:
+            laws, error = refined(
+                solve,
+                self.laws,
+                self.first_touch + self.lean[0],
+                approach_end + self.lean[0],
+                compliance=self.compliance,
+                tolerance=tolerance,
+                most_rows=most_rows,
+            )
+        return laws, error, self._spread(seen)
+
+    def _spread(self, seen: list[tuple[Array, Array]]) -> ContactSpread | None:
+        if self.sinking is None:
+            return None
+        local, forces = (np.concatenate(parts) for parts in zip(*seen, strict=True))
+        order = np.argsort(local[:, 0], kind="stable")
+        loads = self.sinking.loads
+        return ContactSpread(
+            patches=self.patches,
+            loads=loads,
+            approach=local[order],
+            forces=forces[order],
+            correction=self.sinking.patch_compliance(loads) / loads.area,
         )
 
     def _force(self, approach: float) -> float:
@@ -123,6 +197,7 @@ def consistent_laws(
     tolerance: float = 1e-3,
     most_rows: int = MOST_ROWS,
     tilt: tuple[float, float] = (0.0, 0.0),
+    sinking: Sinking | None = None,
     comm: Any = None,
 ) -> LawTable:
     """Tabulate the laws of all patches of one surface that is pressed as a whole.
@@ -140,6 +215,8 @@ def consistent_laws(
         tolerance: Interpolation error of the force, see `refinement.refined`.
         most_rows: Rows that are solved at most.
         tilt: Slopes of the plane that presses the surface; laws serve other planes less well.
+        sinking: What the block that the laws are for sinks more than a half-space, on rectangles
+            that divide the patches; the table then tells where the contacts are.
         comm: MPI communicator; its first rank solves, so that the table is the same to the bit on
             any number of ranks.
 
@@ -159,8 +236,11 @@ def consistent_laws(
         mean_heights=means,
         compliance=influence_matrix(patches) / (np.pi * model.contact_modulus),
         tilt=tilt,
+        sinking=sinking,
     )
-    laws, error = on_root(comm, lambda: whole.tabulated(approach_end, tolerance, most_rows))
+    if sinking is not None:
+        check_division(patches, sinking.loads)
+    laws, error, spread = on_root(comm, lambda: whole.tabulated(approach_end, tolerance, most_rows))
     return LawTable(
         patches=patches,
         laws=tuple(laws),
@@ -172,6 +252,7 @@ def consistent_laws(
             "tilt": f"{tilt[0]:g}, {tilt[1]:g}",
         },
         force_error=error,
+        spread=spread,
     )
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from multiscale.laws import PatchLaw
+from multiscale.spread import ContactSpread
 
 _COLUMNS = {
     "approach": "mm",
@@ -29,6 +30,7 @@ _SCALARS = {
     "stiffness_error": "1",
     "warned_from": "MPa",
 }
+_SPREAD = {"approach": "mm", "forces": "N", "correction": "mm/N"}
 _UNKNOWN = float("nan")
 _OLDER = {"stiffness_error": _UNKNOWN, "warned_from": float("inf")}  # files that lack these
 
@@ -44,12 +46,15 @@ class LawTable:
             slopes of the plane that pressed the whole surface.
         force_error: Estimated error of the force between the rows, see `refinement.Errors`: of
             all patches together, or of the worst where each was tabulated alone.
+        spread: Where the contacts are within the patches, and what the block that the laws were
+            made for yields there; None for laws of a half-space.
     """
 
     patches: PatchGrid
     laws: tuple[PatchLaw, ...]
     made_by: dict[str, str]
     force_error: float = float("nan")
+    spread: ContactSpread | None = None
 
     def __post_init__(self) -> None:
         if len(self.laws) != self.patches.count:
@@ -80,6 +85,11 @@ def write_laws(path: Path, table: LawTable) -> None:
                 group.create_dataset(name, data=getattr(law, name)).attrs["unit"] = unit
             for name in _SCALARS:
                 group.attrs[name] = getattr(law, name)
+        if table.spread is not None:
+            group = file.create_group("spread")
+            group.attrs["load_grid"] = table.spread.loads.grid
+            for name, unit in _SPREAD.items():
+                group.create_dataset(name, data=getattr(table.spread, name)).attrs["unit"] = unit
 
 
 def read_laws(path: Path) -> LawTable:
@@ -108,11 +118,19 @@ def read_laws(path: Path) -> LawTable:
                 laws=tuple(map(_law, groups)),
                 made_by=made_by,
                 force_error=float(file.attrs.get("force_error", _UNKNOWN)),
+                spread=_spread(file["spread"], patches) if "spread" in file else None,
             )
     except (OSError, KeyError) as error:
         raise InputError(f"is not a readable law file: {error}", file=str(path)) from None
     except InputError as error:
         raise error.located(file=str(path)) from None
+
+
+def _spread(group: Any, patches: PatchGrid) -> ContactSpread:
+    grid = _pair(group.attrs["load_grid"], int)
+    loads = PatchGrid(grid=grid, lengths=patches.lengths, origin=patches.origin)
+    columns = {name: np.asarray(group[name][()]) for name in _SPREAD}
+    return ContactSpread(patches=patches, loads=loads, **columns)
 
 
 def _law(group: Any) -> PatchLaw:

@@ -133,13 +133,14 @@ def refined(
     Returns:
         The N laws, with their errors, and the error of the force.
     """
-    rows = solve(start + (end - start) * np.linspace(0.0, 1.0, _FIRST_ROWS) ** 2)
+    first = start + (end - start) * np.linspace(0.0, 1.0, _FIRST_ROWS) ** 2
+    rows = solve(first)
     laws = make(rows)
     if not rows[-1, :, 2].any():
         return list(laws), 0.0
     most_rows = max(most_rows, 2 * _FIRST_ROWS - 1)  # each interval is measured once
     least = _LEAST_LOAD * float(rows[-1, :, 2].mean())
-    intervals = np.column_stack((rows[:-1, 0, 0], rows[1:, 0, 0]))
+    intervals = np.column_stack((first[:-1], first[1:]))
     errors = Errors.unknown(len(intervals), len(laws))
     while (room := min(_BATCH, most_rows - len(rows))) > 0 and np.any(errors.worst > tolerance):
         order = np.argsort(-errors.worst, kind="stable")

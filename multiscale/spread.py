@@ -1,56 +1,49 @@
-"""Where within the patches the contacts are: shares of small rectangles in a patch's force."""
+"""Where within the patches the contacts are, and what the block yields to them there."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
-from geometry.collective import on_root
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
-from micro import MicroModel
-from multiscale.coupling import tilted_approaches
+from micro import Field
 
 Array = NDArray[np.float64]
 
-_ROWS = 17  # the contacts' places change slowly with the load
-_SHORTEST = 1e-9  # of the diagonal, that the rows reach over
 
+class Sinking(Protocol):
+    """What the block sinks more than a half-space, for forces on small rectangles."""
 
-class Shares(NamedTuple):
-    """Shares of M rectangles in what happens to their patches; they add up to 1 over a patch.
+    @property
+    def loads(self) -> PatchGrid:
+        """The M rectangles."""
 
-    Attributes:
-        force: Share in the patch's force, shape (M,).
-        dforce: Its derivative over the patch's local approach, shape (M,) [1/mm].
-        stiffness: Share in the derivative of the patch's force, shape (M,).
-        dstiffness: Its derivative over the patch's local approach, shape (M,) [1/mm].
-    """
+    def sag(self, forces: Array, /) -> Field:
+        """Return the field of what it sinks by forces on the rectangles, shape (M,) [N]."""
 
-    force: Array
-    dforce: Array
-    stiffness: Array
-    dstiffness: Array
+    def patch_compliance(self, patches: PatchGrid, /) -> Array:
+        """Return its mean over patch i by unit pressure on patch j, shape (N, N) [mm/MPa]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ContactSpread:
     """Forces of the contacts on rectangles that divide the patches, along the local approach.
 
-    A block yields under contacts where they are, and what it yields counts where contacts are
-    stiff. A patch alone knows its mean pressure; the shares tell how it is spread.
+    A block yields to contacts where they are. A patch alone knows its mean pressure; the shares
+    tell how it is spread.
 
     Args:
         patches: The N patches.
         loads: M rectangles that divide them.
-        approach: Approaches of the plane at K rows, ascending, shape (K,) [mm].
-        lean: What the local approach of each patch is more than that, shape (N,) [mm].
+        approach: Local approaches of every patch at K rows, rising, shape (K, N) [mm].
         forces: Forces on the rectangles, shape (K, M) [N].
+        correction: Mean of what the block sinks more than a half-space at rectangle m by unit
+            force on rectangle n, shape (M, M) [mm/N].
 
     Raises:
         InputError: When the rectangles do not divide the patches or the shapes do not fit.
@@ -59,116 +52,74 @@ class ContactSpread:
     patches: PatchGrid
     loads: PatchGrid
     approach: Array
-    lean: Array
     forces: Array
+    correction: Array
 
     def __post_init__(self) -> None:
-        counts = np.divide(self.loads.grid, self.patches.grid)
-        if not np.all(counts == np.round(counts)):
-            raise InputError(
-                "the rectangles of the loads must divide the patches",
-                value=self.loads.grid,
-                allowed=f"multiples of {self.patches.grid}",
-            )
-        fits = self.forces.shape == (len(self.approach), self.loads.count)
-        if not fits or self.lean.shape != (self.patches.count,):
-            raise InputError(
-                "the rows of a spread do not fit",
-                value=(self.forces.shape, self.lean.shape),
-                allowed=f"{(len(self.approach), self.loads.count)}, {(self.patches.count,)}",
-            )
+        check_division(self.patches, self.loads)
+        rows, count, parts = len(self.approach), self.patches.count, self.loads.count
+        shapes = self.approach.shape, self.forces.shape, self.correction.shape
+        expected = (rows, count), (rows, parts), (parts, parts)
+        if shapes != expected or not rows:
+            raise InputError("the rows of a spread do not fit", value=shapes, allowed=str(expected))
 
     @cached_property
     def owner(self) -> NDArray[np.intp]:
         """Flat index of the patch that holds each rectangle, shape (M,)."""
         return self.patches.index_of(*self.loads.centres.T)
 
-    def shares(self, local: Array) -> Shares:
-        """Return the shares at local approaches of the patches.
+    def shares(self, local: Array) -> tuple[Array, Array]:
+        """Return the shares of rectangles in their patch's force, and the derivatives.
 
-        Between rows forces are interpolated by monotone cubics. Before its first row under load a
-        patch has that row's shares, beyond the last row the last one's; without any load the
-        rectangles' shares are equal.
+        Forces are interpolated linearly between rows. Before its first row under load a patch has
+        that row's shares, beyond the last row the last one's, and equal ones without any load.
 
         Args:
-            local: Local approaches, shape (N,) [mm].
-        """
-        asked = local - self.lean
-        held = np.clip(asked, self._first, self.approach[-1])
-        moving = (asked == held)[self.owner]
-        row = np.clip(np.searchsorted(self.approach, held, side="right") - 1, 0, self._last_piece)
-        along = (held - self.approach[row])[self.owner]
-        a, b, c, d = self._pieces[:, row[self.owner], np.arange(self.loads.count)]
-        force = ((a * along + b) * along + c) * along + d
-        slope = (3.0 * a * along + 2.0 * b) * along + c
-        bend = 6.0 * a * along + 2.0 * b
-        return Shares(*self._normed(force, slope, moving), *self._normed(slope, bend, moving))
+            local: Local approaches of the patches, shape (N,) [mm].
 
-    def _normed(self, part: Array, change: Array, moving: NDArray[np.bool_]) -> tuple[Array, Array]:
-        """Divide by the sums over patches, and give the derivative of the quotient."""
+        Returns:
+            Shares, shape (M,), and derivatives over the local approach, shape (M,) [1/mm].
+        """
+        column, last = np.arange(self.patches.count), len(self.approach) - 1
+        low = (local >= self.approach).sum(axis=0) - 1
+        low = np.clip(low, self._first, np.maximum(last - 1, self._first))
+        high = np.minimum(low + 1, last)
+        start, end = self.approach[low, column], self.approach[high, column]
+        width = np.where(end > start, end - start, 1.0)
+        along = (local - start) / width
+        rate = np.where((along >= 0.0) & (along <= 1.0) & (end > start), 1.0 / width, 0.0)
+        rectangle = np.arange(self.loads.count)
+        before, after = (self.forces[row[self.owner], rectangle] for row in (low, high))
+        force = before + np.clip(along, 0.0, 1.0)[self.owner] * (after - before)
+        slope = rate[self.owner] * (after - before)
         total, rise = (
-            np.bincount(self.owner, values, minlength=self.patches.count)[self.owner]
-            for values in (part, change)
+            np.bincount(self.owner, values, minlength=len(column))[self.owner]
+            for values in (force, slope)
         )
         none = total <= 0.0
         total = np.where(none, 1.0, total)
-        share = np.where(none, self.patches.count / self.loads.count, part / total)
-        return share, np.where(none | ~moving, 0.0, (change - share * rise) / total)
+        share = np.where(none, len(column) / self.loads.count, force / total)
+        return share, np.where(none, 0.0, (slope - share * rise) / total)
 
     @cached_property
-    def _pieces(self) -> Array:
-        """Coefficients of the cubics, shape (4, K − 1, M)."""
-        return np.asarray(PchipInterpolator(self.approach, self.forces, axis=0).c)
-
-    @property
-    def _last_piece(self) -> int:
-        return len(self.approach) - 2
-
-    @cached_property
-    def _first(self) -> Array:
-        """Approach of the first row under load of every patch, shape (N,) [mm]."""
+    def _first(self) -> NDArray[np.intp]:
+        """First row under load of every patch, or the last, shape (N,)."""
         by_patch = np.zeros((self.patches.count, len(self.forces)))
         np.add.at(by_patch, self.owner, self.forces.T)
         loaded = by_patch > 0.0
-        first = np.where(loaded.any(axis=1), loaded.argmax(axis=1), len(self.approach) - 1)
-        return np.asarray(self.approach[first])
+        return np.where(loaded.any(axis=1), loaded.argmax(axis=1), len(self.approach) - 1)
 
 
-def contact_spread(
-    model: MicroModel,
-    patches: PatchGrid,
-    loads: PatchGrid,
-    *,
-    approach_end: float,
-    tilt: tuple[float, float] = (0.0, 0.0),
-    comm: Any = None,
-) -> ContactSpread:
-    """Find where the contacts of a whole surface are, up to an approach.
+def check_division(patches: PatchGrid, loads: PatchGrid) -> None:
+    """Refuse rectangles that do not divide the patches.
 
-    Args:
-        model: Micro model of the surface.
-        patches: Its patches.
-        loads: Rectangles that divide them.
-        approach_end: Largest approach at the middle [mm].
-        tilt: Slopes of the plane.
-        comm: MPI communicator (mpi4py) or None; its first rank solves for all.
-
-    Note:
-        Collective.
+    Raises:
+        InputError: When they do not.
     """
-    lean = tilted_approaches(patches, 0.0, tilt)
-    below = approach_end - _SHORTEST * float(np.hypot(*patches.lengths))  # a touch may lie beyond
-    lowest = min(model.first_touch, below) - float(np.abs(lean).max())
-    rows = np.linspace(lowest, approach_end, _ROWS)
-
-    def forces() -> Array:
-        response = model.respond(rows, patches=loads, mean_heights=np.zeros(loads.count), tilt=tilt)
-        return response.patch_force
-
-    return ContactSpread(
-        patches=patches,
-        loads=loads,
-        approach=rows,
-        lean=lean,
-        forces=on_root(comm, forces),
-    )
+    counts = np.divide(loads.grid, patches.grid)
+    if not np.all(counts == np.round(counts)):
+        raise InputError(
+            "the rectangles of the loads must divide the patches",
+            value=loads.grid,
+            allowed=f"multiples of {patches.grid}",
+        )

@@ -23,7 +23,6 @@ from multiscale import (
     Programme,
     SpreadLoads,
     consistent_laws,
-    contact_spread,
     load_steps,
 )
 
@@ -66,18 +65,20 @@ def by_laws(rest, count):
     model = HalfSpaceModel(surface=surface, contact_modulus=MATERIAL.contact_modulus)
     patches = PatchGrid(grid=(count, count), lengths=surface.lengths)
     given = {"mean_heights": patch_means(surface, patches), "approach_end": 1.2 * APPROACH}
-    for rows in (33, 65):
-        spent, table = median(consistent_laws, model, patches, most_rows=rows, **given)
-        used = max(law.approach.size for law in table.laws)
-        print(f"laws of {count**2} patches, 256² heights, {used} rows: {spent:.2f} s")
-    spread = contact_spread(model, patches, LOADS, approach_end=1.2 * APPROACH)
+    for block, where in ((None, "half-space"), (rest, "block")):
+        for rows in (33, 65):
+            more = given | {"most_rows": rows, "sinking": block}
+            spent, table = median(consistent_laws, model, patches, **more)
+            used = max(law.approach.size for law in table.laws)
+            print(f"laws of {count**2} patches on a {where}, 256², {used} rows: {spent:.2f} s")
+    table = consistent_laws(model, patches, **given)
     under_patches = influence_matrix(patches) / (math.pi * model.contact_modulus)
-    under_loads = rest.patch_compliance(LOADS) / LOADS.area
-    for name, yielding in (
-        ("mean over patches", under_patches + rest.patch_compliance(patches)),
-        ("where contacts are", SpreadLoads(under_patches, under_loads, spread)),
+    on_block = consistent_laws(model, patches, sinking=rest, **given)
+    for name, laws, yielding in (
+        ("mean over patches", table, under_patches + rest.patch_compliance(patches)),
+        ("where contacts are", on_block, SpreadLoads(under_patches, on_block.spread)),
     ):
-        spent, _ = median(condensed, table, yielding)
+        spent, _ = median(condensed, laws, yielding)
         print(f"100 condensed load steps, {count**2} patches, rest {name}: {spent:.3f} s")
 
 

@@ -1,5 +1,7 @@
 """Laws survive a file bit for bit, and anything else is refused."""
 
+from dataclasses import replace
+
 import h5py
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from multiscale.law_files import LawTable, read_laws, write_laws
 from multiscale.laws import PatchLaw
+from multiscale.spread import ContactSpread
 
 COLUMNS = ("closure", "pressure", "approach", "contact_area_fraction", "contacts", "relief")
 
@@ -49,6 +52,23 @@ def test_round_trip_is_exact(table, tmp_path):
             assert getattr(law, name).tobytes() == getattr(copy, name).tobytes()
         for name in ("touch", "reach", "interpolation_error", "stiffness_error", "warned_from"):
             assert getattr(law, name) == getattr(copy, name)
+
+
+def test_places_of_the_contacts_survive_too(table, tmp_path):
+    random = np.random.default_rng(6)
+    loads = PatchGrid(grid=(4, 3), lengths=table.patches.lengths)
+    spread = ContactSpread(
+        patches=table.patches,
+        loads=loads,
+        approach=np.sort(random.random((5, 6)), axis=0),
+        forces=random.random((5, 12)),
+        correction=random.random((12, 12)),
+    )
+    write_laws(tmp_path / "laws.h5", replace(table, spread=spread))
+    back = read_laws(tmp_path / "laws.h5").spread
+    assert (back.patches, back.loads) == (spread.patches, spread.loads)
+    for name in ("approach", "forces", "correction"):
+        assert getattr(back, name).tobytes() == getattr(spread, name).tobytes()
 
 
 def test_files_from_before_some_errors_were_told(table, tmp_path):
