@@ -8,7 +8,7 @@
 #     Λ/(π E*) and D of the block: once               1000 × { surface → whole-surface micro
 #     (half-space exactly, finite elements for D)                solution → 16 laws → 8 load steps }
 #
-# Run time: two minutes on one core, half of it under `mpirun -n 2`; the surfaces are dealt to the
+# Run time: three minutes on one core, half of it under `mpirun -n 2`; the surfaces are dealt to the
 # ranks. `--quick` for 24 surfaces, `--out DIR` for the folder of the figure.
 
 # %%
