@@ -130,6 +130,19 @@ class WholeSurface:
         share = min(1.0, furthest / bent) if bent else 1.0
         return lambda x, y: share * (sag(x, y) - mean)
 
+    def _reserve(self, approach: float) -> float:
+        """Return how much further laws must go where the block bends, twice what it does [mm].
+
+        Patches that sag end at smaller local approaches; a step's own forces bend it once more.
+        """
+        if self.sinking is None:
+            return 0.0
+        plane = RigidPlane(approach=approach, tilt=self.tilt, centre=self._middle)
+        loads = self.sinking.loads
+        found = self.model.press(plane, patches=loads, mean_heights=np.zeros(loads.count))
+        sag = self._bending(self.sinking, found.response.patch_force[0], approach)
+        return 0.0 if sag is None else 2.0 * float(np.abs(sag(*loads.centres.T)).max())
+
     @property
     def _middle(self) -> tuple[float, float]:
         middle = np.add(self.patches.origin, np.multiply(0.5, self.patches.lengths))
@@ -160,7 +173,7 @@ class WholeSurface:
                 solve,
                 self.laws,
                 self.first_touch + self.lean[0],
-                approach_end + self.lean[0],
+                approach_end + self._reserve(approach_end) + self.lean[0],
                 compliance=self.compliance,
                 tolerance=tolerance,
                 most_rows=most_rows,
