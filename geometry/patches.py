@@ -60,6 +60,11 @@ class PatchGrid:
         return self.size[0] * self.size[1]
 
     @property
+    def middle(self) -> Array:
+        """Middle of the divided rectangle, shape (2,) [mm]."""
+        return np.add(self.origin, np.multiply(0.5, self.lengths))
+
+    @property
     def borders_x(self) -> Array:
         """Borders along x, shape (Nx + 1,) [mm]."""
         return self.origin[0] + np.linspace(0.0, self.lengths[0], self.grid[0] + 1)

@@ -157,11 +157,6 @@ def assemble_vector(form: Any) -> PETSc.Vec:
     return vector
 
 
-def petsc_vector(function: Any) -> PETSc.Vec:
-    """Return the PETSc view of a function's degrees of freedom."""
-    return function.x.petsc_vec if hasattr(function.x, "petsc_vec") else function.vector
-
-
 def write_xdmf(path: str, mesh: Any, functions: Sequence[Any]) -> None:
     """Write a mesh and functions of its degree, or constant on cells, as XDMF with HDF5.
 

@@ -50,7 +50,7 @@ class Contact:
     ) -> None:
         self._comm, self._sampling, self._laws = interface.block.mesh.comm, sampling, laws
         patches = interface.patches
-        middle = np.add(patches.origin, np.multiply(0.5, patches.lengths))
+        middle = patches.middle
         x, y = sampling.x - middle[0], sampling.y - middle[1]
         self._lever = np.column_stack((np.ones_like(x), x, y))
         self.half = 0.5 * float(np.hypot(*patches.lengths))

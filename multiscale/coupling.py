@@ -54,7 +54,7 @@ class AnalyticCoupling:
 
     def _loads(self, plane: Array) -> tuple[Array, Response]:
         """Return force and moments of a plane, and the response."""
-        middle = np.add(self._patches.origin, np.multiply(0.5, self._patches.lengths))
+        middle = self._patches.middle
         rigid = RigidPlane(
             approach=float(plane[0]),
             tilt=(float(plane[1]), float(plane[2])),
@@ -205,7 +205,7 @@ def tilted_approaches(patches: PatchGrid, approach: float, tilt: tuple[float, fl
         approach: Approach at the middle of the interface [mm].
         tilt: Slopes of the approach along x and y, about the middle.
     """
-    centre = np.asarray(patches.origin) + 0.5 * np.asarray(patches.lengths)
+    centre = patches.middle
     return approach + (patches.centres - centre) @ np.asarray(tilt)
 
 

@@ -74,7 +74,7 @@ class DenseEquations:
     def __init__(self, laws: Laws, block: Array | Yielding, patches: PatchGrid) -> None:
         self.laws, self.block = laws, _yielding(block, patches.count)
         count = patches.count
-        middle = np.add(patches.origin, np.multiply(0.5, patches.lengths))
+        middle = patches.middle
         self.lever: Array = np.column_stack((np.ones(count), patches.centres - middle))
         self.area = patches.area
         self.half = 0.5 * float(np.hypot(*patches.lengths))

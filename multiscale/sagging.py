@@ -86,7 +86,7 @@ class SaggingContact:
         self._model, self._patches, self._heights = model, patches, mean_heights
         self._correction, self._comm = correction, comm
         self.loads = loads = correction.loads
-        self._middle = np.asarray(loads.origin) + 0.5 * np.asarray(loads.lengths)
+        self._middle = loads.middle
         self.shape = np.column_stack([np.ones(loads.count), loads.centres - self._middle])
         x, y = loads.centres.T
         units = np.eye(loads.count)

@@ -116,7 +116,7 @@ class Stage:
         if coupling.interface == "pointwise" or alone_by_force:
             ends = ends + 0.5 * float(np.abs(np.multiply(self.patches.size, tilt)).sum())
         if loading.tilt == "free":
-            ends = ends + 0.5 * (ends.max() - approach)
+            ends = ends + (ends.max() - approach)
         return ends + CLOSURE_RESERVE * self.deepest
 
     @cached_property
