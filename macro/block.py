@@ -150,8 +150,8 @@ class Block:
         free = self.stiffness.createVecRight()
         free.set(1.0)
         for condition in self.conditions:
-            dofs, owned = condition.dof_indices()
-            free.array[dofs[:owned]] = 0.0
+            dofs, _ = condition.dof_indices()
+            free.array[dofs[dofs < self.owned_dofs]] = 0.0
         return free
 
     @cached_property
