@@ -17,6 +17,7 @@ from geometry.errors import InputError
 from macro import compat
 from macro.elasticity import Material, rigid_body_modes, stiffness_form
 from macro.mesh import BOTTOM, SIDES, BlockMesh
+from macro.multigrid import lattice_of, transfers
 from macro.solvers import linear_solver, solve_linear
 
 Sides = Literal["free", "roller"]
@@ -96,7 +97,10 @@ class Block:
     @cached_property
     def solver(self) -> PETSc.KSP:
         """Linear solver of the block alone; its preconditioner also serves the contact solves."""
-        return linear_solver(self.stiffness)
+        lattice = lattice_of(self.space, self.mesh)
+        if lattice is None:
+            return linear_solver(self.stiffness)
+        return linear_solver(self.stiffness, transfers=lambda: transfers(lattice, self._free))
 
     def solve(self, load: PETSc.Vec) -> Any:
         """Return the displacement under a nodal load.
@@ -139,6 +143,16 @@ class Block:
         # exact on boxes and affine tetrahedra, full integration on distorted hexahedra
         degree = 2 * self.degree if self.mesh.shape.hexahedral else 2 * (self.degree - 1)
         return stiffness_form(self.space, self.material, degree)
+
+    @property
+    def _free(self) -> PETSc.Vec:
+        """1 for degrees of freedom that no condition holds, 0 for the others."""
+        free = self.stiffness.createVecRight()
+        free.set(1.0)
+        for condition in self.conditions:
+            dofs, _ = condition.dof_indices()
+            free.array[dofs[dofs < self.owned_dofs]] = 0.0
+        return free
 
     @cached_property
     def _bottom_row(self) -> PETSc.Vec:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 from petsc4py import PETSc
@@ -12,17 +12,33 @@ from geometry.errors import InputError, NotConverged
 PREFIX = "patchlaw_"
 """Prefix of every PETSc option: ``-patchlaw_ksp_rtol 1e-6`` on the command line wins."""
 
-LINEAR_DEFAULTS: Mapping[str, object] = {
+KRYLOV_DEFAULTS: Mapping[str, object] = {
     "ksp_type": "cg",
     "ksp_norm_type": "unpreconditioned",
     "ksp_rtol": 1e-10,
     "ksp_max_it": 1000,
+}
+"""Conjugate gradients, whatever the preconditioner."""
+
+ALGEBRAIC_DEFAULTS: Mapping[str, object] = {
     "pc_type": "gamg",
     "pc_gamg_threshold": 0.01,
     "mg_levels_ksp_type": "chebyshev",
     "mg_levels_pc_type": "jacobi",
 }
-"""Conjugate gradients and smoothed aggregation; Jacobi smooths on every release of PETSc."""
+"""Smoothed aggregation; Jacobi smooths on every release of PETSc."""
+
+GEOMETRIC_DEFAULTS: Mapping[str, object] = {
+    "pc_type": "mg",
+    "pc_mg_galerkin": "both",
+    "mg_levels_ksp_type": "chebyshev",
+    "mg_levels_ksp_max_it": 3,
+    "mg_levels_esteig_ksp_type": "cg",
+    "mg_levels_pc_type": "jacobi",
+    "mg_coarse_pc_type": "redundant",
+    "mg_coarse_redundant_pc_type": "cholesky",
+}
+"""Grids of the block itself. Two steps of smoothing, or Gauss–Seidel, take no less time."""
 
 
 @contextmanager
@@ -53,12 +69,18 @@ def default_options(prefix: str, defaults: Mapping[str, object]) -> Iterator[Non
             database.delValue(name)
 
 
-def linear_solver(matrix: PETSc.Mat, prefix: str = PREFIX) -> PETSc.KSP:
+def linear_solver(
+    matrix: PETSc.Mat,
+    prefix: str = PREFIX,
+    transfers: Callable[[], Sequence[PETSc.Mat]] | None = None,
+) -> PETSc.KSP:
     """Return a solver for a symmetric positive definite matrix, its preconditioner set up.
 
     Args:
         matrix: The matrix, with its near-nullspace attached.
         prefix: Prefix of its PETSc options.
+        transfers: Makes the interpolations of a geometric multigrid, finest first; called unless
+            the user chooses another preconditioner.
 
     Note:
         Collective.
@@ -66,7 +88,15 @@ def linear_solver(matrix: PETSc.Mat, prefix: str = PREFIX) -> PETSc.KSP:
     solver = PETSc.KSP().create(matrix.comm)
     solver.setOptionsPrefix(prefix)
     solver.setOperators(matrix)
-    with default_options(prefix, LINEAR_DEFAULTS):
+    geometric = transfers is not None and PETSc.Options(prefix).getString("pc_type", "mg") == "mg"
+    if transfers is not None and geometric:
+        steps = transfers()
+        solver.pc.setType("mg")
+        solver.pc.setMGLevels(len(steps) + 1)
+        for level, step in enumerate(reversed(steps), start=1):
+            solver.pc.setMGInterpolation(level, step)
+    preconditioner = GEOMETRIC_DEFAULTS if geometric else ALGEBRAIC_DEFAULTS
+    with default_options(prefix, {**KRYLOV_DEFAULTS, **preconditioner}):
         solver.setFromOptions()
         solver.setUp()  # multigrid reads the options of its levels here
     return solver
