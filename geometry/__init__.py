@@ -11,6 +11,7 @@ from geometry.files import read_surface
 from geometry.meshes import Alignment, BlockShape, alignment, flat_block
 from geometry.partition import Partition, UnevenPartition
 from geometry.patches import PatchGrid, patch_means
+from geometry.reference_meshes import characteristic_size, reference_shapes, suggested_fine
 from geometry.refined_block import RefinedShape, places_in_reach
 from geometry.spectrum import Spectrum, synthesise
 from geometry.statistics import PowerSpectrum, Roughness, power_spectrum, roughness
@@ -33,12 +34,15 @@ __all__ = [
     "Surface",
     "UnevenPartition",
     "alignment",
+    "characteristic_size",
     "find_asperities",
     "flat_block",
     "patch_means",
     "places_in_reach",
     "power_spectrum",
     "read_surface",
+    "reference_shapes",
     "roughness",
+    "suggested_fine",
     "synthesise",
 ]

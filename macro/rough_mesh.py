@@ -24,8 +24,8 @@ _DECAY = 3.0
 _LEAST_VOLUME = 0.05
 """Volume relative to that of the flat block, below which cells are refused."""
 
-_CORNERS = {4: [(0, 1, 2, 3)], 8: [(i, i ^ 1, i ^ 2, i ^ 4) for i in range(8)]}
-"""Vertices of tetrahedra and hexahedra: a corner and the ends of the edges that leave it."""
+_STEEPEST = 2.0
+"""Slope between neighbouring nodes above which a top is refused: edges at 27° to each other."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,8 +33,8 @@ class MeshQuality:
     """How far the roughness has deformed the cells.
 
     Attributes:
-        thinnest: Smallest volume that the edges of a cell's corner span, relative to that of the
-            flat block; negative in a cell turned inside out.
+        thinnest: Smallest volume at a node of a cell (the Jacobian of its map), relative to that
+            of the flat block; negative in a cell turned inside out.
         steepest: Largest slope of an edge of the top.
     """
 
@@ -50,24 +50,24 @@ def rough_block_mesh(
     The top becomes z = h(x, y) − <h>, from the surface's interpolant at the nodes; below, the
     movement fades as (1 + z/height)³. Every rank moves the nodes that it has.
 
+    Along every vertical line the movement keeps the order of points as long as the deepest valley
+    lies less than height/3 below the mean. Hexahedra, whose sides are vertical, then stay
+    hexahedra; tetrahedra are looked at one by one.
+
     Args:
         shape: The flat block, without margin; its interface is the surface's rectangle.
         surface: The rough surface.
         comm: MPI communicator.
 
     Raises:
-        InputError: When the rectangles differ, or the roughness is too high for the block and
-            turns a cell inside out.
+        InputError: When the rectangles differ, a valley is too deep for the block, the roughness
+            is too steep for the mesh, or it turns a cell inside out.
 
     Note:
         Collective.
     """
-    if shape.margin or not np.allclose(shape.interface, surface.lengths, rtol=1e-9, atol=0.0):
-        raise InputError(
-            "the rough surface must cover the block's top",
-            value=shape.interface,
-            allowed=f"an interface of {surface.lengths} mm without margin",
-        )
+    _check_cover(shape, surface)
+    _check_depth(shape, surface)
     flat = block_mesh(shape, comm)
     points = flat.mesh.geometry.x
     x, y = (np.clip(points[:, k], 0.0, surface.lengths[k]) for k in (0, 1))
@@ -78,29 +78,92 @@ def rough_block_mesh(
         thinnest=float(comm.allreduce(_thinnest(flat, moved), op=MPI.MIN)),
         steepest=float(comm.allreduce(_steepest(flat, rise), op=MPI.MAX)),
     )
+    if quality.steepest > _STEEPEST:
+        raise InputError(
+            "the roughness is too steep for a mesh",
+            value=quality.steepest,
+            allowed=f"slopes up to {_STEEPEST:g} between neighbouring nodes of the top",
+        )
     if quality.thinnest <= _LEAST_VOLUME:
         raise InputError(
-            "the roughness turns cells inside out: it is too high for the block, or for cells "
-            "that are much longer than its waves",
-            value=float(np.ptp(surface.heights)),
-            allowed=f"valleys not {shape.height / _DECAY:g} mm below the mean, or finer cells",
+            "the roughness turns cells inside out, which are much longer than its waves",
+            value=quality.thinnest,
+            allowed=f"cells that keep {_LEAST_VOLUME:.0%} of their volume at every node",
         )
     points[:] = moved
     return flat, quality
 
 
-def _thinnest(flat: BlockMesh, moved: Array) -> float:
-    """Return the smallest ratio of the volumes at corners of cells after and before a movement."""
-    cells, points = compat.cell_vertices(flat.mesh), flat.mesh.geometry.x
-    thinnest = 1.0
-    for corner in _CORNERS[cells.shape[1]] if len(cells) else ():
-        at, *ends = (cells[:, vertex] for vertex in corner)
-        before, after = (
-            np.linalg.det(np.stack([place[end] - place[at] for end in ends], axis=1))
-            for place in (points, moved)
+def _check_cover(shape: BlockShape | RefinedShape, surface: Surface) -> None:
+    larger = np.array(surface.lengths) > np.array(shape.interface) * (1.0 + 1e-9)
+    if larger.any():
+        raise InputError(
+            "the rough surface is larger than the block's top",
+            value=surface.lengths,
+            allowed=f"{shape.interface} mm",
         )
-        thinnest = min(thinnest, float(np.min(after / before)))
+    if shape.margin or not np.allclose(shape.interface, surface.lengths, rtol=1e-9, atol=0.0):
+        raise InputError(
+            "the rough surface must cover the block's top",
+            value=shape.interface,
+            allowed=f"an interface of {surface.lengths} mm without margin",
+        )
+
+
+def _check_depth(shape: BlockShape | RefinedShape, surface: Surface) -> None:
+    valley = surface.mean_height - float(surface.heights.min())
+    deepest = (1.0 - _LEAST_VOLUME) * shape.height / _DECAY
+    if valley > deepest:
+        raise InputError(
+            "a valley of the roughness is too deep for the block",
+            value=valley,
+            allowed=f"{deepest:.6g} mm below the mean, for a block {shape.height:g} mm high",
+        )
+
+
+def _thinnest(flat: BlockMesh, moved: Array) -> float:
+    """Return the smallest ratio of the volumes at nodes of cells after and before a movement.
+
+    Nodes move along z alone, which changes one row of the Jacobian matrix.
+    """
+    cells, points = compat.cell_vertices(flat.mesh), flat.mesh.geometry.x
+    x, y, before, after = (row[cells] for row in (*points.T, moved[:, 2]))
+    thinnest = 1.0
+    for slopes in _slopes(cells.shape[1]) if len(cells) else ():
+        normal = np.cross(x @ slopes, y @ slopes)
+        volumes = (np.einsum("ci,ci->c", normal, z @ slopes) for z in (after, before))
+        thinnest = min(thinnest, float(np.divide(*volumes).min()))
     return thinnest
+
+
+def _slopes(nodes: int) -> Array:
+    """Return the shape functions' gradients at the nodes of a cell, shape (points, nodes, 3).
+
+    Nodes of hexahedra (8) and tetrahedra (4 or 10) in the order of dolfinx; of a linear
+    tetrahedron's gradients, which are the same everywhere, one.
+    """
+    if nodes == 8:
+        return _trilinear_slopes()
+    linear = np.vstack([np.full(3, -1.0), np.eye(3)])
+    if nodes == 4:
+        return linear[None]
+    i, j = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)]).T
+    at = np.vstack([np.eye(4), 0.5 * (np.eye(4)[i] + np.eye(4)[j])])[:, :, None]
+    # of L (2 L - 1) at vertices, of 4 L L' in the middle of edges
+    vertices = (4.0 * at - 1.0) * linear
+    middles = 4.0 * (at[:, i] * linear[j] + at[:, j] * linear[i])
+    return np.concatenate([vertices, middles], axis=1)
+
+
+def _trilinear_slopes() -> Array:
+    corners = np.array(list(np.ndindex(2, 2, 2)))[:, ::-1]  # x runs first
+    slopes = np.zeros((8, 8, 3))
+    for point, node in np.ndindex(8, 8):
+        apart = corners[point] != corners[node]
+        for axis in range(3):
+            if not np.delete(apart, axis).any():
+                slopes[point, node, axis] = 2 * corners[node, axis] - 1
+    return slopes
 
 
 def _steepest(flat: BlockMesh, rise: Array) -> float:
@@ -108,6 +171,7 @@ def _steepest(flat: BlockMesh, rise: Array) -> float:
     points = flat.mesh.geometry.x
     cells = compat.cell_vertices(flat.mesh)
     top = np.abs(points[:, 2]) < 1e-9 * flat.shape.height
+    cells = cells[top[cells].any(axis=1)]
     steepest = 0.0
     for i in range(cells.shape[1]):
         for j in range(i):
