@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from geometry.errors import InputError, PatchlawError
-from multiscale import commands, terminal
+from multiscale import commands, doctor_command, terminal
 
 _SOLVER_OPTIONS = ("-snes_", "-ksp_", "-pc_", "-mg_")
 
@@ -83,6 +83,7 @@ def _parser() -> argparse.ArgumentParser:
         )
     schema = subparsers.add_parser("schema", help=_summary(commands.print_schema))
     schema.set_defaults(command=commands.print_schema)
+    doctor_command.add_commands(subparsers)
     return parser
 
 
