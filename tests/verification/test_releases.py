@@ -16,7 +16,10 @@ SMALL = [
 # of Debian 13 (0.9.0, 3.22.5, 2.2.4, 1.15.3) and sid (0.11.0, 3.25.5, 2.4.6, 1.17.1) agree to 8e-13.
 FORCES = {
     "embedded": (["patches.grid=[4, 2]"], [0.559137615013406, 2.41750883739317]),
-    "concurrent": (["coupling.kind=concurrent", "micro.model=half-space"], [0.629709463485547, 3.11451895560614]),
+    "concurrent": (
+        ["coupling.kind=concurrent", "micro.model=half-space"],
+        [0.629709463485547, 3.11451895560614],
+    ),
 }
 
 
