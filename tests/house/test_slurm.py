@@ -157,3 +157,29 @@ def test_an_array_makes_a_folder_for_each_seed(slurm, reference):
     for seed in (1, 2):
         expected = reference(*changes, f"surface.spectrum.seed={seed}")
         np.testing.assert_allclose(forces(out / f"seed-{seed}"), expected, rtol=1e-12)
+
+
+def test_a_run_longer_than_the_limit_goes_on_after_it(slurm, reference):
+    """Signal before the time limit → checkpoint → back into the queue → the same history."""
+    out = slurm.folder / "long"
+    # a load step takes 0.05 s or more: 1000 of them outlast the signal, which comes after 5 to 35 s
+    changes = [
+        "surface.grid=[192, 192]", "block.cells=[8, 8, 5]", "coupling.kind=concurrent",
+        "micro.model=half-space", "load.steps=1000",
+    ]  # fmt: skip
+    job = slurm.submit(
+        "--time=1", "--signal=B:USR1@25", SCRIPTS / "requeue.sbatch",
+        SCENE, out, "--set", *SMALL, *changes,
+    )  # fmt: skip
+    slurm.wait(lambda: slurm.show(job, "RestartCnt").isdigit() and restarts(slurm, job) > 0, 90)
+    assert (out / "checkpoint.h5").is_file()
+    assert slurm.finish(job, 400) == {"COMPLETED"}, slurm.logs()
+    assert "go on with --resume" in (slurm.folder / f"patchlaw-long-{job}.log").read_text()
+    found = forces(out)
+    assert len(found) == 1000
+    # contacts start from the last load step, so that a fresh start agrees to their tolerance alone
+    np.testing.assert_allclose(found, reference(*changes), rtol=1e-7, atol=1e-9)
+
+
+def restarts(slurm, job):
+    return int(slurm.show(job, "RestartCnt"))
