@@ -235,7 +235,7 @@ class HalfSpaceModel:
                 value=pressure.shape,
                 allowed=f"{self.surface.grid}",
             )
-        return pressure / self.contact_modulus
+        return np.asarray(np.divide(pressure, self.contact_modulus))
 
     def _pressed(self, plane: RigidPlane, start: Array | None) -> HalfSpaceState:
         required = self._required(plane)

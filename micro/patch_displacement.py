@@ -62,9 +62,9 @@ def patch_displacements(
     block = max(1, _BLOCK // len(corners))
     for first in range(0, len(load), block):  # blocks bound the memory
         corners += _corners(patches, point[first : first + block], load[first : first + block])
-    corners = corners.reshape(patches.grid[0] + 1, patches.grid[1] + 1)
-    love = np.diff(np.diff(corners, axis=0), axis=1)
-    return love.ravel() / (np.pi * contact_modulus * patches.area)
+    crossings = corners.reshape(patches.grid[0] + 1, patches.grid[1] + 1)
+    love = np.diff(np.diff(crossings, axis=0), axis=1)
+    return np.asarray(love.ravel() / (np.pi * contact_modulus * patches.area))
 
 
 def _corners(patches: PatchGrid, point: Array, load: Array) -> Array:
@@ -72,7 +72,7 @@ def _corners(patches: PatchGrid, point: Array, load: Array) -> Array:
     to_x = patches.borders_x - point[:, 0, None]
     to_y = patches.borders_y - point[:, 1, None]
     corners = corner_integral(to_x[:, :, None], to_y[:, None, :])
-    return np.tensordot(load, corners, axes=1).ravel()
+    return np.asarray(np.tensordot(load, corners, axes=1), dtype=np.float64).ravel()
 
 
 def _far_from_borders(patches: PatchGrid, position: Array, semi_major: Array) -> NDArray[np.bool_]:

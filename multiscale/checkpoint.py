@@ -156,7 +156,7 @@ def _columns(steps: Sequence[LoadStep]) -> Arrays:
 
 
 def _steps(columns: Arrays) -> tuple[LoadStep, ...]:
-    listed = {
+    listed: dict[str, Any] = {
         name: _tuples(json.loads(as_text(column))) if column.dtype == np.uint8 else column.tolist()
         for name, column in columns.items()
         if not name.startswith(_PATCH)

@@ -132,8 +132,8 @@ def show_counts(facts: list[dict]) -> None:
 def show_model(one: dict, most: dict) -> None:
     """Print what the counts mean for many ranks.
 
-    An iteration on P ranks with n unknowns each takes n c + m α + v n^(2/3) / β + r α log₂ P: work c
-    of one rank, m messages, volume v over the faces of a rank's part, r reductions.
+    An iteration on P ranks with n unknowns each takes n c + m α + v n^(2/3) / β + r α log₂ P: work
+    c of one rank, m messages, volume v over the faces of a rank's part, r reductions.
     """
     work = one["seconds"]["solve"] / (one["iterations"] * one["dofs"])
     volume = FACES * most["bytes"] / (most["dofs"] / most["ranks"]) ** (2.0 / 3.0)
