@@ -27,6 +27,9 @@ except ImportError:
     from dolfinx.io import gmshio as _gmsh_io
 
 _JIT = {"timeout": TIMEOUT}  # another process may be compiling the same form on a slow machine
+HAS_VTX = hasattr(io, "VTXWriter")
+"""Whether this dolfinx was built with ADIOS2."""
+
 _CELLS = {"hexahedron": basix.CellType.hexahedron, "tetrahedron": basix.CellType.tetrahedron}
 
 
@@ -171,6 +174,20 @@ def assemble_vector(form: Any) -> PETSc.Vec:
     vector = fem_petsc.assemble_vector(form)
     vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
     return vector
+
+
+def write_vtx(path: str, function: Any) -> None:
+    """Write a Lagrange function of any degree as VTX; only where `HAS_VTX`.
+
+    Args:
+        path: Folder to write, ending in ``.bp``.
+        function: The function.
+
+    Note:
+        Collective.
+    """
+    with io.VTXWriter(function.function_space.mesh.comm, path, [function]) as file:
+        file.write(0.0)
 
 
 def write_xdmf(path: str, mesh: Any, functions: Sequence[Any]) -> None:

@@ -181,8 +181,8 @@ def test_a_run_longer_than_the_limit_goes_on_after_it(slurm, reference):
     out, slow = slurm.folder / "long", slurm.folder / "slow.py"
     slow.write_text(SLOW, encoding="utf-8")
     slurm.environment["PATCHLAW"] = f"{sys.executable} {slow}"
-    changes = "load.steps=100"  # which take 50 s; the signal comes 5 to 35 s after a start
-    limit = ("--time=1", "--signal=B:USR1@25")
+    changes = "load.steps=100"  # which take 50 s; the signal comes 15 to 45 s after a start
+    limit = ("--time=1", "--signal=B:USR1@15")
     job = slurm.submit(
         *limit, SCRIPTS / "requeue.sbatch", SCENE, out, "--set", *SMALL, changes
     )  # fmt: skip
