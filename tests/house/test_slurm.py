@@ -162,6 +162,15 @@ def test_an_array_makes_a_folder_for_each_seed(slurm, reference):
         np.testing.assert_allclose(forces(out / f"seed-{seed}"), expected, rtol=1e-12)
 
 
+def test_slurm_itself_can_start_the_ranks(slurm):
+    done = subprocess.run(
+        ["srun", "--mpi=pmix", "--ntasks=2", sys.executable, "-m", "multiscale", "doctor", "--json"],
+        cwd=slurm.folder, env=slurm.environment, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert '"2: 2 on ' in done.stdout
+
+
 SLOW = """
 import sys, time
 from multiscale.cli import main
