@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import importlib
 import os
 import platform
 import re
@@ -24,10 +25,7 @@ def blas(comm: Any) -> list[Finding]:
     Args:
         comm: MPI communicator, or None.
     """
-    import petsc4py.PETSc
-    import scipy.linalg  # noqa: F401 - loads BLAS
-
-    del petsc4py
+    importlib.import_module("scipy.linalg")  # loads it
     fast = [path for path in _loaded() if re.search("openblas|mkl|blis", path.name)]
     if not fast:
         remedy = "apt-get install libopenblas0-pthread (factorisations are 5 to 8 times faster)"

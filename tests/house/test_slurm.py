@@ -163,8 +163,9 @@ def test_an_array_makes_a_folder_for_each_seed(slurm, reference):
 
 
 def test_slurm_itself_can_start_the_ranks(slurm):
+    doctor = (sys.executable, "-m", "multiscale", "doctor", "--json")
     done = subprocess.run(
-        ["srun", "--mpi=pmix", "--ntasks=2", sys.executable, "-m", "multiscale", "doctor", "--json"],
+        ["srun", "--mpi=pmix", "--ntasks=2", *doctor],
         cwd=slurm.folder, env=slurm.environment, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
