@@ -9,6 +9,7 @@ from geometry.control import Control
 from geometry.errors import InputError, NotConverged, PatchlawError
 from geometry.files import read_surface
 from geometry.meshes import Alignment, BlockShape, alignment, flat_block
+from geometry.partition import Partition, UnevenPartition
 from geometry.patches import PatchGrid, patch_means
 from geometry.refined_block import RefinedShape, places_in_reach
 from geometry.spectrum import Spectrum, synthesise
@@ -22,6 +23,7 @@ __all__ = [
     "Control",
     "InputError",
     "NotConverged",
+    "Partition",
     "PatchGrid",
     "PatchlawError",
     "PowerSpectrum",
@@ -29,6 +31,7 @@ __all__ = [
     "Roughness",
     "Spectrum",
     "Surface",
+    "UnevenPartition",
     "alignment",
     "find_asperities",
     "flat_block",

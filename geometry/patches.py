@@ -5,17 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from geometry.checks import cell_counts, finite_pair, positive_lengths
 from geometry.errors import InputError
+from geometry.partition import Partition
 from geometry.surface import Surface
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PatchGrid:
+class PatchGrid(Partition):
     """Nx × Ny equal rectangular patches; patch (ix, iy) has the flat index ix Ny + iy.
 
     Args:
@@ -40,11 +41,6 @@ class PatchGrid:
         object.__setattr__(self, "origin", origin)
 
     @property
-    def count(self) -> int:
-        """Number of patches N."""
-        return self.grid[0] * self.grid[1]
-
-    @property
     def size(self) -> tuple[float, float]:
         """Sides (sx, sy) of a patch [mm]."""
         return self.lengths[0] / self.grid[0], self.lengths[1] / self.grid[1]
@@ -60,11 +56,6 @@ class PatchGrid:
         return self.size[0] * self.size[1]
 
     @property
-    def middle(self) -> Array:
-        """Middle of the divided rectangle, shape (2,) [mm]."""
-        return np.add(self.origin, np.multiply(0.5, self.lengths))
-
-    @property
     def borders_x(self) -> Array:
         """Borders along x, shape (Nx + 1,) [mm]."""
         return self.origin[0] + np.linspace(0.0, self.lengths[0], self.grid[0] + 1)
@@ -73,13 +64,6 @@ class PatchGrid:
     def borders_y(self) -> Array:
         """Borders along y, shape (Ny + 1,) [mm]."""
         return self.origin[1] + np.linspace(0.0, self.lengths[1], self.grid[1] + 1)
-
-    @property
-    def centres(self) -> Array:
-        """Centres of the patches in flat order, shape (N, 2) [mm]."""
-        x, y = self.borders_x, self.borders_y
-        mesh = np.meshgrid(0.5 * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1]), indexing="ij")
-        return np.stack([part.ravel() for part in mesh], axis=1)
 
     def unravel(self, i: int) -> tuple[int, int]:
         """Return (ix, iy) of the patch with flat index ``i``.
@@ -110,28 +94,8 @@ class PatchGrid:
         (x0, x1), (y0, y1) = self.bounds(i)
         return PatchGrid(grid=(1, 1), lengths=(x1 - x0, y1 - y0), origin=(x0, y0))
 
-    def index_of(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.intp]:
-        """Return the flat index of the patch that holds each point.
 
-        A border belongs to the patch above it, the far border to the last patch: every point of
-        the closed rectangle is in exactly one patch.
-
-        Args:
-            x: Abscissae [mm]; broadcast against ``y``.
-            y: Ordinates [mm].
-
-        Returns:
-            Flat indices of the broadcast shape.
-
-        Raises:
-            InputError: When a point lies outside the rectangle.
-        """
-        ix = _interval_of(np.asarray(x, dtype=np.float64), self.borders_x, "x")
-        iy = _interval_of(np.asarray(y, dtype=np.float64), self.borders_y, "y")
-        return ix * self.grid[1] + iy
-
-
-def patch_means(surface: Surface, patches: PatchGrid) -> Array:
+def patch_means(surface: Surface, patches: Partition) -> Array:
     """Average the heights over every patch; cells that straddle a border are shared by area.
 
     Args:
@@ -147,17 +111,6 @@ def patch_means(surface: Surface, patches: PatchGrid) -> Array:
     shares_x = _shares(patches.borders_x, surface.lengths[0], surface.grid[0], "x")
     shares_y = _shares(patches.borders_y, surface.lengths[1], surface.grid[1], "y")
     return (shares_x @ surface.heights @ shares_y.T).ravel()
-
-
-def _interval_of(value: Array, borders: Array, axis: str) -> NDArray[np.intp]:
-    outside = ~((value >= borders[0]) & (value <= borders[-1]))
-    if outside.any():
-        raise InputError(
-            f"{int(outside.sum())} points lie outside the patches",
-            value=float(value[outside].flat[0]),
-            allowed=f"{borders[0]} ≤ {axis} ≤ {borders[-1]} mm",
-        )
-    return np.searchsorted(borders[1:-1], value, side="right")
 
 
 def _shares(borders: Array, length: float, cells: int, axis: str) -> Array:

@@ -18,7 +18,7 @@ from scipy.sparse import csr_array
 from geometry.collective import together
 from geometry.errors import InputError
 from geometry.meshes import BlockShape
-from geometry.patches import PatchGrid
+from geometry.partition import Partition
 from geometry.smooth_shape import SmoothShape, smooth_shape
 from macro.block import Block, Sides
 from macro.correction import Correction
@@ -34,11 +34,11 @@ _BLOCK = 1024  # points at which the half-space is evaluated together
 class HalfSpaceField(Protocol):
     """Displacements and stresses in the depth of a half-space by unit pressures on rectangles."""
 
-    def displacements(self, x: Array, y: Array, depth: Array, loads: PatchGrid, /) -> Array:
+    def displacements(self, x: Array, y: Array, depth: Array, loads: Partition, /) -> Array:
         """Return displacements along x, y and into the depth, shape (3, n, M) [mm/MPa]."""
         ...
 
-    def stresses(self, x: Array, y: Array, depth: Array, loads: PatchGrid, /) -> Array:
+    def stresses(self, x: Array, y: Array, depth: Array, loads: Partition, /) -> Array:
         """Return σ_xx, σ_yy, σ_zz, σ_yz, σ_xz, σ_xy, z into the depth, shape (6, n, M)."""
         ...
 
@@ -47,7 +47,7 @@ def make_correction(
     shape: BlockShape,
     material: Material,
     sides: Sides,
-    loads: PatchGrid,
+    loads: Partition,
     half_space: HalfSpaceField,
     comm: Any,
 ) -> Correction:
@@ -96,7 +96,7 @@ class _Solver:
     """The block of one rank, with what the half-space leaves on its faces."""
 
     def __init__(
-        self, block: Block, shape: SmoothShape, half_space: HalfSpaceField, loads: PatchGrid
+        self, block: Block, shape: SmoothShape, half_space: HalfSpaceField, loads: Partition
     ) -> None:
         self._block, self._shape, self._field, self._loads = block, shape, half_space, loads
         # node of the mesh at every place (i, j, k) of the grid
@@ -160,7 +160,7 @@ class _Solver:
         return forces
 
 
-def _in_parts(evaluate: Any, x: Array, y: Array, depth: Array, loads: PatchGrid) -> Array:
+def _in_parts(evaluate: Any, x: Array, y: Array, depth: Array, loads: Partition) -> Array:
     """Evaluate the half-space at some points at a time, which bounds the memory."""
     cuts = np.arange(_BLOCK, len(x), _BLOCK)
     pieces = zip(*(np.split(part, cuts) for part in (x, y, depth)), strict=True)
@@ -187,7 +187,7 @@ def _solved(matrix: PETSc.Mat, right: Array) -> Array:
     return solution
 
 
-def _check_place(shape: BlockShape, loads: PatchGrid) -> None:
+def _check_place(shape: BlockShape, loads: Partition) -> None:
     for axis, borders in enumerate((loads.borders_x, loads.borders_y)):
         low, high = -shape.margin, shape.interface[axis] + shape.margin
         slack = 1e-9 * (high - low)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline, make_interp_spline
 
-from geometry.patches import PatchGrid
+from geometry.partition import Partition
 
 Array = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ class Correction:
             shape (nx, ny, M) [mm/MPa].
     """
 
-    loads: PatchGrid
+    loads: Partition
     x: Array
     y: Array
     values: Array
@@ -61,28 +61,29 @@ class Correction:
         Args:
             forces: Forces, uniform on each rectangle, shape (M,) [N].
         """
-        nodal = self.values @ (np.asarray(forces, float) / self.loads.area)
+        nodal = self.values @ (np.asarray(forces, float) / self.loads.areas)
         return Sag(RectBivariateSpline(self.x, self.y, nodal))
 
-    def patch_compliance(self, patches: PatchGrid) -> Array:
+    def patch_compliance(self, patches: Partition) -> Array:
         """Return the mean of u_c over patch i by unit pressure on patch j, shape (N, N) [mm/MPa].
 
         Patches that the rectangles do not divide load them by the area they share. By reciprocity
-        the matrix is symmetric; what the mesh leaves is averaged out (see `asymmetry`).
+        forces displace each other's patches alike; what the mesh leaves of a difference is averaged
+        out (see `asymmetry`).
 
         Args:
             patches: N patches within the loads' rectangle.
         """
-        found = self._means(patches)
-        return np.asarray(0.5 * (found + found.T))
+        by_force = self._means(patches) / patches.areas
+        return np.asarray(0.5 * (by_force + by_force.T) * patches.areas)
 
     @cached_property
     def asymmetry(self) -> float:
         """Largest asymmetry of the compliance of the rectangles, relative to its largest entry."""
-        found = self._means(self.loads)
+        found = self._means(self.loads) / self.loads.areas
         return float(np.abs(found - found.T).max() / np.abs(found).max())
 
-    def _means(self, patches: PatchGrid) -> Array:
+    def _means(self, patches: Partition) -> Array:
         over_x = _interval_means(self.x, patches.borders_x)
         over_y = _interval_means(self.y, patches.borders_y)
         means = np.einsum("ia,jb,abm->ijm", over_x, over_y, self.values, optimize=True)
@@ -91,7 +92,7 @@ class Correction:
             for borders in ("borders_x", "borders_y")
         )
         spread = np.einsum("ki,lj->klij", share_x, share_y)
-        spread = spread.reshape(self.loads.count, patches.count) / self.loads.area
+        spread = spread.reshape(self.loads.count, patches.count) / self.loads.areas[:, None]
         return np.asarray(means.reshape(patches.count, -1) @ spread)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from geometry.meshes import BlockShape
-from geometry.patches import PatchGrid
+from geometry.partition import Partition
 from geometry.smooth_shape import smooth_shape
 from macro.block import Sides
 from macro.compliance_cache import Arrays, cached
@@ -18,7 +18,7 @@ def cached_correction(
     shape: BlockShape,
     material: Material,
     sides: Sides,
-    loads: PatchGrid,
+    loads: Partition,
     half_space: HalfSpaceField,
     comm: Any,
 ) -> Correction:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.patches import PatchGrid
+from geometry.partition import Partition
 from geometry.smooth_shape import SmoothShape
 
 Array = NDArray[np.float64]
@@ -95,7 +95,7 @@ class Side:
         return np.asarray(np.tensordot(part, self.down.shapes, axes=(1, 0)).transpose(0, 2, 1))
 
 
-def sides(shape: SmoothShape, loads: PatchGrid, order: int = ORDER) -> list[Side]:
+def sides(shape: SmoothShape, loads: Partition, order: int = ORDER) -> list[Side]:
     """Return the four side planes of a block, with rules for loads on its top.
 
     Args:
@@ -104,7 +104,8 @@ def sides(shape: SmoothShape, loads: PatchGrid, order: int = ORDER) -> list[Side
         order: Gauss points in each interval.
     """
     ticks, counts = shape.ticks, [len(nodes) for nodes in shape.nodes]
-    steps = min(loads.size) * _FINEST * _GROWTH ** np.arange(64)
+    narrowest = min(np.diff(loads.borders_x).min(), np.diff(loads.borders_y).min())
+    steps = narrowest * _FINEST * _GROWTH ** np.arange(64)
     down = LineRule.between(ticks[2], -steps[steps < shape.height], order)
     found = []
     for axis in (0, 1):

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry import Asperities, PatchGrid
+from geometry import Asperities, Partition, PatchGrid
 from geometry.errors import InputError
 from micro.active_set import active_set
 from micro.asperity_state import AsperityState, HertzCoefficients
@@ -174,7 +174,7 @@ class AsperityModel:
         self,
         approaches: ArrayLike,
         *,
-        patches: PatchGrid,
+        patches: Partition,
         mean_heights: ArrayLike,
         tilt: tuple[float, float] = _LEVEL,
     ) -> Response:
@@ -213,7 +213,7 @@ class AsperityModel:
         self,
         plane: RigidPlane,
         *,
-        patches: PatchGrid,
+        patches: Partition,
         mean_heights: ArrayLike,
         start: Any = None,
     ) -> Pressed:
@@ -269,7 +269,7 @@ class AsperityModel:
         return self._interaction.lift(own).displacement
 
     def sums(
-        self, patches: PatchGrid, mean_heights: ArrayLike, home: Asperities | None = None
+        self, patches: Partition, mean_heights: ArrayLike, home: Asperities | None = None
     ) -> PatchSums:
         """Return what sums the results of this model over patches.
 

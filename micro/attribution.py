@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import PatchGrid
+from geometry import Partition
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -39,7 +39,7 @@ class Shares(NamedTuple):
     area: Array
 
 
-def shares(patches: PatchGrid, position: Array, semi_axes: Array, angle: Array) -> Shares:
+def shares(patches: Partition, position: Array, semi_axes: Array, angle: Array) -> Shares:
     """Share contacts among patches.
 
     Args:
@@ -55,7 +55,7 @@ def shares(patches: PatchGrid, position: Array, semi_axes: Array, angle: Array) 
     lean = cos * sin * (axes[:, 0] - axes[:, 1])  # the ellipse's matrix is [[X², lean], [lean, Y²]]
     first, last = (_interval(patches, position + side * across) for side in (-1.0, 1.0))
     whole = np.flatnonzero((first == last).all(axis=1))
-    stride = np.array([patches.grid[1], 1])
+    stride = np.array([patches.shape[1], 1])
     home = first[whole] @ stride
     parts = [Shares(whole, home, np.ones(len(whole)), np.ones(len(whole)))]
     cut = np.flatnonzero((first != last).any(axis=1))
@@ -73,7 +73,7 @@ def shares(patches: PatchGrid, position: Array, semi_axes: Array, angle: Array) 
 class _Cut(NamedTuple):
     """Contacts that straddle borders: half extents and covariance of their ellipses."""
 
-    patches: PatchGrid
+    patches: Partition
     position: Array
     across: Array
     lean: Array
@@ -135,7 +135,7 @@ def _segment(t: Array) -> Array:
     return t * np.sqrt(1.0 - t * t) + np.arcsin(t)
 
 
-def _interval(patches: PatchGrid, point: Array) -> Indices:
+def _interval(patches: Partition, point: Array) -> Indices:
     """Return the grid places (ix, iy) of points, outside the nearest."""
     ticks = patches.borders_x, patches.borders_y
     columns = [

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry import PatchGrid
+from geometry import Partition
 from geometry.errors import InputError
 
 Array = NDArray[np.float64]
@@ -55,7 +55,7 @@ class HalfSpace:
         return self.young_modulus / (2.0 * (1.0 + self.poisson_ratio))
 
     def displacements(
-        self, x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: PatchGrid
+        self, x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: Partition
     ) -> Array:
         """Return displacements by unit pressure on each rectangle alone.
 
@@ -78,7 +78,7 @@ class HalfSpace:
         )
         return _differences(parts, loads, 4.0 * np.pi * self.shear_modulus)
 
-    def stresses(self, x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: PatchGrid) -> Array:
+    def stresses(self, x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: Partition) -> Array:
         """Return stresses by unit pressure on each rectangle alone, positive in tension.
 
         Args:
@@ -124,7 +124,7 @@ class _Corners:
     r: Array
 
     @classmethod
-    def of(cls, x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: PatchGrid) -> _Corners:
+    def of(cls, x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: Partition) -> _Corners:
         """Measure from the crossings of the loads' borders to points."""
         z = np.asarray(depth, float)[:, None, None]
         if np.any(z < 0.0):
@@ -198,7 +198,7 @@ class _Corners:
         return np.log(np.maximum(self.r + self.z, _TINY))
 
 
-def _differences(parts: tuple[Array, ...], loads: PatchGrid, divisor: float) -> Array:
+def _differences(parts: tuple[Array, ...], loads: Partition, divisor: float) -> Array:
     """Difference corner terms to rectangles and divide them, shape (parts, n, M).
 
     Distances to the lower border are the longer ones: it counts positive.

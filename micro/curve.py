@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry import Asperities, PatchGrid, Surface
+from geometry import Asperities, Partition, PatchGrid, Surface
 from geometry.errors import InputError
 from micro.asperity_state import HertzCoefficients
 from micro.attribution import shares
@@ -47,7 +47,7 @@ class PatchSums:
 
     asperities: Asperities
     home: Asperities
-    patches: PatchGrid
+    patches: Partition
     mean_heights: Array
     hertz: HertzCoefficients
     contact_modulus: float
@@ -78,7 +78,7 @@ class PatchSums:
             "moment": plane.moment(self.asperities.x[on], self.asperities.y[on], force),
             "contact_area": area.sum(),
             "contacts": len(on),
-            "mean_separation": separation.mean(),
+            "mean_separation": np.average(separation, weights=self.patches.areas),
             "iterations": solution.iterations,
             "residual": solution.residual,
             "engulfed": solution.engulfed,
@@ -95,7 +95,7 @@ class PatchSums:
         return Response.of(told, name, self.contact_modulus, self.patches)
 
     def _warning(self, name: str, row: dict[str, Any]) -> str:
-        fraction = row["contact_area"] / (self.patches.area * self.patches.count)
+        fraction = row["contact_area"] / np.prod(self.patches.sides)
         alone = row["contacts"] + row["engulfed"] < 2  # in a small patch, say: Hertz's contact
         if fraction <= LARGEST_AREA_FRACTION or alone:
             return ""
@@ -127,7 +127,7 @@ def whole_patch(surface: Surface) -> PatchGrid:
     return PatchGrid(grid=(1, 1), lengths=surface.lengths)
 
 
-def checked_means(mean_heights: ArrayLike, patches: PatchGrid) -> Array:
+def checked_means(mean_heights: ArrayLike, patches: Partition) -> Array:
     """Return the mean heights of patches as an array.
 
     Raises:

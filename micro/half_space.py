@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry import PatchGrid, Surface
+from geometry import Partition, PatchGrid, Surface
 from geometry.errors import InputError
 from micro.contact_pressure import Pressures
 from micro.elastic_grid import ElasticGrids
@@ -164,7 +164,7 @@ class HalfSpaceModel:
         self,
         approaches: ArrayLike,
         *,
-        patches: PatchGrid,
+        patches: Partition,
         mean_heights: ArrayLike,
         tilt: tuple[float, float] = _LEVEL,
     ) -> Response:
@@ -197,7 +197,7 @@ class HalfSpaceModel:
         self,
         plane: RigidPlane,
         *,
-        patches: PatchGrid,
+        patches: Partition,
         mean_heights: ArrayLike,
         start: Any = None,
     ) -> Pressed:
@@ -208,7 +208,7 @@ class HalfSpaceModel:
         rows = [sums.row(plane, state)]
         return Pressed(Response.of(rows, self.name, self.contact_modulus, patches), state.pressure)
 
-    def _sums(self, patches: PatchGrid, mean_heights: ArrayLike) -> CellSums:
+    def _sums(self, patches: Partition, mean_heights: ArrayLike) -> CellSums:
         means = np.asarray(mean_heights, float)
         return CellSums(
             surface=self.surface, patches=patches, mean_heights=means, highest=self.datum

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import PatchGrid, Surface, patch_means
+from geometry import Partition, Surface, patch_means
 from micro.contacts import true_area
 from micro.curve import checked_means
 from micro.half_space_state import HalfSpaceState
@@ -36,7 +36,7 @@ class CellSums:
     """
 
     surface: Surface
-    patches: PatchGrid
+    patches: Partition
     mean_heights: Array
     highest: float
 
@@ -57,7 +57,7 @@ class CellSums:
             "moment": self._moment(plane, state),
             "contact_area": state.contact_area,
             "contacts": len(contacts),
-            "mean_separation": separation.mean(),
+            "mean_separation": np.average(separation, weights=self.patches.areas),
             "iterations": state.iterations,
             "residual": state.residual,
             "engulfed": 0,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import PatchGrid
+from geometry import Partition
 from micro.island_passes import Settled
 from micro.island_state import IslandState
 from micro.patch_displacement import patch_displacements
@@ -35,7 +35,7 @@ class IslandSums:
     relief: Relief
     lengths: tuple[float, float]
     highest: float
-    patches: PatchGrid
+    patches: Partition
     mean_heights: Array
     contact_modulus: float
 
@@ -55,7 +55,7 @@ class IslandSums:
             "moment": plane.moment(state.x, state.y, state.force),
             "contact_area": state.contact_area.sum(),
             "contacts": len(state.force),
-            "mean_separation": separation.mean(),
+            "mean_separation": np.average(separation, weights=self.patches.areas),
             "iterations": state.iterations,
             "residual": state.residual,
             "engulfed": state.merged,
@@ -88,7 +88,7 @@ class IslandSums:
         kept = found.member[catchment] >= 0
         island = found.member[catchment[kept]]
         row, column = np.divmod(sample[kept], self.relief.grid[1])
-        patch = self._rows[row] * self.patches.grid[1] + self._columns[column]
+        patch = self._rows[row] * self.patches.shape[1] + self._columns[column]
         pressed = 2.0 * height[kept] / found.depth[island] - 1.0
         place = island * self.patches.count + patch
         home = self._homes(settled)

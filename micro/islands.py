@@ -23,7 +23,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry import PatchGrid, Surface
+from geometry import Partition, PatchGrid, Surface
 from micro.curve import checked_means, whole_patch
 from micro.hertz import checked_modulus
 from micro.island_passes import Settled, settle
@@ -110,7 +110,7 @@ class IslandModel:
         self,
         approaches: ArrayLike,
         *,
-        patches: PatchGrid,
+        patches: Partition,
         mean_heights: ArrayLike,
         tilt: tuple[float, float] = _LEVEL,
     ) -> Response:
@@ -146,7 +146,7 @@ class IslandModel:
         self,
         plane: RigidPlane,
         *,
-        patches: PatchGrid,
+        patches: Partition,
         mean_heights: ArrayLike,
         start: Any = None,
     ) -> Pressed:
@@ -157,7 +157,7 @@ class IslandModel:
         return Pressed(self._response([plane], patches, mean_heights), None)
 
     def _response(
-        self, planes: list[RigidPlane], patches: PatchGrid, mean_heights: ArrayLike
+        self, planes: list[RigidPlane], patches: Partition, mean_heights: ArrayLike
     ) -> Response:
         """Solve under planes that differ in their approach alone."""
         means = checked_means(mean_heights, patches)

@@ -86,7 +86,7 @@ def love_mutual(dx: ArrayLike, dy: ArrayLike, a: ArrayLike, b: ArrayLike) -> Arr
     dx, dy, a, b = np.asarray(dx, float), np.asarray(dy, float), *_half_sides(a, b)
     total = np.zeros(np.broadcast_shapes(dx.shape, dy.shape, a.shape, b.shape))
     for (i, p), (j, q) in product(((-1, 1.0), (0, -2.0), (1, 1.0)), repeat=2):
-        total += p * q * _fourfold(dx + 2 * i * a, dy + 2 * j * b)
+        total += p * q * fourfold_integral(dx + 2 * i * a, dy + 2 * j * b)
     return total / (4.0 * a * b)
 
 
@@ -103,7 +103,8 @@ def corner_integral(u: ArrayLike, v: ArrayLike) -> Array:
     return u * _asinh_ratio(v, u) + v * _asinh_ratio(u, v)
 
 
-def _fourfold(u: Array, v: Array) -> Array:
+def fourfold_integral(u: Array, v: Array) -> Array:
+    """Return the antiderivative of 1/sqrt(u² + v²), twice in u and twice in v [mm³]."""
     logs = u * _asinh_ratio(v, u) + v * _asinh_ratio(u, v)
     return 0.5 * u * v * logs - np.hypot(u, v) ** 3 / 6.0
 

@@ -6,7 +6,7 @@ from typing import Any, Protocol, Self
 
 from numpy.typing import ArrayLike
 
-from geometry import PatchGrid, Surface, find_asperities
+from geometry import Partition, PatchGrid, Surface, find_asperities
 from geometry.errors import InputError
 from micro.asperity_models import MODELS, asperity_model
 from micro.half_space import HalfSpaceModel
@@ -50,7 +50,7 @@ class MicroModel(Protocol):
         self,
         approaches: ArrayLike,
         *,
-        patches: PatchGrid,
+        patches: Partition,
         mean_heights: ArrayLike,
         tilt: tuple[float, float] = (0.0, 0.0),
     ) -> Response:
@@ -71,7 +71,7 @@ class MicroModel(Protocol):
         self,
         plane: RigidPlane,
         *,
-        patches: PatchGrid,
+        patches: Partition,
         mean_heights: ArrayLike,
         start: Any = None,
     ) -> Pressed:

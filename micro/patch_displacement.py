@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import roots_jacobi
 
-from geometry import PatchGrid
+from geometry import Partition
 from micro.love import corner_integral
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ _BLOCK = 2**20
 
 
 def patch_displacements(
-    patches: PatchGrid,
+    patches: Partition,
     position: Array,
     semi_axes: Array,
     angle: Array,
@@ -58,16 +58,16 @@ def patch_displacements(
     points.append(cubature)
     loads.append((force[:, None] * weight).ravel())
     point, load = np.concatenate(points), np.concatenate(loads)
-    corners = np.zeros((patches.grid[0] + 1) * (patches.grid[1] + 1))
+    crossings = patches.shape[0] + 1, patches.shape[1] + 1
+    corners = np.zeros(crossings[0] * crossings[1])
     block = max(1, _BLOCK // len(corners))
     for first in range(0, len(load), block):  # blocks bound the memory
         corners += _corners(patches, point[first : first + block], load[first : first + block])
-    crossings = corners.reshape(patches.grid[0] + 1, patches.grid[1] + 1)
-    love = np.diff(np.diff(crossings, axis=0), axis=1)
-    return np.asarray(love.ravel() / (np.pi * contact_modulus * patches.area))
+    love = np.diff(np.diff(corners.reshape(crossings), axis=0), axis=1)
+    return np.asarray(love.ravel() / (np.pi * contact_modulus * patches.areas))
 
 
-def _corners(patches: PatchGrid, point: Array, load: Array) -> Array:
+def _corners(patches: Partition, point: Array, load: Array) -> Array:
     """Return the sum of loads times corner integrals at all crossings of borders, flat."""
     to_x = patches.borders_x - point[:, 0, None]
     to_y = patches.borders_y - point[:, 1, None]
@@ -75,12 +75,17 @@ def _corners(patches: PatchGrid, point: Array, load: Array) -> Array:
     return np.asarray(np.tensordot(load, corners, axes=1), dtype=np.float64).ravel()
 
 
-def _far_from_borders(patches: PatchGrid, position: Array, semi_major: Array) -> NDArray[np.bool_]:
+def _far_from_borders(patches: Partition, position: Array, semi_major: Array) -> NDArray[np.bool_]:
     """Return which contacts are as good as point forces, small and 10 semi-axes off a border."""
-    sides = np.array(patches.size)
-    within = np.mod(position - np.array(patches.origin), sides)
-    gap = np.minimum(within, sides - within).min(axis=1)
-    return (gap > 10.0 * semi_major) & (semi_major < 5e-3 * sides.min())
+    borders = patches.borders_x, patches.borders_y
+    gap = np.min([_to_nearest(*pair) for pair in zip(borders, position.T, strict=True)], axis=0)
+    narrowest = min(np.diff(ticks).min() for ticks in borders)
+    return (gap > 10.0 * semi_major) & (semi_major < 5e-3 * narrowest)
+
+
+def _to_nearest(borders: Array, place: Array) -> Array:
+    above = np.clip(np.searchsorted(borders, place), 1, len(borders) - 1)
+    return np.minimum(np.abs(place - borders[above - 1]), np.abs(borders[above] - place))
 
 
 def _cubature(position: Array, semi_axes: Array, angle: Array) -> tuple[Array, Array]:

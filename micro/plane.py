@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Asperities, PatchGrid, Surface
+from geometry import Asperities, Partition, Surface
 from geometry.errors import InputError
 
 Array = NDArray[np.float64]
@@ -66,16 +66,16 @@ class RigidPlane:
         level = self.approach + tx * (x - xc) + ty * (y - yc)
         return level if self.sag is None else level - self.sag(x, y)
 
-    def means(self, patches: PatchGrid) -> Array:
+    def means(self, patches: Partition) -> Array:
         """Return the mean approach over every patch, shape (N,) [mm].
 
         Exact but for the sag, which Gauss' rule integrates to degree 7.
         """
         if self.sag is None:
             return self.at(*patches.centres.T)
-        (a, b), centres = patches.half_sizes, patches.centres
-        x = centres[:, 0, None, None] + a * _NODES[:, None]
-        y = centres[:, 1, None, None] + b * _NODES
+        centres, half = patches.centres[:, :, None, None], patches.half_sides[:, :, None, None]
+        x = centres[:, 0] + half[:, 0] * _NODES[:, None]
+        y = centres[:, 1] + half[:, 1] * _NODES
         values = self.at(*np.broadcast_arrays(x, y))
         return np.asarray(0.25 * np.einsum("nij,i,j->n", values, _WEIGHTS, _WEIGHTS))
 

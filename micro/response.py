@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import PatchGrid
+from geometry import Partition
 from geometry.errors import InputError
 
 Array = NDArray[np.float64]
@@ -109,7 +109,7 @@ class Response:
         rows: Sequence[dict[str, Any]],
         model: str,
         contact_modulus: float,
-        patches: PatchGrid,
+        patches: Partition,
     ) -> Self:
         """Put together the fields at single approaches, in their order.
 
@@ -128,7 +128,7 @@ class Response:
         return cls(
             model=model,
             contact_modulus=contact_modulus,
-            nominal_area=patches.area * patches.count,
+            nominal_area=float(np.prod(patches.sides)),
             **columns,
         )
 
@@ -144,7 +144,7 @@ class Response:
 
     @property
     def patch_pressure(self) -> Array:
-        """Force per area of the patch, shape (n, N) [MPa]."""
+        """Force per area of each of N equal patches, shape (n, N) [MPa]."""
         return self.patch_force * (self.patch_force.shape[1] / self.nominal_area)
 
     @property

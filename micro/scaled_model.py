@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry import Asperities, PatchGrid, Surface
+from geometry import Asperities, Partition, PatchGrid, Surface
 from geometry.errors import InputError, NotConverged
 from micro.asperity_models import MODELS, AsperityModel, asperity_model
 from micro.asperity_state import AsperityState
@@ -149,7 +149,7 @@ class ScaledModel:
         self,
         approaches: ArrayLike,
         *,
-        patches: PatchGrid,
+        patches: Partition,
         mean_heights: ArrayLike,
         tilt: tuple[float, float] = _LEVEL,
     ) -> Response:
@@ -191,7 +191,7 @@ class ScaledModel:
         self,
         plane: RigidPlane,
         *,
-        patches: PatchGrid,
+        patches: Partition,
         mean_heights: ArrayLike,
         start: Any = None,
     ) -> Pressed:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.patches import PatchGrid
+from geometry.partition import Partition, UnevenPartition
 from micro import HalfSpace, influence_matrix
 from multiscale.law_files import LawTable
 from multiscale.stage import Stage
@@ -19,6 +19,9 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
 Array = NDArray[np.float64]
 
 _LOADS = 16  # rectangles along a side, at least, that tell a smooth field the contacts' forces
+_HALVINGS = 2
+"""Halvings of the outermost rectangles: contacts near a free side feel it on a finer scale. None
+misses 1.4 % of the force of Set 1, seed 1 at 8 µm; 1, 2, 3 miss 0.5, 0.2 and 0.1 %."""
 
 
 def embedding(stage: Stage, comm: Any) -> Interface:
@@ -97,17 +100,30 @@ def yielding(stage: Stage, table: LawTable, comm: Any) -> Yielding:
     return SpreadLoads(_half_space(stage), table.spread)
 
 
-def fine_loads(stage: Stage) -> PatchGrid:
-    """Return rectangles that divide the patches of a scene, several along each side."""
-    nx, ny = (count * -(-_LOADS // count) for count in stage.patches.grid)
-    return PatchGrid(grid=(nx, ny), lengths=stage.patches.lengths)
+def fine_loads(stage: Stage) -> UnevenPartition:
+    """Return rectangles that divide the patches of a scene, smallest at free sides of its block."""
+    patches = stage.patches
+    sizes = zip(patches.lengths, patches.grid, strict=True)
+    even = [
+        np.linspace(0.0, length, n * -(-_LOADS // n) + 1, dtype=np.float64) for length, n in sizes
+    ]
+    if stage.scene.block.sides == "free" and not stage.shape.margin:
+        even = [_graded(ticks) for ticks in even]
+    return UnevenPartition(ticks_x=tuple(even[0]), ticks_y=tuple(even[1]))
+
+
+def _graded(ticks: Array) -> Array:
+    """Halve the outermost intervals towards the ends."""
+    halves = 0.5 ** np.arange(_HALVINGS, 0, -1)
+    first, last = ticks[0] + halves * (ticks[1] - ticks[0]), ticks[-1] - halves * np.diff(ticks)[-1]
+    return np.concatenate([ticks[:1], first, ticks[1:-1], last[::-1], ticks[-1:]])
 
 
 def _half_space(stage: Stage) -> Array:
     return np.asarray(influence_matrix(stage.patches) / (np.pi * stage.model.contact_modulus))
 
 
-def smooth_correction(stage: Stage, loads: PatchGrid, comm: Any) -> Correction:
+def smooth_correction(stage: Stage, loads: Partition, comm: Any) -> Correction:
     """Return what the scene's block adds to the half-space.
 
     Args:

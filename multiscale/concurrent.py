@@ -85,7 +85,7 @@ class ConcurrentCoupling:
             raise InputError("the tolerance must be positive", value=tolerance, allowed="> 0")
         self._model, self._tolerance = model, tolerance
         self._contact = SaggingContact(model, patches, mean_heights, correction, comm)
-        self._half = 0.5 * float(np.hypot(*correction.loads.lengths))
+        self._half = 0.5 * float(np.hypot(*correction.loads.sides))
         self._newton = ConcurrentNewton(self._contact, model.contact_modulus, self._half)
         self._last: _Found | None = None
         self._coarse: ConcurrentCoupling | None = None

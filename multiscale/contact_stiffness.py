@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.patches import PatchGrid
+from geometry.partition import Partition
 from micro import Response
 from micro.influence import influence_matrix
 
@@ -33,9 +33,9 @@ class ContactStiffness:
         Pharr, Oliver & Brotzen 1992, doi 10.1557/JMR.1992.0613, eq. 4.
     """
 
-    def __init__(self, loads: PatchGrid, contact_modulus: float) -> None:
+    def __init__(self, loads: Partition, contact_modulus: float) -> None:
         self._modulus = contact_modulus
-        self._mutual = influence_matrix(loads) / (np.pi * contact_modulus * loads.area)
+        self._mutual = influence_matrix(loads) / (np.pi * contact_modulus * loads.areas)
 
     def estimate(self, response: Response) -> Array:
         """Return the stiffness from the contact areas alone, shape (M, M) [N/mm].

@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 
 from geometry.errors import InputError
+from geometry.partition import UnevenPartition
 from geometry.patches import PatchGrid
 from multiscale.laws import PatchLaw
 from multiscale.spread import ContactSpread
@@ -87,7 +88,8 @@ def write_laws(path: Path | BinaryIO, table: LawTable) -> None:
                 group.attrs[name] = getattr(law, name)
         if table.spread is not None:
             group = file.create_group("spread")
-            group.attrs["load_grid"] = table.spread.loads.grid
+            group.attrs["load_borders_x_mm"] = table.spread.loads.borders_x
+            group.attrs["load_borders_y_mm"] = table.spread.loads.borders_y
             for name, unit in _SPREAD.items():
                 group.create_dataset(name, data=getattr(table.spread, name)).attrs["unit"] = unit
 
@@ -130,8 +132,8 @@ def read_laws(path: Path | BinaryIO) -> LawTable:
 
 
 def _spread(group: Any, patches: PatchGrid) -> ContactSpread:
-    grid = _pair(group.attrs["load_grid"], int)
-    loads = PatchGrid(grid=grid, lengths=patches.lengths, origin=patches.origin)
+    ticks = {f"ticks_{axis}": tuple(group.attrs[f"load_borders_{axis}_mm"]) for axis in "xy"}
+    loads = UnevenPartition(**ticks)
     columns = {name: np.asarray(group[name][()]) for name in _SPREAD}
     return ContactSpread(patches=patches, loads=loads, **columns)
 

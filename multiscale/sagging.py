@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from geometry.collective import on_root
 from geometry.control import Control
+from geometry.partition import Partition
 from geometry.patches import PatchGrid
 from micro import MicroModel, Response, RigidPlane
 from multiscale.coupling import response_step
@@ -23,7 +24,7 @@ class SmoothCorrection(Protocol):
     """What a block's surface yields beyond the half-space."""
 
     @property
-    def loads(self) -> PatchGrid:
+    def loads(self) -> Partition:
         """The M rectangles whose forces drive it."""
 
     def sag(self, forces: Array) -> Callable[[Array, Array], Array]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import InputError
+from geometry.partition import Partition
 from geometry.patches import PatchGrid
 from micro import Field
 
@@ -20,13 +21,13 @@ class Sinking(Protocol):
     """What the block sinks more than a half-space, for forces on small rectangles."""
 
     @property
-    def loads(self) -> PatchGrid:
+    def loads(self) -> Partition:
         """The M rectangles."""
 
     def sag(self, forces: Array, /) -> Field:
         """Return the field of what it sinks by forces on the rectangles, shape (M,) [N]."""
 
-    def patch_compliance(self, patches: PatchGrid, /) -> Array:
+    def patch_compliance(self, patches: Partition, /) -> Array:
         """Return its mean over patch i by unit pressure on patch j, shape (N, N) [mm/MPa]."""
 
 
@@ -50,7 +51,7 @@ class ContactSpread:
     """
 
     patches: PatchGrid
-    loads: PatchGrid
+    loads: Partition
     approach: Array
     forces: Array
     correction: Array
@@ -72,7 +73,7 @@ class ContactSpread:
         """Return the shares of rectangles in their patch's force, and the derivatives.
 
         Forces are interpolated linearly between rows. Before its first row under load a patch has
-        that row's shares, beyond the last row the last one's, and equal ones without any load.
+        that row's shares, beyond the last row the last one's, and those of its area without any.
 
         Args:
             local: Local approaches of the patches, shape (N,) [mm].
@@ -98,7 +99,7 @@ class ContactSpread:
         )
         none = total <= 0.0
         total = np.where(none, 1.0, total)
-        share = np.where(none, len(column) / self.loads.count, force / total)
+        share = np.where(none, self.loads.areas / self.patches.area, force / total)
         return share, np.where(none, 0.0, (slope - share * rise) / total)
 
     @cached_property
@@ -110,16 +111,19 @@ class ContactSpread:
         return np.where(loaded.any(axis=1), loaded.argmax(axis=1), len(self.approach) - 1)
 
 
-def check_division(patches: PatchGrid, loads: PatchGrid) -> None:
+def check_division(patches: PatchGrid, loads: Partition) -> None:
     """Refuse rectangles that do not divide the patches.
 
     Raises:
         InputError: When they do not.
     """
-    counts = np.divide(loads.grid, patches.grid)
-    if not np.all(counts == np.round(counts)):
-        raise InputError(
-            "the rectangles of the loads must divide the patches",
-            value=loads.grid,
-            allowed=f"multiples of {patches.grid}",
-        )
+    slack = 1e-9 * max(patches.lengths)
+    for axis in ("borders_x", "borders_y"):
+        borders, lines = getattr(patches, axis), getattr(loads, axis)
+        away = np.abs(np.subtract.outer(borders, lines)).min(axis=1) > slack
+        if away.any() or abs(lines[0] - borders[0]) + abs(lines[-1] - borders[-1]) > slack:
+            raise InputError(
+                "the rectangles of the loads must divide the patches",
+                value=loads.shape,
+                allowed=f"grid lines on all {axis} of the patches",
+            )

@@ -70,8 +70,7 @@ class SpreadLoads:
         self._half_space, self._spread = half_space, spread
         self._area, self.count = spread.patches.area, len(half_space)
         patches, owner = np.arange(self.count), spread.owner
-        belongs = np.equal.outer(patches, owner)
-        means = belongs / belongs.sum(axis=1, keepdims=True)
+        means = np.equal.outer(patches, owner) * spread.loads.areas / self._area
         # columns of one patch side by side: their sums are the bulk of a Newton step
         self._order = np.argsort(owner, kind="stable")
         self._starts = np.searchsorted(owner[self._order], patches)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geometry import PatchGrid, Spectrum, Surface, patch_means, synthesise
+from geometry import PatchGrid, Spectrum, Surface, UnevenPartition, patch_means, synthesise
 from geometry.control import Control
 from geometry.meshes import BlockShape
 from macro import Material, make_correction
@@ -154,3 +154,28 @@ def test_laws_reach_all_patches_of_a_pancake(root):
     }
     # measured: 0.7 % on finer cells
     assert force["consistent"] == pytest.approx(force["concurrent"], rel=0.015)
+
+
+def _near_a_side(halvings):
+    """Force on a ball 20 µm from a free side, on rectangles of 1/16 that are halved outwards."""
+    x = (np.arange(96) + 0.5) / 96
+    ball = ((x[:, None] - 0.02) ** 2 + (x - 0.4) ** 2) / (2.0 * 0.1)
+    ticks = np.linspace(0.0, 1.0, 17)
+    halves = ticks[1] * 0.5 ** np.arange(halvings, 0, -1)
+    ticks = np.concatenate([[0.0], halves, ticks[1:-1], 1.0 - halves[::-1], [1.0]])
+    loads = UnevenPartition(ticks_x=tuple(ticks), ticks_y=tuple(ticks))
+    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(16, 16, 12))
+    material, half_space = Material(young_modulus=YOUNG, poisson_ratio=NU), HalfSpace(YOUNG, NU)
+    correction = make_correction(shape, material, "free", loads, half_space, mpi.COMM_SELF)
+    surface = Surface(heights=-ball, lengths=(1.0, 1.0))
+    model = HalfSpaceModel(surface=surface, contact_modulus=MODULUS)
+    means = patch_means(surface, SCENE)
+    coupling = ConcurrentCoupling(model, SCENE, means, correction)
+    return coupling.press(Control(approach=2e-3)).force_N
+
+
+def test_contacts_near_a_free_side_feel_it_on_their_own_scale():
+    even, halved, finest = (_near_a_side(halvings) for halvings in (0, 2, 3))
+    # measured 2.4 and 0.7 %, of a contact of 14 µm whose middle is 20 µm from the side
+    assert abs(even / finest - 1.0) > 0.02
+    assert abs(halved / finest - 1.0) < 0.01

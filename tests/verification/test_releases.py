@@ -18,7 +18,7 @@ FORCES = {
     "embedded": (["patches.grid=[4, 2]"], [0.559137615013406, 2.41750883739317]),
     "concurrent": (
         ["coupling.kind=concurrent", "micro.model=half-space"],
-        [0.629709463485547, 3.11451895560614],
+        [0.629709463485602, 3.0780472893962],
     ),
 }
 

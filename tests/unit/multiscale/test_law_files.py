@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import InputError
+from geometry.partition import UnevenPartition
 from geometry.patches import PatchGrid
 from multiscale.law_files import LawTable, read_laws, write_laws
 from multiscale.laws import PatchLaw
@@ -56,7 +57,10 @@ def test_round_trip_is_exact(table, tmp_path):
 
 def test_places_of_the_contacts_survive_too(table, tmp_path):
     random = np.random.default_rng(6)
-    loads = PatchGrid(grid=(4, 3), lengths=table.patches.lengths)
+    lx, ly = table.patches.lengths
+    loads = UnevenPartition(
+        ticks_x=(0.0, 0.1 * lx, 0.5 * lx, 0.7 * lx, lx), ticks_y=tuple(np.linspace(0.0, ly, 4))
+    )
     spread = ContactSpread(
         patches=table.patches,
         loads=loads,

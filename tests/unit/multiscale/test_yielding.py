@@ -119,7 +119,7 @@ def test_slope_is_the_derivative(local):
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"loads": PatchGrid(grid=(3, 2), lengths=(2.0, 1.0))}, r"must divide .*multiples of"),
+        ({"loads": PatchGrid(grid=(3, 2), lengths=(2.0, 1.0))}, r"must divide .*grid lines on all"),
         ({"forces": np.zeros((3, 8))}, "rows of a spread do not fit"),
         ({"approach": np.zeros((9, 3))}, "rows of a spread do not fit"),
         ({"correction": np.zeros((8, 7))}, "rows of a spread do not fit"),
