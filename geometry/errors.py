@@ -86,5 +86,14 @@ class NotConverged(PatchlawError, RuntimeError):
         return _not_converged, (self.what, self.reason, self.iterations, self.remedy)
 
 
+class NotWritten(PatchlawError, RuntimeError):
+    """A file cannot be written: no space left, a folder gone; no half of it stands anywhere.
+
+    What a run had accepted before is in its last checkpoint.
+    """
+
+    exit_code = 5
+
+
 def _not_converged(what: str, reason: str, iterations: int, remedy: str) -> NotConverged:
     return NotConverged(what, reason=reason, iterations=iterations, remedy=remedy)

@@ -119,7 +119,7 @@ class UnevenPartition(Partition):
                     allowed="two numbers or more, each above the one before, in mm",
                     key=name,
                 )
-            object.__setattr__(self, name, tuple(ticks.tolist()))
+            object.__setattr__(self, name, tuple(map(float, ticks)))
 
     @property
     def borders_x(self) -> Array:

@@ -9,21 +9,27 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import basix
 import numpy as np
-from dolfinx import fem, io
+from dolfinx import fem, io, jit
 from dolfinx.fem import petsc as fem_petsc
 from numpy.typing import NDArray
 from petsc4py import PETSc
+
+from macro.jit import TIMEOUT, explained
 
 try:
     from dolfinx.io import gmsh as _gmsh_io
 except ImportError:
     from dolfinx.io import gmshio as _gmsh_io
 
-_JIT = {"timeout": 60}  # another process may be compiling the same form on a slow machine
+_JIT = {"timeout": TIMEOUT}  # another process may be compiling the same form on a slow machine
+HAS_VTX = hasattr(io, "VTXWriter")
+"""Whether this dolfinx was built with ADIOS2."""
+
 _CELLS = {"hexahedron": basix.CellType.hexahedron, "tetrahedron": basix.CellType.tetrahedron}
 
 
@@ -38,6 +44,19 @@ def _quiet_compiler() -> Iterator[None]:
     finally:
         root.setLevel(level)  # setuptools changes it
         logging.disable(disabled)
+
+
+def form_cache() -> Path:
+    """Return the folder of the compiled forms."""
+    options = jit.get_options if hasattr(jit, "get_options") else jit.get_parameters
+    return Path(options()["cache_dir"])
+
+
+@contextmanager
+def _compiling() -> Iterator[None]:
+    """Compile in silence; what goes wrong comes with its remedy."""
+    with _quiet_compiler(), explained(form_cache()):
+        yield
 
 
 @_quiet_compiler()
@@ -55,7 +74,7 @@ def mesh_from_gmsh(model: Any, comm: Any) -> tuple[Any, Any]:
     return (data.mesh, data.facet_tags) if hasattr(data, "mesh") else (data[0], data[2])
 
 
-@_quiet_compiler()
+@_compiling()
 def vector_space(mesh: Any, degree: int) -> Any:
     """Return the continuous Lagrange space of displacements, three components per node.
 
@@ -68,7 +87,7 @@ def vector_space(mesh: Any, degree: int) -> Any:
     return fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
 
 
-@_quiet_compiler()
+@_compiling()
 def cellwise_space(mesh: Any) -> Any:
     """Return the space of scalars that are constant on every cell."""
     if hasattr(fem, "functionspace"):
@@ -139,7 +158,7 @@ def triangle_rule(degree: int) -> tuple[NDArray[np.float64], NDArray[np.float64]
     return points, weights
 
 
-@_quiet_compiler()
+@_compiling()
 def compile_form(form: Any) -> Any:
     """Compile a UFL form."""
     try:
@@ -169,6 +188,20 @@ def assemble_vector(form: Any) -> PETSc.Vec:
     vector = fem_petsc.assemble_vector(form)
     vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
     return vector
+
+
+def write_vtx(path: str, function: Any) -> None:
+    """Write a Lagrange function of any degree as VTX; only where `HAS_VTX`.
+
+    Args:
+        path: Folder to write, ending in ``.bp``.
+        function: The function.
+
+    Note:
+        Collective.
+    """
+    with io.VTXWriter(function.function_space.mesh.comm, path, [function]) as file:
+        file.write(0.0)
 
 
 def write_xdmf(path: str, mesh: Any, functions: Sequence[Any]) -> None:

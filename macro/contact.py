@@ -56,7 +56,7 @@ class Contact:
         self.half = 0.5 * float(np.hypot(*patches.lengths))
         self.unit = np.array([1.0, 1.0 / self.half, 1.0 / self.half])
         self.plane: Array = np.zeros(3)
-        self.free = np.zeros(3, dtype=bool)
+        self.free: NDArray[np.bool_] = np.zeros(3, dtype=bool)
         self.force: float | None = None
 
     def prescribe(self, control: Control, plane: Array) -> None:

@@ -84,8 +84,8 @@ class _TangentAction:
         self._stiffness, self._operator = stiffness, sampling.operator
         self._comm = stiffness.comm.tompi4py()
         self._stretch = sampling.operator.createVecRight()
-        self.slope = np.zeros(len(sampling.weight))  # p'/w
-        self.border = np.zeros((len(sampling.weight), 0))  # E
+        self.slope: Array = np.zeros(len(sampling.weight))  # p'/w
+        self.border: Array = np.zeros((len(sampling.weight), 0))  # E
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write K x + B (diag(p'/w) − E Eᵀ) Bᵀ x."""

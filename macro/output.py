@@ -20,7 +20,8 @@ def write_fields(
     """Write displacements [mm] and patch pressures [MPa] as XDMF, with an HDF5 file beside it.
 
     Quadratic displacements are written at the vertices. The pressure of a patch colours the cells
-    under it; it is zero elsewhere.
+    under it; it is zero elsewhere. Where dolfinx has ADIOS2, displacements of any degree are also
+    written as VTX, in a folder beside it that ends in ``.bp``.
 
     Args:
         path: File to write, ending in ``.xdmf``.
@@ -34,6 +35,8 @@ def write_fields(
     block = interface.block
     mesh = block.mesh.mesh
     moved = block.function(displacement)
+    if compat.HAS_VTX:
+        compat.write_vtx(str(Path(path).with_suffix(".bp")), moved)
     if block.degree > 1:
         linear = fem.Function(compat.vector_space(mesh, 1), name=moved.name)
         linear.interpolate(moved)

@@ -129,6 +129,23 @@ class PressedBlock:
         seconds = comm.allreduce(time.perf_counter() - began, op=MPI.MAX)
         return self._state(solution, report, seconds)
 
+    def start_from(self, pressure: Array) -> None:
+        """Let the next load step start from the displacements by mean pressures of the patches.
+
+        Args:
+            pressure: Pressures, shape (N,) [MPa].
+
+        Note:
+            Collective; one linear solve.
+        """
+        if not pressure.any():
+            return
+        block = self.equilibrium.block
+        displacement = block.stiffness.createVecRight()
+        found = block.solve(self._interface.load(pressure))
+        displacement.array[:] = found.x.array[: block.owned_dofs]
+        self._basis.add(displacement)
+
     def patch_means(self, functions: Sequence[Callable[[Array], Array]]) -> Array:
         """Average functions of closure over the patches, at the latest equilibrium.
 

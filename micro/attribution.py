@@ -55,7 +55,8 @@ def shares(patches: Partition, position: Array, semi_axes: Array, angle: Array) 
     lean = cos * sin * (axes[:, 0] - axes[:, 1])  # the ellipse's matrix is [[X², lean], [lean, Y²]]
     first, last = (_interval(patches, position + side * across) for side in (-1.0, 1.0))
     whole = np.flatnonzero((first == last).all(axis=1))
-    home = first[whole] @ [patches.shape[1], 1]
+    stride = np.array([patches.shape[1], 1])
+    home = first[whole] @ stride
     parts = [Shares(whole, home, np.ones(len(whole)), np.ones(len(whole)))]
     cut = np.flatnonzero((first != last).any(axis=1))
     if cut.size:
@@ -65,7 +66,7 @@ def shares(patches: Partition, position: Array, semi_axes: Array, angle: Array) 
             place = first[cut] + (i, j)
             on = np.flatnonzero((place <= last[cut]).all(axis=1))
             force, area = contacts.within(on, place[on])
-            parts.append(Shares(cut[on], place[on] @ [patches.shape[1], 1], force, area))
+            parts.append(Shares(cut[on], place[on] @ stride, force, area))
     return _normed(Shares(*map(np.concatenate, zip(*parts, strict=True))), len(position))
 
 

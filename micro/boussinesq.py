@@ -76,7 +76,7 @@ class HalfSpace:
             -side * corner.chi_y - z * corner.v_y,
             2.0 * (1.0 - nu) * corner.v - z * corner.v_z,
         )
-        return _differences(parts, loads) / (4.0 * np.pi * self.shear_modulus)
+        return _differences(parts, loads, 4.0 * np.pi * self.shear_modulus)
 
     def stresses(self, x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: Partition) -> Array:
         """Return stresses by unit pressure on each rectangle alone, positive in tension.
@@ -102,7 +102,7 @@ class HalfSpace:
             -z * corner.v_xz,
             -side * corner.chi_xy - z * corner.v_xy,
         )
-        return _differences(parts, loads) / (2.0 * np.pi)
+        return _differences(parts, loads, 2.0 * np.pi)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -198,13 +198,15 @@ class _Corners:
         return np.log(np.maximum(self.r + self.z, _TINY))
 
 
-def _differences(parts: tuple[Array, ...], loads: Partition) -> Array:
-    """Difference corner terms to rectangles, shape (parts, n, M).
+def _differences(parts: tuple[Array, ...], loads: Partition, divisor: float) -> Array:
+    """Difference corner terms to rectangles and divide them, shape (parts, n, M).
 
     Distances to the lower border are the longer ones: it counts positive.
     """
     corners = np.stack(np.broadcast_arrays(*parts))
-    return np.diff(np.diff(corners, axis=2), axis=3).reshape(*corners.shape[:2], loads.count)
+    rectangles: Array = np.diff(np.diff(corners, axis=2), axis=3)
+    rectangles /= divisor
+    return rectangles.reshape(*corners.shape[:2], loads.count)
 
 
 def _asinh_ratio(numerator: Array, denominator: Array) -> Array:

@@ -55,7 +55,7 @@ def find_contacts(pressure: Array, spacing: tuple[float, float], *, periodic: bo
     owner = labels.ravel()
     cells = np.flatnonzero(owner)
     which, load = owner[cells] - 1, pressure.ravel()[cells]
-    cell = spacing[0] * spacing[1]
+    cell = np.float64(spacing[0] * spacing[1])
     corrected = true_area(pressure > 0.0, periodic=periodic).ravel()[cells]
     rising = np.argsort(load, kind="stable")
     top = np.zeros(count, np.intp)

@@ -123,7 +123,7 @@ class HalfSpaceModel:
                 pressed to full contact or by a tilted plane.
             NotConverged: When the contact conditions cannot be met to the tolerance.
         """
-        first = None if start is None else self._started(start)
+        first = None if start is None else self._started(start.pressure)
         return self._pressed(self._plane(approach, tilt), first)
 
     def solve_force(
@@ -155,7 +155,7 @@ class HalfSpaceModel:
         dx, dy = self.surface.spacing
         known = None
         if start is not None and start.force > 0.0:
-            known = Pressures(self._started(start), start.approach, 0.0, 0, 0)
+            known = Pressures(self._started(start.pressure), start.approach, 0.0, 0, 0)
         total = force / (self.contact_modulus * dx * dy)
         found = self._pressing.by_force(level, total, known)
         return self._state(self._plane(found.approach, tilt), level + found.approach, found)
@@ -206,7 +206,7 @@ class HalfSpaceModel:
         self._check_tilt(plane.tilt)
         state = self._pressed(plane, None if start is None else self._started(start))
         rows = [sums.row(plane, state)]
-        return Pressed(Response.of(rows, self.name, self.contact_modulus, patches), state)
+        return Pressed(Response.of(rows, self.name, self.contact_modulus, patches), state.pressure)
 
     def _sums(self, patches: Partition, mean_heights: ArrayLike) -> CellSums:
         means = np.asarray(mean_heights, float)
@@ -228,14 +228,14 @@ class HalfSpaceModel:
             before, last = last, self._pressed(plane, first)
             yield plane, last
 
-    def _started(self, start: HalfSpaceState) -> Array:
-        if start.pressure.shape != self.surface.grid:
+    def _started(self, pressure: Array) -> Array:
+        if pressure.shape != self.surface.grid:
             raise InputError(
                 "the solution to start from is of another grid",
-                value=start.pressure.shape,
+                value=pressure.shape,
                 allowed=f"{self.surface.grid}",
             )
-        return start.pressure / self.contact_modulus
+        return np.asarray(np.divide(pressure, self.contact_modulus))
 
     def _pressed(self, plane: RigidPlane, start: Array | None) -> HalfSpaceState:
         required = self._required(plane)

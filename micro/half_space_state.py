@@ -75,7 +75,7 @@ class HalfSpaceState:
         On a periodic surface it counts from its own mean.
         """
         grid = self.grids.at(self.pressure.shape, self.spacing)
-        return grid.displacement(self.pressure / self.contact_modulus)
+        return grid.displacement(np.divide(self.pressure, self.contact_modulus))
 
     @property
     def gap(self) -> Array:

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,7 +121,9 @@ class Interaction:
         slope[own] = 0.0
         return Lift(active, field @ (1.0 / (self.size * self.integral)[active]), slope)
 
-    def local(self, dx: Array, dy: Array, index: NDArray[np.intp] | slice) -> tuple[Array, Array]:
+    def local(
+        self, dx: Array, dy: Array, index: NDArray[np.integer[Any]] | slice
+    ) -> tuple[Array, Array]:
         """Return differences of position along and across the axes of contacts [mm].
 
         Args:

@@ -55,7 +55,8 @@ def settle(relief: Relief, level: float) -> Settled:
     deepest = float(above.max(initial=0.0))
     reached = above > 0.0
     linked = relief.open_passes(np.full(len(relief), level))
-    region, lift, relaxed = relief.regions(linked), np.zeros(len(relief)), Relaxation()
+    region, relaxed = relief.regions(linked), Relaxation()
+    lift: Array = np.zeros(len(relief))
     for number in range(_MOST_PASSES):
         now = relief.open_passes(level + lift)
         now &= linked | (number < _FREE_PASSES)

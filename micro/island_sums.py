@@ -94,7 +94,7 @@ class IslandSums:
         home = self._homes(settled)
         force, area = (
             self._share(place, weight, home)
-            for weight in (np.sqrt(np.maximum(pressed, 0.0)), pressed > 0.0)
+            for weight in (np.sqrt(np.maximum(pressed, 0.0)), (pressed > 0.0).astype(float))
         )
         return force, area
 

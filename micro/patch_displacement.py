@@ -64,7 +64,7 @@ def patch_displacements(
     for first in range(0, len(load), block):  # blocks bound the memory
         corners += _corners(patches, point[first : first + block], load[first : first + block])
     love = np.diff(np.diff(corners.reshape(crossings), axis=0), axis=1)
-    return love.ravel() / (np.pi * contact_modulus * patches.areas)
+    return np.asarray(love.ravel() / (np.pi * contact_modulus * patches.areas))
 
 
 def _corners(patches: Partition, point: Array, load: Array) -> Array:
@@ -72,7 +72,7 @@ def _corners(patches: Partition, point: Array, load: Array) -> Array:
     to_x = patches.borders_x - point[:, 0, None]
     to_y = patches.borders_y - point[:, 1, None]
     corners = corner_integral(to_x[:, :, None], to_y[:, None, :])
-    return np.tensordot(load, corners, axes=1).ravel()
+    return np.asarray(np.tensordot(load, corners, axes=1), dtype=np.float64).ravel()
 
 
 def _far_from_borders(patches: Partition, position: Array, semi_major: Array) -> NDArray[np.bool_]:

@@ -31,7 +31,8 @@ class Box(NamedTuple):
         Its sides are rounded up to 2^k or 3 · 2^(k−1) cells, as far as the grid has them: along
         a load path few sizes occur, whose kernels and work arrays serve again.
         """
-        return cls(_span(cells.any(axis=1)), _span(cells.any(axis=0)))
+        rows, columns = (np.logical_or.reduce(cells, axis=axis) for axis in (1, 0))
+        return cls(_span(rows), _span(columns))
 
 
 def _span(used: NDArray[np.bool_]) -> slice:

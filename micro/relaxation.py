@@ -23,7 +23,8 @@ class Relaxation:
 
     def forget(self) -> None:
         """Start anew, where the iteration has become another one."""
-        self._part, self._last = _FIRST, np.empty(0)
+        self._part = _FIRST
+        self._last: NDArray[np.float64] = np.empty(0)
 
     def next(self, point: Array, change: Array) -> Array:
         """Return the next point.

@@ -183,7 +183,8 @@ class Relief:
     @cached_property
     def _cumulated(self) -> tuple[Array, Array]:
         nothing = np.zeros((len(_POWERS), 1))
-        return tuple(
+        moments, deep = (
             np.concatenate([nothing, np.cumsum(part, axis=1)], axis=1)
             for part in (self.moments, self.moments * self.depth)
         )
+        return moments, deep

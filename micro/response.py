@@ -21,7 +21,8 @@ class Pressed(NamedTuple):
 
     Attributes:
         response: The response, of one row.
-        start: What the same model starts the next plane from, when that lies nearby.
+        start: What the same model starts the next plane from, when that lies nearby: an array, or
+            None of a model that starts from nothing.
     """
 
     response: Response

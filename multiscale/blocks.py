@@ -104,7 +104,9 @@ def fine_loads(stage: Stage) -> UnevenPartition:
     """Return rectangles that divide the patches of a scene, smallest at free sides of its block."""
     patches = stage.patches
     sizes = zip(patches.lengths, patches.grid, strict=True)
-    even = [np.linspace(0.0, length, n * -(-_LOADS // n) + 1) for length, n in sizes]
+    even = [
+        np.linspace(0.0, length, n * -(-_LOADS // n) + 1, dtype=np.float64) for length, n in sizes
+    ]
     if stage.scene.block.sides == "free" and not stage.shape.margin:
         even = [_graded(ticks) for ticks in even]
     return UnevenPartition(ticks_x=tuple(even[0]), ticks_y=tuple(even[1]))

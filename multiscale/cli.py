@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import argparse
 import sys
+import time
 import traceback
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
 from geometry.errors import InputError, PatchlawError
-from multiscale import commands, terminal
+from multiscale import commands, doctor_command, terminal
 
+_MOST_PATIENT = 5.0  # with other ranks, at the end [s]
 _SOLVER_OPTIONS = ("-snes_", "-ksp_", "-pc_", "-mg_")
 
 
@@ -31,29 +33,62 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Returns:
         0 done; 2 the input is wrong and nothing was written; 3 not converged, the state up to
-        there kept; 1 a bug.
+        there kept; 4 stopped in time; 5 a file cannot be written; 130 and 143 stopped by SIGINT
+        and SIGTERM; 1 a bug. After 3, 4, 5, 130 and 143 ``patchlaw run --resume`` goes on from the
+        last load step.
 
     Note:
         Collective over all processes of the MPI job.
     """
     comm = _world()
+    meeting = None if comm is None else comm.Dup()  # none else must send anything through it
     words = list(sys.argv[1:] if arguments is None else arguments)
     cut = words.index("--") if "--" in words else len(words)
     try:
         choice = _parser().parse_args(words[:cut])
         choice.command(choice, _given_to_petsc(words[cut + 1 :]), comm)
     except PatchlawError as error:
-        terminal.complain(comm, error)
-        return error.exit_code
+        if _met_by_all(meeting):
+            terminal.complain(comm, error)
+            return error.exit_code
+        terminal.complain(None, error)
+        return _ended(comm, error.exit_code)
+    except KeyboardInterrupt:
+        return _ended(comm, 130)
     except BrokenPipeError:  # whoever read our output has enough
         sys.stderr.close()
         return 0
     except Exception:
-        traceback.print_exc()
         if comm is not None:
-            comm.Abort(1)  # the other ranks may wait for this one
-        return 1
+            time.sleep(min(comm.rank, _MOST_PATIENT))  # of ranks with the same error, one tells it
+        traceback.print_exc()
+        return _ended(comm, 1)
+    _met_by_all(meeting)
     return 0
+
+
+def _met_by_all(comm: Any) -> bool:
+    """Wait for the other ranks at the end of a command; False when some do not come.
+
+    An error that only this rank met leaves them waiting in the middle of something.
+    """
+    if comm is None:
+        return True
+    barrier = comm.Ibarrier()
+    until = time.monotonic() + _MOST_PATIENT
+    while not barrier.Test():
+        if time.monotonic() > until:
+            return False
+        time.sleep(0.01)
+    return True
+
+
+def _ended(comm: Any, code: int) -> int:
+    """End all ranks of a job at once; a process on its own is left to return."""
+    if comm is not None:
+        sys.stderr.flush()
+        comm.Abort(code)
+    return code
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -71,6 +106,8 @@ def _parser() -> argparse.ArgumentParser:
     }.items():
         sub = subparsers.add_parser(name, help=_summary(command), description=_summary(command))
         sub.set_defaults(command=command)
+        if name == "run":
+            _add_interruption(sub)
         sub.add_argument("scene", type=Path, help="scene file (TOML)")
         sub.add_argument("--out", type=Path, metavar="DIR", help="folder of the results")
         sub.add_argument(
@@ -83,7 +120,17 @@ def _parser() -> argparse.ArgumentParser:
         )
     schema = subparsers.add_parser("schema", help=_summary(commands.print_schema))
     schema.set_defaults(command=commands.print_schema)
+    doctor_command.add_commands(subparsers)
     return parser
+
+
+def _add_interruption(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--resume", action="store_true", help="go on after the last load step of an interrupted run"
+    )
+    parser.add_argument(
+        "--max-time", metavar="TIME", help="stop cleanly before so much wall time is over, as 55m"
+    )
 
 
 def _summary(command: Any) -> str:

@@ -9,12 +9,16 @@ from pathlib import Path
 from typing import Any
 
 from geometry.collective import on_root
-from geometry.errors import InputError, NotConverged
+from geometry.errors import InputError, NotConverged, PatchlawError
 from geometry.statistics import roughness
 from multiscale import plan, terminal
+from multiscale.folder_lock import locked
+from multiscale.interruption import Interruption, Stopped
 from multiscale.law_files import write_laws
 from multiscale.outputs import write_whole
+from multiscale.quantities import parse_duration
 from multiscale.results import write_fields, write_figure, write_results
+from multiscale.resuming import Keeper, is_finished
 from multiscale.run import Run
 from multiscale.scene import Scene
 from multiscale.stage import make_stage
@@ -28,24 +32,73 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    scene, folder = _scene_and_folder(choice, comm)
-    run = Run(scene, comm)
+    with Interruption(comm, _limit(choice.max_time)) as interruption:
+        scene, folder = _scene_and_folder(choice, comm)
+        run = Run(scene, comm)
+        with locked(folder, comm) as lock:
+            keeper = Keeper(folder, run, lock)
+            if not _begun(choice.resume, folder, run, keeper):
+                return
+            failure = _stepped(run, keeper, interruption)
+            if run.steps:
+                terminal.show_history(comm, run.history())
+                files = on_root(comm, lambda: write_results(folder, run, options=options))
+                if scene.output.fields:
+                    files += write_fields(folder, run)
+                terminal.show_files(comm, files)
+            if failure is not None:
+                raise failure
+            on_root(comm, keeper.remove)
+
+
+def _begun(resume: bool, folder: Path, run: Run, keeper: Keeper) -> bool:
+    """Go on from a checkpoint if asked to, and say what will be done; False if nothing is left."""
+    comm, said = run.comm, None
+    if resume and keeper.resume():
+        said = f"goes on after load step {len(run.steps)}, kept in {folder}"
+    elif resume and on_root(comm, lambda: is_finished(folder, run)):
+        terminal.say(comm, f"this run is finished; its results are in {folder}")
+        return False
+    elif resume:
+        said = f"nothing to resume in {folder}: begins with the first load step"
+    elif on_root(comm, keeper.exists):
+        said = f"replaces the interrupted run in {folder} (to go on with it: --resume)"
     terminal.show_plan(comm, run.stage)
-    failure = None
-    with terminal.progress(comm, scene.loading.programme) as advance:
+    if said:
+        terminal.say(comm, said)
+    return True
+
+
+def _stepped(run: Run, keeper: Keeper, interruption: Interruption) -> PatchlawError | None:
+    """Make and keep the load steps; return what ended them early, on all ranks alike."""
+    programme = run.scene.loading.programme
+    with terminal.progress(run.comm, programme, len(run.steps)) as advance:
         try:
+            if run.stage.by_laws:
+                run.make_laws()
+            keeper.write()
+            interruption.check("before the block was made")
+            run.make_coupling()
+            interruption.check(f"after load step {len(run.steps)}")
             for step in run.load_steps():
+                keeper.keep(step)
                 advance(step)
-        except NotConverged as error:  # on all ranks; what was accepted before it is kept
-            failure = error
-    if run.steps:
-        terminal.show_history(comm, run.history())
-        files = on_root(comm, lambda: write_results(folder, run, options=options))
-        if scene.output.fields:
-            files += write_fields(folder, run)
-        terminal.show_files(comm, files)
-    if failure is not None:
-        raise failure
+                if not run.finished:
+                    interruption.check(f"after load step {step.step}", step.wall_s)
+        except Stopped as error:
+            keeper.write()
+            return error
+        except NotConverged as error:  # what was accepted before it is kept
+            return error
+    return None
+
+
+def _limit(text: str | None) -> float | None:
+    """Return the wall time that a run may take [s]."""
+    try:
+        return None if text is None else parse_duration(text)
+    except ValueError as error:
+        raise InputError(str(error), key="--max-time", value=text) from None
 
 
 def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
-from micro import MicroModel
+from micro import MicroModel, Response
 from multiscale.concurrent_newton import ConcurrentNewton, free, prescribed
 from multiscale.contact_stiffness import Secant
 from multiscale.history import LoadStep
 from multiscale.loading import described
+from multiscale.records import Arrays, packed, unpacked
 from multiscale.sagging import SaggingContact, SmoothCorrection, Trial
 
 Array = NDArray[np.float64]
@@ -110,6 +111,17 @@ class ConcurrentCoupling:
         step = self._contact.summed(found.trial, found.presses)
         self._last = found
         return step
+
+    def state(self) -> Arrays:
+        """Return the latest iterates and secants, of the coarse model too; see `Restorable`.
+
+        It is whole on rank 0 alone, which presses for all.
+        """
+        return packed(self._last)
+
+    def restore(self, state: Arrays) -> None:
+        """Go on from iterates and secants; see `Restorable`."""
+        self._last = unpacked(state, (_Found, Trial, Response))
 
     def _solved(self, control: Control, last: _Found | None) -> _Found:
         """Iterate; where a plane free to turn hardly touches, from a force that holds it there."""

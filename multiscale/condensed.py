@@ -11,6 +11,7 @@ from multiscale.dense_newton import DenseNewton, DenseState
 from multiscale.history import LoadStep, PatchState
 from multiscale.law_files import LawTable
 from multiscale.patch_laws import PatchLaws
+from multiscale.records import Arrays, packed, unpacked
 from multiscale.yielding import Yielding
 
 Array = NDArray[np.float64]
@@ -42,6 +43,14 @@ class CondensedCoupling:
         self._check_range(control, state.local)
         self._last = state
         return self._step(state)
+
+    def state(self) -> Arrays:
+        """Return the latest equilibrium; see `Restorable`."""
+        return packed(self._last)
+
+    def restore(self, state: Arrays) -> None:
+        """Go on from an equilibrium; see `Restorable`."""
+        self._last = unpacked(state, (DenseState,))
 
     def _check_range(self, control: Control, local: Array) -> None:
         """Refuse a state that stands on what was made up beyond the end of a law."""

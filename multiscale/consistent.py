@@ -64,7 +64,7 @@ def consistent_laws(
         model=model,
         patches=patches,
         mean_heights=means,
-        compliance=influence_matrix(patches) / (np.pi * model.contact_modulus),
+        compliance=np.divide(influence_matrix(patches), np.pi * model.contact_modulus),
         tilt=tilt,
         sinking=sinking,
     )

@@ -16,6 +16,7 @@ from multiscale.balance import Balance
 from multiscale.history import LoadStep, PatchState
 from multiscale.law_files import LawTable
 from multiscale.loading import BeyondLaws, described
+from multiscale.records import Arrays, packed, unpacked
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import PressedBlock, PressState
@@ -51,6 +52,14 @@ class AnalyticCoupling:
             closure=lean - response.patch_displacement[0],
             iterations=self._iterations,
         )
+
+    def state(self) -> Arrays:
+        """Return the latest plane and solution; see `Restorable`."""
+        return packed((self._balance.plane, self._balance.force, self._start))
+
+    def restore(self, state: Arrays) -> None:
+        """Go on from a plane and a solution; see `Restorable`."""
+        self._balance.plane, self._balance.force, self._start = unpacked(state, ())
 
     def _loads(self, plane: Array) -> tuple[Array, Response]:
         """Return force and moments of a plane, and the response."""
@@ -96,6 +105,21 @@ class EmbeddedCoupling:
         step = self._step(control, state)
         self._last = state
         return step
+
+    def state(self) -> Arrays:
+        """Return the latest plane and pressures, of which the displacements follow."""
+        last = self._last
+        return {} if last is None else packed((last.approach, last.tilt, last.pressure))
+
+    def restore(self, state: Arrays) -> None:
+        """Find the equilibrium under a plane again, from the pressures; see `Restorable`.
+
+        It agrees with the earlier one to the tolerance of the Newton iteration.
+        """
+        if state:
+            approach, tilt, pressure = unpacked(state, ())
+            self._pressed.start_from(pressure)
+            self._last = self._pressed.press(Control(approach=approach, tilt=tilt))
 
     def _step(self, control: Control, press: PressState) -> LoadStep:
         """Read area, contacts and separation off the laws at the converged closures."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import h5py
 import numpy as np
@@ -65,11 +65,11 @@ class LawTable:
         return self.laws[index]
 
 
-def write_laws(path: Path, table: LawTable) -> None:
+def write_laws(path: Path | BinaryIO, table: LawTable) -> None:
     """Write all laws to one HDF5 file: a group ``patch_IX_IY`` per patch, a dataset per column.
 
     Args:
-        path: File to write; one that exists is replaced.
+        path: File to write, by name or open; one that exists is replaced.
         table: The laws.
     """
     with h5py.File(path, "w") as file:
@@ -94,8 +94,11 @@ def write_laws(path: Path, table: LawTable) -> None:
                 group.create_dataset(name, data=getattr(table.spread, name)).attrs["unit"] = unit
 
 
-def read_laws(path: Path) -> LawTable:
+def read_laws(path: Path | BinaryIO) -> LawTable:
     """Read a law file.
+
+    Args:
+        path: The file, by name or open.
 
     Raises:
         InputError: When the file cannot be read, is no law file or lacks anything.

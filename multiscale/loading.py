@@ -5,13 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 
 from geometry.control import Control
 from geometry.errors import NotConverged
 from multiscale.history import LoadStep
+from multiscale.records import Arrays
 
 _MOST_HALVINGS = 8
 
@@ -28,6 +29,31 @@ class Coupling(Protocol):
         Raises:
             NotConverged: When there is none to be found; what was accepted before stays as it
                 was, so that a smaller step can be tried.
+        """
+
+
+@runtime_checkable
+class Restorable(Protocol):
+    """A coupling whose load steps depend on those before them, if only by where they start.
+
+    Without it a coupling is taken to find the same equilibrium from nothing.
+    """
+
+    def state(self) -> Arrays:
+        """Return what the next load step starts from; nothing in it depends on the ranks.
+
+        Note:
+            Collective.
+        """
+
+    def restore(self, state: Arrays) -> None:
+        """Go on from a state, in a coupling newly made from the same scene.
+
+        Args:
+            state: What `state` returned.
+
+        Note:
+            Collective.
         """
 
 
@@ -74,6 +100,30 @@ class Programme:
         return Control(approach=value, tilt=self.tilt)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Position:
+    """Where a programme has come to between two load steps; all that is needed to go on from there.
+
+    Attributes:
+        steps: Load steps accepted so far.
+        targets: Targets of the programme that were set out for so far.
+        ahead: Values still to be reached on the way to the latest target and that itself, the
+            nearest last; empty once it is reached.
+        smallest: Smallest increment on that way.
+        value: Prescribed quantity at the last accepted step [mm or N].
+        force: Force there [N].
+        largest: Largest force so far [N].
+    """
+
+    steps: int = 0
+    targets: int = 0
+    ahead: tuple[float, ...] = ()
+    smallest: float = 0.0
+    value: float = 0.0
+    force: float = 0.0
+    largest: float = 0.0
+
+
 def load_steps(coupling: Coupling, programme: Programme) -> Iterator[LoadStep]:
     """Yield the load steps of a programme as they are accepted.
 
@@ -88,42 +138,59 @@ def load_steps(coupling: Coupling, programme: Programme) -> Iterator[LoadStep]:
         NotConverged: When a step fails at the smallest increment too, or a patch leaves the range
             of its law; the steps yielded before stay valid.
     """
-    drive = _Drive(coupling, programme)
-    for target in programme.targets:
-        smallest = abs(target - drive.value) / 2**_MOST_HALVINGS
-        ahead = [target]
-        while ahead:
-            step = drive.to(ahead[-1], smallest)
-            if step is None:
-                ahead.append(0.5 * (drive.value + ahead[-1]))
-            else:
-                ahead.pop()
-                yield step
+    return iter(Drive(coupling, programme))
 
 
-class _Drive:
-    """Where a programme has come to.
+class Drive:
+    """Makes the load steps of a programme, see `load_steps`; may go on where another one stopped.
+
+    Args:
+        coupling: What finds the equilibria.
+        programme: The loads.
+        position: Where to go on from.
 
     Attributes:
-        value: Prescribed quantity at the last accepted step [mm or N].
+        position: Where the programme has come to; up to date whenever a load step is yielded.
     """
 
-    def __init__(self, coupling: Coupling, programme: Programme) -> None:
+    def __init__(
+        self, coupling: Coupling, programme: Programme, position: Position | None = None
+    ) -> None:
         self._coupling, self._programme = coupling, programme
-        self.value = 0.0
-        self._number = self._newton = self._linear = 0
-        self._force = self._largest = 0.0
+        self.position = position or Position()
+        self._newton = self._linear = 0
         self._spent = 0.0
 
-    def to(self, target: float, smallest: float) -> LoadStep | None:
+    def __iter__(self) -> Iterator[LoadStep]:
+        """Yield the load steps that are still to be made."""
+        targets = self._programme.targets
+        while True:
+            now = self.position
+            if now.ahead:
+                step = self._to(now.ahead[-1], now.smallest)
+                if step is None:
+                    between = 0.5 * (now.value + now.ahead[-1])
+                    self.position = replace(now, ahead=(*now.ahead, between))
+                else:
+                    yield self._accepted(step)
+            elif now.targets < len(targets):
+                target = targets[now.targets]
+                smallest = abs(target - now.value) / 2**_MOST_HALVINGS
+                self.position = replace(
+                    now, targets=now.targets + 1, ahead=(target,), smallest=smallest
+                )
+            else:
+                return
+
+    def _to(self, target: float, smallest: float) -> LoadStep | None:
         """Press to a value; None when the force would change by too much on the way."""
         began = time.perf_counter()
         step = self._tried(target, smallest)
         self._spent += time.perf_counter() - began
-        return None if step is None else self._accepted(target, step)
+        return step
 
     def _tried(self, target: float, smallest: float) -> LoadStep | None:
-        divisible = abs(target - self.value) > smallest
+        divisible = abs(target - self.position.value) > smallest
         if divisible and self._programme.quantity == "force" and self._is_leap(target):
             return None
         step = self._pressed(target, smallest)
@@ -133,14 +200,15 @@ class _Drive:
 
     def _is_leap(self, force: float) -> bool:
         limit = self._programme.force_change
-        if limit is None or self._force == 0.0:
+        last, largest = self.position.force, self.position.largest
+        if limit is None or last == 0.0:
             return False
         # halved steps of a force may meet the limit exactly, up to rounding
-        return abs(force - self._force) > limit * max(self._largest, force) * (1.0 + 1e-9)
+        return abs(force - last) > limit * max(largest, force) * (1.0 + 1e-9)
 
     def _pressed(self, target: float, smallest: float) -> LoadStep:
         """Press to a value, through smaller steps where the whole one fails."""
-        last, ahead = self.value, [target]
+        last, ahead = self.position.value, [target]
         while True:
             control = self._programme.control(ahead[-1])
             try:
@@ -160,24 +228,30 @@ class _Drive:
             if not ahead:
                 return step
 
-    def _accepted(self, target: float, step: LoadStep) -> LoadStep:
+    def _accepted(self, step: LoadStep) -> LoadStep:
         """Number a step and give it the work that led to it."""
-        self._number += 1
+        now = self.position
         told = replace(
             step,
-            step=self._number,
+            step=now.steps + 1,
             newton_iterations=self._newton,
             linear_iterations=self._linear,
             wall_s=self._spent,
         )
-        self.value, self._force = target, step.force_N
-        self._largest = max(self._largest, step.force_N)
+        self.position = replace(
+            now,
+            steps=now.steps + 1,
+            ahead=now.ahead[:-1],
+            value=now.ahead[-1],
+            force=step.force_N,
+            largest=max(now.largest, step.force_N),
+        )
         self._newton, self._linear, self._spent = 0, 0, 0.0
         return told
 
     def _failed(self, control: Control, error: NotConverged, halved: str) -> NotConverged:
         return NotConverged(
-            f"load step {self._number + 1} ({described(control)})",
+            f"load step {self.position.steps + 1} ({described(control)})",
             reason=error.reason,
             iterations=error.iterations,
             remedy=halved + error.remedy,

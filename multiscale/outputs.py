@@ -5,11 +5,29 @@ from __future__ import annotations
 import csv
 import json
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from geometry.errors import NotWritten
 from multiscale.history import COLUMNS, PATCH_COLUMNS, History
+
+
+@contextmanager
+def written(path: Path) -> Iterator[None]:
+    """Turn what the system says against writing a file into an error that names it.
+
+    Args:
+        path: The file.
+
+    Raises:
+        NotWritten: When the system raised an error.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise NotWritten(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
 def write_whole(path: Path, write: Callable[[Path], None]) -> Path:
@@ -21,15 +39,31 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> Path:
 
     Returns:
         The final name.
+
+    Raises:
+        NotWritten: When the system refuses; whatever stood under the final name stands there still.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f".{path.stem}.partial-{os.getpid()}{path.suffix}")
-    try:
-        write(partial)
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
+    with written(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            write(partial)
+            with partial.open("rb") as file:
+                os.fsync(file.fileno())  # lest a crash of the machine leave the name without data
+            partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
     return path
+
+
+def remove_partial(folder: Path) -> None:
+    """Remove what runs that were killed left half-written.
+
+    Args:
+        folder: Where results are; nobody else may be writing there.
+    """
+    for path in folder.glob(".*.partial-*"):
+        path.unlink(missing_ok=True)
 
 
 def write_tables(folder: Path, history: History) -> list[Path]:
@@ -59,6 +93,16 @@ def write_json(path: Path, content: dict[str, Any]) -> Path:
     return write_whole(path, lambda partial: _write_text(partial, text))
 
 
+def write_bytes(path: Path, content: bytes) -> Path:
+    """Write bytes.
+
+    Args:
+        path: File to write.
+        content: Its content.
+    """
+    return write_whole(path, lambda partial: _write_bytes(partial, content))
+
+
 def write_text(path: Path, text: str) -> Path:
     """Write a text as UTF-8.
 
@@ -71,6 +115,10 @@ def write_text(path: Path, text: str) -> Path:
 
 def _write_text(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8")
+
+
+def _write_bytes(path: Path, content: bytes) -> None:
+    path.write_bytes(content)
 
 
 def _write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> Path:

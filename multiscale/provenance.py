@@ -36,6 +36,7 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "units": "mm, N, MPa",
         "surface": {
             "source": run.stage.surface.source,
+            "heights_sha256": run.heights,
             "highest_mm": run.stage.surface.highest,
             "summits": run.stage.asperities.count,
             "summits_in_reach": int(run.stage.reached.sum()),
@@ -48,6 +49,7 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "unknowns": run.unknowns,
         "seconds": history.seconds,
         "steps": len(history),
+        "finished": run.finished,
         "reasons": sorted(set(history.reason)) if len(history) else [],
         "notes": list(history.notes),
         "versions": _versions(),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from functools import cache, partial
 from itertools import pairwise
 from typing import Annotated, Any, Literal
@@ -15,6 +16,7 @@ _EXAMPLES = {
     "mm**4": '"1e-9 mm^4"',
     "": '"5 um/mm"',
     "N": '"5 N"',
+    "s": '"55 min"',
 }
 
 
@@ -60,6 +62,25 @@ def _with_unit(text: str, unit: str) -> float:
         return float(quantity.to(unit or "dimensionless").magnitude)
     except Exception as error:
         raise ValueError(f"has the wrong unit {allowed}") from error
+
+
+def parse_duration(text: str) -> float:
+    """Turn a duration into seconds.
+
+    Args:
+        text: A quantity such as ``"55 min"``, ``"2 h"`` or, as batch systems have it, ``"55m"``.
+
+    Returns:
+        The seconds.
+
+    Raises:
+        ValueError: When it is no duration, or not positive.
+    """
+    minutes = re.fullmatch(r"\s*([0-9.]+)\s*m\s*", text)  # to pint, metres
+    seconds = parse_quantity(f"{minutes[1]} min" if minutes else text, "s")
+    if not seconds > 0.0:
+        raise ValueError("must be greater than 0")
+    return seconds
 
 
 def parse_turning_points(value: Any, unit: str) -> tuple[float, ...]:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 _FILES = (
     "history.csv", "patches.csv", "laws.h5", "provenance.json", "report.html", "surface.png",
     "curves.png", "pressures.png", "laws.png", "fields.xdmf", "fields.h5",
+    "fields.bp",
 )  # fmt: skip
 
 
@@ -63,7 +64,15 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
 def _remove_older(folder: Path) -> None:
     """Remove an earlier run's files, lest this run's tables stand beside another scene's laws."""
     for name in _FILES:
-        (folder / name).unlink(missing_ok=True)
+        _remove(folder / name)
+
+
+def _remove(path: Path) -> None:
+    """Remove a file or a folder (ADIOS2 writes folders), if it is there."""
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def write_figure(path: Path, figure: Figure) -> Path:
@@ -101,7 +110,7 @@ def _figures(run: Run) -> Iterator[tuple[str, str, Figure]]:
 
 
 def write_fields(folder: Path, run: Run) -> list[Path]:
-    """Write displacement and patch pressure of the last load step as XDMF, for ParaView.
+    """Write displacement and patch pressure of the last load step as XDMF and VTX, for ParaView.
 
     Args:
         folder: Where to; made when missing.
@@ -131,7 +140,10 @@ def write_fields(folder: Path, run: Run) -> list[Path]:
     write_xdmf(aside / "fields.xdmf", interface, displacement, run.steps[-1].patches.pressure_MPa)
 
     def move() -> list[Path]:
-        files = [path.replace(folder / path.name) for path in sorted(aside.iterdir())]
+        files = []
+        for path in sorted(aside.iterdir()):
+            _remove(folder / path.name)
+            files.append(path.replace(folder / path.name))
         aside.rmdir()
         return files
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cached_property
+from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,10 +15,12 @@ from numpy.typing import NDArray
 from geometry.collective import on_root
 from multiscale.assemble import assemble, make_table
 from multiscale.blocks import final_field
+from multiscale.checkpoint import Checkpoint, digest
 from multiscale.coupling import EmbeddedCoupling
 from multiscale.history import History, LoadStep
-from multiscale.law_files import LawTable
-from multiscale.loading import Coupling, load_steps
+from multiscale.law_files import LawTable, read_laws, write_laws
+from multiscale.loading import Coupling, Drive, Position, Restorable
+from multiscale.records import Arrays
 from multiscale.scene import Scene
 from multiscale.stage import Stage, make_stage
 from multiscale.validity import range_notes
@@ -41,12 +45,16 @@ class Run:
         interface: The interface of the block that is pressed itself, once made.
         coupling: What makes the load steps, once made.
         steps: The load steps accepted so far.
+        position: Where the load programme has come to with them.
     """
 
     def __init__(self, scene: Scene, comm: Any = None) -> None:
         self.scene, self.comm = scene, comm
         self.seconds: dict[str, float] = {}
         self.steps: list[LoadStep] = []
+        self.position = Position()
+        self._resumed: Checkpoint | None = None
+        self._laws: bytes | None = None
         self.table: LawTable | None = None
         self.interface: Interface | None = None
         self.coupling: Coupling | None = None
@@ -60,19 +68,88 @@ class Run:
                 self.table = make_table(self.stage, self.comm)
         return self.table
 
+    def make_coupling(self) -> Coupling:
+        """Make what finds the load steps, once, and what it needs."""
+        if self.coupling is None:
+            table = self.make_laws() if self.stage.by_laws else None
+            with self._phase("block"):
+                coupling, self.interface = assemble(self.stage, table, self.comm)
+                if self._resumed and self._resumed.state and isinstance(coupling, Restorable):
+                    coupling.restore(self._resumed.state)
+                self.coupling = coupling
+        return self.coupling
+
     def load_steps(self) -> Iterator[LoadStep]:
         """Yield the load steps as they are accepted, making first what they need.
 
         Raises:
             NotConverged: When a step fails for good; `history` holds those before it.
         """
-        table = self.make_laws() if self.stage.by_laws else None
-        with self._phase("block"):
-            self.coupling, self.interface = assemble(self.stage, table, self.comm)
+        drive = Drive(self.make_coupling(), self.scene.loading.programme, self.position)
         with self._phase("load steps"):
-            for step in load_steps(self.coupling, self.scene.loading.programme):
+            for step in drive:
                 self.steps.append(step)
+                self.position = drive.position
                 yield step
+
+    @property
+    def finished(self) -> bool:
+        """Whether the load programme has come to its end."""
+        ends = self.position.targets == len(self.scene.loading.programme.targets)
+        return ends and not self.position.ahead
+
+    def checkpoint(self, name: str, state: Arrays) -> Checkpoint:
+        """Return all that is needed to go on from here.
+
+        Args:
+            name: Name of the run.
+            state: What `state` returned.
+        """
+        return Checkpoint(
+            run=name,
+            scene=self.scene.model_dump(by_alias=True, mode="json"),
+            heights=self.heights,
+            laws=self._law_bytes,
+            steps=tuple(self.steps),
+            position=self.position,
+            state=state,
+        )
+
+    def state(self) -> Arrays:
+        """Return what the coupling's next load step starts from.
+
+        Note:
+            Collective.
+        """
+        if isinstance(self.coupling, Restorable):
+            return self.coupling.state()
+        return self._resumed.state if self._resumed else {}
+
+    def resume(self, checkpoint: Checkpoint) -> None:
+        """Go on from a checkpoint of the same scene; call it before anything is made.
+
+        Args:
+            checkpoint: The checkpoint.
+        """
+        self._resumed = checkpoint
+        self.steps, self.position = list(checkpoint.steps), checkpoint.position
+        if checkpoint.laws:
+            self.table = read_laws(BytesIO(checkpoint.laws))
+
+    @cached_property
+    def heights(self) -> str:
+        """SHA-256 of the surface's heights."""
+        return digest({"heights": self.stage.surface.heights})
+
+    @property
+    def _law_bytes(self) -> bytes:
+        if self.table is None:
+            return b""
+        if self._laws is None:
+            content = BytesIO()
+            write_laws(content, self.table)
+            self._laws = content.getvalue()
+        return self._laws
 
     def history(self) -> History:
         """Return the load steps accepted so far, with times and notes."""
@@ -89,6 +166,9 @@ class Run:
         if imbalances:
             notes.append(f"force against the support's reaction: equal to {max(imbalances):.1e}")
         notes += range_notes(self.steps, self.table)
+        if self._resumed:
+            count = len(self._resumed.steps)
+            notes.append(f"resumed after load step {count}; times of phases are those since then")
         return History(
             steps=tuple(self.steps),
             patches=self.stage.patches,

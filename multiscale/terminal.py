@@ -79,12 +79,15 @@ def show_plan(comm: Any, stage: Stage) -> None:
 
 
 @contextmanager
-def progress(comm: Any, programme: Programme) -> Iterator[Callable[[LoadStep], None]]:
+def progress(
+    comm: Any, programme: Programme, done: int = 0
+) -> Iterator[Callable[[LoadStep], None]]:
     """Follow load steps: by a bar, or under ``mpirun`` by a line each, fit for a log file.
 
     Args:
         comm: MPI communicator, or None.
         programme: The load steps to come.
+        done: How many of them were accepted before.
 
     Yields:
         The function to call with every load step.
@@ -102,7 +105,7 @@ def progress(comm: Any, programme: Programme) -> Iterator[Callable[[LoadStep], N
         TextColumn("{task.description}"),
     )
     with Progress(*columns) as bar:
-        task = bar.add_task("preparing laws and block", total=steps)
+        task = bar.add_task("preparing laws and block", total=steps, completed=done)
         yield lambda step: bar.update(task, advance=1, description=_in_short(step))
 
 

@@ -188,7 +188,7 @@ class WholeSurface:
             loads=loads,
             approach=local[order],
             forces=forces[order],
-            correction=self.sinking.patch_compliance(loads) / loads.areas,
+            correction=np.divide(self.sinking.patch_compliance(loads), loads.areas),
         )
 
     def _force(self, approach: float) -> float:

@@ -123,7 +123,7 @@ def test_moment_of_cells():
     found = press(model, tilt=TILT)
     dx, dy = SURFACE.spacing
     x, y = np.meshgrid(SURFACE.x - 0.5, SURFACE.y - 0.45, indexing="ij")
-    pressure = found.start.pressure
+    pressure = found.start
     expected = [(pressure * arm).sum() * dx * dy for arm in (x, y)]
     assert found.response.moment[0] == pytest.approx(expected, rel=1e-12)
 

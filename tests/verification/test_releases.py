@@ -1,0 +1,30 @@
+"""The same scene gives the same force on every release of dolfinx, PETSc, numpy and scipy."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from multiscale import Scene, run
+
+PAPER = Path(__file__).parents[2] / "demos" / "scenes" / "paper.toml"
+SMALL = [
+    "surface.grid=[64, 64]", "block.cells=[8, 8, 5]", "load.steps=2",
+    "output.figures=false", "output.report=false",
+]  # fmt: skip
+# Figures of Debian 12 (dolfinx 0.5.2, PETSc 3.18.5, numpy 1.24.2, scipy 1.10.1) on one rank;
+# Debian 13 (0.9.0, 3.22.5, 2.2.4, 1.15.3) and sid (0.11.0, 3.25.5, 2.4.6, 1.17.1) agree to 8e-13.
+FORCES = {
+    "embedded": (["patches.grid=[4, 2]"], [0.559137615013406, 2.41750883739317]),
+    "concurrent": (
+        ["coupling.kind=concurrent", "micro.model=half-space"],
+        [0.629709463485602, 3.0780472893962],
+    ),
+}
+
+
+@pytest.mark.parametrize(("scene", "force"), FORCES.values(), ids=FORCES)
+def test_force_does_not_depend_on_the_release(scene, force):
+    history = run(Scene.load(PAPER, SMALL + scene))
+    # the residuals of Newton's methods are driven to 1e-10 of the load or below
+    np.testing.assert_allclose(history.force_N, force, rtol=1e-8)
