@@ -150,7 +150,9 @@ def tables(out):
     for name in ("history.csv", "patches.csv"):
         with (out / name).open(encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
-        found.append(np.array([[float(r[key]) for key in r if key not in UNCOMPARED] for r in rows]))
+        found.append(
+            np.array([[float(r[key]) for key in r if key not in UNCOMPARED] for r in rows])
+        )
     return found
 
 

@@ -31,7 +31,8 @@ COUPLINGS = {
     "condensed, halved steps": CUBE
     | {"coupling": {"kind": "isolated", "newton": "condensed"}}
     | {"load": {"approach": "8 um", "steps": 2, "force_change": 0.4}},
-    "consistent laws": CUBE | {"micro": {"model": "half-space"}, "coupling": {"kind": "consistent"}},
+    "consistent laws": CUBE
+    | {"micro": {"model": "half-space"}, "coupling": {"kind": "consistent"}},
     "concurrent, a coarse half-space ahead": CUBE
     | {"surface": {"grid": [72, 72]}, "coupling": {"kind": "concurrent"}}
     | {"micro": {"model": "half-space"}},
@@ -197,7 +198,10 @@ def relabel(path):
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"load": {"approach": "8 um", "steps": 2}}, r"load.approach = .*allowed: \[0.008, 0.004\]"),
+        (
+            {"load": {"approach": "8 um", "steps": 2}},
+            r"load.approach = .*allowed: \[0.008, 0.004\]",
+        ),
         ({"block": {"poisson_ratio": 0.2}}, r"block.poisson_ratio = 0.2: .*allowed: 0.15"),
         ({"surface": {"detrend": "plane"}}, r"surface.detrend = 'plane': .*allowed: 'none'"),
     ],
@@ -268,7 +272,9 @@ def test_full_disk_leaves_the_earlier_checkpoint(tmp_path, ended, monkeypatch):
 
     monkeypatch.setattr(Path, "write_bytes", full)
     run = Run(ended.scene)
-    with pytest.raises(NotWritten, match=r"checkpoint.h5: cannot be written: No space left") as error:
+    with pytest.raises(
+        NotWritten, match=r"checkpoint.h5: cannot be written: No space left"
+    ) as error:
         Keeper(path.parent, run, FolderLock(path.parent)).write()
     assert error.value.exit_code == 5
     assert path.read_bytes() == before
