@@ -60,7 +60,7 @@ def members(session):
 
 
 class Runs:
-    """Starts runs, forked from a process that has the imports done, or under mpirun, and kills them.
+    """Starts runs, forked from a process that has the imports done or by mpirun, and kills them.
 
     Args:
         root: Folder of the project.

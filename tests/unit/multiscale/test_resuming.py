@@ -19,7 +19,7 @@ from multiscale.resuming import Keeper, with_journal
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 ALONE = {"coupling": {"kind": "analytic"}, "micro": {"model": "half-space"}}
-CUBE = {"block": {"cells": [8, 8, 4]}, "patches": {"grid": [2, 2]}}
+CUBE = {"block": {"cells": [4, 4, 3]}, "patches": {"grid": [2, 2]}}
 FORCE = {"force": ["3 N", "1 N", "2 N"], "steps": 1, "tilt": "free"}
 COUPLINGS = {
     "half-space": ALONE,
@@ -63,7 +63,7 @@ def columns(steps):
 
 
 @pytest.mark.parametrize("changes", COUPLINGS.values(), ids=COUPLINGS)
-def test_resumed_after_any_step_is_as_if_never_stopped(tmp_path, changes):
+def test_resumed_run_is_as_if_never_stopped(tmp_path, changes):
     whole = Run(scene(changes))
     for step in whole.load_steps():
         path = tmp_path / f"{step.step}.h5"
@@ -75,7 +75,7 @@ def test_resumed_after_any_step_is_as_if_never_stopped(tmp_path, changes):
     scale[6:8] = scale[1]  # moments vanish: they count relative to force times 1 mm
     # on the mesh a step is solved to 1e-10 of the load from other first guesses; else bit for bit
     exact = whole.interface is None
-    for done in range(1, count):
+    for done in (1, count - 1):
         again = Run(whole.scene)
         again.resume(read_checkpoint(tmp_path / f"{done}.h5"))
         list(again.load_steps())
