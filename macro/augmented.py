@@ -36,12 +36,15 @@ Array = NDArray[np.float64]
 TOLERANCE = 1e-10
 """Residual of the equilibrium that a solution may have, relative to its contact forces."""
 
-PENETRATION = 1e-8
-"""Depth of quadrature points beyond the plane, relative to the largest displacement."""
+PENETRATION = {1: 1e-8, 2: 1e-5}
+"""Depth of quadrature points beyond the plane, relative to the largest displacement, by the
+element's degree: on quadratic facets points nearly repeat each other's conditions, and multipliers
+that share one load settle slowly."""
 
 _SOFT, _HARD = 30.0, 1000.0  # stiffness at first and at last: E* times this over a facet's size
 _LOOSEST, _SPARE = 0.03, 0.3  # relative residual of linear solves, and at the end
-_HARDER = 10.0  # growth of the stiffness between updates
+_HARDER, _HARDEST = 10.0, 10.0  # growth of the stiffness between updates, and all in all
+_FALL = 0.1  # of the penetration by an update; else springs are too soft
 _MOST_STEPS, _MOST_UPDATES, _HALVINGS = 60, 40, 30
 _ON = 1e-12  # of a basis function: its node is not on the facet
 _CLOSED = 1e-6  # gap of points, relative to the displacements, and force of nodes that are none
@@ -89,6 +92,7 @@ class AugmentedFacets:
         unit = block.material.contact_modulus / _sizes(points.cell, points.weight)
         self._stiff = _HARD * unit if penalty is None else np.full_like(unit, penalty)
         self._soft = np.minimum(_SOFT * unit, self._stiff)
+        self._penetration = PENETRATION[block.degree]
         self._law = _AugmentedLaw(np.sum(points.values * rest[points.nodes], axis=1))
         self._contact = Contact(interface, sampling, [self._law])
         self._equilibrium = Equilibrium(block, sampling, self._contact)
@@ -116,21 +120,25 @@ class AugmentedFacets:
         law.multiplier = np.maximum(start.contact, 0.0) if self._exact else 0.0 * start.contact
         displacement = self._block.stiffness.createVecRight()
         displacement.array[:] = start.displacement
-        steps, spent, tolerance = 0, 0, _LOOSEST
-        law.slope = self._soft
+        steps, spent, tolerance, before = 0, 0, _LOOSEST, np.inf
+        law.slope, hardest = self._soft, self._stiff
         for _ in range(_MOST_UPDATES):
             more, cycles = self._equilibrate(displacement, tolerance, control)
             steps, spent = steps + more, spent + cycles
             closure = self._equilibrium.closure(displacement)
             depth = self._largest(np.maximum(closure - law.rest, 0.0))
-            excess = depth / max(PENETRATION * self._largest(displacement.array_r), _TINY)
-            hard = self._largest(law.slope / self._stiff - 1.0) == 0.0
+            excess = depth / max(self._penetration * self._largest(displacement.array_r), _TINY)
+            hard = bool(np.all(law.slope >= self._stiff))
+            hard = bool(self._block.mesh.comm.allreduce(hard, op=MPI.LAND))
             if hard and tolerance <= TOLERANCE and (excess <= 1.0 or not self._exact):
                 return self._found(control, displacement, steps, spent)
             if self._exact:
                 law.multiplier = law.pressure(closure)
-            law.slope = np.minimum(_HARDER * law.slope, self._stiff)
-            near = min(0.1 * tolerance, _SPARE * PENETRATION * excess) if self._exact else 0.0
+            if self._exact and hard and excess > _FALL * before:
+                hardest = np.minimum(_HARDER * hardest, _HARDEST * self._stiff)
+            before = excess
+            law.slope = np.minimum(_HARDER * law.slope, hardest)
+            near = min(0.1 * tolerance, _SPARE * self._penetration * excess) if self._exact else 0.0
             tolerance = max(TOLERANCE, near) if hard or not self._exact else tolerance
         raise self._failure(control, "MULTIPLIERS", _MOST_UPDATES)
 
