@@ -100,7 +100,7 @@ class Block:
         lattice = lattice_of(self.space, self.mesh)
         if lattice is None:
             return linear_solver(self.stiffness)
-        return linear_solver(self.stiffness, transfers=lambda: transfers(lattice, self._free))
+        return linear_solver(self.stiffness, transfers=lambda: transfers(lattice, self.free))
 
     def solve(self, load: PETSc.Vec) -> Any:
         """Return the displacement under a nodal load.
@@ -145,7 +145,7 @@ class Block:
         return stiffness_form(self.space, self.material, degree)
 
     @property
-    def _free(self) -> PETSc.Vec:
+    def free(self) -> PETSc.Vec:
         """1 for degrees of freedom that no condition holds, 0 for the others."""
         free = self.stiffness.createVecRight()
         free.set(1.0)
