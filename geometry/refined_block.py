@@ -30,7 +30,7 @@ class RefinedShape:
         fine: Edge length there [mm].
         coarse: Edge length far from them [mm].
         growth: Increase of the edge length per distance.
-        element: ``P1`` or ``P2``.
+        element: ``P1``, or ``P2``, whose edges have a node in their middle and can be curved.
 
     Raises:
         InputError: When a value is out of its range.
@@ -85,13 +85,17 @@ class RefinedShape:
 
     @contextmanager
     def meshed(self) -> Iterator[Any]:
-        """Mesh the block in gmsh for as long as the context lasts; faces as in `flat_block`."""
+        """Mesh the block in gmsh for as long as the context lasts; faces as in `flat_block`.
+
+        The geometry has the order of the element.
+        """
         with gmsh_session("patchlaw refined block") as gmsh:
             box = gmsh.model.occ.addBox(0.0, 0.0, -self.height, *self.interface, self.height)
             gmsh.model.occ.synchronize()
             _name_faces(gmsh, box, self.height)
             _set_sizes(gmsh, self)
             gmsh.model.mesh.generate(3)
+            gmsh.model.mesh.setOrder(self.degree)
             yield gmsh.model
 
 
