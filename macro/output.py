@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from dolfinx import fem
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 
 from macro import compat
 from macro.interface import Interface
+from macro.obstacle import ObstacleBlock
+from macro.obstacle_state import ObstacleState
 
 Array = NDArray[np.float64]
 
@@ -35,12 +38,43 @@ def write_fields(
     mesh = block.mesh.mesh
     moved = block.function(displacement)
     if block.degree > 1:
-        linear = fem.Function(compat.vector_space(mesh, 1), name=moved.name)
-        linear.interpolate(moved)
-        moved = linear
+        moved = _at_vertices(compat.vector_space(mesh, 1), moved)
     pressed = fem.Function(compat.cellwise_space(mesh), name="pressure")
     points = interface.quadrature
     cells = compat.cell_nodes(pressed.function_space)[:, 0]
     pressed.x.array[cells[points.cell]] = pressure[points.patch]
     pressed.x.scatter_forward()
     compat.write_xdmf(str(path), mesh, [moved, pressed])
+
+
+def write_rough_fields(path: Path | str, obstacle: ObstacleBlock, state: ObstacleState) -> None:
+    """Write displacements [mm] and contact pressures [MPa] of a rough block as XDMF.
+
+    The pressure of a node of the top is its contact force over its tributary area. Quadratic
+    functions on straight cells are written at the vertices.
+
+    Args:
+        path: File to write, ending in ``.xdmf``; an HDF5 file goes beside it.
+        obstacle: The rough block that was pressed.
+        state: The load step.
+
+    Note:
+        Collective.
+    """
+    block, top = obstacle.block, obstacle.top
+    upright = np.zeros(block.owned_dofs)
+    upright[top.dofs] = state.pressing / top.area
+    functions = [block.function(state.displacement), block.function(upright)]
+    if block.degree > 1 and block.mesh.shape.hexahedral:
+        space = compat.vector_space(block.mesh.mesh, 1)
+        functions = [_at_vertices(space, function) for function in functions]
+    moved, pressed = functions[0], functions[1].sub(2).collapse()
+    moved.name, pressed.name = "displacement", "pressure"
+    compat.write_xdmf(str(path), block.mesh.mesh, [moved, pressed])
+
+
+def _at_vertices(space: Any, function: Any) -> Any:
+    """Return a function in the space of linear ones."""
+    linear = fem.Function(space, name=function.name)
+    linear.interpolate(function)
+    return linear

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from geometry.control import Control
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
+from multiscale.blocks import block_material
 from multiscale.coupling import embedded_step
 from multiscale.history import LoadStep, PatchState
 from multiscale.reference_record import ReferenceRecord, reference_record
@@ -31,15 +32,25 @@ class ReferenceCoupling:
     Args:
         blocks: The rough blocks, the finest last, with the patches on its top.
         patches: Partition that the results are summed over; it does not change the solution.
+        qualities: How far the roughness has deformed the cells of every block.
+
+    Attributes:
+        qualities: The same.
 
     Raises:
         ValueError: When there is no block.
     """
 
-    def __init__(self, blocks: Sequence[ObstacleBlock], patches: PatchGrid) -> None:
+    def __init__(
+        self,
+        blocks: Sequence[ObstacleBlock],
+        patches: PatchGrid,
+        qualities: Sequence[MeshQuality] = (),
+    ) -> None:
         if not blocks:
             raise ValueError("a reference needs a mesh")
         self._blocks, self._patches = tuple(blocks), patches
+        self.qualities = tuple(qualities)
         self._last: ObstacleState | None = None
 
     @property
@@ -97,15 +108,12 @@ class ReferenceCoupling:
         )
 
 
-def make_reference(stage: Stage, comm: Any) -> tuple[ReferenceCoupling, tuple[MeshQuality, ...]]:
+def make_reference(stage: Stage, comm: Any) -> ReferenceCoupling:
     """Mesh the rough block of a scene, as often as it asks.
 
     Args:
         stage: The scene's ingredients, of a reference.
         comm: MPI communicator; None for this process alone.
-
-    Returns:
-        The coupling, and how far the roughness has deformed the cells of every mesh.
 
     Raises:
         InputError: When the roughness is too steep for a mesh, or patches are too small.
@@ -116,7 +124,6 @@ def make_reference(stage: Stage, comm: Any) -> tuple[ReferenceCoupling, tuple[Me
     from mpi4py import MPI
 
     from macro import Block, ObstacleBlock, rough_block_mesh
-    from multiscale.blocks import block_material
 
     assert stage.meshes is not None
     scene, surface, blocks, qualities = stage.scene, stage.surface, [], []
@@ -138,7 +145,7 @@ def make_reference(stage: Stage, comm: Any) -> tuple[ReferenceCoupling, tuple[Me
             raise error.located(key="patches.grid", file=scene.file) from None
         blocks.append(pressed)
         qualities.append(quality)
-    return ReferenceCoupling(blocks, stage.patches), tuple(qualities)
+    return ReferenceCoupling(blocks, stage.patches, qualities)
 
 
 def recorded(
@@ -159,3 +166,20 @@ def recorded(
         force_order=stage.meshes.force_order,
         area_order=stage.meshes.area_order,
     )
+
+
+def reference_notes(record: ReferenceRecord, coupling: ReferenceCoupling) -> Iterator[str]:
+    """Yield what a report says of a reference's own errors.
+
+    Args:
+        record: What its meshes say together.
+        coupling: What made the load steps.
+    """
+    yield record.sentence
+    if coupling.qualities:
+        thinnest = min(quality.thinnest for quality in coupling.qualities)
+        steepest = max(quality.steepest for quality in coupling.qualities)
+        yield (
+            f"the roughness leaves the cells at least {thinnest:.2g} of their volume; the steepest "
+            f"edge of the top has a slope of {steepest:.2g}"
+        )
