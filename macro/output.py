@@ -38,7 +38,7 @@ def write_fields(
     mesh = block.mesh.mesh
     moved = block.function(displacement)
     if block.degree > 1:
-        moved = _at_vertices(compat.vector_space(mesh, 1), moved)
+        moved = _interpolated(compat.vector_space(mesh, 1), moved, moved.name)
     pressed = fem.Function(compat.cellwise_space(mesh), name="pressure")
     points = interface.quadrature
     cells = compat.cell_nodes(pressed.function_space)[:, 0]
@@ -64,17 +64,19 @@ def write_rough_fields(path: Path | str, obstacle: ObstacleBlock, state: Obstacl
     block, top = obstacle.block, obstacle.top
     upright = np.zeros(block.owned_dofs)
     upright[top.dofs] = state.pressing / top.area
-    functions = [block.function(state.displacement), block.function(upright)]
-    if block.degree > 1 and block.mesh.shape.hexahedral:
-        space = compat.vector_space(block.mesh.mesh, 1)
-        functions = [_at_vertices(space, function) for function in functions]
-    moved, pressed = functions[0], functions[1].sub(2).collapse()
-    moved.name, pressed.name = "displacement", "pressure"
-    compat.write_xdmf(str(path), block.mesh.mesh, [moved, pressed])
+    mesh, degree = block.mesh.mesh, 1 if block.mesh.shape.hexahedral else block.degree
+    moved = _interpolated(
+        compat.vector_space(mesh, degree), block.function(state.displacement), "displacement"
+    )
+    # files take functions numbered as the mesh is, which parts of a vector need not be
+    pressed = _interpolated(
+        compat.scalar_space(mesh, degree), block.function(upright).sub(2).collapse(), "pressure"
+    )
+    compat.write_xdmf(str(path), mesh, [moved, pressed])
 
 
-def _at_vertices(space: Any, function: Any) -> Any:
-    """Return a function in the space of linear ones."""
-    linear = fem.Function(space, name=function.name)
-    linear.interpolate(function)
-    return linear
+def _interpolated(space: Any, function: Any, name: str) -> Any:
+    """Return a function in another space."""
+    other = fem.Function(space, name=name)
+    other.interpolate(function)
+    return other

@@ -102,8 +102,7 @@ class ReferenceCoupling:
             ),
             imbalance=(finest.force - finest.reaction) / finest.force if finest.force else 0.0,
             meshes=tuple(
-                (state.approach, state.force, state.contact_area_fine / nominal)
-                for state in states
+                (state.approach, state.force, state.contact_area_fine / nominal) for state in states
             ),
         )
 

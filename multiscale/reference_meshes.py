@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -24,7 +25,7 @@ Plane: TypeAlias = tuple[float, tuple[float, float]]
 BYTES_PER_UNKNOWN = {1: 2000, 2: 3500}
 """Memory that mesh, stiffness and multigrid take per unknown, by the element's degree [B]."""
 
-_NODES = {1: 1.5, 2: 11.0}
+_NODES = {1: 1.1, 2: 8.4}
 """Nodes of unstructured tetrahedra per cube of their edge, by the element's degree."""
 
 _RESERVE = 0.1
@@ -216,7 +217,7 @@ def _cubes(shape: RefinedShape) -> float:
     depths, total = [0.0], 0.0
     while depths[-1] < shape.height:
         depths.append(min(depths[-1] + 0.5 * _edge(shape, depths[-1]), shape.height))
-    for above, below in zip(depths[:-1], depths[1:], strict=True):
+    for above, below in pairwise(depths):
         distance = np.hypot(beside, 0.5 * (above + below))
         total += (below - above) * float(np.sum(_edge(shape, distance) ** -3.0))
     return total * float(np.prod(spacing))

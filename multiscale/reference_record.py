@@ -58,12 +58,21 @@ class ReferenceRecord:
         return bool(np.all(spread <= 1e-6 * np.abs(self.force_N).max(axis=0)))
 
     @property
+    def _unknown(self) -> tuple[Estimate, float, str]:
+        """What is not prescribed, with the scale and unit that people read it in."""
+        return (self.approach, 1e3, "µm") if self.by_force else (self.force, 1.0, "N")
+
+    @property
+    def _most(self) -> int:
+        """Index of the step of the largest force."""
+        return int(np.argmax(self.force_N[-1]))
+
+    @property
     def relative_error(self) -> float:
         """Error bar at the largest force, relative: of the force, or of the approach by force."""
         if not self.force_N.size:
             return float("nan")
-        last = int(np.argmax(self.force_N[-1]))
-        found = self.approach if self.by_force else self.force
+        found, last = self._unknown[0], self._most
         value, error = abs(float(found.value[last])), float(found.error[last])
         return error / value if value else error
 
@@ -77,14 +86,12 @@ class ReferenceRecord:
     @property
     def sentence(self) -> str:
         """What a report says of the discretisation error."""
-        what = "approach" if self.by_force else "force"
         if len(self.sizes) == 1:
             return "one mesh: no error bar; reference.meshes = 2 gives one"
         if not self.force_N.size:
             return "no load step, no error bar"
-        last = int(np.argmax(self.force_N[-1]))
-        found = self.approach if self.by_force else self.force
-        scale, unit = (1e3, "µm") if self.by_force else (1.0, "N")
+        what = "approach" if self.by_force else "force"
+        (found, scale, unit), last = self._unknown, self._most
         rate = float(found.rate[last])
         if np.isnan(rate):
             why = "the meshes show no rate, and the finest stands"
@@ -97,6 +104,16 @@ class ReferenceRecord:
             f"± {scale * found.error[last]:.2g} {unit} ({self.label}), extrapolated from {why}; "
             "the table holds the finest mesh"
         )
+
+    @property
+    def cells(self) -> tuple[str, list[str]]:
+        """Heading and cells of a table's column that holds the values at mesh size zero."""
+        found, scale, unit = self._unknown
+        heading = f"at size zero [{unit}]"
+        if len(self.sizes) == 1:
+            return heading, ["no error bar"] * found.value.size
+        pairs = zip(scale * found.value, scale * found.error, strict=True)
+        return heading, [f"{value:.5g} ± {error:.2g}" for value, error in pairs]
 
     @property
     def columns(self) -> tuple[str, ...]:
