@@ -38,7 +38,8 @@ TOLERANCE = 1e-10
 _LOOSE = 1e-3  # relative residual while the active set still changes
 _MOST_SETS = 80
 _PATIENCE = 10  # sets without progress before nodes change one by one
-_ROUNDING = 1e-15  # of the block's size and stiffness: nothing
+_CLOSED = 1e-8  # gap, relative to the displacements, that is none
+_ROUNDING = 1e-15  # of the block's size: nothing
 _SOFT = 8.0  # springs under a plane that nothing holds yet: E* times this over the block's width
 
 
@@ -60,7 +61,7 @@ class ActiveNodes:
         self._work = block.stiffness.createVecRight()
         self._history = StepHistory()
         modulus, half = block.material.contact_modulus, plane.half
-        self._nothing = _ROUNDING * modulus * half**2  # N
+        self._nothing = 1e-17 * modulus * half**2  # N
         self._springs = top.area * modulus * _SOFT / (2.0 * half)
 
     def press(self, control: Control) -> Found:
@@ -172,13 +173,15 @@ class ActiveNodes:
         depth = self._depth(plane, displacement)
         displacement.array[self._top.dofs] -= np.where(active, depth, np.maximum(depth, 0.0))
         forces = np.maximum(self._forces(displacement), 0.0)
+        # vertices of quadratic triangles touch without a force
+        touching = active | (depth > -_CLOSED * self._largest(displacement.array_r))
         found = Found(
             plane=plane,
             displacement=displacement.array_r.copy(),
             pressing=np.where(active, forces, 0.0),
-            touching=active,
-            area=np.where(active, self._top.area, 0.0),
-            contacts=self._contacts(active),
+            touching=touching,
+            area=np.where(touching, self._top.area, 0.0),
+            contacts=self._contacts(touching),
             active_sets=sets,
             linear_iterations=spent,
             reason="CONVERGED_ACTIVE_SET" if self._count(active) else "CONVERGED_NO_CONTACT",

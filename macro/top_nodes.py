@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
+import ufl
 from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
@@ -27,10 +28,9 @@ Index = NDArray[np.intp]
 class TopNodes:
     """Nodes of a block's top and what is measured with them.
 
-    Facets are cut into triangles between neighbouring nodes, quadrilaterals along both diagonals
-    with half the weight each; a third of a triangle's area, projected on the plane, belongs to
-    each of its nodes. The force and the area of a node on the border of patches are shared equally
-    among the two or four patches there.
+    The force and the area of a node on the border of patches are shared equally among the two or
+    four patches there. Facets are cut into triangles between neighbouring nodes, quadrilaterals
+    along both diagonals with half the weight each.
 
     Args:
         block: The block.
@@ -41,7 +41,8 @@ class TopNodes:
         x: Abscissae of this rank's nodes, shape (n,) [mm].
         y: Their ordinates [mm].
         height: Their heights [mm].
-        area: Their tributary areas [mm²].
+        area: Their tributary areas, the integrals of their basis functions over the plane [mm²];
+            none at the vertices of quadratic triangles.
         patches: The patches.
 
     Raises:
@@ -58,7 +59,7 @@ class TopNodes:
         nodes = np.sort(nodes[nodes < space.dofmap.index_map.size_local])
         self.dofs = 3 * nodes + 2
         self.x, self.y, self.height = space.tabulate_dof_coordinates()[nodes].T.copy()
-        self.area = self._tributary_areas()
+        self.area = self._areas()
         self._patch_areas = self.patch_sums(self.area)
         if not np.all(self._patch_areas > 0.0):
             raise InputError(
@@ -102,7 +103,7 @@ class TopNodes:
             gap: Their gaps, shape (n,) [mm].
         """
         triangles, area = self.triangles
-        pressure = pressing / (self.area * self._block.material.contact_modulus)
+        pressure = pressing / (self._thirds * self._block.material.contact_modulus)
         values = self.spread(touching.astype(float), pressure, gap)
         flags, pressure, gap = (value[triangles] for value in values)
         share = covered(flags > 0.5, pressure, gap, self.edges)
@@ -171,7 +172,16 @@ class TopNodes:
         entries = 1.0 / found[rows]
         return coo_array((entries, (rows, columns)), shape=(len(at), self.patches.count)).tocsr()
 
-    def _tributary_areas(self) -> Array:
+    def _areas(self) -> Array:
+        space, mesh = self._block.space, self._block.mesh
+        test = ufl.TestFunction(space)
+        ds = ufl.Measure("ds", domain=mesh.mesh, subdomain_data=mesh.facet_tags)
+        form = compat.compile_form(test[2] * ufl.FacetNormal(mesh.mesh)[2] * ds(TOP))
+        return compat.assemble_vector(form).array_r[self.dofs].copy()
+
+    @cached_property
+    def _thirds(self) -> Array:
+        """Thirds of the triangles around this rank's nodes [mm²]."""
         triangles, area = self.triangles
         vector = self._block.stiffness.createVecRight()
         numbers = self._block.space.dofmap.index_map.local_to_global(
