@@ -24,6 +24,7 @@ _DECAY = 3.0
 _LEAST_VOLUME = 0.05
 """Volume relative to that of the flat block, below which cells are refused."""
 
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeshQuality:
     """How far the roughness has deformed the cells.
