@@ -32,7 +32,7 @@ _RESERVE = 0.1
 """Depth beyond the largest approach that tetrahedra are small for, relative to it: what the block
 yields more than a half-space, where the approach is not given."""
 
-_ORDERS = {1: (2.0, 1.0), 2: (2.0, 1.0)}
+_ORDERS = {1: (2.0, 1.0), 2: (3.0, 1.0)}
 """Known orders of force and contact area in the mesh size, by the element's degree."""
 
 _MOST_LATTICE = 400
@@ -114,7 +114,7 @@ def reference_meshes(scene: Scene, surface: Surface, furthest: Plane) -> Referen
             surface, reach, scene.block.height, count=scene.reference.meshes, tilt=tilt,
             **_asked(scene, hexahedral),
         )  # fmt: skip
-        radius = contact_radius(surface, approach, tilt)
+        radius = contact_radius(surface, approach, tilt=tilt)
     except InputError as error:
         raise error.located(key=key, file=scene.file) from None
     sizes = np.array([characteristic_size(shape) for shape in shapes])
