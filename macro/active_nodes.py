@@ -165,15 +165,16 @@ class ActiveNodes:
     ) -> Found:
         depth = self._depth(plane, displacement)
         displacement.array[self._top.dofs] -= np.where(active, depth, np.maximum(depth, 0.0))
-        forces = np.maximum(self._forces(displacement), 0.0)
+        pressing = np.where(active, np.maximum(self._forces(displacement), 0.0), 0.0)
         # vertices of quadratic triangles touch without a force
         touching = active | (depth > -_CLOSED * self._largest(displacement.array_r))
         found = Found(
             plane=plane,
             displacement=displacement.array_r.copy(),
-            pressing=np.where(active, forces, 0.0),
+            pressing=pressing,
             touching=touching,
             area=np.where(touching, self._top.area, 0.0),
+            covered=self._top.covered_area(touching, pressing, np.maximum(-depth, 0.0)),
             contacts=self._contacts(touching),
             active_sets=sets,
             linear_iterations=spent,

@@ -31,7 +31,8 @@ class ObstacleState:
             interface, shape (2,) [N mm].
         reaction: Force that the bottom bears [N]; equals ``force`` in equilibrium.
         contact_area: Tributary area of the nodes, or of the quadrature points, in contact [mm²].
-        contact_area_fine: The same with its border within the facets; see `covered` [mm²].
+        contact_area_fine: Area with its border within the facets: between nodes as `covered` tells,
+            or that of the quadrature points [mm²].
         nodes: Number of nodes in contact.
         contacts: Number of connected regions of contact.
         mean_separation: Mean gap between the plane and the top [mm].
@@ -73,6 +74,7 @@ class Found(NamedTuple):
         pressing: Contact forces of the nodes of the top, shape (n,) [N].
         touching: Whether these nodes are in contact, shape (n,).
         area: Their areas in contact, shape (n,) [mm²].
+        covered: Contact area with its border within the facets, of all ranks [mm²].
         contacts: Number of connected regions of contact, over all ranks.
         active_sets: Active sets that were solved for.
         linear_iterations: Iterations of the linear solver.
@@ -84,6 +86,7 @@ class Found(NamedTuple):
     pressing: Array
     touching: Flags
     area: Array
+    covered: float
     contacts: int
     active_sets: int
     linear_iterations: int
@@ -119,7 +122,7 @@ def measured(block: Block, top: TopNodes, plane: RigidPlane, found: Found) -> Ob
         moment=loads[1:],
         reaction=block.reaction(displacement),
         contact_area=float(area),
-        contact_area_fine=top.covered_area(found.touching, found.pressing, np.maximum(gap, 0.0)),
+        contact_area_fine=found.covered,
         nodes=round(nodes),
         contacts=found.contacts,
         mean_separation=float(room / whole),
