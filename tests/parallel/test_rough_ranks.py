@@ -41,6 +41,6 @@ def test_the_cases_are_what_they_claim(found):
 
 @pytest.mark.parametrize("ranks", [2, 3])
 def test_refusal_reaches_every_rank(found, ranks):
-    texts = found[ranks]["inside out"]
-    assert texts == found[1]["inside out"] * ranks
-    assert "turns cells inside out" in texts[0]
+    texts = found[ranks]["too steep"]
+    assert texts == found[1]["too steep"] * ranks
+    assert "too steep for a mesh" in texts[0]
