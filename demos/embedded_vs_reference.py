@@ -17,6 +17,8 @@
 import argparse
 from pathlib import Path
 
+import numpy as np
+from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
 
 from micro import MODELS, finite_slope_effect
@@ -82,29 +84,28 @@ parts = {
 }
 coupled = [name for name in models if "×" in name]
 parts |= {name: final[name] / final["concurrent"] - 1.0 for name in coupled}
-print("parts of the difference")
 for name, part in parts.items():
-    print(f"  {name:36s} {part:+8.2%}")
+    print(f"  part: {name:30s} {part:+8.2%}")
 
 # %%
 figure = Figure(figsize=(14.0, 8.6), layout="constrained")
-upper, lower = figure.subfigures(2, 1, height_ratios=(1.35, 1.0))
+upper, lower = figure.subfigures(2, 1, height_ratios=(1.5, 1.0))
 curve, apart, split = upper.subplots(1, 3)
 approach, value = 1e3 * reference.approach_mm, record.force.value
 bar, band = 100 * record.force.error / value, {"color": "0.75", "lw": 0}
 curve.fill_between(approach, value * (1 - bar / 100), value * (1 + bar / 100), **band)
 curve.plot(approach, value, "k", lw=2.5, label=f"reference, {record.label}")
 apart.fill_between(approach, -bar, bar, label="its error bar", **band)
-COLOURS = {"half-space": "#0b3c5d", "concurrent": "#1b998b", "consistent": "#6a4c93"}
+COLOURS = {"half-space": "#0b3c5d", "half-space,": "#edae49", "concurrent": "#1b998b"}
+COLOURS |= {"consistent,": "#6a4c93", "isolated,": "#d1495b"}
 for (name, history), mark in zip(models.items(), "*sdv^osdvsdv", strict=False):
-    colour = COLOURS.get(name.split(",")[0], "#d1495b")
-    colour = "#edae49" if name.startswith("half-space,") else colour
-    look = {"color": colour, "ls": ":", "marker": mark, "mfc": "none", "label": name}
+    look = {"color": COLOURS[name.split()[0]], "marker": mark, "label": name}
+    look |= {"ls": ":", "mfc": "none"}
     curve.plot(approach, history.mean_pressure_MPa, **look)
     apart.plot(approach, 100 * (history.force_N / value - 1.0), **look)
-curve.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]")
+curve.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]", ylim=(0.0, 1.6 * value[-1]))
 curve.legend(frameon=False, fontsize=8)
-apart.set(xlabel="approach [µm]", ylabel="force against the reference [%]")
+apart.set(xlabel="approach [µm]", ylabel="force against the reference [%]", ylim=(-20.0, 50.0))
 split.barh(list(parts), [100 * part for part in parts.values()], color="#0b3c5d")
 split.set(xlabel="part of the difference at 8 µm [%]")
 split.invert_yaxis()
@@ -114,12 +115,12 @@ maps = {"reference": reference} | {
     name: models[name]
     for name in ("half-space", "concurrent", coupled[len(GRIDS) - 1], coupled[-1])
 }
-top = reference.patch_pressure_MPa[-1].max()
+SHADES = PowerNorm(0.5, vmin=0.0, vmax=reference.patch_pressure_MPa[-1].max())
 panels = lower.subplots(1, len(maps), sharey=True)
 for axes, (name, history) in zip(panels, maps.items(), strict=True):
     grid, pressure = history.patches, history.patch_pressure_MPa[-1].reshape(history.patches.grid)
-    look = {"cmap": "magma_r", "vmin": 0.0, "vmax": top}
-    image = axes.pcolormesh(grid.borders_x, grid.borders_y, pressure.T, **look)
+    pressed = np.where(pressure > 0.0, pressure, np.nan).T  # open patches stay white
+    image = axes.pcolormesh(grid.borders_x, grid.borders_y, pressed, cmap="magma_r", norm=SHADES)
     axes.set(title=name, xlabel="x [mm]", aspect="equal", xticks=(0.0, 0.5, 1.0))
 lower.colorbar(image, ax=panels, label="patch pressure at 8 µm [MPa]", extend="max", shrink=0.75)
 figure.savefig(choice.out / "embedded_vs_reference.png", dpi=110)

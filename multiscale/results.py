@@ -142,7 +142,7 @@ def _write_xdmf(path: Path, run: Run) -> None:
     import macro
 
     if isinstance(run.coupling, ReferenceCoupling):
-        macro.write_rough_fields(path, run.coupling.finest, run.coupling.state)
+        macro.write_rough_fields(path, run.coupling.finest, run.coupling.latest)
         return
     interface, displacement = run.last_field()
     macro.write_fields(path, interface, displacement, run.steps[-1].patches.pressure_MPa)
