@@ -20,6 +20,7 @@ from petsc4py import PETSc
 from geometry.control import Control
 from geometry.errors import NotConverged
 from geometry.patches import PatchGrid
+from macro.augmented_law import AugmentedLaw, facet_sizes
 from macro.block import Block
 from macro.contact import Contact
 from macro.equilibrium import Equilibrium
@@ -47,23 +48,9 @@ _HARDER, _HARDEST = 10.0, 10.0  # growth of the stiffness between updates, and a
 _FALL = 0.1  # of the penetration by an update; else springs are too soft
 _MOST_STEPS, _MOST_UPDATES, _HALVINGS = 60, 40, 30
 _ON = 1e-12  # of a basis function: its node is not on the facet
-_CLOSED = 1e-6  # gap of points, relative to the displacements, and force of nodes that are none
+_NO_FORCE = 1e-6  # of the largest nodal force: none
 _TINY = 1e-300
 _ENOUGH = 0.9  # share of the energy's slope that a step may leave
-
-
-class _AugmentedLaw:
-    """Pressures of this rank's quadrature points over their closures; a `ContactLaw`."""
-
-    def __init__(self, rest: Array) -> None:
-        self.rest = rest
-        self.slope, self.multiplier = np.zeros_like(rest), np.zeros_like(rest)
-
-    def pressure(self, closure: Array) -> Array:
-        return np.maximum(self.multiplier + self.slope * (closure - self.rest), 0.0)
-
-    def stiffness(self, closure: Array) -> Array:
-        return np.where(self.pressure(closure) > 0.0, self.slope, 0.0)
 
 
 class AugmentedFacets:
@@ -89,11 +76,11 @@ class AugmentedFacets:
         self._sampling = sampling = interface.pointwise
         (rest,) = top.spread(plane.rest)
         points = interface.quadrature
-        unit = block.material.contact_modulus / _sizes(points.cell, points.weight)
+        unit = block.material.contact_modulus / facet_sizes(points.cell, points.weight)
         self._stiff = _HARD * unit if penalty is None else np.full_like(unit, penalty)
         self._soft = np.minimum(_SOFT * unit, self._stiff)
         self._penetration = PENETRATION[block.degree]
-        self._law = _AugmentedLaw(np.sum(points.values * rest[points.nodes], axis=1))
+        self._law = AugmentedLaw(np.sum(points.values * rest[points.nodes], axis=1))
         self._contact = Contact(interface, sampling, [self._law])
         self._equilibrium = Equilibrium(block, sampling, self._contact)
         self._preconditioner = StiffPreconditioner(
@@ -201,15 +188,11 @@ class AugmentedFacets:
         samples = self._sampling.operator.createVecRight()
         samples.array[:] = pressure
         self._sampling.operator.mult(samples, load)
-        pressing, pressed = -load.array_r[self._top.dofs], self._closed(closure, pressure)
-        points = self._interface.quadrature
-        share = np.abs(points.values)
-        share *= (points.weight / share.sum(axis=1))[:, None]
-        touching = pressing > _CLOSED * self._largest(pressing)
+        pressing = -load.array_r[self._top.dofs]
         gap = -self._plane.closure(plane, -displacement.array_r[self._top.dofs])
-        gap = np.where(touching, 0.0, np.maximum(gap, 0.0))
-        area = self._top.collect(points.nodes, share * pressed[:, None])
-        contacts = self._top.regions(points.nodes[pressed], (share > 0.0)[pressed])
+        touching = pressing > _NO_FORCE * self._largest(pressing)
+        if self._exact:
+            touching |= gap < self._penetration * self._largest(displacement.array_r)
         values = displacement.array_r.copy()
         self._history.add(Start(plane, values, pressure), float(self._plane.loads(pressing)[0]))
         reason = "CONVERGED_MULTIPLIERS" if self._exact else "CONVERGED_PENALTY"
@@ -218,21 +201,10 @@ class AugmentedFacets:
             displacement=values,
             pressing=pressing,
             touching=touching,
-            area=area,
-            covered=self._top.covered_area(touching, np.maximum(pressing, 0.0), gap),
-            contacts=contacts,
             active_sets=steps,
             linear_iterations=spent,
-            reason=reason if contacts else "CONVERGED_NO_CONTACT",
+            reason=reason if self._largest(pressing) else "CONVERGED_NO_CONTACT",
         )
-
-    def _closed(self, closure: Array, pressure: Array) -> NDArray[np.bool_]:
-        """Tell which points are in contact: facets may touch at more points than bear forces."""
-        bearing = pressure > 0.0
-        if not self._exact:
-            return bearing
-        near = _CLOSED * self._largest(np.where(bearing, closure, 0.0))
-        return bearing | (closure - self._law.rest > -near)
 
     def _failure(self, control: Control, reason: str, iterations: int) -> NotConverged:
         return NotConverged(
@@ -245,9 +217,3 @@ class AugmentedFacets:
     def _largest(self, values: Array) -> float:
         largest = float(np.abs(values).max(initial=0.0))
         return float(self._block.mesh.comm.allreduce(largest, op=MPI.MAX))
-
-
-def _sizes(cell: NDArray[np.int32], weight: Array) -> Array:
-    """Return the size of the facet that every point lies on, shape (n,) [mm]."""
-    _, at = np.unique(cell, return_inverse=True)
-    return np.sqrt(np.bincount(at, weights=weight))[at] if len(at) else np.empty(0)

@@ -123,3 +123,25 @@ def test_finite_slopes_soften_the_rough_block_as_estimated(seed):
     # nine tenths of the heights are between the two meshes; 0.4 % (rms) are of second order
     assert measured < -0.02
     assert 0.9 * estimate == pytest.approx(measured, abs=5e-3)
+
+
+def test_area_within_facets_is_hertz():
+    """Two methods on one mesh of 4.5 elements along a contact radius, nodes off the middle."""
+    x = (np.arange(129) + 0.5) / 129 - 0.5
+    heights = -((x[:, None] - 0.013) ** 2 + (x - 0.005) ** 2) / (2.0 * RADIUS)
+    moved = Surface(heights=heights, lengths=(1.0, 1.0))
+    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(32, 32, 8), grading=8.0)
+    mesh, _ = rough_block_mesh(shape, moved, MPI.COMM_SELF)
+    block = Block(mesh, MATERIAL)
+    highest = moved.highest - moved.mean_height
+    nodes, points = (
+        ObstacleBlock(block, highest, method=method).press(Control(approach=APPROACH))
+        for method in ("active-set", "augmented-lagrangian")
+    )
+    # of the force that was found, so that the mesh's stiffness does not count
+    area = np.pi * CONTACT**2 * (nodes.force / HERTZ) ** (2.0 / 3.0)
+    # measured +2.9 % at 4.5 elements along the radius; nodes alone +12 %
+    assert nodes.contact_area_fine == pytest.approx(area, rel=0.05)
+    assert points.contact_area_fine == pytest.approx(nodes.contact_area_fine, rel=0.01)
+    # constraints at points between the nodes of linear facets ask for nearly the same
+    assert points.force == pytest.approx(nodes.force, rel=1e-3)
