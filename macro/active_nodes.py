@@ -34,7 +34,7 @@ Flags = NDArray[np.bool_]
 TOLERANCE = 1e-10
 """What a solution may miss: residual and complementarity, relative to the contact forces."""
 
-_LOOSE = 1e-3  # relative residual while the active set still changes
+_LOOSE = 1e-2  # relative residual while the active set still changes
 _MOST_SETS = 80
 _PATIENCE = 10  # sets without progress before nodes change one by one
 _CLOSED = 1e-8  # gap, relative to the displacements, that is none

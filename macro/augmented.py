@@ -42,7 +42,7 @@ PENETRATION = {1: 1e-8, 2: 1e-5}
 element's degree: on quadratic facets points nearly repeat each other's conditions, and multipliers
 that share one load settle slowly."""
 
-_SOFT, _HARD = 30.0, 1000.0  # stiffness at first and at last: E* times this over a facet's size
+_SOFT, _HARD = 30.0, 1000.0  # stiffness at first and at last: E* over the facet
 _LOOSEST, _SPARE = 0.03, 0.3  # relative residual of linear solves, and at the end
 _HARDER, _HARDEST = 10.0, 10.0  # growth of the stiffness between updates, and all in all
 _FALL = 0.1  # of the penetration by an update; else springs are too soft
@@ -60,7 +60,7 @@ class AugmentedFacets:
         block: The block.
         top: Its top.
         plane: The plane over the nodes of the top.
-        penalty: The stiffness k [MPa/mm]; None: 30 E* over the size of each facet.
+        penalty: The stiffness k [MPa/mm]; None: 1000 E* over the size of each facet.
         exact: Whether multipliers make up for the penetration.
 
     Note:

@@ -45,3 +45,22 @@ def test_numbers_that_are_none_do_not_converge(block):
     residual.set(np.inf)
     with pytest.raises(NotConverged, match="the linear solve of the rough block"):
         solver.improve(found, residual, 1e-8)
+
+
+def test_held_degrees_of_freedom_move_together(block):
+    count = block.dofs
+    every = np.arange(count, dtype=PETSc.IntType)
+    matrix = block.stiffness.getValues(every, every)
+    held = np.sort(RANDOM.choice(count, count // 4, replace=False))
+    motions = np.linalg.qr(RANDOM.standard_normal((len(held), 2)))[0]
+    start, right = RANDOM.standard_normal((2, count))
+    solver, found = FreeSolver(block.stiffness, block.solver.pc), vector_of(start)
+    solver.hold(held, motions)
+    solver.improve(found, vector_of(right - matrix @ start), 1e-8)
+    free = np.setdiff1d(np.arange(count), held)
+    ways = np.zeros((count, len(free) + 2))
+    ways[free, np.arange(len(free))] = 1.0
+    ways[held, -2:] = motions
+    step = np.linalg.solve(ways.T @ matrix @ ways, ways.T @ (right - matrix @ start))
+    # residuals of 1e-8 over the smallest stiffness
+    np.testing.assert_allclose(found.array_r, start + ways @ step, atol=1e-9)
