@@ -28,6 +28,13 @@ _STEEPEST = 2.0
 """Slope between neighbouring nodes above which a top is refused: edges at 27° to each other."""
 
 
+_LEAST_BENT = 0.3
+"""The same, below which the edges of a quadratic tetrahedron are made straight."""
+
+_EDGES = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])
+"""Ends of a quadratic tetrahedron's edges, in dolfinx's order of the nodes 4 … 9 between them."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeshQuality:
     """How far the roughness has deformed the cells.
@@ -49,6 +56,9 @@ def rough_block_mesh(
 
     The top becomes z = h(x, y) − <h>, from the surface's interpolant at the nodes; below, the
     movement fades as (1 + z/height)³. Every rank moves the nodes that it has.
+
+    The edges of quadratic tetrahedra bend with the roughness, but for the few cells, long against
+    its waves and far from contact, that this would turn inside out: they stay straight.
 
     Along every vertical line the movement keeps the order of points as long as the deepest valley
     lies less than height/3 below the mean. Hexahedra, whose sides are vertical, then stay
@@ -74,8 +84,10 @@ def rough_block_mesh(
     rise = surface.height_at(x, y) - surface.mean_height if len(points) else np.empty(0)
     moved = points.copy()
     moved[:, 2] += rise * (1.0 + points[:, 2] / shape.height) ** _DECAY
+    if isinstance(shape, RefinedShape) and shape.degree == 2:
+        _straighten(flat, moved)
     quality = MeshQuality(
-        thinnest=float(comm.allreduce(_thinnest(flat, moved), op=MPI.MIN)),
+        thinnest=float(comm.allreduce(_volumes(flat, moved).min(initial=np.inf), op=MPI.MIN)),
         steepest=float(comm.allreduce(_steepest(flat, rise), op=MPI.MAX)),
     )
     if quality.steepest > _STEEPEST:
@@ -121,19 +133,35 @@ def _check_depth(shape: BlockShape | RefinedShape, surface: Surface) -> None:
         )
 
 
-def _thinnest(flat: BlockMesh, moved: Array) -> float:
-    """Return the smallest ratio of the volumes at nodes of cells after and before a movement.
+def _straighten(flat: BlockMesh, moved: Array) -> None:
+    """Put the middles of edges onto the chord in cells that bend too much, on all ranks alike."""
+    cells, names = compat.cell_vertices(flat.mesh), flat.mesh.geometry.input_global_indices
+    done: Array = np.empty(0, dtype=np.int64)
+    while True:
+        middles = cells[:, 4:]
+        found = np.unique(np.asarray(names)[middles[_volumes(flat, moved) < _LEAST_BENT]])
+        wanted = np.union1d(done, np.concatenate(flat.comm.allgather(found)))
+        if len(wanted) == len(done):
+            return
+        done = wanted
+        cell, edge = np.nonzero(np.isin(np.asarray(names)[middles], done))
+        ends = cells[cell[:, None], _EDGES[edge]]
+        moved[middles[cell, edge], 2] = moved[ends, 2].mean(axis=1)
+
+
+def _volumes(flat: BlockMesh, moved: Array) -> Array:
+    """Return each cell's smallest ratio of the volumes at its nodes after and before a movement.
 
     Nodes move along z alone, which changes one row of the Jacobian matrix.
     """
     cells, points = compat.cell_vertices(flat.mesh), flat.mesh.geometry.x
     x, y, before, after = (row[cells] for row in (*points.T, moved[:, 2]))
-    thinnest = 1.0
+    smallest = np.full(len(cells), np.inf)
     for slopes in _slopes(cells.shape[1]) if len(cells) else ():
         normal = np.cross(x @ slopes, y @ slopes)
         volumes = (np.einsum("ci,ci->c", normal, z @ slopes) for z in (after, before))
-        thinnest = min(thinnest, float(np.divide(*volumes).min()))
-    return thinnest
+        np.minimum(smallest, np.divide(*volumes), out=smallest)
+    return smallest
 
 
 def _slopes(nodes: int) -> Array:
@@ -147,7 +175,7 @@ def _slopes(nodes: int) -> Array:
     linear = np.vstack([np.full(3, -1.0), np.eye(3)])
     if nodes == 4:
         return linear[None]
-    i, j = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)]).T
+    i, j = _EDGES.T
     at = np.vstack([np.eye(4), 0.5 * (np.eye(4)[i] + np.eye(4)[j])])[:, :, None]
     # of L (2 L - 1) at vertices, of 4 L L' in the middle of edges
     vertices = (4.0 * at - 1.0) * linear

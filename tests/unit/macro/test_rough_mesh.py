@@ -55,21 +55,33 @@ def test_quality_of_tetrahedra_is_the_jacobian(element, slack):
 @pytest.mark.parametrize("element", ["P1", "P2"])
 def test_all_nodes_of_the_top_lie_on_the_surface(element):
     surface = wave(0.02, waves=2)
-    mesh, _ = rough_block_mesh(refined(element), surface, COMM)
+    mesh, _ = rough_block_mesh(refined(element, coarse=0.1), surface, COMM)
     block = ObstacleBlock(Block(mesh, Material(young_modulus=1.0, poisson_ratio=0.3)), 0.02)
     # the nodes of the displacements: those in the middle of edges are no means of the ends
     np.testing.assert_allclose(block.height, surface.height_at(block.x, block.y), atol=1e-12)
 
 
+def test_cells_that_span_waves_stay_straight():
+    """Bent edges would turn cells inside out that straight ones leave alone."""
+    rough = synthesise(
+        Spectrum(hurst=0.9, waves=(4, 10), rms_slope=0.2, seed=1), grid=(64, 64), lengths=(1.0, 1.0)
+    )
+    straight, curved = (
+        rough_block_mesh(refined(element, coarse=0.3), rough, COMM)[1] for element in ("P1", "P2")
+    )
+    assert straight.thinnest > 0.3
+    # 0.3 is asked for; unless even straight edges leave less
+    assert curved.thinnest > 0.3
+
+
 def test_a_curved_top_has_the_volume_of_the_surface():
     """Between nodes the top is a quadratic: its volume errs less than a faceted top's."""
-    errors = []
+    surface, errors = wave(0.02, waves=2), []
     for element in ("P1", "P2"):
-        mesh, _ = rough_block_mesh(refined(element, coarse=0.15), wave(0.04, waves=2), COMM)
-        one = fem.Constant(mesh.mesh, 1.0)
-        volume = fem.assemble_scalar(fem.form(one * ufl.dx(domain=mesh.mesh)))
-        errors.append(abs(volume - 1.0))  # the mean of the heights is that of the waves
-    assert errors[1] < 0.1 * errors[0]
+        mesh, _ = rough_block_mesh(refined(element, coarse=0.1), surface, COMM)
+        length = fem.Constant(mesh.mesh, 1.0) * ufl.dx(domain=mesh.mesh)
+        errors.append(abs(fem.assemble_scalar(fem.form(length)) - 1.0))
+    assert errors[1] < 0.2 * errors[0]  # the mean of the waves is 0
 
 
 def test_tetrahedra_longer_than_the_waves_are_refused():
