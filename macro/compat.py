@@ -88,6 +88,19 @@ def vector_space(mesh: Any, degree: int) -> Any:
 
 
 @_compiling()
+def scalar_space(mesh: Any, degree: int) -> Any:
+    """Return the continuous Lagrange space of scalars.
+
+    Args:
+        mesh: dolfinx mesh.
+        degree: Polynomial degree.
+    """
+    if hasattr(fem, "functionspace"):
+        return fem.functionspace(mesh, ("Lagrange", degree))
+    return fem.FunctionSpace(mesh, ("Lagrange", degree))
+
+
+@_compiling()
 def cellwise_space(mesh: Any) -> Any:
     """Return the space of scalars that are constant on every cell."""
     if hasattr(fem, "functionspace"):

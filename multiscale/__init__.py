@@ -2,18 +2,21 @@
 
 A `Scene` becomes a stage (surface, summits, patches, micro model), the micro model gives every
 patch its law, the laws go onto the flat interface of an elastic block, and load steps become a
-`History`.
+`History`. A reference meshes the rough surface itself instead, and tells its own error.
 """
 
 from multiscale.concurrent import ConcurrentCoupling
 from multiscale.condensed import CondensedCoupling
 from multiscale.consistent import consistent_laws
 from multiscale.coupling import AnalyticCoupling, EmbeddedCoupling
+from multiscale.extrapolation import Estimate, extrapolated
 from multiscale.history import History, LoadStep, PatchState
 from multiscale.law_files import LawTable, read_laws, write_laws
 from multiscale.laws import PatchLaw
 from multiscale.loading import Programme, load_steps
 from multiscale.patch_laws import PatchLaws
+from multiscale.reference import ReferenceCoupling
+from multiscale.reference_record import ReferenceRecord
 from multiscale.run import Run, run
 from multiscale.scene import Scene
 from multiscale.spread import ContactSpread
@@ -27,6 +30,7 @@ __all__ = [
     "CondensedCoupling",
     "ContactSpread",
     "EmbeddedCoupling",
+    "Estimate",
     "History",
     "LawTable",
     "LoadStep",
@@ -34,12 +38,15 @@ __all__ = [
     "PatchLaws",
     "PatchState",
     "Programme",
+    "ReferenceCoupling",
+    "ReferenceRecord",
     "Run",
     "Scene",
     "SpreadLoads",
     "Stage",
     "UniformLoads",
     "consistent_laws",
+    "extrapolated",
     "isolated_laws",
     "load_steps",
     "make_stage",

@@ -67,19 +67,24 @@ def remove_partial(folder: Path) -> None:
 
 
 def write_tables(folder: Path, history: History) -> list[Path]:
-    """Write ``history.csv`` and ``patches.csv``.
+    """Write ``history.csv`` and ``patches.csv``, and of a reference ``reference.csv``.
 
     Args:
         folder: Where to; made when missing.
         history: The load steps.
 
     Returns:
-        The two files.
+        The files.
     """
-    return [
+    files = [
         _write_csv(folder / "history.csv", COLUMNS, history.rows()),
         _write_csv(folder / "patches.csv", PATCH_COLUMNS, history.patch_rows()),
     ]
+    record = history.reference
+    if record is not None:
+        rows = record.rows(history.steps)
+        files.append(_write_csv(folder / "reference.csv", record.columns, rows))
+    return files
 
 
 def write_json(path: Path, content: dict[str, Any]) -> Path:

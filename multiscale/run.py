@@ -21,6 +21,7 @@ from multiscale.history import History, LoadStep
 from multiscale.law_files import LawTable, read_laws, write_laws
 from multiscale.loading import Coupling, Drive, Position, Restorable
 from multiscale.records import Arrays
+from multiscale.reference import ReferenceCoupling, recorded, reference_notes
 from multiscale.scene import Scene
 from multiscale.stage import Stage, make_stage
 from multiscale.validity import range_notes
@@ -169,16 +170,23 @@ class Run:
         if self._resumed:
             count = len(self._resumed.steps)
             notes.append(f"resumed after load step {count}; times of phases are those since then")
+        record = None
+        if isinstance(self.coupling, ReferenceCoupling):
+            record = recorded(self.stage, self.coupling, self.steps)
+            notes += reference_notes(record, self.coupling)
         return History(
             steps=tuple(self.steps),
             patches=self.stage.patches,
             seconds=dict(self.seconds),
             notes=tuple(notes),
+            reference=record,
         )
 
     @property
     def unknowns(self) -> int | None:
         """Degrees of freedom of the block that is pressed, where one is."""
+        if isinstance(self.coupling, ReferenceCoupling):
+            return self.coupling.unknowns[-1]
         return None if self.interface is None else self.interface.block.dofs
 
     def last_field(self) -> tuple[Interface, NDArray[np.float64]]:
