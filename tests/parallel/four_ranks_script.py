@@ -10,14 +10,14 @@ from multiscale import Run, Scene
 
 PAPER = Path(__file__).parents[2] / "demos" / "scenes" / "paper.toml"
 SMALL = ["surface.grid=[48, 48]", "load.steps=2", "block.cells=[4, 4, 3]", "patches.grid=[1, 2]"]
-# most of the block lies beside the interface: of four ranks some own none of it; two patches and
-# four ranks leave some without a patch whose law they would tabulate
-WIDE = ["block.margin=4 mm", "block.margin_cells=6"]
+# a column falls to the ranks in slices: most own none of the interface; two patches and four ranks
+# leave some without a patch whose law they would tabulate
+COLUMN = ["block.height=8 mm", "block.cells=[4, 4, 32]"]
 HALF_SPACE = "micro.model=half-space"
 SCENES = {
-    "isolated, patchwise": [*WIDE, "coupling.kind=isolated", "coupling.newton=full"],
-    "isolated, pointwise": [*WIDE, "coupling.kind=isolated", "coupling.interface=pointwise"],
-    "isolated, condensed": [*WIDE, "coupling.kind=isolated", "coupling.newton=condensed"],
+    "isolated, patchwise": [*COLUMN, "coupling.kind=isolated", "coupling.newton=full"],
+    "isolated, pointwise": [*COLUMN, "coupling.kind=isolated", "coupling.interface=pointwise"],
+    "isolated, condensed": [*COLUMN, "coupling.kind=isolated", "coupling.newton=condensed"],
     "consistent": ["coupling.kind=consistent", HALF_SPACE],
     "concurrent": ["coupling.kind=concurrent", HALF_SPACE],
     "analytic": ["coupling.kind=analytic", HALF_SPACE],
