@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from geometry.collective import on_root
 from multiscale import plan
 from multiscale.law_files import write_laws
-from multiscale.outputs import write_json, write_tables, write_text, write_whole
+from multiscale.outputs import write_json, write_tables, write_text, write_whole, written
 from multiscale.provenance import provenance
 from multiscale.report import report_html
 from multiscale.run import Run
@@ -63,7 +63,8 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
 def _remove_older(folder: Path) -> None:
     """Remove an earlier run's files, lest this run's tables stand beside another scene's laws."""
     for name in _FILES:
-        (folder / name).unlink(missing_ok=True)
+        with written(folder / name):
+            (folder / name).unlink(missing_ok=True)
 
 
 def write_figure(path: Path, figure: Figure) -> Path:

@@ -263,6 +263,21 @@ def test_folder_of_a_file_cannot_be_locked(tmp_path):
         FolderLock(tmp_path / "file" / "out").hold()
 
 
+def test_folder_that_cannot_be_made_is_refused():
+    with pytest.raises(InputError, match="'/proc/nothing': cannot be written to"):
+        FolderLock(Path("/proc/nothing")).hold()
+
+
+def test_wrong_input_met_late_leaves_nothing(capsys, tmp_path, monkeypatch):
+    def refuse(*arguments):
+        raise InputError("does not go", key="command line")
+
+    monkeypatch.setattr(sys.modules["multiscale.run"], "assemble", refuse)
+    assert main([*WORDS[:2], "--out", str(tmp_path / "out"), *WORDS[2:]]) == 2
+    assert "patchlaw: command line: does not go" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_full_disk_leaves_the_earlier_checkpoint(tmp_path, ended, monkeypatch):
     path, _ = interrupted(tmp_path / "out", ended)
     before = path.read_bytes()
