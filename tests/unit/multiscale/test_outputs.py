@@ -75,7 +75,7 @@ def test_failed_write_leaves_the_old_file(tmp_path):
         partial.write_text("half", encoding="utf-8")
         raise OSError("disk full")
 
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(NotWritten, match="report.html: cannot be written: disk full"):
         write_whole(path, fail)
     assert path.read_text(encoding="utf-8") == "old"
     assert [entry.name for entry in tmp_path.iterdir()] == ["report.html"]
