@@ -5,6 +5,7 @@ patch its law, the laws go onto the flat interface of an elastic block, and load
 `History`. A reference meshes the rough surface itself instead, and tells its own error.
 """
 
+from multiscale.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
 from multiscale.concurrent import ConcurrentCoupling
 from multiscale.condensed import CondensedCoupling
 from multiscale.consistent import consistent_laws
@@ -26,6 +27,7 @@ from multiscale.yielding import SpreadLoads, UniformLoads
 
 __all__ = [
     "AnalyticCoupling",
+    "Checkpoint",
     "ConcurrentCoupling",
     "CondensedCoupling",
     "ContactSpread",
@@ -50,7 +52,9 @@ __all__ = [
     "isolated_laws",
     "load_steps",
     "make_stage",
+    "read_checkpoint",
     "read_laws",
     "run",
+    "write_checkpoint",
     "write_laws",
 ]

@@ -90,6 +90,10 @@ def _stepped(run: Run, keeper: Keeper, interruption: Interruption) -> PatchlawEr
             return error
         except NotConverged as error:  # what was accepted before it is kept
             return error
+        except InputError:  # of which nothing is written
+            if not run.steps:
+                on_root(run.comm, keeper.remove)
+            raise
     return None
 
 

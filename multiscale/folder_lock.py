@@ -14,6 +14,7 @@ from geometry.collective import on_root
 from geometry.errors import InputError
 
 _NAME = ".lock"
+_ATTEMPTS = 10
 _NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS)
 
 
@@ -62,16 +63,18 @@ class FolderLock:
         Raises:
             InputError: When another process holds it, or the folder cannot be written to.
         """
-        while not self._holds():
+        for attempt in range(_ATTEMPTS):
+            if self._holds():
+                return
             try:
                 self._path.parent.mkdir(parents=True, exist_ok=True)
                 self._lock()
-            except FileNotFoundError:  # removed between two calls
-                continue
             except BlockingIOError:
                 raise self._refused("another run is writing to this folder") from None
             except OSError as error:
-                raise self._refused(f"cannot be written to: {error.strerror}") from None
+                removed = isinstance(error, FileNotFoundError)  # between two calls, by its holder
+                if not removed or attempt == _ATTEMPTS - 1:
+                    raise self._refused(f"cannot be written to: {error.strerror}") from None
 
     def release(self) -> None:
         """Lift the lock and leave nothing of it."""

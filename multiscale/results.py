@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from geometry.collective import on_root
 from multiscale import plan
 from multiscale.law_files import write_laws
-from multiscale.outputs import write_json, write_tables, write_text, write_whole
+from multiscale.outputs import write_json, write_tables, write_text, write_whole, written
 from multiscale.provenance import provenance
 from multiscale.reference import ReferenceCoupling
 from multiscale.report import report_html
@@ -65,7 +65,8 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
 def _remove_older(folder: Path) -> None:
     """Remove an earlier run's files, lest this run's tables stand beside another scene's laws."""
     for name in _FILES:
-        _remove(folder / name)
+        with written(folder / name):
+            _remove(folder / name)
 
 
 def _remove(path: Path) -> None:

@@ -129,7 +129,7 @@ def after(seconds, path=None):
     until = [None if path else time.monotonic() + seconds]
 
     def over():
-        if until[0] is None and stamp(path) != before:
+        if until[0] is None and stamp(path) not in (before, None):
             until[0] = time.monotonic() + seconds
         return until[0] is not None and time.monotonic() > until[0]
 
@@ -137,11 +137,12 @@ def after(seconds, path=None):
 
 
 def stamp(path):
-    """Return when a file was changed last, None where there is none."""
+    """Return when a file was changed last, None where there is none or it is empty."""
     try:
-        return path.stat().st_mtime_ns
+        facts = path.stat()
     except FileNotFoundError:
         return None
+    return facts.st_mtime_ns if facts.st_size else None
 
 
 def tables(out):
@@ -188,7 +189,7 @@ def campaign(runs, scene, kills, folder, *, seed, every=2):
         elif dice.random() < 0.5:
             over = after(dice.uniform(0.0, lasts))
         else:
-            over = after(dice.uniform(0.0, 0.3 * lasts), out / "checkpoint.h5")
+            over = after(dice.uniform(0.0, 0.2 * lasts), out / "checkpoint.journal")
         sessions += 1
         start = runs.on_two_ranks if sessions % every == 0 else runs.forked
         code = start(words_of(out, scene, *words), log, over)

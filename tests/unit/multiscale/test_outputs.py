@@ -5,6 +5,7 @@ import csv
 import numpy as np
 import pytest
 
+from geometry.errors import NotWritten
 from geometry.patches import PatchGrid
 from multiscale.history import COLUMNS, PATCH_COLUMNS, History, LoadStep, PatchState
 from multiscale.outputs import write_tables, write_text, write_whole
@@ -75,7 +76,7 @@ def test_failed_write_leaves_the_old_file(tmp_path):
         partial.write_text("half", encoding="utf-8")
         raise OSError("disk full")
 
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(NotWritten, match=r"report.html: cannot be written: disk full"):
         write_whole(path, fail)
     assert path.read_text(encoding="utf-8") == "old"
     assert [entry.name for entry in tmp_path.iterdir()] == ["report.html"]

@@ -1,6 +1,8 @@
 """Checkpoints: what is kept, what is refused, and that a resumed run meets the undisturbed one."""
 
 import shutil
+import subprocess
+import sys
 import tomllib
 from dataclasses import fields
 from pathlib import Path
@@ -261,6 +263,21 @@ def test_folder_of_a_file_cannot_be_locked(tmp_path):
         FolderLock(tmp_path / "file" / "out").hold()
 
 
+def test_folder_that_cannot_be_made_is_refused():
+    with pytest.raises(InputError, match="'/proc/nothing': cannot be written to"):
+        FolderLock(Path("/proc/nothing")).hold()
+
+
+def test_wrong_input_met_late_leaves_nothing(capsys, tmp_path, monkeypatch):
+    def refuse(*arguments):
+        raise InputError("does not go", key="command line")
+
+    monkeypatch.setattr(sys.modules["multiscale.run"], "assemble", refuse)
+    assert main([*WORDS[:2], "--out", str(tmp_path / "out"), *WORDS[2:]]) == 2
+    assert "patchlaw: command line: does not go" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_full_disk_leaves_the_earlier_checkpoint(tmp_path, ended, monkeypatch):
     path, _ = interrupted(tmp_path / "out", ended)
     before = path.read_bytes()
@@ -322,3 +339,38 @@ def test_outputs_asked_for_do_not_change_the_solution(tmp_path):
         texts.append([row.split(",")[:9] + row.split(",")[10:] for row in rows])  # but for wall_s
         texts[-1].append((out / "patches.csv").read_text(encoding="utf-8"))
     assert texts[0] == texts[1]
+
+
+LIMITED = (
+    "import resource, sys; from mpi4py import MPI; from multiscale.cli import main;"
+    "resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), resource.RLIM_INFINITY));"
+    "sys.exit(main(sys.argv[2:]))"
+)  # MPI writes files of its own when it starts
+
+
+@pytest.mark.parametrize(
+    ("size", "file", "left"),
+    [
+        (8_000, "checkpoint.h5", set()),
+        (40_000, "surface.png", {"history.csv", "patches.csv", "provenance.json"}),
+    ],
+)
+def test_run_on_a_full_disk_ends_with_5_and_goes_on(capsys, tmp_path, size, file, left):
+    """The limit on the size of files stands for a disk that is full."""
+    out = tmp_path / "out"
+    words = [*WORDS[:2], "--out", str(out), "--resume", *WORDS[2:]]
+    words.remove("output.figures=false")
+    done = subprocess.run(
+        [sys.executable, "-c", LIMITED, str(size), *words],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stderr == f"patchlaw: {out / file}: cannot be written: File too large\n"
+    assert done.returncode == 5
+    kept = {path.name for path in out.iterdir()} if out.exists() else set()
+    assert kept == (left | {"checkpoint.h5", "checkpoint.journal"} if left else set())
+    assert main(words) == 0
+    assert ("goes on after load step 2" in capsys.readouterr().out) == bool(left)
+    assert (out / "surface.png").exists()
+    assert not list(out.glob("checkpoint*"))
