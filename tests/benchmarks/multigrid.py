@@ -1,4 +1,4 @@
-"""Geometric beside algebraic multigrid on blocks of many shapes: iterations, work, memory.
+"""Geometric beside algebraic multigrid on blocks of many shapes: iterations and times.
 
 Run by hand: `.venv/bin/python tests/benchmarks/multigrid.py [--runs 3] [--large] [SHAPE …]`, also
 under mpirun. Solves to 1e-8 under a load of all frequencies; times are medians of CPU seconds of

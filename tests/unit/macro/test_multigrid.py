@@ -151,7 +151,8 @@ def test_iterations_do_not_depend_on_the_shape(name):
     block = make("roller" if name in ("tall", "margin") else "free", **SHAPES[name])
     count, residual = iterations(block)
     assert block.solver.pc.getType() == "mg"
-    assert count <= 18  # 7 … 15 were counted; eigenvalues are estimated from a random start
+    # 9 … 15 were counted, 18 with tetrahedra; eigenvalues are estimated from a random start
+    assert count <= (24 if name == "tetrahedra" else 18)
     assert residual < 1.1e-8
 
 
@@ -166,7 +167,7 @@ def test_iterations_stay_on_a_rough_block():
 
 
 def test_nearly_incompressible_blocks_converge():
-    assert iterations(make(poisson_ratio=0.49, cells=(12, 12, 8)))[0] <= 80  # 50 were counted
+    assert iterations(make(poisson_ratio=0.49, cells=(12, 12, 8)))[0] <= 80  # 52 were counted
 
 
 def test_same_displacement_as_by_algebraic_multigrid():
