@@ -125,33 +125,26 @@ def places_in_reach(
     )
     grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     grid = np.vstack([grid, surface.highest_point])
-    depth = depth_below_plane(surface, *grid.T, approach, tilt=tilt)
+    depth = depth_below_plane(surface, grid, approach, tilt)
     return grid[depth >= min(0.0, float(depth.max()))]
 
 
 def depth_below_plane(
-    surface: Surface,
-    x: Array,
-    y: Array,
-    approach: float,
-    *,
-    tilt: tuple[float, float] = (0.0, 0.0),
+    surface: Surface, points: Array, approach: float, tilt: tuple[float, float] = (0.0, 0.0)
 ) -> Array:
     """Return how far the undeformed surface stands out behind the rigid plane [mm].
 
     Args:
         surface: The rough surface.
-        x: Abscissae [mm].
-        y: Ordinates, of the same shape [mm].
+        points: Places on it, shape (…, 2) [mm].
         approach: Approach at the middle of the surface, from first touch of a level plane [mm].
         tilt: Slopes of the approach along x and y.
 
     Returns:
-        Depths, of the same shape; negative where there is a gap.
+        Depths, shape (…); negative where there is a gap.
     """
-    middle_x, middle_y = (0.5 * length for length in surface.lengths)
-    lean = tilt[0] * (x - middle_x) + tilt[1] * (y - middle_y)
-    return surface.height_at(x, y) - surface.highest + approach + lean
+    lean = (points - 0.5 * np.array(surface.lengths)) @ np.array(tilt)
+    return surface.height_at(points[..., 0], points[..., 1]) - surface.highest + approach + lean
 
 
 def _name_faces(gmsh: Any, box: int, height: float) -> None:

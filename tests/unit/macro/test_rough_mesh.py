@@ -64,14 +64,15 @@ def test_all_nodes_of_the_top_lie_on_the_surface(element):
 def test_cells_that_span_waves_stay_straight():
     """Bent edges would turn cells inside out that straight ones leave alone."""
     rough = synthesise(
-        Spectrum(hurst=0.9, waves=(4, 10), rms_slope=0.2, seed=1), grid=(64, 64), lengths=(1.0, 1.0)
+        Spectrum(hurst=0.9, waves=(4, 10), rms_slope=0.35, seed=1),
+        grid=(64, 64),
+        lengths=(1.0, 1.0),
     )
     straight, curved = (
-        rough_block_mesh(refined(element, coarse=0.3), rough, COMM)[1] for element in ("P1", "P2")
+        rough_block_mesh(refined(element, coarse=0.2), rough, COMM)[1] for element in ("P1", "P2")
     )
     assert straight.thinnest > 0.3
-    # 0.3 is asked for; unless even straight edges leave less
-    assert curved.thinnest > 0.3
+    assert curved.thinnest >= 0.3  # −0.15 with all edges bent
 
 
 def test_a_curved_top_has_the_volume_of_the_surface():
