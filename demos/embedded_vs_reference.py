@@ -11,7 +11,7 @@
 # Half-spaces and flat interfaces are limits of small slopes. What finite slopes change is seen
 # with heights and approach ten times smaller, on the same meshes: their own error cancels.
 #
-# Run time: five minutes. `--quick` for coarse meshes, `--out DIR` for the figure's folder.
+# Run time: two minutes. `--quick` for coarse meshes, `--out DIR` for the figure's folder.
 
 # %%
 import argparse

@@ -177,5 +177,19 @@ def test_wrong_input_is_refused():
         obstacle(method="barrier")
     with pytest.raises(InputError, match="the penalty must be positive"):
         obstacle(method="penalty", penalty=0.0)
-    with pytest.raises(InputError, match="a patch holds no node"):
-        obstacle(patches=PatchGrid(grid=(40, 1), lengths=(1.0, 1.0)))
+
+
+def test_a_patch_without_a_node_is_closed_like_the_nearest():
+    patches = PatchGrid(grid=(40, 1), lengths=(1.0, 1.0))  # on 16 cells
+    found = obstacle(patches=patches)
+    state = found.press(Control(approach=10e-3))
+    assert state.patch_force.sum() == pytest.approx(state.force, rel=1e-12)
+    # a node on a border belongs to both sides
+    beside = np.abs(found.top.x[:, None] - patches.centres[:, 0])
+    held = (beside <= 0.5 / 40 + 1e-9).any(axis=0)
+    assert not held.all()
+    sag = -state.displacement[found.top.dofs]
+    for index in np.flatnonzero(~held):
+        apart = np.hypot(*(np.stack([found.top.x, found.top.y]).T - patches.centres[index]).T)
+        nearest = sag[apart < apart.min() * (1.0 + 1e-9)].mean()  # two may be as near
+        assert state.patch_closure[index] == pytest.approx(10e-3 - nearest, rel=1e-12)
