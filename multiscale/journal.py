@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import json
+import math
 import os
 from collections.abc import Iterator
-from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO
 
@@ -102,19 +103,18 @@ def journalled(path: Path, run: str) -> Iterator[tuple[LoadStep, Position, Array
 
 
 def _record(arrays: Arrays) -> bytes:
-    """Return arrays with their names in numpy's own format, led by checksum and length."""
-    body = BytesIO()
-    for name, array in arrays.items():
-        for content in (text_array(name), array):
-            np.lib.format.write_array(body, content, allow_pickle=False)
-    whole = body.getbuffer()
-    check = hashlib.sha256(whole).digest()
-    return b"".join((check, len(whole).to_bytes(_LENGTH, "little"), whole))
+    """Return arrays one behind the other, led by checksum, length and a line that lists them."""
+    listed = [(name, array.dtype.str, array.shape) for name, array in arrays.items()]
+    parts = [json.dumps(listed).encode(), b"\n", *(array.tobytes() for array in arrays.values())]
+    content = b"".join(parts)
+    check = hashlib.sha256(content).digest()
+    return b"".join((check, len(content).to_bytes(_LENGTH, "little"), content))
 
 
 def _arrays(content: bytes) -> Arrays:
-    body, arrays = BytesIO(content), {}
-    while body.tell() < len(content):
-        name = as_text(np.lib.format.read_array(body, allow_pickle=False))
-        arrays[name] = np.lib.format.read_array(body, allow_pickle=False)
+    at, arrays = content.index(b"\n") + 1, {}
+    for name, kind, shape in json.loads(content[:at]):
+        count = math.prod(shape)
+        array = np.frombuffer(content, np.dtype(kind), count, at).reshape(shape).copy()
+        arrays[name], at = array, at + array.nbytes
     return arrays

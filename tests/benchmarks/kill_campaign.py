@@ -1,0 +1,37 @@
+"""Kills runs of all couplings at random moments, resumes them and compares; see ``--help``."""
+
+import argparse
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "parallel")]
+
+from killed_runs import SCENES, Runs, campaign  # noqa: E402
+
+
+def main():
+    """Run the campaign and print a line for every coupling."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--kills", type=int, default=25, help="kills of each coupling")
+    parser.add_argument("--seed", type=int, default=0)
+    choice = parser.parse_args()
+    os.environ["PATCHLAW_CACHE"] = "off"
+    from conftest import MPI_ENVIRONMENT
+
+    runs = Runs(ROOT, MPI_ENVIRONMENT)
+    for scene in SCENES:
+        with tempfile.TemporaryDirectory() as folder:
+            worst, resumed = campaign(runs, scene, choice.kills, Path(folder), seed=choice.seed)
+        print(
+            f"{scene}: {choice.kills} kills, {resumed} sessions went on after a load step, "
+            f"largest difference {worst:.1e}",
+            flush=True,
+        )
+        assert worst <= 1e-10
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,45 @@
+"""Runs the command line with something going wrong on one rank; see `test_faults.py`."""
+
+import os
+import signal
+import sys
+
+from mpi4py import MPI
+
+from geometry.errors import NotConverged
+from multiscale import commands
+from multiscale.cli import main
+from multiscale.condensed import CondensedCoupling
+
+run = sys.modules["multiscale.run"]  # the package's attribute of that name is the function
+PLACES = {
+    "surface": (run, "on_root"),
+    "laws": (run, "make_table"),
+    "block": (run, "assemble"),
+    "load step": (CondensedCoupling, "press"),
+    "checkpoint": (commands.Keeper, "keep"),
+    "output": (commands, "write_fields"),
+    "writing on rank 0": (commands, "write_results"),
+}
+
+
+def bug(*arguments, **more):
+    raise RuntimeError("something broke")
+
+
+def one_sided(*arguments):
+    raise NotConverged("one rank alone", reason="DIVERGED", iterations=1, remedy="none")
+
+
+def signalled(self, step):
+    """Send a signal to this rank alone."""
+    keep(self, step)
+    if step.step == 2:
+        os.kill(os.getpid(), signal.SIGUSR1)
+
+
+keep = commands.Keeper.keep
+rank, what, place, *words = int(sys.argv[1]), *sys.argv[2:]
+if MPI.COMM_WORLD.rank == rank:
+    setattr(*PLACES[place], {"bug": bug, "one-sided": one_sided, "signal": signalled}[what])
+sys.exit(main(words))

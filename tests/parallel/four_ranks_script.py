@@ -1,0 +1,45 @@
+"""Runs every coupling and writes its numbers; see `test_four_ranks.py`."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+
+from multiscale import Run, Scene
+
+PAPER = Path(__file__).parents[2] / "demos" / "scenes" / "paper.toml"
+SMALL = ["surface.grid=[48, 48]", "load.steps=2", "block.cells=[4, 4, 3]", "patches.grid=[1, 2]"]
+# a column falls to the ranks in slices: most own none of the interface; two patches and four ranks
+# leave some without a patch whose law they would tabulate
+COLUMN = ["block.height=8 mm", "block.cells=[4, 4, 32]"]
+HALF_SPACE = "micro.model=half-space"
+SCENES = {
+    "isolated, patchwise": [*COLUMN, "coupling.kind=isolated", "coupling.newton=full"],
+    "isolated, pointwise": [*COLUMN, "coupling.kind=isolated", "coupling.interface=pointwise"],
+    "isolated, condensed": [*COLUMN, "coupling.kind=isolated", "coupling.newton=condensed"],
+    "consistent": ["coupling.kind=consistent", HALF_SPACE],
+    "concurrent": ["coupling.kind=concurrent", HALF_SPACE],
+    "analytic": ["coupling.kind=analytic", HALF_SPACE],
+}
+
+
+def main():
+    """Run all scenes and save a row of numbers for every load step."""
+    world, numbers = MPI.COMM_WORLD, {}
+    for name, changes in SCENES.items():
+        run = Run(Scene.load(PAPER, [*SMALL, *changes]), world)
+        steps = list(run.load_steps())
+        numbers[name] = np.array([
+            [s.force_N, s.contact_area_fraction, s.mean_separation_mm, *s.patches.closure_mm,
+             *s.patches.pressure_MPa, *s.patches.contact_area_fraction]
+            for s in steps
+        ])  # fmt: skip
+        if name.endswith("pointwise"):
+            counts = world.gather(len(run.interface.quadrature.x))
+            numbers["facet points"] = np.array(counts if counts else [])
+    if world.rank == 0:
+        np.savez(sys.argv[1], **numbers)
+
+
+main()

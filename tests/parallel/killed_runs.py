@@ -1,0 +1,203 @@
+"""Runs that are killed at random moments and resumed, for the test and the long campaign."""
+
+import csv
+import multiprocessing
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+PAPER = "demos/scenes/paper.toml"
+QUIET = ["output.figures=false", "output.report=false"]
+# small, with steps of a few milliseconds: most of the time a run is between two of them, or in one
+SCENES = {
+    "half-space alone, balanced": [
+        "surface.grid=[32, 32]", "coupling.kind=analytic", "micro.model=half-space",
+        "load.approach=['8 um', '3 um']", "load.tilt=free", "load.steps=12",
+    ],
+    "concurrent, balanced": [
+        "surface.grid=[72, 72]", "coupling.kind=concurrent", "micro.model=half-space",
+        "block.cells=[4, 4, 3]", "load.approach=['8 um', '3 um']", "load.tilt=free",
+        "load.steps=6",
+    ],
+    "on the mesh": [
+        "surface.grid=[48, 48]", "coupling.kind=isolated", "coupling.newton=full",
+        "block.cells=[6, 6, 3]", "patches.grid=[2, 2]", "load.approach=['8 um', '3 um']",
+        "load.steps=6", "load.force_change=0.2",
+    ],
+    "condensed, laws of the block": [
+        "surface.grid=[32, 32]", "coupling.kind=consistent", "micro.model=half-space",
+        "coupling.table_tolerance=0.01", "block.cells=[4, 4, 3]", "patches.grid=[2, 2]",
+        "load.approach=['8 um', '3 um']", "load.steps=150",
+    ],
+}  # fmt: skip
+UNCOMPARED = {"newton_iterations", "linear_iterations", "wall_s", "reason"}
+
+
+def words_of(out, scene, *more):
+    """Return the words of the command line that run a scene."""
+    return ["run", PAPER, "--out", str(out), *more, "--set", *SCENES[scene], *QUIET]
+
+
+def members(session):
+    """Return the processes of a session, zombies left out."""
+    found = []
+    for path in Path("/proc").iterdir():
+        if path.name.isdigit():
+            try:
+                _, _, rest = (path / "stat").read_text().rpartition(") ")
+            except OSError:
+                continue
+            state, _, _, sid, *_ = rest.split()
+            if int(sid) == session and state != "Z":
+                found.append(int(path.name))
+    return found
+
+
+class Runs:
+    """Starts runs, forked from a process that has the imports done or by mpirun, and kills them.
+
+    Args:
+        root: Folder of the project.
+        environment: Variables for MPI.
+    """
+
+    def __init__(self, root, environment):
+        self.root, self.environment = root, os.environ | environment
+        self.forks = multiprocessing.get_context("forkserver")
+        self.forks.set_forkserver_preload(["multiscale.cli", "multiscale.report", "scipy.fft"])
+
+    def forked(self, words, log, over):
+        """Run in a forked process until `over` tells; return the exit code, None when killed."""
+        process = self.forks.Process(target=enter, args=(words, str(log), str(self.root)))
+        process.start()
+        while process.is_alive() and not over():
+            process.join(0.005)
+        if process.is_alive():
+            process.kill()
+            process.join()
+            return None
+        return process.exitcode
+
+    def on_two_ranks(self, words, log, over):
+        """Run on two ranks until `over` tells; return the exit code, None when killed."""
+        command = ["mpirun", "-n", "2", sys.executable, "-m", "multiscale", *words]
+        with log.open("wb") as file:
+            process = subprocess.Popen(
+                command, cwd=self.root, env=self.environment, start_new_session=True, stdout=file,
+                stderr=subprocess.STDOUT,
+            )  # fmt: skip
+            while process.poll() is None and not over():
+                time.sleep(0.01)
+            if process.poll() is not None:
+                return process.returncode
+            while left := members(process.pid):
+                for pid in left:
+                    try:
+                        os.kill(pid, signal.SIGKILL)
+                    except ProcessLookupError:
+                        pass
+                time.sleep(0.01)
+            process.wait()
+        return None
+
+
+def enter(words, log, root):
+    """Run one command in this process; what it says goes to a file."""
+    os.chdir(root)
+    file = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+    os.dup2(file, 1)
+    os.dup2(file, 2)
+    from multiscale.cli import main
+
+    sys.exit(main(words))
+
+
+def never():
+    """Let a run come to its end."""
+    return False
+
+
+def after(seconds, path=None):
+    """Return what tells that a time is over: from now, or from the next change of a file."""
+    before = stamp(path) if path else None
+    until = [None if path else time.monotonic() + seconds]
+
+    def over():
+        if until[0] is None and stamp(path) != before:
+            until[0] = time.monotonic() + seconds
+        return until[0] is not None and time.monotonic() > until[0]
+
+    return over
+
+
+def stamp(path):
+    """Return when a file was changed last, None where there is none."""
+    try:
+        return path.stat().st_mtime_ns
+    except FileNotFoundError:
+        return None
+
+
+def tables(out):
+    """Return the numbers of history.csv and patches.csv that a resumed run has to meet."""
+    found = []
+    for name in ("history.csv", "patches.csv"):
+        with (out / name).open(encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        found.append(
+            np.array([[float(r[key]) for key in r if key not in UNCOMPARED] for r in rows])
+        )
+    return found
+
+
+def largest_difference(out, reference):
+    """Return the largest difference of two runs, relative to the largest value of its column."""
+    worst = 0.0
+    for one, other in zip(tables(out), tables(reference), strict=True):
+        assert one.shape == other.shape
+        scale = np.maximum(np.abs(other).max(axis=0), np.finfo(float).tiny)
+        worst = max(worst, float((np.abs(one - other) / scale).max()))
+    return worst
+
+
+def campaign(runs, scene, kills, folder, *, seed, every=2):
+    """Kill runs of a scene at random moments and resume them until enough were killed.
+
+    Half of the kills come at any time, half within the load steps; every so many sessions one runs
+    on two ranks.
+
+    Returns the largest difference of all runs that came to their end from one that nobody
+    disturbed, and how many sessions went on after a load step.
+    """
+    dice, log = random.Random(seed), folder / "log"
+    began = time.monotonic()
+    assert runs.forked(words_of(folder / "whole", scene), log, never) == 0, log.read_text()
+    lasts = time.monotonic() - began
+    worst, done, resumed, sessions, out = 0.0, 0, 0, 0, None
+    while done < kills or out is not None:
+        words = () if out is None else ("--resume",)
+        out = out or folder / f"killed_after_{done}"
+        if done >= kills:
+            over = never
+        elif dice.random() < 0.5:
+            over = after(dice.uniform(0.0, lasts))
+        else:
+            over = after(dice.uniform(0.0, 0.3 * lasts), out / "checkpoint.h5")
+        sessions += 1
+        start = runs.on_two_ranks if sessions % every == 0 else runs.forked
+        code = start(words_of(out, scene, *words), log, over)
+        shown = log.read_text()
+        resumed += "goes on after load step" in shown and "after load step 0" not in shown
+        if code is None:
+            done += 1
+            continue
+        assert code == 0, shown
+        assert not list(out.glob("checkpoint*")), "a finished run keeps none"
+        worst, out = max(worst, largest_difference(out, folder / "whole")), None
+    return worst, resumed

@@ -1,0 +1,49 @@
+"""What goes wrong on one rank ends all within seconds, with one message."""
+
+import csv
+
+import pytest
+
+SCRIPT = "tests/parallel/fault_script.py"
+WORDS = (
+    "run", "demos/scenes/paper.toml", "--set", "surface.grid=[32, 32]", "block.cells=[4, 4, 2]",
+    "patches.grid=[2, 2]", "coupling.kind=isolated", "coupling.newton=condensed", "load.steps=3",
+    "output.figures=false", "output.report=false", "output.fields=true", "--out",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("rank", "place"),
+    [
+        (1, "surface"),
+        (1, "laws"),
+        (1, "block"),
+        (1, "load step"),
+        (1, "checkpoint"),
+        (1, "output"),
+        (0, "writing on rank 0"),
+    ],
+)
+def test_bug_on_one_rank_ends_all(mpirun, tmp_path, rank, place):
+    done = mpirun(2, SCRIPT, rank, "bug", place, *WORDS, tmp_path / "out", timeout=100)
+    assert done.returncode == 1, done.stderr
+    assert done.stderr.count("RuntimeError: something broke") == 1, done.stderr
+
+
+def test_error_that_one_rank_alone_meets_ends_all(mpirun, tmp_path):
+    """Errors of ours come on all ranks alike; one that does not must not leave the others."""
+    done = mpirun(2, SCRIPT, 1, "one-sided", "load step", *WORDS, tmp_path / "out", timeout=100)
+    assert done.returncode == 3, done.stderr
+    assert done.stderr.count("did not converge: DIVERGED after 1 iterations") == 1
+
+
+def test_signal_to_one_rank_stops_all_and_any_number_goes_on(mpirun, tmp_path):
+    out = tmp_path / "out"
+    done = mpirun(2, SCRIPT, 1, "signal", "checkpoint", *WORDS, out, timeout=100)
+    assert done.returncode == 4, done.stderr
+    assert done.stderr.count("(SIGUSR1): stopped after load step 2; go on with --resume") == 1
+    done = mpirun(1, "-m", "multiscale", *WORDS, out, "--resume", timeout=100)
+    assert done.returncode == 0, done.stderr
+    assert "goes on after load step 2" in done.stdout
+    with (out / "history.csv").open(encoding="utf-8") as file:
+        assert [row["step"] for row in csv.DictReader(file)] == ["1", "2", "3"]

@@ -1,0 +1,135 @@
+"""A run that is told to stop, or short of time, stops between two load steps and goes on later."""
+
+import os
+import signal
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from geometry.errors import InputError
+from multiscale import Run
+from multiscale.cli import main
+from multiscale.interruption import Interruption, Stopped
+from multiscale.quantities import parse_duration
+
+PAPER = str(Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml")
+SMALL = [
+    "--set", "surface.grid=[32, 32]", "coupling.kind=analytic", "micro.model=half-space",
+    "load.steps=4", "output.figures=false",
+]  # fmt: skip
+
+
+def rows(folder):
+    """Return what history.csv and patches.csv hold but for wall times."""
+    history = (folder / "history.csv").read_text(encoding="utf-8").splitlines()
+    kept = [row.split(",")[:9] + row.split(",")[10:] for row in history]
+    return kept, (folder / "patches.csv").read_text(encoding="utf-8").splitlines()
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    out = tmp_path_factory.mktemp("undisturbed")
+    assert main(["run", PAPER, "--out", str(out), *SMALL]) == 0
+    return rows(out)
+
+
+def disturb(monkeypatch, change):
+    """Let something happen with every load step of a run."""
+    steps = Run.load_steps
+
+    def changed(self):
+        for step in steps(self):
+            yield change(step)
+
+    monkeypatch.setattr(Run, "load_steps", changed)
+
+
+@pytest.mark.parametrize(
+    ("number", "code", "text"),
+    [
+        (signal.SIGINT, 130, "interrupted (SIGINT)"),
+        (signal.SIGTERM, 143, "terminated (SIGTERM)"),
+        (signal.SIGUSR1, 4, "told to stop (SIGUSR1)"),
+    ],
+)
+def test_signal_stops_after_the_load_step(
+    capfd, tmp_path, monkeypatch, undisturbed, number, code, text
+):
+    def send(step):
+        if step.step == 2:
+            os.kill(os.getpid(), number)
+        return step
+
+    words = ["run", PAPER, "--out", str(tmp_path), *SMALL]
+    handlers = [signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)]
+    with monkeypatch.context() as patch:
+        disturb(patch, send)
+        assert main(words) == code
+    shown = capfd.readouterr()
+    assert f"{text}: stopped after load step 2; go on with --resume" in shown.err
+    assert "report.html" in shown.out
+    assert rows(tmp_path)[0] == undisturbed[0][:3]
+    assert (tmp_path / "checkpoint.h5").exists()
+    assert [
+        signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
+    ] == handlers
+    assert main([*words[:2], "--resume", *words[2:]]) == 0
+    assert "goes on after load step 2" in capfd.readouterr().out
+    assert rows(tmp_path) == undisturbed
+    assert not list(tmp_path.glob("checkpoint*"))
+
+
+def test_second_signal_is_not_held_back():
+    with Interruption(None) as interruption:
+        os.kill(os.getpid(), signal.SIGINT)
+        assert signal.getsignal(signal.SIGINT) == signal.SIG_DFL
+        with pytest.raises(Stopped, match="stopped here"):
+            interruption.check("here")
+
+
+def test_load_step_that_would_last_too_long_is_not_begun(capfd, tmp_path, monkeypatch, undisturbed):
+    words = ["run", PAPER, "--out", str(tmp_path), "--max-time", "1 h", *SMALL]
+    with monkeypatch.context() as patch:
+        disturb(patch, lambda step: replace(step, wall_s=2500.0))  # the next would take 1.5 times
+        assert main(words) == 4
+    text = "the time is nearly over: stopped after load step 1; go on with --resume"
+    assert text in capfd.readouterr().err
+    assert main([*words[:2], "--resume", *words[2:]]) == 0
+    assert rows(tmp_path) == undisturbed
+
+
+def test_no_time_at_all_keeps_what_there_is(capfd, tmp_path):
+    words = ["run", PAPER, "--out", str(tmp_path), "--max-time", "1 s", *SMALL]
+    assert main(words) == 4
+    assert "stopped before the block was made" in capfd.readouterr().err
+    assert [path.name for path in sorted(tmp_path.iterdir())] == [
+        "checkpoint.h5",
+        "checkpoint.journal",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds"),
+    [("55m", 3300.0), ("55 min", 3300.0), ("1.5 h", 5400.0), ("90 s", 90.0), ("2 days", 172800.0)],
+)
+def test_durations(text, seconds):
+    assert parse_duration(text) == pytest.approx(seconds, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("90", 'has no unit .*such as "55 min"'),
+        ("5 mm", "has the wrong unit"),
+        ("soon", "cannot be read as a quantity"),
+        ("0 s", "must be greater than 0"),
+        ("-5 min", "must be greater than 0"),
+    ],
+)
+def test_what_is_no_duration(capsys, text, problem):
+    with pytest.raises(ValueError, match=problem):
+        parse_duration(text)
+    assert main(["run", PAPER, f"--max-time={text}"]) == 2
+    assert capsys.readouterr().err.startswith(f"patchlaw: --max-time = '{text}': ")
+    assert issubclass(InputError, ValueError)

@@ -1,0 +1,361 @@
+"""Checkpoints: what is kept, what is refused, and that a resumed run meets the undisturbed one."""
+
+import shutil
+import subprocess
+import sys
+import tomllib
+from dataclasses import fields
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from geometry.errors import InputError, NotWritten
+from multiscale import Run, Scene
+from multiscale.checkpoint import read_checkpoint, write_checkpoint
+from multiscale.cli import main
+from multiscale.folder_lock import FolderLock
+from multiscale.journal import Journal, journalled
+from multiscale.resuming import Keeper, with_journal
+
+PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
+ALONE = {"coupling": {"kind": "analytic"}, "micro": {"model": "half-space"}}
+CUBE = {"block": {"cells": [4, 4, 3]}, "patches": {"grid": [2, 2]}}
+FORCE = {"force": ["3 N", "1 N", "2 N"], "steps": 1, "tilt": "free"}
+COUPLINGS = {
+    "half-space": ALONE,
+    "half-space, balanced force": ALONE | {"load": FORCE},
+    "asperities": ALONE | {"micro": {"model": "elliptic"}},
+    "asperities fitted to the contacts": ALONE
+    | {"micro": {"model": "elliptic", "curvature": "contact", "border": "include"}},
+    "islands": ALONE | {"micro": {"model": "islands"}},
+    "condensed, halved steps": CUBE
+    | {"coupling": {"kind": "isolated", "newton": "condensed"}}
+    | {"load": {"approach": "8 um", "steps": 2, "force_change": 0.4}},
+    "consistent laws": CUBE
+    | {"micro": {"model": "half-space"}, "coupling": {"kind": "consistent"}},
+    "concurrent, a coarse half-space ahead": CUBE
+    | {"surface": {"grid": [72, 72]}, "coupling": {"kind": "concurrent"}}
+    | {"micro": {"model": "half-space"}},
+    "on the mesh": CUBE | {"coupling": {"kind": "isolated", "newton": "full"}},
+    "on the mesh, at points, balanced force": CUBE
+    | {"coupling": {"kind": "isolated", "interface": "pointwise"}, "load": FORCE},
+}
+
+
+def scene(changes):
+    """Return the paper's scene, small, with some sections changed."""
+    data = tomllib.loads(PAPER.read_text(encoding="utf-8"))
+    data["surface"]["grid"] = [48, 48]
+    data["load"] = {"approach": ["8 um", "4 um"], "steps": 2}
+    for name, section in changes.items():
+        data[name] = section if name == "load" else data.get(name, {}) | section
+    return Scene.from_dict(data)
+
+
+def columns(steps):
+    """Return what a resumed run has to meet, a row per step."""
+    return np.array([
+        [s.approach_mm, s.force_N, s.contact_area_fraction, s.mean_separation_mm, *s.tilt,
+         *s.moment_N_mm, *s.patches.pressure_MPa, *s.patches.closure_mm,
+         *s.patches.contact_area_fraction]
+        for s in steps
+    ])  # fmt: skip
+
+
+@pytest.mark.parametrize("changes", COUPLINGS.values(), ids=COUPLINGS)
+def test_resumed_run_is_as_if_never_stopped(tmp_path, changes):
+    whole = Run(scene(changes))
+    for step in whole.load_steps():
+        path = tmp_path / f"{step.step}.h5"
+        write_checkpoint(path, whole.checkpoint("name", whole.state()))
+    count = len(whole.steps)
+    assert count >= 3
+    wanted = columns(whole.steps)
+    scale = np.abs(wanted).max(axis=0)
+    scale[6:8] = scale[1]  # moments vanish: they count relative to force times 1 mm
+    # on the mesh a step is solved to 1e-10 of the load from other first guesses; else bit for bit
+    exact = whole.interface is None
+    for done in (1, count - 1):
+        again = Run(whole.scene)
+        again.resume(read_checkpoint(tmp_path / f"{done}.h5"))
+        list(again.load_steps())
+        off = np.abs(columns(again.steps) - wanted)
+        assert np.all(off <= (0.0 if exact else 1e-10) * scale)
+        assert again.finished
+
+
+def test_checkpoint_keeps_every_bit(tmp_path):
+    run = Run(scene(CUBE | {"load": {"approach": "8 um", "steps": 2, "tilt": [1e-3, 0.0]}}))
+    list(run.load_steps())
+    kept = run.checkpoint("name", run.state())
+    found = read_checkpoint(write_checkpoint(tmp_path / "c.h5", kept))
+    assert (found.run, found.scene, found.heights) == ("name", kept.scene, kept.heights)
+    assert (found.position, found.laws) == (kept.position, kept.laws)
+    for one, other in zip(found.steps, kept.steps, strict=True):
+        for field in fields(one):
+            if field.name != "patches":
+                assert getattr(one, field.name) == getattr(other, field.name)
+        for field in fields(one.patches):
+            mine, its = (getattr(step.patches, field.name) for step in (one, other))
+            np.testing.assert_array_equal(mine, its)
+
+
+@pytest.fixture(scope="module")
+def ended():
+    """A small run that came to its end."""
+    run = Run(scene(ALONE))
+    list(run.load_steps())
+    return run
+
+
+def interrupted(folder, ended, steps=2):
+    """Leave in a folder what a run leaves that was killed after some steps."""
+    run = Run(ended.scene)
+    keeper = Keeper(folder, run, FolderLock(folder))
+    keeper.write()
+    for step in run.load_steps():
+        keeper.keep(step)
+        if step.step == steps:
+            break
+    keeper._journal.close()
+    keeper._lock.release()
+    return folder / "checkpoint.h5", folder / "checkpoint.journal"
+
+
+def resumed(folder, changed):
+    run = Run(changed)
+    found = Keeper(folder, run, FolderLock(folder)).resume()
+    return run if found else None
+
+
+def test_journal_goes_on_where_the_checkpoint_ends(tmp_path, ended):
+    path, journal = interrupted(tmp_path / "out", ended)
+    assert not read_checkpoint(path).steps  # all within the second that it may be old
+    found = with_journal(read_checkpoint(path), journal)
+    np.testing.assert_array_equal(columns(found.steps), columns(ended.steps[:2]))
+    assert len(resumed(tmp_path / "out", ended.scene).steps) == 2
+
+
+def test_torn_record_is_dropped(tmp_path, ended):
+    _, journal = interrupted(tmp_path / "out", ended)
+    whole = journal.read_bytes()
+    name, counts = run_of(tmp_path), []
+    for size in (*np.linspace(0, len(whole) - 1, 40, dtype=int), len(whole)):
+        journal.write_bytes(whole[:size])
+        counts.append(len(list(journalled(journal, name))))
+    assert (counts[0], counts[-2], counts[-1]) == (0, 1, 2)
+    assert sorted(counts) == counts
+    half = bytearray(whole)
+    half[len(half) // 4] ^= 1
+    journal.write_bytes(half)
+    assert not list(journalled(journal, name))
+
+
+def run_of(folder):
+    return read_checkpoint(folder / "out" / "checkpoint.h5").run
+
+
+def test_journal_of_another_run_is_not_taken(tmp_path, ended):
+    path, journal = interrupted(tmp_path / "one", ended)
+    _, other = interrupted(tmp_path / "two", ended, steps=1)
+    shutil.copy(journal, other)
+    assert len(resumed(tmp_path / "one", ended.scene).steps) == 2
+    assert not resumed(tmp_path / "two", ended.scene).steps
+    assert path.exists()
+
+
+@pytest.mark.parametrize(
+    ("damage", "text"),
+    [
+        (lambda path: path.write_bytes(path.read_bytes()[:3000]), "is damaged or cannot be read"),
+        (lambda path: path.write_bytes(b"nothing of the kind"), "is damaged or cannot be read"),
+        (lambda path: flip(path), "its checksum does not fit its content"),
+        (lambda path: relabel(path), "'patchlaw checkpoint 99': is not a checkpoint of this"),
+    ],
+    ids=["cut", "foreign", "a bit flipped", "another format"],
+)
+def test_damaged_checkpoint_is_refused_and_stays(tmp_path, ended, capsys, damage, text):
+    path, _ = interrupted(tmp_path / "out", ended)
+    damage(path)
+    before = {each.name: each.read_bytes() for each in path.parent.iterdir()}
+    with pytest.raises(InputError, match=text) as error:
+        resumed(path.parent, ended.scene)
+    assert str(path) in str(error.value)
+    assert "remove it, or run without --resume" in str(error.value)
+    assert {each.name: each.read_bytes() for each in path.parent.iterdir()} == before
+
+
+def flip(path):
+    with h5py.File(path, "r+") as file:
+        file["position/structure"][3] ^= 1
+
+
+def relabel(path):
+    with h5py.File(path, "r+") as file:
+        file.attrs["format"] = "patchlaw checkpoint 99"
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        (
+            {"load": {"approach": "8 um", "steps": 2}},
+            r"load.approach = .*allowed: \[0.008, 0.004\]",
+        ),
+        ({"block": {"poisson_ratio": 0.2}}, r"block.poisson_ratio = 0.2: .*allowed: 0.15"),
+        ({"surface": {"detrend": "plane"}}, r"surface.detrend = 'plane': .*allowed: 'none'"),
+    ],
+)
+def test_changed_scene_is_refused_with_the_key(tmp_path, ended, changes, text):
+    interrupted(tmp_path / "out", ended)
+    with pytest.raises(InputError, match=text):
+        resumed(tmp_path / "out", scene(ALONE | changes))
+
+
+def test_other_outputs_may_be_asked_for(tmp_path, ended):
+    interrupted(tmp_path / "out", ended)
+    assert resumed(tmp_path / "out", scene(ALONE | {"output": {"figures": False}}))
+
+
+def test_changed_heights_are_refused(tmp_path):
+    heights = np.random.default_rng(1).normal(scale=1e-3, size=(16, 16))
+    np.save(tmp_path / "h.npy", heights)
+    surface = {"file": str(tmp_path / "h.npy"), "lengths": [1.0, 1.0]}
+    data = tomllib.loads(PAPER.read_text(encoding="utf-8"))
+    data |= {"surface": surface, **ALONE, "load": {"approach": "1 um", "steps": 2}}
+    run = Run(Scene.from_dict(data))
+    interrupted(tmp_path / "out", run, steps=1)
+    np.save(tmp_path / "h.npy", heights * 1.01)
+    with pytest.raises(InputError, match=r"surface.file = '.*h.npy': the heights are not those"):
+        resumed(tmp_path / "out", run.scene)
+
+
+def test_folder_that_vanishes_comes_back_whole(tmp_path, ended):
+    run, folder = Run(ended.scene), tmp_path / "out"
+    lock = FolderLock(folder)
+    lock.hold()
+    keeper = Keeper(folder, run, lock)
+    keeper.write()
+    for step in run.load_steps():
+        if step.step == 2:
+            shutil.rmtree(folder)
+        keeper.keep(step)
+    lock.release()
+    assert len(resumed(folder, ended.scene).steps) == len(ended.steps)
+
+
+def test_two_runs_do_not_share_a_folder(tmp_path):
+    one, other = FolderLock(tmp_path / "out"), FolderLock(tmp_path / "out")
+    one.hold()
+    with pytest.raises(InputError, match=r"--out = '.*out': another run is writing to this folder"):
+        other.hold()
+    one.release()
+    other.hold()
+    other.release()
+    assert not (tmp_path / "out").exists()  # neither wrote anything
+
+
+def test_folder_of_a_file_cannot_be_locked(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match="cannot be written to: Not a directory"):
+        FolderLock(tmp_path / "file" / "out").hold()
+
+
+def test_full_disk_leaves_the_earlier_checkpoint(tmp_path, ended, monkeypatch):
+    path, _ = interrupted(tmp_path / "out", ended)
+    before = path.read_bytes()
+
+    def full(self, data):
+        with self.open("wb") as file:
+            file.write(data[:100])
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    run = Run(ended.scene)
+    with pytest.raises(
+        NotWritten, match=r"checkpoint.h5: cannot be written: No space left"
+    ) as error:
+        Keeper(path.parent, run, FolderLock(path.parent)).write()
+    assert error.value.exit_code == 5
+    assert path.read_bytes() == before
+    assert {each.name for each in path.parent.iterdir() if each.name != ".lock"} == {
+        "checkpoint.h5", "checkpoint.journal",
+    }  # fmt: skip
+
+
+def test_journal_cut_short_by_a_full_disk_is_told(tmp_path, ended):
+    journal = Journal(tmp_path / "journal", "name")
+    journal.begin()
+    journal._file.close()
+    journal._file = open("/dev/full", "wb", buffering=0)
+    with pytest.raises(NotWritten, match=r"journal: cannot be written: No space left on device"):
+        journal.append(ended.steps[0], ended.position, {})
+    journal.close()
+
+
+WORDS = [
+    "run", str(PAPER), "--set", "surface.grid=[32, 32]", "coupling.kind=analytic", "load.steps=2",
+    "micro.model=half-space", "output.figures=false", "output.report=false",
+]  # fmt: skip
+
+
+def test_finished_run_is_done(capsys, tmp_path):
+    words = [*WORDS[:2], "--out", str(tmp_path / "out"), "--resume", *WORDS[2:]]
+    assert main(words) == 0
+    assert "nothing to resume in" in capsys.readouterr().out
+    before = (tmp_path / "out" / "history.csv").stat().st_mtime_ns
+    assert main(words) == 0
+    assert "this run is finished" in capsys.readouterr().out
+    assert (tmp_path / "out" / "history.csv").stat().st_mtime_ns == before
+    assert main([*words, "load.approach=4 um"]) == 0  # of another scene: made
+    assert "nothing to resume in" in capsys.readouterr().out
+
+
+def test_outputs_asked_for_do_not_change_the_solution(tmp_path):
+    words = [*WORDS[:2], "--set", "surface.grid=[32, 32]", "block.cells=[8, 8, 4]", "load.steps=2"]
+    texts = []
+    for more in (["figures=true", "report=true", "fields=true"], ["figures=false", "report=false"]):
+        out = tmp_path / more[0]
+        more = [f"output.{word}" for word in more]
+        assert main([*words, *more, "--out", str(out)]) == 0
+        rows = (out / "history.csv").read_text(encoding="utf-8").splitlines()
+        texts.append([row.split(",")[:9] + row.split(",")[10:] for row in rows])  # but for wall_s
+        texts[-1].append((out / "patches.csv").read_text(encoding="utf-8"))
+    assert texts[0] == texts[1]
+
+
+LIMITED = (
+    "import resource, sys; from mpi4py import MPI; from multiscale.cli import main;"
+    "resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), resource.RLIM_INFINITY));"
+    "sys.exit(main(sys.argv[2:]))"
+)  # MPI writes files of its own when it starts
+
+
+@pytest.mark.parametrize(
+    ("size", "file", "left"),
+    [
+        (8_000, "checkpoint.h5", set()),
+        (40_000, "surface.png", {"history.csv", "patches.csv", "provenance.json"}),
+    ],
+)
+def test_run_on_a_full_disk_ends_with_5_and_goes_on(capsys, tmp_path, size, file, left):
+    """The limit on the size of files stands for a disk that is full."""
+    out = tmp_path / "out"
+    words = [*WORDS[:2], "--out", str(out), "--resume", *WORDS[2:]]
+    words.remove("output.figures=false")
+    done = subprocess.run(
+        [sys.executable, "-c", LIMITED, str(size), *words],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stderr == f"patchlaw: {out / file}: cannot be written: File too large\n"
+    assert done.returncode == 5
+    kept = {path.name for path in out.iterdir()} if out.exists() else set()
+    assert kept == (left | {"checkpoint.h5", "checkpoint.journal"} if left else set())
+    assert main(words) == 0
+    assert ("goes on after load step 2" in capsys.readouterr().out) == bool(left)
+    assert (out / "surface.png").exists()
+    assert not list(out.glob("checkpoint*"))
