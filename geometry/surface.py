@@ -60,12 +60,12 @@ class Surface:
     @property
     def x(self) -> Array:
         """Cell centres along x, shape (nx,) [mm]."""
-        return (np.arange(self.grid[0]) + 0.5) * self.spacing[0]
+        return np.multiply(np.arange(self.grid[0]) + 0.5, self.spacing[0])
 
     @property
     def y(self) -> Array:
         """Cell centres along y, shape (ny,) [mm]."""
-        return (np.arange(self.grid[1]) + 0.5) * self.spacing[1]
+        return np.multiply(np.arange(self.grid[1]) + 0.5, self.spacing[1])
 
     @property
     def mean_height(self) -> float:

@@ -237,7 +237,7 @@ class AsperityModel:
         total = np.zeros(np.broadcast_shapes(np.shape(x), np.shape(y)))
         a = self.asperities
         for k in np.flatnonzero(state.in_contact):  # one field at a time bounds the memory
-            contact = self._contact(state.indentation[k], k)
+            contact = self._contact(state.indentation[k], int(k))
             dx, dy = np.asarray(x, float) - a.x[k], np.asarray(y, float) - a.y[k]
             cos, sin = np.cos(a.angle[k]), np.sin(a.angle[k])
             total += contact.displacement(cos * dx + sin * dy, cos * dy - sin * dx)

@@ -57,7 +57,7 @@ def contact_measures(surface: Surface, approach: float, *, periodic: bool) -> Co
     cells = max(int(area.sum()), _LEAST_REGION)
     radius = np.sqrt(0.5 * cells / (np.pi * max(regions, 1)))
     summits = grid_maxima(surface.heights, periodic=periodic)
-    above = np.count_nonzero(summits.height > level)
+    above = int(np.count_nonzero(summits.height > level))
     return ContactMeasures(
         regions=regions,
         contact_fraction=0.5 * cells / surface.heights.size,

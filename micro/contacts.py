@@ -60,14 +60,14 @@ def find_contacts(pressure: Array, spacing: tuple[float, float], *, periodic: bo
     rising = np.argsort(load, kind="stable")
     top = np.zeros(count, np.intp)
     top[which[rising]] = cells[rising]  # the last, largest one stays
-    peak = (np.stack(np.unravel_index(top, pressure.shape), axis=1) + 0.5) * spacing
+    middle = np.stack(np.unravel_index(top, pressure.shape), axis=1) + 0.5
     return Contacts(
         labels=labels.astype(np.int64),
         force=np.bincount(which, load, minlength=count) * cell,
         area=np.bincount(which, corrected, minlength=count) * cell,
         counted_area=np.bincount(which, minlength=count) * cell,
         peak_pressure=pressure.ravel()[top],
-        peak=peak,
+        peak=np.multiply(middle, spacing),
     )
 
 

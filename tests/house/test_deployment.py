@@ -1,0 +1,54 @@
+"""Scripts for clusters and for other Debian releases: what can be said of them without either."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+HPC = ROOT / "demos" / "hpc"
+RUNNER = ROOT / "tests" / "releases" / "run"
+SCRIPTS = [*sorted(HPC.glob("*.sbatch")), RUNNER, ROOT / ".ci" / "run", ROOT / "setup.sh"]
+PAGE = (HPC / "README.md").read_text(encoding="utf-8")
+
+
+def call(*words):
+    return subprocess.run(words, capture_output=True, text=True, check=False, timeout=100)
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.name)
+def test_scripts_are_executable_and_parse(script):
+    assert script.stat().st_mode & 0o111
+    assert call("bash", "-n", script).returncode == 0
+
+
+def test_definition_installs_as_everybody_does_and_compiles_ahead():
+    sections = re.split(
+        r"^%(\w+)\n", (HPC / "patchlaw.def").read_text(encoding="utf-8"), flags=re.MULTILINE
+    )
+    steps = dict(zip(sections[1::2], sections[2::2], strict=True))
+    assert {"files", "post", "environment", "test", "runscript"} == set(steps)
+    assert "./setup.sh" in steps["post"]
+    # what is compiled while the image is built is looked for there when it runs
+    (made,) = re.findall(r"XDG_CACHE_HOME=(\S+) .*patchlaw warm", steps["post"])
+    assert f"export XDG_CACHE_HOME={made}\n" in steps["environment"]
+
+
+def test_page_names_files_that_exist():
+    names = set(re.findall(r"\b((?:demos|tests)/[\w/]+\.\w+)\b", PAGE))
+    assert {f"demos/hpc/{path.name}" for path in HPC.glob("*.sbatch")} <= names
+    for name in names:
+        assert (ROOT / name).is_file(), name
+
+
+def test_runner_says_how_it_is_called():
+    done = call(RUNNER)
+    assert done.returncode == 2
+    assert "--ranks N" in done.stderr
+
+
+def test_runner_skips_what_it_cannot_build_with_one_line():
+    done = call(RUNNER, "no-such-release")
+    assert done.returncode == 0, done.stderr
+    assert re.fullmatch(r"releases: SKIPPED: .+\n", done.stdout)

@@ -1,0 +1,27 @@
+"""The doctor under mpirun: it speaks once, for all ranks."""
+
+import json
+
+
+def test_doctor_tells_ranks_and_hosts_once(mpirun):
+    done = mpirun(3, "-m", "multiscale", "doctor", "--json", timeout=100)
+    assert done.returncode == 0, done.stderr
+    findings = {found["topic"]: found for found in json.loads(done.stdout)}
+    assert findings["ranks"]["text"].startswith("3: 3 on ")
+    assert findings["test solve"]["state"] == "ok"
+
+
+def test_a_check_that_fails_on_one_rank_fails_for_all(mpirun):
+    code = (
+        "import sys; from mpi4py import MPI; from multiscale import doctor_machine;"
+        "from multiscale.cli import main\n"
+        "def broken(comm):\n"
+        "    if comm.rank == 1: raise OSError('only here')\n"
+        "    return []\n"
+        "doctor_machine.blas = broken\n"
+        "sys.exit(main(['doctor']))"
+    )
+    done = mpirun(2, "-c", code, timeout=100)
+    assert done.returncode == 2
+    assert done.stdout.count("OSError: only here") == 1
+    assert done.stderr.count("not fit to run: BLAS") == 1
