@@ -1,0 +1,304 @@
+"""The levels at which a scene can be computed, from the micro model alone to the meshed roughness.
+
+All levels run the same surface under the same load programme. Steps are not halved
+(``load.force_change``), so that curves can be compared step by step. Couplings without laws sum
+their results over the patches that pressures are compared on (`pressure_grid`).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from geometry.errors import InputError
+from micro import MODEL_NAMES
+from multiscale.ingredients import make_surface
+from multiscale.level_cost import predicted_seconds
+from multiscale.scene import Scene
+from multiscale.stage_checks import EMBEDDED_CELLS
+
+Grid = tuple[int, int]
+Content = dict[str, Any]
+
+FEWEST_HEIGHTS = 32
+"""Heights along a side, at least, of coarser versions of a surface."""
+
+HEIGHTS_PER_WAVE = 3
+"""Heights per shortest wave of the spectrum, at least, of coarser versions."""
+
+LAW_HEIGHTS = 128
+"""Heights along a side, at most, of the half-space behind consistent laws."""
+
+PATCHES = (1, 2, 4, 8, 16)
+"""Patches along a side of the couplings by laws."""
+
+CELLS_PER_PATCH = 2
+"""Elements along a patch, at least, of blocks that carry laws themselves."""
+
+SMOOTH_CELLS = ((8, 8, 6), (16, 16, 12))
+"""Elements of blocks that only correct the half-space."""
+
+OPTIONS: Content = {"figures": False, "report": False, "fields": False}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Level:
+    """One way to compute a scene.
+
+    Attributes:
+        name: What tells it from the others, for tables and legends.
+        kind: Its coupling.
+        content: The complete scene, as `Scene.from_dict` takes it.
+        heights: Heights of its surface.
+        cost: Predicted wall time [s]; orders the levels.
+        slopes: Whether the effect of finite slopes is estimated after the run.
+        ranks: Processes that it runs on.
+    """
+
+    name: str
+    kind: str
+    content: Content
+    heights: Grid
+    cost: float
+    slopes: bool = False
+    ranks: int = 1
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The scene of this level."""
+        return Scene.from_dict(self.content)
+
+    @property
+    def model(self) -> str:
+        """The micro model; an explicit reference has none."""
+        return "" if self.kind == "reference" else str(self.content["micro"]["model"])
+
+    @property
+    def key(self) -> str:
+        """Hash of all that its results depend on."""
+        told = {"scene": self.content, "version": version("patchlaw"), "ranks": self.ranks}
+        file = self.content["surface"].get("file")
+        if file is not None:
+            told["heights"] = hashlib.sha256(Path(file).read_bytes()).hexdigest()
+        text = json.dumps(told, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:20]
+
+
+def levels(scene: Scene, ranks: int = 1) -> tuple[Level, ...]:
+    """Return the levels of a scene, cheapest first by predicted cost.
+
+    Args:
+        scene: The scene.
+        ranks: Processes for levels that can use more than one.
+
+    Raises:
+        InputError: When the surface cannot be read.
+    """
+    found: dict[str, Level] = {}
+    for level in _Family(scene, ranks).all():  # the scene itself comes first, and keeps its name
+        first = found.setdefault(level.key, level)
+        found[level.key] = replace(first, slopes=first.slopes or level.slopes)
+    return tuple(sorted(found.values(), key=lambda level: level.cost))
+
+
+def pressure_grid(scene: Scene) -> Grid:
+    """Return the patches that pressures are compared on: the scene's, divided to at least 4 × 4."""
+    nx, ny = (count * -(-4 // count) for count in scene.patches.grid)
+    return nx, ny
+
+
+class _Family:
+    """Makes the levels of one scene."""
+
+    def __init__(self, scene: Scene, ranks: int) -> None:
+        self._scene, self._ranks = scene, ranks
+        self._base = _content(scene)
+        stated = scene.surface.grid
+        self._heights: Grid = stated if isinstance(stated, tuple) else make_surface(scene).grid
+        self._base["patches"] = {"grid": list(pressure_grid(scene))}
+
+    def all(self) -> Iterator[Level]:
+        for level in (
+            self._own(),
+            *self._analytic(),
+            *self._isolated(),
+            *self._consistent(),
+            *self._concurrent(),
+            *self._references(),
+        ):
+            if level is not None:
+                yield level
+
+    def _own(self) -> Level | None:
+        content = {key: self._base[key] for key in self._base if key != "patches"}
+        whole = content | {"patches": {"grid": list(self._scene.patches.grid)}}
+        return self._level("the scene as it is", whole, self._heights)
+
+    def _analytic(self) -> Iterator[Level | None]:
+        fitted = {"model": "elliptic", "curvature": "contact", "border": "include"}
+        micros: dict[str, Content] = {
+            name: {"model": name} for name in MODEL_NAMES if name != "half-space"
+        }
+        for name, micro in (micros | {"elliptic, fitted": fitted}).items():
+            yield self._level(f"analytic, {name}", self._alone(micro), self._heights)
+        for grid in self._grids:
+            yield self._level(
+                f"analytic, half-space {_times(grid)}",
+                self._alone({"model": "half-space"}),
+                grid,
+                slopes=grid == self._law_grid,
+            )
+
+    def _alone(self, micro: Content) -> Content:
+        return self._base | {
+            "micro": micro,
+            "coupling": {"kind": "analytic"},
+            "block": self._block(None),
+        }
+
+    def _isolated(self) -> Iterator[Level | None]:
+        micro = self._base["micro"]
+        if micro["model"] in ("half-space", "auto"):
+            micro = {"model": "elliptic"}
+        love = {"kind": "isolated", "love": self._scene.coupling.love}
+        own, cells = tuple(self._scene.patches.grid), self._cells
+        half = tuple(max(1, count // 2) for count in cells)
+        for grid, mesh in (*((grid, cells) for grid in self._patch_grids), (own, half)):
+            if _carries(mesh, grid):
+                yield self._patched("isolated", micro, grid, love, mesh)
+        yield self._patched("isolated", {"model": "half-space"}, own, love, cells)
+
+    def _consistent(self) -> Iterator[Level | None]:
+        own, whole = tuple(self._scene.patches.grid), {"model": "half-space"}
+        decomposed = {"kind": "consistent", "compliance": "decomposed"}
+        for grid in self._patch_grids:
+            yield self._patched("consistent", whole, grid, decomposed, None)
+        micro = self._base["micro"]
+        if micro["model"] not in ("half-space", "auto"):
+            yield self._patched("consistent", micro, own, decomposed, None)
+        meshed = {"kind": "consistent", "compliance": "finite-element"}
+        if _carries(self._cells, own):
+            yield self._patched("consistent", whole, own, meshed, self._cells)
+
+    def _patched(
+        self, kind: str, micro: Content, grid: Grid, coupling: Content, cells: Any
+    ) -> Level | None:
+        heights = self._law_grid if micro["model"] == "half-space" else self._heights
+        name = f"{kind}, {_times(grid)} patches, {micro['model']}"
+        changes: Content = {
+            "micro": micro,
+            "coupling": coupling,
+            "patches": {"grid": list(grid)},
+            "block": self._block(cells),
+        }
+        return self._level(
+            f"{name}, {_times(cells)} elements" if cells else name, self._base | changes, heights
+        )
+
+    def _concurrent(self) -> Iterator[Level | None]:
+        pairs = [(grid, SMOOTH_CELLS[-1]) for grid in self._grids]
+        pairs += [(self._law_grid, cells) for cells in SMOOTH_CELLS[:-1]]
+        for grid, cells in pairs:
+            changes: Content = {
+                "micro": {"model": "half-space"},
+                "coupling": {"kind": "concurrent"},
+                "block": self._block(cells),
+            }
+            name = f"concurrent, half-space {_times(grid)}, {_times(cells)} elements"
+            yield self._level(name, self._base | changes, grid)
+
+    def _references(self) -> Iterator[Level | None]:
+        stated = self._base.get("reference", {})
+        for meshes in (1, 2, 3):
+            changes: Content = {
+                "coupling": {"kind": "reference"},
+                "reference": stated | {"meshes": meshes},
+            }
+            name = f"reference, {meshes} mesh{'es' * (meshes > 1)}"
+            yield self._level(name, self._base | changes, self._heights)
+
+    def _block(self, cells: Any) -> Content:
+        block = {key: value for key, value in self._base["block"].items() if key != "cells"}
+        return block | {"cells": list(cells)} if cells else block
+
+    def _level(
+        self, name: str, content: Content, heights: Grid, *, slopes: bool = False
+    ) -> Level | None:
+        """Return a level; None when the scene does not allow it."""
+        if heights != self._heights:
+            content = content | {"surface": content["surface"] | {"grid": list(heights)}}
+        try:
+            scene = Scene.from_dict(content)
+        except InputError:
+            return None
+        kind = scene.coupling.kind
+        return Level(
+            name=name,
+            kind=kind,
+            content=_content(scene),
+            heights=heights,
+            cost=predicted_seconds(scene, heights),
+            slopes=slopes,
+            ranks=1 if kind == "analytic" else self._ranks,
+        )
+
+    @property
+    def _cells(self) -> tuple[int, int, int]:
+        """Elements of a block that carries laws itself."""
+        stated = self._scene.block.cells
+        return stated if isinstance(stated, tuple) else EMBEDDED_CELLS
+
+    @property
+    def _patch_grids(self) -> list[Grid]:
+        own: Grid = tuple(self._scene.patches.grid)
+        grids = {(count, count) for count in PATCHES if count <= min(self._heights)} | {own}
+        return sorted(grids)
+
+    @property
+    def _law_grid(self) -> Grid:
+        """The finest of the surface's grids that laws can be made on without much waiting."""
+        fitting = [grid for grid in self._grids if max(grid) <= LAW_HEIGHTS]
+        return fitting[-1] if fitting else self._grids[0]
+
+    @cached_property
+    def _grids(self) -> list[Grid]:
+        """Grids of the surface, coarsest first; heights from a file are taken as they are."""
+        grids, spectrum = [self._heights], self._scene.surface.spectrum
+        while spectrum is not None and all(count % 2 == 0 for count in grids[0]):
+            coarser = (grids[0][0] // 2, grids[0][1] // 2)
+            waves = _shortest(spectrum)
+            fewest = [max(FEWEST_HEIGHTS, HEIGHTS_PER_WAVE * count) for count in waves]
+            if any(count < least for count, least in zip(coarser, fewest, strict=True)):
+                break
+            grids.insert(0, coarser)
+        return grids
+
+
+def _content(scene: Scene) -> Content:
+    """Return a scene as it would stand in a file, alone in the world."""
+    content = scene.model_dump(by_alias=True, mode="json", exclude_none=True)
+    if scene.surface_path is not None:
+        content["surface"]["file"] = str(scene.surface_path.resolve())
+    content["load"].pop("force_change", None)
+    return content | {"output": OPTIONS}
+
+
+def _shortest(spectrum: Any) -> tuple[float, float]:
+    """Return the largest numbers of waves per side."""
+    bands = [band or spectrum.waves for band in (spectrum.waves_x, spectrum.waves_y)]
+    return bands[0][1], bands[1][1]
+
+
+def _carries(cells: tuple[int, ...], grid: Grid) -> bool:
+    """Tell whether every patch lies on enough elements."""
+    return all(c >= CELLS_PER_PATCH * n for c, n in zip(cells[:2], grid, strict=True))
+
+
+def _times(counts: tuple[int, ...]) -> str:
+    return " × ".join(map(str, counts))
