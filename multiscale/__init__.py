@@ -5,6 +5,8 @@ patch its law, the laws go onto the flat interface of an elastic block, and load
 `History`.
 """
 
+from multiscale.compare import compare
+from multiscale.comparison import Comparison, Row
 from multiscale.concurrent import ConcurrentCoupling
 from multiscale.condensed import CondensedCoupling
 from multiscale.consistent import consistent_laws
@@ -23,6 +25,7 @@ from multiscale.yielding import SpreadLoads, UniformLoads
 
 __all__ = [
     "AnalyticCoupling",
+    "Comparison",
     "ConcurrentCoupling",
     "CondensedCoupling",
     "ContactSpread",
@@ -34,11 +37,13 @@ __all__ = [
     "PatchLaws",
     "PatchState",
     "Programme",
+    "Row",
     "Run",
     "Scene",
     "SpreadLoads",
     "Stage",
     "UniformLoads",
+    "compare",
     "consistent_laws",
     "isolated_laws",
     "load_steps",

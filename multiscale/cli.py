@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from geometry.errors import InputError, PatchlawError
-from multiscale import commands, terminal
+from multiscale import commands, compare_command, terminal
 
 _SOLVER_OPTIONS = ("-snes_", "-ksp_", "-pc_", "-mg_")
 
@@ -66,6 +66,7 @@ def _parser() -> argparse.ArgumentParser:
     for name, command in {
         "run": commands.run_scene,
         "plan": commands.plan_scene,
+        "compare": compare_command.compare_scene,
         "laws": commands.tabulate_scene,
         "surface": commands.describe_surface,
     }.items():
@@ -81,6 +82,8 @@ def _parser() -> argparse.ArgumentParser:
             metavar="KEY=VALUE",
             help="change keys of the scene, such as load.approach='4 um'",
         )
+        if command is compare_command.compare_scene:
+            compare_command.add_options(sub)
     schema = subparsers.add_parser("schema", help=_summary(commands.print_schema))
     schema.set_defaults(command=commands.print_schema)
     return parser

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -72,8 +72,9 @@ def compared(
     if chosen is None:
         rows = tuple(_row(one) for one in outcomes)
         return Comparison(rows=rows, warnings=tuple(warnings), **common)
-    best, *coarser = ranked[chosen]
-    own = uncertainty(best.curves, coarser[0].curves if coarser else None, common["grid"])
+    best = ranked[chosen][0]
+    pairs = [(coarse.curves, fine.curves) for coarse, fine in _refinements(ranked[chosen])]
+    own = uncertainty(best.curves, pairs, common["grid"])
     if not math.isfinite(getattr(own, f"{_response(scene)}_max")):
         warnings.append(f"{best.level.name} has no error bar of its own: it is taken as exact")
     split = _Split(scene, outcomes, ranked, chosen)
@@ -87,7 +88,12 @@ def compared(
         for one in outcomes
     )
     return Comparison(
-        rows=rows, measure=best.level.name, uncertainty=own, warnings=tuple(warnings), **common
+        rows=rows,
+        measure=best.level.name,
+        against=chosen,
+        uncertainty=own,
+        warnings=tuple(warnings),
+        **common,
     )
 
 
@@ -102,12 +108,23 @@ def _ranked(outcomes: Sequence[Outcome], against: Against) -> list[Outcome]:
     return sorted(fitting, key=_fineness, reverse=True)
 
 
-def _fineness(one: Outcome) -> tuple[float, ...]:
-    """Return what makes a level better than another of its kind."""
+def _fineness(one: Outcome) -> tuple[int, int, int]:
+    """Return what makes a level better than another of its kind: meshes, elements, heights."""
     content = one.level.content
-    cells = content["block"].get("cells", (1,))
-    finest = content.get("reference", {})
-    return finest.get("meshes", 0), math.prod(cells), math.prod(one.level.heights)
+    cells, reference = content["block"].get("cells", (1,)), content.get("reference", {})
+    return reference.get("meshes", 0), math.prod(cells), math.prod(one.level.heights)
+
+
+def _refinements(ranked: Sequence[Outcome]) -> Iterator[tuple[Outcome, Outcome]]:
+    """Yield, for each thing that can be refined, the finest pair that differs by nothing else."""
+    for which in range(3):
+        groups: dict[tuple[int, ...], list[Outcome]] = {}
+        for one in ranked:  # the best first, in groups too
+            others = tuple(value for k, value in enumerate(_fineness(one)) if k != which)
+            groups.setdefault(others, []).append(one)
+        pairs = [group for group in groups.values() if len(group) > 1]
+        if pairs:
+            yield pairs[0][1], pairs[0][0]
 
 
 def _grid(scene: Scene, found: Sequence[Outcome]) -> PatchGrid:

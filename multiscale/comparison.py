@@ -98,6 +98,7 @@ class Comparison:
         grid: Patches that pressures are compared on.
         measure: Name of the level that the others are compared against; None when none was
             reached.
+        against: What kind of level that is, as ``--against`` names it.
         uncertainty: The measure's own; NaN where unknown.
         curves: What was found, by name of the level.
         warnings: What a reader should know.
@@ -109,6 +110,7 @@ class Comparison:
     steps: int
     grid: PatchGrid
     measure: str | None = None
+    against: str | None = None
     uncertainty: Measures = field(default_factory=Measures)
     curves: Mapping[str, Curves] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()

@@ -8,20 +8,29 @@ from multiscale.micro_choice import SOLUTIONS_OF_LAWS
 from multiscale.scene import Scene
 from multiscale.stage_checks import block_cells
 
-START = 0.1
+START = 0.05
 """Seconds for a surface and its summits."""
 
-SUMMITS = 5e-3
-"""Seconds of a solution by summits, islands included."""
+SUMMITS = 3e-3
+"""Seconds of a solution by summits."""
 
-CELL = 3e-6
-"""Seconds of a half-space's solution per cell."""
+CELL = 7e-7
+"""Seconds of a half-space's solution, or one by islands, per height."""
 
-BLOCK = 5e-5
-"""Seconds to assemble, and to solve once, per unknown of a block on the mesh."""
+ASSEMBLY = 1.5e-5
+"""Seconds to mesh and assemble a block and its multigrid, per unknown."""
 
-FACTORISATION = 4.5e-7
-"""Seconds to factorise the smooth rest, per unknown to the power 3/2."""
+SOLUTION = 2.5e-6
+"""Seconds of a load step, or of the compliance of a patch, per unknown."""
+
+CORRECTION = 0.4
+"""Seconds for the loads of the smooth rest of a block, whatever its mesh."""
+
+FACTORISATION = 9e-7
+"""Seconds to factorise and solve the smooth rest, per unknown to the power 3/2."""
+
+REFERENCE = 10.0
+"""Seconds of a load step with the roughness meshed, per mesh."""
 
 
 def predicted_seconds(scene: Scene, heights: tuple[int, int]) -> float:
@@ -31,20 +40,18 @@ def predicted_seconds(scene: Scene, heights: tuple[int, int]) -> float:
         scene: The scene of the level.
         heights: Heights of its surface.
     """
+    kind, model = scene.coupling.kind, scene.micro.model
     steps = len(scene.loading.programme.targets)
-    whole = CELL * math.prod(heights) if scene.micro.model in ("half-space", "auto") else SUMMITS
-    kind = scene.coupling.kind
+    if kind == "reference":
+        return REFERENCE * steps * scene.model_dump().get("reference", {}).get("meshes", 1)
+    by_cells = model in ("half-space", "islands", "auto")
+    whole = CELL * math.prod(heights) if by_cells else SUMMITS
     if kind == "analytic":
         return START + steps * whole
-    if kind == "reference":
-        return 100.0 * steps * scene.model_dump().get("reference", {}).get("meshes", 1)
-    cells = block_cells(scene)
+    unknowns = 3.0 * math.prod(count + 1 for count in block_cells(scene))
     if scene.coupling.decomposed:
-        unknowns = 3.0 * math.prod(count + 1 for count in cells)
         solutions = 8 * steps if kind == "concurrent" else 2 * SOLUTIONS_OF_LAWS
-        block = 10.0 * FACTORISATION * unknowns**1.5
-        return START + block + solutions * whole
-    unknowns = 3.0 * math.prod(count + 1 for count in cells)
+        return START + CORRECTION + FACTORISATION * unknowns**1.5 + solutions * whole
     count = math.prod(scene.patches.grid)
-    laws = SOLUTIONS_OF_LAWS * (SUMMITS * count if whole == SUMMITS else whole)
-    return START + laws + BLOCK * unknowns * (1 + min(count, steps))
+    laws = SOLUTIONS_OF_LAWS * (whole if by_cells or kind == "consistent" else whole * count)
+    return START + laws + unknowns * (ASSEMBLY + SOLUTION * min(count, steps))

@@ -1,4 +1,4 @@
-"""Runs one level of a comparison in a process of its own: ``python -m multiscale.level_process``."""
+"""Runs one level of a comparison, as a process of its own."""
 
 from __future__ import annotations
 

@@ -41,8 +41,11 @@ PATCHES = (1, 2, 4, 8, 16)
 CELLS_PER_PATCH = 2
 """Elements along a patch, at least, of blocks that carry laws themselves."""
 
-SMOOTH_CELLS = ((8, 8, 6), (16, 16, 12))
-"""Elements of blocks that only correct the half-space."""
+SMOOTH_CELLS = ((8, 8, 6), (16, 16, 12), (24, 24, 16))
+"""Elements of blocks that only correct the half-space: coarse, as by default, fine."""
+
+OWN = "the scene as it is"
+"""Name of the level that runs the scene as its file has it."""
 
 OPTIONS: Content = {"figures": False, "report": False, "fields": False}
 
@@ -138,7 +141,7 @@ class _Family:
     def _own(self) -> Level | None:
         content = {key: self._base[key] for key in self._base if key != "patches"}
         whole = content | {"patches": {"grid": list(self._scene.patches.grid)}}
-        return self._level("the scene as it is", whole, self._heights)
+        return self._level(OWN, whole, self._heights)
 
     def _analytic(self) -> Iterator[Level | None]:
         fitted = {"model": "elliptic", "curvature": "contact", "border": "include"}
@@ -167,15 +170,15 @@ class _Family:
         if micro["model"] in ("half-space", "auto"):
             micro = {"model": "elliptic"}
         love = {"kind": "isolated", "love": self._scene.coupling.love}
-        own, cells = tuple(self._scene.patches.grid), self._cells
-        half = tuple(max(1, count // 2) for count in cells)
+        own, cells = self._patches, self._cells
+        half = (max(1, cells[0] // 2), max(1, cells[1] // 2), max(1, cells[2] // 2))
         for grid, mesh in (*((grid, cells) for grid in self._patch_grids), (own, half)):
             if _carries(mesh, grid):
                 yield self._patched("isolated", micro, grid, love, mesh)
         yield self._patched("isolated", {"model": "half-space"}, own, love, cells)
 
     def _consistent(self) -> Iterator[Level | None]:
-        own, whole = tuple(self._scene.patches.grid), {"model": "half-space"}
+        own, whole = self._patches, {"model": "half-space"}
         decomposed = {"kind": "consistent", "compliance": "decomposed"}
         for grid in self._patch_grids:
             yield self._patched("consistent", whole, grid, decomposed, None)
@@ -202,8 +205,9 @@ class _Family:
         )
 
     def _concurrent(self) -> Iterator[Level | None]:
-        pairs = [(grid, SMOOTH_CELLS[-1]) for grid in self._grids]
-        pairs += [(self._law_grid, cells) for cells in SMOOTH_CELLS[:-1]]
+        coarse, usual, fine = SMOOTH_CELLS
+        pairs = [(grid, usual) for grid in self._grids]
+        pairs += [(self._law_grid, coarse), *((grid, fine) for grid in self._grids[-2:])]
         for grid, cells in pairs:
             changes: Content = {
                 "micro": {"model": "half-space"},
@@ -255,9 +259,15 @@ class _Family:
         return stated if isinstance(stated, tuple) else EMBEDDED_CELLS
 
     @property
+    def _patches(self) -> Grid:
+        """The scene's own patches."""
+        nx, ny = self._scene.patches.grid
+        return nx, ny
+
+    @property
     def _patch_grids(self) -> list[Grid]:
-        own: Grid = tuple(self._scene.patches.grid)
-        grids = {(count, count) for count in PATCHES if count <= min(self._heights)} | {own}
+        fitting = [count for count in PATCHES if count <= min(self._heights)]
+        grids = {(count, count) for count in fitting} | {self._patches}
         return sorted(grids)
 
     @property

@@ -2,7 +2,7 @@
 
 With R the run that is compared against and k the load steps that both have,
 
-* of force, approach and contact area, relative to their largest in R,
+* of force, approach and contact area, relative to their largest in R over these steps,
 
       max_k |X_k − R_k| / max_k |R_k|,    and signed at R's last step,    (X − R) / R;
 
@@ -20,6 +20,7 @@ uncertainty is defined by the same formulas.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -114,9 +115,10 @@ def measures(run: Curves, against: Curves, grid: PatchGrid) -> Measures:
     found: dict[str, float] = {}
     for name in ("force", "approach", "area", "separation"):
         mine, right = getattr(run, name), getattr(against, name)
-        each_step = name == "separation"
-        scale = np.abs(right) if each_step else np.full(right.shape, np.abs(right).max())
-        found[f"{name}_max"] = largest(mine[:common] - right[:common], scale[:common])
+        scale = np.abs(right[:common])
+        if name != "separation":
+            scale[:] = scale.max()
+        found[f"{name}_max"] = largest(mine[:common] - right[:common], scale)
         if common == len(against):
             floor = _NOTHING * float(np.abs(right).max())
             found[f"{name}_last"] = ratio(mine[common - 1] - right[-1], right[-1], floor)
@@ -128,20 +130,24 @@ def measures(run: Curves, against: Curves, grid: PatchGrid) -> Measures:
     return Measures(**found)
 
 
-def uncertainty(against: Curves, coarser: Curves | None, grid: PatchGrid) -> Measures:
+def uncertainty(
+    against: Curves, pairs: Sequence[tuple[Curves, Curves]], grid: PatchGrid
+) -> Measures:
     """Measure the uncertainty of the run that others are compared against; all values positive.
 
-    Force and area take the run's own error bars where it has them. The rest is the distance to the
-    next coarser run of its kind: with errors that at least halve from one to the other, that of
-    the finer one is no larger.
+    Force and area take the run's own error bars where it has them. The rest is the sum of the
+    distances between runs that differ by one refinement each: with an error that at least halves
+    by it, that of the finer run is no larger.
 
     Args:
         against: The run.
-        coarser: The next coarser one of its kind, where there is one.
+        pairs: A coarser and a finer run for each refinement; without any, nothing is known.
         grid: Patches on which pressures are compared.
     """
-    apart = Measures() if coarser is None else measures(coarser, against, grid)
-    found = {name: abs(getattr(apart, name)) for name in Measures.__slots__}
+    apart = [measures(coarser, finer, grid) for coarser, finer in pairs] or [Measures()]
+    found = {
+        name: float(sum(abs(getattr(one, name)) for one in apart)) for name in Measures.__slots__
+    }
     for name in ("force", "area"):
         value, error = getattr(against, name), getattr(against, f"{name}_error")
         if np.isfinite(error).all():

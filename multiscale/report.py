@@ -18,6 +18,7 @@ th, td { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid #d5d
 th:first-child, td:first-child { text-align: left; } th { background: #f4f6f7; }
 td.text { text-align: left; } figure { margin: 1.2rem 0; } img { max-width: 100%; }
 figcaption, .note { color: #566573; }
+.wide { overflow-x: auto; font-size: .85rem; } .wide td, .wide th { padding: .2rem .45rem; }
 .warning { border-left: 4px solid #d68910; padding-left: .8rem; }
 """
 
