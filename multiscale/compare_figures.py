@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from multiscale.comparison import Comparison, Row
 from multiscale.figures import PRESSURE_LABEL, draw_pressures
 from multiscale.levels import OWN
+from multiscale.measures import on_grid
 
 _MARKS = {
     "analytic": "o",
@@ -28,6 +30,7 @@ _COLOURS = {
 }
 _GREY = "#b8bec4"
 _LEAST = 1e-5  # errors below are drawn there
+_WITHIN = 0.2  # of the error bar: errors below are drawn there, as they cannot be told apart
 _STYLES = ("-", "--", "-.", ":")
 
 
@@ -77,12 +80,13 @@ def _draw_pareto(axes: Any, comparison: Comparison, error: str) -> None:
     """Draw one panel."""
     frontier = comparison.frontier(error)
     bar = getattr(comparison.uncertainty, error)
+    least = max(_LEAST, np.nan_to_num(_WITHIN * bar))
     points: list[tuple[float, float, int, Row]] = []
     for number, row in enumerate(comparison.rows, 1):
         size = abs(getattr(row.errors, error))  # the measure stands at its own uncertainty
         if not np.isfinite((row.seconds, size)).all():
             continue
-        size = max(size, _LEAST)
+        size = max(size, least)
         points.append((row.seconds, size, number, row))
     for seconds, size, _, row in points:
         ahead = row in frontier
@@ -198,7 +202,7 @@ def _draw_bar(axes: Any, comparison: Comparison, given: Any) -> None:
 
 
 def maps_figure(comparison: Comparison) -> Figure:
-    """Draw patch pressures at the last load step side by side, on one scale."""
+    """Draw pressures at the last load step side by side: on the same patches, on one scale."""
     closest = told_rows(comparison, "pressure_l1", most=6)
     rows = [row for row in closest if row.steps == comparison.steps]
     across = min(3, max(1, len(rows)))
@@ -208,9 +212,8 @@ def maps_figure(comparison: Comparison) -> Figure:
     top = max((float(_last_pressure(comparison, row).max()) for row in rows), default=1.0)
     image = None
     for axes, row in zip(panels, rows, strict=False):
-        patches = comparison.curves[row.name].patches
         pressure = _last_pressure(comparison, row)
-        image = draw_pressures(figure, axes, patches, pressure, top=top)
+        image = draw_pressures(figure, axes, comparison.grid, pressure, top=top)
         told = " (measure)" if row.is_measure else ""
         axes.set_title(f"{row.name}{told}".replace(", ", "\n", 1), fontsize=8.5)
         axes.set(xlabel="", ylabel="", xticks=[], yticks=[])
@@ -221,5 +224,7 @@ def maps_figure(comparison: Comparison) -> Figure:
     return figure
 
 
-def _last_pressure(comparison: Comparison, row: Row) -> Any:
-    return comparison.curves[row.name].patch_pressure[-1]
+def _last_pressure(comparison: Comparison, row: Row) -> NDArray[np.float64]:
+    """Return pressures on the patches that they are compared on."""
+    found = comparison.curves[row.name]
+    return on_grid(found.patch_pressure[-1], found.patches, comparison.grid)
