@@ -10,6 +10,7 @@ from geometry.errors import InputError, NotConverged, PatchlawError
 from geometry.files import read_surface
 from geometry.meshes import Alignment, BlockShape, alignment, flat_block
 from geometry.patches import PatchGrid, patch_means
+from geometry.reference_meshes import characteristic_size, reference_shapes, suggested_fine
 from geometry.refined_block import RefinedShape, places_in_reach
 from geometry.spectrum import Spectrum, synthesise
 from geometry.statistics import PowerSpectrum, Roughness, power_spectrum, roughness
@@ -30,12 +31,15 @@ __all__ = [
     "Spectrum",
     "Surface",
     "alignment",
+    "characteristic_size",
     "find_asperities",
     "flat_block",
     "patch_means",
     "places_in_reach",
     "power_spectrum",
     "read_surface",
+    "reference_shapes",
     "roughness",
+    "suggested_fine",
     "synthesise",
 ]

@@ -30,7 +30,7 @@ class RefinedShape:
         fine: Edge length there [mm].
         coarse: Edge length far from them [mm].
         growth: Increase of the edge length per distance.
-        element: ``P1`` or ``P2``.
+        element: ``P1``, or ``P2``, whose edges have a node in their middle and can be curved.
 
     Raises:
         InputError: When a value is out of its range.
@@ -85,37 +85,73 @@ class RefinedShape:
 
     @contextmanager
     def meshed(self) -> Iterator[Any]:
-        """Mesh the block in gmsh for as long as the context lasts; faces as in `flat_block`."""
+        """Mesh the block in gmsh for as long as the context lasts; faces as in `flat_block`.
+
+        The geometry has the order of the element.
+        """
         with gmsh_session("patchlaw refined block") as gmsh:
             box = gmsh.model.occ.addBox(0.0, 0.0, -self.height, *self.interface, self.height)
             gmsh.model.occ.synchronize()
             _name_faces(gmsh, box, self.height)
             _set_sizes(gmsh, self)
             gmsh.model.mesh.generate(3)
+            gmsh.model.mesh.setOrder(self.degree)
             yield gmsh.model
 
 
-def places_in_reach(surface: Surface, approach: float, *, spacing: float) -> Array:
-    """Return places that a level plane can touch: where the surface is above z_M − approach.
+def places_in_reach(
+    surface: Surface,
+    approach: float,
+    *,
+    spacing: float,
+    tilt: tuple[float, float] = (0.0, 0.0),
+) -> Array:
+    """Return places that the plane can touch: where the surface stands out behind it.
 
-    The half-space only moves away under pressure, so that nothing below can come into contact.
+    The half-space only moves away under pressure, so that nothing else can come into contact.
 
     Args:
         surface: The rough surface.
-        approach: Largest approach, with what a tilt adds to it [mm].
+        approach: Largest approach at the middle of the surface [mm].
         spacing: Distance between places [mm].
+        tilt: Slopes of the approach along x and y.
 
     Returns:
-        Points of a square lattice, shape (n, 2) [mm]; at least the highest point.
+        Points of a square lattice, shape (n, 2) [mm]; at least that of the largest depth.
     """
     x, y = (
         np.linspace(0.0, length, max(2, math.ceil(length / spacing) + 1))
         for length in surface.lengths
     )
-    grid = np.meshgrid(x, y, indexing="ij")
-    inside = surface.height_at(*grid) > surface.highest - approach
-    found = np.stack([part[inside] for part in grid], axis=1)
-    return np.vstack([found, np.reshape(surface.highest_point, (1, 2))])
+    grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    grid = np.vstack([grid, surface.highest_point])
+    depth = depth_below_plane(surface, *grid.T, approach, tilt=tilt)
+    return grid[depth >= min(0.0, float(depth.max()))]
+
+
+def depth_below_plane(
+    surface: Surface,
+    x: Array,
+    y: Array,
+    approach: float,
+    *,
+    tilt: tuple[float, float] = (0.0, 0.0),
+) -> Array:
+    """Return how far the undeformed surface stands out behind the rigid plane [mm].
+
+    Args:
+        surface: The rough surface.
+        x: Abscissae [mm].
+        y: Ordinates, of the same shape [mm].
+        approach: Approach at the middle of the surface, from first touch of a level plane [mm].
+        tilt: Slopes of the approach along x and y.
+
+    Returns:
+        Depths, of the same shape; negative where there is a gap.
+    """
+    middle_x, middle_y = (0.5 * length for length in surface.lengths)
+    lean = tilt[0] * (x - middle_x) + tilt[1] * (y - middle_y)
+    return surface.height_at(x, y) - surface.highest + approach + lean
 
 
 def _name_faces(gmsh: Any, box: int, height: float) -> None:

@@ -16,7 +16,7 @@ from macro.interface import ContactLaw, Interface
 from macro.kept import cached_correction
 from macro.mesh import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
 from macro.obstacle import ObstacleBlock, ObstacleState
-from macro.output import write_fields
+from macro.output import write_fields, write_rough_fields
 from macro.pressed import PressedBlock, PressState
 from macro.rough_mesh import MeshQuality, rough_block_mesh
 
@@ -43,4 +43,5 @@ __all__ = [
     "plain_compliance",
     "rough_block_mesh",
     "write_fields",
+    "write_rough_fields",
 ]

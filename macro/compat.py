@@ -69,6 +69,19 @@ def vector_space(mesh: Any, degree: int) -> Any:
 
 
 @_quiet_compiler()
+def scalar_space(mesh: Any, degree: int) -> Any:
+    """Return the continuous Lagrange space of scalars.
+
+    Args:
+        mesh: dolfinx mesh.
+        degree: Polynomial degree.
+    """
+    if hasattr(fem, "functionspace"):
+        return fem.functionspace(mesh, ("Lagrange", degree))
+    return fem.FunctionSpace(mesh, ("Lagrange", degree))
+
+
+@_quiet_compiler()
 def cellwise_space(mesh: Any) -> Any:
     """Return the space of scalars that are constant on every cell."""
     if hasattr(fem, "functionspace"):
@@ -105,12 +118,21 @@ def lagrange_values(cell_name: str, degree: int, points: NDArray[np.float64]) ->
         degree: Polynomial degree.
         points: Reference coordinates, shape (points, dimension).
     """
-    element = basix.create_element(
-        basix.ElementFamily.P, _CELLS[cell_name], degree, basix.LagrangeVariant.equispaced
-    )
+    element = _lagrange(cell_name, degree)
     if not len(points):  # basix 0.5 aborts the process on no points
         return np.empty((0, element.dim))
     return element.tabulate(0, points)[0].reshape(len(points), -1)
+
+
+def _lagrange(cell_name: str, degree: int) -> Any:
+    return basix.create_element(
+        basix.ElementFamily.P, _CELLS[cell_name], degree, basix.LagrangeVariant.equispaced
+    )
+
+
+def lagrange_points(cell_name: str, degree: int) -> NDArray[np.float64]:
+    """Return the nodes of the scalar Lagrange basis on the reference cell, shape (nodes, 3)."""
+    return np.asarray(_lagrange(cell_name, degree).points)
 
 
 def reference_facets(cell_name: str) -> tuple[NDArray[np.float64], NDArray[np.intp]]:

@@ -39,12 +39,20 @@ class FacetQuadrature:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Facets:
-    """Facets of the top whose cells this rank owns; affine images of a triangle or a square."""
+class TopFacets:
+    """Facets of the top whose cells this rank owns; affine images of a triangle or a square.
+
+    Args:
+        cell: Rank-local cell behind, shape (n,).
+        side: Which of its facets it is, shape (n,).
+        reference: Vertices on the reference cell, shape (n, 3 or 4, 3).
+        corners: Vertices in the plane, shape (n, 3 or 4, 2) [mm].
+    """
 
     cell: NDArray[np.int32]
-    reference: Array  # their vertices on the reference cell, (n, 3 or 4, 3)
-    corners: Array  # their vertices in the plane, (n, 3 or 4, 2) [mm]
+    side: NDArray[np.intp]
+    reference: Array
+    corners: Array
 
     def pull_back(self, facet: NDArray[np.intp], points: Array) -> Array:
         """Map points (n, 2) of given facets (n,) to the reference cell, (n, 3)."""
@@ -70,7 +78,7 @@ def facet_quadrature(
         degree: Polynomial degree that is integrated exactly.
     """
     cell_name = block.mesh.topology.cell_name()
-    facets = _owned_top(block)
+    facets = top_facets(block)
     triangles, facet = _cut_into_patches(*_triangles(facets.corners), patches)
     patch = patches.index_of(*triangles.mean(axis=1).T)
     order = np.argsort(patch, kind="stable")
@@ -93,7 +101,8 @@ def facet_quadrature(
     )
 
 
-def _owned_top(block: BlockMesh) -> _Facets:
+def top_facets(block: BlockMesh) -> TopFacets:
+    """Return the facets of the top whose cells this rank owns; there may be none."""
     topology = block.mesh.topology
     topology.create_connectivity(2, 3)
     topology.create_connectivity(3, 2)
@@ -104,9 +113,11 @@ def _owned_top(block: BlockMesh) -> _Facets:
     owned = cell < topology.index_map(3).size_local
     cell, facets = cell[owned], facets[owned]
     mates = facets_of.array.reshape(-1, len(shapes))[cell]
-    at = shapes[np.argmax(mates == facets[:, None], axis=1)]
+    side = np.argmax(mates == facets[:, None], axis=1)
+    at = shapes[side]
     rows = np.take_along_axis(compat.cell_vertices(block.mesh)[cell], at, axis=1)
-    return _Facets(cell=cell, reference=vertices[at], corners=block.mesh.geometry.x[rows][..., :2])
+    corners = block.mesh.geometry.x[rows][..., :2]
+    return TopFacets(cell=cell, side=side, reference=vertices[at], corners=corners)
 
 
 def _triangles(corners: Array) -> tuple[Array, NDArray[np.intp]]:

@@ -1,33 +1,39 @@
-"""Solves on some degrees of freedom with the matrix and the preconditioner of all of them."""
+"""Solves in a part of the displacements with the matrix and the preconditioner of all of them."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.errors import NotConverged
 from macro.solvers import reason_name
 
+Array = NDArray[np.float64]
+
 
 class FreeSolver:
-    """Conjugate gradients on the degrees of freedom that are not held.
+    """Conjugate gradients where some degrees of freedom are held, or move together.
+
+    With P the orthogonal projection on the vectors that are left, the operator is P A P and the
+    preconditioner P M P. Held degrees of freedom that a rigid plane takes along add as many
+    unknowns as the plane has motions, and no second solve.
 
     Args:
         matrix: Symmetric positive definite matrix A of all of them.
-        preconditioner: A preconditioner of it.
+        preconditioner: A preconditioner M of it.
 
     Note:
         Every method is collective.
     """
 
     def __init__(self, matrix: PETSc.Mat, preconditioner: PETSc.PC) -> None:
-        self._free = matrix.createVecRight()
-        self._free.set(1.0)
+        self._left = _Projection(matrix)
         operator = PETSc.Mat().createPython(
-            matrix.getSizes(), _Restricted(matrix.mult, self._free), comm=matrix.comm
+            matrix.getSizes(), _Projected(matrix.mult, self._left), comm=matrix.comm
         )
         operator.setUp()
         self._ksp = PETSc.KSP().create(matrix.comm)
@@ -36,16 +42,17 @@ class FreeSolver:
         self._ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
         self._ksp.setTolerances(max_it=1000)
         self._ksp.pc.setType("python")
-        self._ksp.pc.setPythonContext(_Restricted(preconditioner.apply, self._free))
+        self._ksp.pc.setPythonContext(_Projected(preconditioner.apply, self._left))
 
-    def hold(self, dofs: NDArray[np.intp]) -> None:
-        """Hold degrees of freedom, and free all others.
+    def hold(self, dofs: NDArray[np.intp], motions: Array | None = None) -> None:
+        """Hold degrees of freedom but for common motions, and free all others.
 
         Args:
-            dofs: Local indices of what this rank owns.
+            dofs: Local indices of what this rank owns, shape (n,).
+            motions: Displacements of these by every motion that is left to them, shape (n, k);
+                orthonormal, all ranks together. None: they stand still.
         """
-        self._free.set(1.0)
-        self._free.array[dofs] = 0.0
+        self._left.hold(dofs, np.zeros((len(dofs), 0)) if motions is None else motions)
 
     def improve(self, solution: PETSc.Vec, residual: PETSc.Vec, tolerance: float) -> int:
         """Change what is free of a solution until its residual is small.
@@ -61,7 +68,7 @@ class FreeSolver:
         Raises:
             NotConverged: When conjugate gradients fail.
         """
-        residual.pointwiseMult(residual, self._free)
+        self._left.project(residual)
         norm = residual.norm()
         if norm <= tolerance:
             return 0
@@ -79,19 +86,34 @@ class FreeSolver:
         return int(self._ksp.its)
 
 
-class _Restricted:
-    """A linear map on the free degrees of freedom, the identity on the others."""
+class _Projection:
+    """The orthogonal projection P: identity on what is free, Q Qᵀ on what is held."""
 
-    def __init__(self, apply: Any, free: PETSc.Vec) -> None:
-        self._apply, self._free = apply, free
-        self._part = free.duplicate()
+    def __init__(self, matrix: PETSc.Mat) -> None:
+        self._comm = matrix.comm.tompi4py()
+        self._dofs: NDArray[np.intp] = np.empty(0, dtype=np.intp)
+        self._motions: Array = np.empty((0, 0))
+
+    def hold(self, dofs: NDArray[np.intp], motions: Array) -> None:
+        self._dofs, self._motions = dofs, motions
+
+    def project(self, vector: PETSc.Vec) -> None:
+        values, q = vector.array, self._motions
+        shares = q.T @ values[self._dofs]
+        if shares.size:
+            shares = self._comm.allreduce(shares, op=MPI.SUM)
+        values[self._dofs] = q @ shares
+
+
+class _Projected:
+    """A linear map on vectors of the range of a projection, back into that range."""
+
+    def __init__(self, apply: Any, left: _Projection) -> None:
+        self._apply, self._left = apply, left
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Write P A P x + (1 − P) x."""
-        self._part.pointwiseMult(self._free, x)
-        self._apply(self._part, y)
-        y.pointwiseMult(y, self._free)
-        y.axpy(1.0, x)
-        y.axpy(-1.0, self._part)
+        """Write P A x."""
+        self._apply(x, y)
+        self._left.project(y)
 
     apply = mult

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from dolfinx import fem
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 
 from macro import compat
 from macro.interface import Interface
+from macro.obstacle import ObstacleBlock
+from macro.obstacle_state import ObstacleState
 
 Array = NDArray[np.float64]
 
@@ -35,12 +38,45 @@ def write_fields(
     mesh = block.mesh.mesh
     moved = block.function(displacement)
     if block.degree > 1:
-        linear = fem.Function(compat.vector_space(mesh, 1), name=moved.name)
-        linear.interpolate(moved)
-        moved = linear
+        moved = _interpolated(compat.vector_space(mesh, 1), moved, moved.name)
     pressed = fem.Function(compat.cellwise_space(mesh), name="pressure")
     points = interface.quadrature
     cells = compat.cell_nodes(pressed.function_space)[:, 0]
     pressed.x.array[cells[points.cell]] = pressure[points.patch]
     pressed.x.scatter_forward()
     compat.write_xdmf(str(path), mesh, [moved, pressed])
+
+
+def write_rough_fields(path: Path | str, obstacle: ObstacleBlock, state: ObstacleState) -> None:
+    """Write displacements [mm] and contact pressures [MPa] of a rough block as XDMF.
+
+    The pressure of a node of the top is its contact force over its tributary area. Quadratic
+    functions on straight cells are written at the vertices.
+
+    Args:
+        path: File to write, ending in ``.xdmf``; an HDF5 file goes beside it.
+        obstacle: The rough block that was pressed.
+        state: The load step.
+
+    Note:
+        Collective.
+    """
+    block, top = obstacle.block, obstacle.top
+    upright = np.zeros(block.owned_dofs)
+    upright[top.dofs] = state.pressing / top.area
+    mesh, degree = block.mesh.mesh, 1 if block.mesh.shape.hexahedral else block.degree
+    moved = _interpolated(
+        compat.vector_space(mesh, degree), block.function(state.displacement), "displacement"
+    )
+    # files take functions numbered as the mesh is, which parts of a vector need not be
+    pressed = _interpolated(
+        compat.scalar_space(mesh, degree), block.function(upright).sub(2).collapse(), "pressure"
+    )
+    compat.write_xdmf(str(path), mesh, [moved, pressed])
+
+
+def _interpolated(space: Any, function: Any, name: str) -> Any:
+    """Return a function in another space."""
+    other = fem.Function(space, name=name)
+    other.interpolate(function)
+    return other

@@ -24,9 +24,6 @@ _DECAY = 3.0
 _LEAST_VOLUME = 0.05
 """Volume relative to that of the flat block, below which cells are refused."""
 
-_CORNERS = {4: [(0, 1, 2, 3)], 8: [(i, i ^ 1, i ^ 2, i ^ 4) for i in range(8)]}
-"""Vertices of tetrahedra and hexahedra: a corner and the ends of the edges that leave it."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeshQuality:
@@ -90,17 +87,47 @@ def rough_block_mesh(
 
 
 def _thinnest(flat: BlockMesh, moved: Array) -> float:
-    """Return the smallest ratio of the volumes at corners of cells after and before a movement."""
+    """Return the smallest ratio of the volumes at nodes of cells after and before a movement."""
     cells, points = compat.cell_vertices(flat.mesh), flat.mesh.geometry.x
     thinnest = 1.0
-    for corner in _CORNERS[cells.shape[1]] if len(cells) else ():
-        at, *ends = (cells[:, vertex] for vertex in corner)
+    for slopes in _slopes(cells.shape[1]) if len(cells) else ():
+        used = np.flatnonzero(slopes.any(axis=1))
         before, after = (
-            np.linalg.det(np.stack([place[end] - place[at] for end in ends], axis=1))
+            np.linalg.det(np.einsum("cni,nj->cij", place[cells[:, used]], slopes[used]))
             for place in (points, moved)
         )
         thinnest = min(thinnest, float(np.min(after / before)))
     return thinnest
+
+
+def _slopes(nodes: int) -> Array:
+    """Return the shape functions' gradients at the nodes of a cell, shape (points, nodes, 3).
+
+    Nodes of hexahedra (8) and tetrahedra (4 or 10) in the order of dolfinx; of a linear
+    tetrahedron's gradients, which are the same everywhere, one.
+    """
+    if nodes == 8:
+        return _trilinear_slopes()
+    linear = np.vstack([np.full(3, -1.0), np.eye(3)])
+    if nodes == 4:
+        return linear[None]
+    i, j = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)]).T
+    at = np.vstack([np.eye(4), 0.5 * (np.eye(4)[i] + np.eye(4)[j])])[:, :, None]
+    # of L (2 L - 1) at vertices, of 4 L L' in the middle of edges
+    vertices = (4.0 * at - 1.0) * linear
+    middles = 4.0 * (at[:, i] * linear[j] + at[:, j] * linear[i])
+    return np.concatenate([vertices, middles], axis=1)
+
+
+def _trilinear_slopes() -> Array:
+    corners = np.array(list(np.ndindex(2, 2, 2)))[:, ::-1]  # x runs first
+    slopes = np.zeros((8, 8, 3))
+    for point, node in np.ndindex(8, 8):
+        apart = corners[point] != corners[node]
+        for axis in range(3):
+            if not np.delete(apart, axis).any():
+                slopes[point, node, axis] = 2 * corners[node, axis] - 1
+    return slopes
 
 
 def _steepest(flat: BlockMesh, rise: Array) -> float:

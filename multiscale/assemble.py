@@ -23,6 +23,7 @@ from multiscale.law_files import LawTable
 from multiscale.laws import ExtendedLaw
 from multiscale.loading import Coupling
 from multiscale.newton_choice import newton_choice
+from multiscale.reference import make_reference
 from multiscale.stage import Stage
 from multiscale.tabulate import isolated_laws
 
@@ -95,6 +96,8 @@ def assemble(stage: Stage, table: LawTable | None, comm: Any) -> tuple[Coupling,
     """
     if table is not None:
         return _with_laws(stage, table, comm)
+    if stage.meshes is not None:
+        return make_reference(stage, comm), None
     if stage.embedded:
         return _concurrent(stage, comm), None
     return AnalyticCoupling(stage.model, stage.patches, stage.mean_heights), None

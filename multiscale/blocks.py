@@ -37,7 +37,7 @@ def embedding(stage: Stage, comm: Any) -> Interface:
 
     section = stage.scene.block
     mesh = block_mesh(stage.shape, comm or MPI.COMM_SELF)
-    return Interface(Block(mesh, _material(stage), sides=section.sides), stage.patches)
+    return Interface(Block(mesh, block_material(stage), sides=section.sides), stage.patches)
 
 
 def patch_compliance(stage: Stage, comm: Any) -> Array:
@@ -61,7 +61,7 @@ def patch_compliance(stage: Stage, comm: Any) -> Array:
     def compute() -> dict[str, Array]:
         return {"compliance": plain_compliance(embedding(stage, comm))}
 
-    key = (stage.shape, _material(stage), stage.scene.block.sides, stage.patches)
+    key = (stage.shape, block_material(stage), stage.scene.block.sides, stage.patches)
     return cached("plain", key, compute, comm or MPI.COMM_SELF)["compliance"]
 
 
@@ -122,7 +122,7 @@ def smooth_correction(stage: Stage, loads: PatchGrid, comm: Any) -> Correction:
 
     from macro import cached_correction
 
-    material = _material(stage)
+    material = block_material(stage)
     return cached_correction(
         stage.shape,
         material,
@@ -133,7 +133,8 @@ def smooth_correction(stage: Stage, loads: PatchGrid, comm: Any) -> Correction:
     )
 
 
-def _material(stage: Stage) -> Material:
+def block_material(stage: Stage) -> Material:
+    """Return the elastic constants of a scene's block."""
     from macro import Material
 
     section = stage.scene.block

@@ -108,17 +108,29 @@ def _ranked(outcomes: Sequence[Outcome], against: Against) -> list[Outcome]:
     return sorted(fitting, key=_fineness, reverse=True)
 
 
-def _fineness(one: Outcome) -> tuple[int, int, int]:
-    """Return what makes a level better than another of its kind: meshes, elements, heights."""
+def _fineness(one: Outcome) -> tuple[float, ...]:
+    """Return what makes a level better than another of its kind.
+
+    These are the number of meshes, the edges of the finest in a contact, elements and heights.
+    """
     content = one.level.content
-    cells, reference = content["block"].get("cells", (1,)), content.get("reference", {})
-    return reference.get("meshes", 0), math.prod(cells), math.prod(one.level.heights)
+    cells, reference = content["block"].get("cells", (1,)), content["reference"]
+    own = one.level.kind == "reference"
+    return (
+        reference["meshes"] if own else 0,
+        -reference.get("fine", 0.0) if own else 0.0,  # by default finer than what levels state
+        math.prod(cells),
+        math.prod(one.level.heights),
+    )
 
 
 def _refinements(ranked: Sequence[Outcome]) -> Iterator[tuple[Outcome, Outcome]]:
-    """Yield, for each thing that can be refined, the finest pair that differs by nothing else."""
-    for which in range(3):
-        groups: dict[tuple[int, ...], list[Outcome]] = {}
+    """Yield, for each thing that can be refined, the finest pair that differs by nothing else.
+
+    Numbers of meshes are none of these things: the finest of them is the same.
+    """
+    for which in range(1, 4):
+        groups: dict[tuple[float, ...], list[Outcome]] = {}
         for one in ranked:  # the best first, in groups too
             others = tuple(value for k, value in enumerate(_fineness(one)) if k != which)
             groups.setdefault(others, []).append(one)

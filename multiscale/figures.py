@@ -90,11 +90,42 @@ def history_figure(histories: Mapping[str, History]) -> Figure:
         force.plot(approach, pressure, **look)
         area.plot(pressure, 100 * np.append(0.0, history.contact_area_fraction), **look)
         gap.plot(1e3 * history.mean_separation_mm, history.mean_pressure_MPa, **look)
+        if history.reference is not None:
+            draw_error_band(force, area, history, colour=colour)
     force.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]")
     area.set(xlabel="mean pressure [MPa]", ylabel="contact area fraction [%]")
     gap.set(xlabel="mean separation [µm]", ylabel="mean pressure [MPa]")
     _finish(figure)
     return figure
+
+
+def draw_error_band(force: Any, area: Any, history: History, *, colour: str) -> None:
+    """Draw the error bands of a reference about its values at mesh size zero.
+
+    Args:
+        force: Axes of pressure [MPa] over approach [µm].
+        area: Axes of the contact area fraction [%] over pressure [MPa]; None leaves it out.
+        history: The reference.
+        colour: Colour of the bands.
+    """
+    record = history.reference
+    if record is None or len(record.sizes) == 1:
+        force.plot([], [], " ", label="(no error bar)")
+        return
+    nominal = history.patches.area * history.patches.count
+    pressure = record.force.value / nominal
+    approach = 1e3 * record.approach.value
+    look: dict[str, Any] = {"color": colour, "alpha": 0.25, "lw": 0.0, "label": record.label}
+    if record.by_force:
+        error = 1e3 * record.approach.error
+        force.fill_betweenx(pressure, approach - error, approach + error, **look)
+    else:
+        error = record.force.error / nominal
+        force.fill_between(approach, pressure - error, pressure + error, **look)
+    if area is not None:
+        middle, error = 100 * record.area.value, 100 * record.area.error
+        look["label"] = None
+        area.fill_between(pressure, middle - error, middle + error, **look)
 
 
 def pressure_figure(history: History) -> Figure:
@@ -103,7 +134,9 @@ def pressure_figure(history: History) -> Figure:
     axes = figure.add_subplot()
     draw_pressures(figure, axes, history.patches, history.steps[-1].patches.pressure_MPa)
     last = history.steps[-1]
-    axes.set_title(f"approach {1e3 * last.approach_mm:.3g} µm, force {last.force_N:.4g} N")
+    record = history.reference
+    error = "" if record is None else f" ({record.label})"
+    axes.set_title(f"approach {1e3 * last.approach_mm:.3g} µm, force {last.force_N:.4g} N{error}")
     return figure
 
 
@@ -194,7 +227,7 @@ def _finish(figure: Figure) -> None:
     for axes in figure.axes:
         axes.grid(alpha=0.3)
     first = figure.axes[0]
-    if len(first.get_lines()) > 1:
+    if len(first.get_legend_handles_labels()[0]) > 1:
         first.legend(frameon=False)
 
 

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.patches import PatchGrid
+
+if TYPE_CHECKING:  # which itself is made of load steps
+    from multiscale.reference_record import ReferenceRecord
 
 Array = NDArray[np.float64]
 
@@ -74,6 +77,8 @@ class LoadStep:
             [N mm].
         warnings: Why the micro model, where it was solved itself, is outside its range of
             validity; empty within it.
+        meshes: Approach [mm], force [N] and contact area fraction on every mesh of a reference,
+            the finest, which the step is of, last; empty with other couplings.
     """
 
     step: int
@@ -93,6 +98,7 @@ class LoadStep:
     tilt: tuple[float, float] = (0.0, 0.0)
     moment_N_mm: tuple[float, float] = (0.0, 0.0)
     warnings: tuple[str, ...] = ()
+    meshes: tuple[tuple[float, float, float], ...] = ()
 
     @property
     def tilt_x(self) -> float:
@@ -124,12 +130,14 @@ class History:
         patches: The partition of the interface.
         seconds: Wall time of each phase of the run [s].
         notes: What the run has to say about its own approximations.
+        reference: What the meshes of a reference say together; None with other couplings.
     """
 
     steps: tuple[LoadStep, ...]
     patches: PatchGrid
     seconds: dict[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    reference: ReferenceRecord | None = None
 
     def __len__(self) -> int:
         return len(self.steps)

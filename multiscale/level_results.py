@@ -60,29 +60,29 @@ class LevelResult:
 def curves_of(history: History) -> Curves | None:
     """Return what is compared of a history; None when it has no load step.
 
-    A history of an explicit reference gives its extrapolated force and area with their errors; the
-    patch pressures of its finest mesh are scaled to the extrapolated force.
+    A history of an explicit reference gives its values at mesh size zero with their errors; the
+    patch pressures of its finest mesh are scaled to the force there.
     """
     if not len(history):
         return None
-    force, area = history.force_N, history.contact_area_fraction
-    pressure = history.patch_pressure_MPa
-    unknown = np.full(len(history), np.nan)
-    errors = {"force_error": unknown, "area_error": unknown}
-    reference = getattr(history, "reference", None)
-    if reference is not None:
-        scale = np.divide(reference.force.value, force, out=np.ones_like(force), where=force > 0.0)
+    force, pressure = history.force_N, history.patch_pressure_MPa
+    columns = {"approach": history.approach_mm, "force": force}
+    columns["area"] = history.contact_area_fraction
+    errors = dict.fromkeys(columns, np.full(len(history), np.nan))
+    record = history.reference
+    if record is not None:
+        found = {name: getattr(record, name) for name in columns}
+        columns = {name: estimate.value for name, estimate in found.items()}
+        errors = {name: estimate.error for name, estimate in found.items()}
+        ones = np.ones_like(force)
+        scale = np.divide(columns["force"], force, out=ones, where=force > 0.0)
         pressure = pressure * scale[:, None]
-        force, area = reference.force.value, reference.area.value
-        errors = {"force_error": reference.force.error, "area_error": reference.area.error}
     return Curves(
         patches=history.patches,
-        approach=history.approach_mm,
-        force=force,
-        area=area,
         separation=history.mean_separation_mm,
         patch_pressure=pressure,
-        **errors,
+        **columns,
+        **{f"{name}_error": error for name, error in errors.items()},
     )
 
 

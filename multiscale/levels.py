@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from geometry.errors import InputError
+from geometry.reference_meshes import suggested_fine
 from micro import MODEL_NAMES
 from multiscale.ingredients import make_surface
 from multiscale.level_cost import predicted_seconds
@@ -43,6 +44,9 @@ CELLS_PER_PATCH = 2
 
 SMOOTH_CELLS = ((8, 8, 6), (16, 16, 12), (24, 24, 16))
 """Elements of blocks that only correct the half-space: coarse, as by default, fine."""
+
+COARSER = 2.0
+"""Edges of the coarse mesh of a reference relative to those by default."""
 
 OWN = "the scene as it is"
 """Name of the level that runs the scene as its file has it."""
@@ -218,14 +222,31 @@ class _Family:
             yield self._level(name, self._base | changes, grid)
 
     def _references(self) -> Iterator[Level | None]:
-        stated = self._base.get("reference", {})
+        stated = self._base["reference"]
+        kind = {"coupling": {"kind": "reference"}}
+        if stated["mesh"] == "auto":
+            stated = stated | {"mesh": "tetrahedra"}
+        if stated["mesh"] == "tetrahedra":
+            kind["block"] = self._block(None)
+            coarse = self._coarse_edge(stated.get("fine"))
+            if coarse is not None:
+                single = {"reference": stated | {"meshes": 1, "fine": coarse}}
+                name = "reference, 1 coarse mesh"
+                yield self._level(name, self._base | kind | single, self._heights)
         for meshes in (1, 2, 3):
-            changes: Content = {
-                "coupling": {"kind": "reference"},
-                "reference": stated | {"meshes": meshes},
-            }
+            several = {"reference": stated | {"meshes": meshes}}
             name = f"reference, {meshes} mesh{'es' * (meshes > 1)}"
-            yield self._level(name, self._base | changes, self._heights)
+            yield self._level(name, self._base | kind | several, self._heights)
+
+    def _coarse_edge(self, fine: float | None) -> float | None:
+        """Return twice the edge of the finest tetrahedra; None where the load does not tell it."""
+        if fine is not None:
+            return COARSER * fine
+        programme = self._scene.loading.programme
+        if programme.quantity == "force" or programme.tilt is None:
+            return None
+        surface = make_surface(self._scene)
+        return COARSER * suggested_fine(surface, programme.largest, tilt=programme.tilt)
 
     def _block(self, cells: Any) -> Content:
         block = {key: value for key, value in self._base["block"].items() if key != "cells"}

@@ -46,7 +46,8 @@ class Curves:
         area: Contact area fraction, shape (m,).
         separation: Mean separation, shape (m,) [mm].
         patch_pressure: Mean pressure of each patch, shape (m, N) [MPa].
-        force_error: The run's own error bar of the force, shape (m,) [N]; NaN where unknown.
+        approach_error: The run's own error bar of the approach, shape (m,) [mm]; NaN where unknown.
+        force_error: That of the force, shape (m,) [N].
         area_error: That of the area fraction, shape (m,).
     """
 
@@ -56,6 +57,7 @@ class Curves:
     area: Array
     separation: Array
     patch_pressure: Array
+    approach_error: Array
     force_error: Array
     area_error: Array
 
@@ -135,9 +137,9 @@ def uncertainty(
 ) -> Measures:
     """Measure the uncertainty of the run that others are compared against; all values positive.
 
-    Force and area take the run's own error bars where it has them. The rest is the sum of the
-    distances between runs that differ by one refinement each: with an error that at least halves
-    by it, that of the finer run is no larger.
+    Force, approach and area take the run's own error bars where it has them. The rest is the sum of
+    the distances between runs that differ by one refinement each: with an error that at least
+    halves by it, that of the finer run is no larger.
 
     Args:
         against: The run.
@@ -148,7 +150,7 @@ def uncertainty(
     found = {
         name: float(sum(abs(getattr(one, name)) for one in apart)) for name in Measures.__slots__
     }
-    for name in ("force", "area"):
+    for name in ("force", "approach", "area"):
         value, error = getattr(against, name), getattr(against, f"{name}_error")
         if np.isfinite(error).all():
             top = float(np.abs(value).max())

@@ -42,19 +42,9 @@ def stated_model(scene: Scene, surface: Surface) -> MicroModel:
 
 
 def chosen_model(scene: Scene, surface: Surface, patches: PatchGrid) -> Choice:
-    """Choose the micro model at the load that brings the plane nearest anywhere.
-
-    Where the force or the moment is prescribed, a half-space of few cells tells how near that is.
-    """
+    """Choose the micro model at the load that brings the plane nearest anywhere."""
     programme = scene.loading.programme
-    cells = min(surface.grid[0], _ESTIMATE_CELLS), min(surface.grid[1], _ESTIMATE_CELLS)
-    rough = HalfSpaceModel(
-        surface=resampled(surface, cells),
-        contact_modulus=_modulus(scene),
-        highest=surface.highest,
-    )
-    whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
-    approach, tilt = furthest_plane(programme, rough, whole, patch_means(surface, whole))
+    approach, tilt = expected_plane(scene, surface)
     rise = 0.5 * float(np.abs(np.multiply(surface.lengths, tilt)).sum())
     laws = scene.coupling.kind in ("isolated", "consistent")
     return choose(
@@ -65,6 +55,24 @@ def chosen_model(scene: Scene, surface: Surface, patches: PatchGrid) -> Choice:
         patches=patches if scene.coupling.kind != "analytic" else None,
         solutions=SOLUTIONS_OF_LAWS if laws else len(programme.targets),
     )
+
+
+def expected_plane(scene: Scene, surface: Surface) -> tuple[float, tuple[float, float]]:
+    """Return the largest approach and the slopes there, before there is a micro model.
+
+    Where the force or the moment is prescribed, a half-space of few cells tells them.
+    """
+    programme = scene.loading.programme
+    if programme.quantity == "approach" and programme.tilt is not None:
+        return programme.largest, programme.tilt
+    cells = min(surface.grid[0], _ESTIMATE_CELLS), min(surface.grid[1], _ESTIMATE_CELLS)
+    rough = HalfSpaceModel(
+        surface=resampled(surface, cells),
+        contact_modulus=_modulus(scene),
+        highest=surface.highest,
+    )
+    whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
+    return furthest_plane(programme, rough, whole, patch_means(surface, whole))
 
 
 def furthest_plane(

@@ -33,19 +33,24 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> Path:
 
 
 def write_tables(folder: Path, history: History) -> list[Path]:
-    """Write ``history.csv`` and ``patches.csv``.
+    """Write ``history.csv`` and ``patches.csv``, and of a reference ``reference.csv``.
 
     Args:
         folder: Where to; made when missing.
         history: The load steps.
 
     Returns:
-        The two files.
+        The files.
     """
-    return [
+    files = [
         write_csv(folder / "history.csv", COLUMNS, history.rows()),
         write_csv(folder / "patches.csv", PATCH_COLUMNS, history.patch_rows()),
     ]
+    record = history.reference
+    if record is not None:
+        rows = record.rows(history.steps)
+        files.append(write_csv(folder / "reference.csv", record.columns, rows))
+    return files
 
 
 def write_json(path: Path, content: dict[str, Any]) -> Path:

@@ -7,6 +7,12 @@ from collections.abc import Iterator
 from geometry.statistics import roughness
 from multiscale.block_plan import block_statement, block_warnings
 from multiscale.newton_choice import newton_choice
+from multiscale.reference_plan import (
+    NO_MICRO_MODEL,
+    reference_coupling,
+    reference_statement,
+    reference_warnings,
+)
 from multiscale.stage import Stage
 
 
@@ -16,7 +22,9 @@ def statements(stage: Stage) -> Iterator[tuple[str, str]]:
     yield "contact", _contact(stage)
     yield "micro model", _model(stage)
     yield "coupling", _coupling(stage)
-    if stage.embedded:
+    if stage.meshes is not None:
+        yield "block", reference_statement(stage.scene, stage.meshes)
+    elif stage.embedded:
         yield "block", block_statement(stage)
     if stage.by_laws:
         yield "newton", _newton(stage)
@@ -28,7 +36,9 @@ def warnings(stage: Stage) -> Iterator[str]:
     yield from _surface_warnings(stage)
     if stage.by_laws:
         yield from _patch_warnings(stage)
-    if stage.embedded:
+    if stage.meshes is not None:
+        yield from reference_warnings(stage.scene, stage.meshes)
+    elif stage.embedded:
         yield from block_warnings(stage)
 
 
@@ -88,6 +98,8 @@ def _contact(stage: Stage) -> str:
 
 
 def _model(stage: Stage) -> str:
+    if stage.micro is None:
+        return NO_MICRO_MODEL
     if stage.choice is not None:
         return f"auto: {stage.choice.sentence}"
     micro = stage.scene.micro
@@ -97,6 +109,8 @@ def _model(stage: Stage) -> str:
 
 def _coupling(stage: Stage) -> str:
     coupling, patches = stage.scene.coupling, stage.patches
+    if stage.meshes is not None:
+        return reference_coupling(stage.scene)
     if not stage.embedded:
         return "analytic: the micro model alone on a half-space, no finite elements"
     grid = f"{patches.grid[0]} × {patches.grid[1]} patches"

@@ -13,6 +13,7 @@ from typing import Any
 import numpy
 import scipy
 
+from multiscale.reference import ReferenceCoupling
 from multiscale.run import Run
 from multiscale.stage import Stage
 
@@ -46,6 +47,7 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "threads": os.environ.get("OMP_NUM_THREADS"),
         "petsc_options": options,
         "unknowns": run.unknowns,
+        "reference": _reference(run),
         "seconds": history.seconds,
         "steps": len(history),
         "reasons": sorted(set(history.reason)) if len(history) else [],
@@ -55,8 +57,27 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
     }
 
 
-def _micro_model(stage: Stage) -> dict[str, Any]:
+def _reference(run: Run) -> dict[str, Any] | None:
+    """Return what a reference's meshes are and found, where there are any."""
+    record, coupling = run.history().reference, run.coupling
+    if record is None or not isinstance(coupling, ReferenceCoupling):
+        return None
+    return {
+        "method": run.scene.reference.method,
+        "sizes_mm": record.sizes.tolist(),
+        "unknowns": record.unknowns,
+        "active_sets": [step.newton_iterations for step in run.steps],
+        "force_rate": record.force.rate.tolist(),
+        "area_rate": record.area.rate.tolist(),
+        "error": record.label,
+        "mesh_quality": [asdict(quality) for quality in coupling.qualities],
+    }
+
+
+def _micro_model(stage: Stage) -> dict[str, Any] | None:
     """Return the micro model used and, when it was chosen, from what."""
+    if stage.micro is None:
+        return None
     if stage.choice is None:
         return {"name": stage.model.name}
     return {

@@ -73,7 +73,7 @@ def page(title: str, parts: Iterable[str]) -> str:
 
 def curve_cells(history: History) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return header and formatted rows of the force–approach table, in µm, N, MPa and %."""
-    header = (
+    header: tuple[str, ...] = (
         "step", "approach [µm]", "force [N]", "pressure [MPa]", "area [%]", "separation [µm]",
         "contacts", "Newton", "linear", "time [s]",
     )  # fmt: skip
@@ -92,17 +92,23 @@ def curve_cells(history: History) -> tuple[tuple[str, ...], list[tuple[str, ...]
         )
         for step in history
     ]
+    if history.reference is not None:
+        heading, cells = history.reference.cells
+        header = (*header, heading)
+        rows = [(*row, cell) for row, cell in zip(rows, cells, strict=True)]
     return header, rows
 
 
 def _headline(history: History) -> str:
     if not len(history):
         return "<p>No load step was accepted.</p>"
-    last = history.steps[-1]
+    last, record = history.steps[-1], history.reference
+    error = "" if record is None else f" Discretisation error: {escape(record.label)}."
+    area = f"{100 * last.contact_area_fraction:.3g} % of the nominal area"
     return (
         f"<p>At an approach of {1e3 * last.approach_mm:.4g} µm the plane carries "
         f"<b>{last.force_N:.5g} N</b> ({last.mean_pressure_MPa:.4g} MPa) on {last.contacts} "
-        f"contacts covering {100 * last.contact_area_fraction:.3g} % of the nominal area.</p>"
+        f"contacts covering {area}.{error}</p>"
     )
 
 

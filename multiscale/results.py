@@ -12,6 +12,7 @@ from multiscale import plan
 from multiscale.law_files import write_laws
 from multiscale.outputs import write_json, write_tables, write_text, write_whole
 from multiscale.provenance import provenance
+from multiscale.reference import ReferenceCoupling
 from multiscale.report import report_html
 from multiscale.run import Run
 
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _FILES = (
-    "history.csv", "patches.csv", "laws.h5", "provenance.json", "report.html", "surface.png",
-    "curves.png", "pressures.png", "laws.png", "fields.xdmf", "fields.h5",
+    "history.csv", "patches.csv", "reference.csv", "laws.h5", "provenance.json", "report.html",
+    "surface.png", "curves.png", "pressures.png", "laws.png", "fields.xdmf", "fields.h5",
 )  # fmt: skip
 
 
@@ -101,7 +102,7 @@ def _figures(run: Run) -> Iterator[tuple[str, str, Figure]]:
 
 
 def write_fields(folder: Path, run: Run) -> list[Path]:
-    """Write displacement and patch pressure of the last load step as XDMF, for ParaView.
+    """Write displacement and pressure of the last load step as XDMF, for ParaView.
 
     Args:
         folder: Where to; made when missing.
@@ -109,16 +110,14 @@ def write_fields(folder: Path, run: Run) -> list[Path]:
 
     Returns:
         The files written; none when no block took part. Where the mesh was not pressed itself,
-        the displacements are those of the scene's block under the patches' mean pressures.
+        the displacements are those of the scene's block under the patches' mean pressures. A
+        reference has its finest rough block and the pressures of its nodes.
 
     Note:
         Collective: every rank writes its part.
     """
     if not run.stage.embedded or not run.steps:
         return []
-    from macro import write_fields as write_xdmf
-
-    interface, displacement = run.last_field()
 
     # The XDMF file names its HDF5 file, so both are written under their names in a folder aside.
     aside = folder / ".fields.partial"
@@ -128,7 +127,7 @@ def write_fields(folder: Path, run: Run) -> list[Path]:
         aside.mkdir(parents=True)
 
     on_root(run.comm, empty)
-    write_xdmf(aside / "fields.xdmf", interface, displacement, run.steps[-1].patches.pressure_MPa)
+    _write_xdmf(aside / "fields.xdmf", run)
 
     def move() -> list[Path]:
         files = [path.replace(folder / path.name) for path in sorted(aside.iterdir())]
@@ -136,3 +135,14 @@ def write_fields(folder: Path, run: Run) -> list[Path]:
         return files
 
     return on_root(run.comm, move)
+
+
+def _write_xdmf(path: Path, run: Run) -> None:
+    """Write the last load step's fields: of the rough block, or of the flat one with patches."""
+    import macro
+
+    if isinstance(run.coupling, ReferenceCoupling):
+        macro.write_rough_fields(path, run.coupling.finest, run.coupling.state)
+        return
+    interface, displacement = run.last_field()
+    macro.write_fields(path, interface, displacement, run.steps[-1].patches.pressure_MPa)

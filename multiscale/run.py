@@ -17,6 +17,7 @@ from multiscale.coupling import EmbeddedCoupling
 from multiscale.history import History, LoadStep
 from multiscale.law_files import LawTable
 from multiscale.loading import Coupling, load_steps
+from multiscale.reference import ReferenceCoupling, recorded, reference_notes
 from multiscale.scene import Scene
 from multiscale.stage import Stage, make_stage
 from multiscale.validity import range_notes
@@ -89,16 +90,23 @@ class Run:
         if imbalances:
             notes.append(f"force against the support's reaction: equal to {max(imbalances):.1e}")
         notes += range_notes(self.steps, self.table)
+        record = None
+        if isinstance(self.coupling, ReferenceCoupling):
+            record = recorded(self.stage, self.coupling, self.steps)
+            notes += reference_notes(record, self.coupling)
         return History(
             steps=tuple(self.steps),
             patches=self.stage.patches,
             seconds=dict(self.seconds),
             notes=tuple(notes),
+            reference=record,
         )
 
     @property
     def unknowns(self) -> int | None:
         """Degrees of freedom of the block that is pressed, where one is."""
+        if isinstance(self.coupling, ReferenceCoupling):
+            return self.coupling.unknowns[-1]
         return None if self.interface is None else self.interface.block.dofs
 
     def last_field(self) -> tuple[Interface, NDArray[np.float64]]:

@@ -13,7 +13,13 @@ from geometry.errors import InputError
 from geometry.spectrum import Spectrum
 from multiscale.quantities import Length, Pressure, Slope, SpectralAmplitude
 from multiscale.refusals import first_refusal
-from multiscale.sections import CouplingSection, LoadSection, Number, Section
+from multiscale.sections import (
+    CouplingSection,
+    LoadSection,
+    Number,
+    ReferenceSection,
+    Section,
+)
 
 Flag = Annotated[bool, Field(strict=True)]
 PositiveLength = Annotated[Length, Field(gt=0)]
@@ -144,6 +150,7 @@ class Scene(Section):
     patches: PatchesSection = PatchesSection()
     micro: MicroSection = MicroSection()
     coupling: CouplingSection = CouplingSection()
+    reference: ReferenceSection = ReferenceSection()
     loading: Annotated[LoadSection, Field(alias="load")]
     output: OutputSection = OutputSection()
     _source: Path | None = None

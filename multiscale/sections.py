@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from multiscale.loading import Programme
-from multiscale.quantities import Approaches, Forces, Tilt
+from multiscale.quantities import Approaches, Forces, Length, Tilt
 
 
 def _number(value: Any) -> Any:
@@ -34,7 +34,8 @@ class CouplingSection(Section):
     ``consistent`` takes all laws from one solution of the whole surface under the tilt of the load
     (where the plane is free, that which it takes on a half-space at the largest load);
     ``concurrent`` solves the whole surface on the block at every load step, without laws;
-    ``analytic`` is the micro model alone on a half-space.
+    ``analytic`` is the micro model alone on a half-space; ``reference`` meshes the rough surface
+    itself and has no micro model, see `ReferenceSection`.
 
     ``compliance`` of the block under its patches: ``finite-element`` from the plain mesh under the
     laws; ``decomposed`` is the half-space exactly and finite elements for the smooth rest. By
@@ -49,7 +50,7 @@ class CouplingSection(Section):
     and 1e-3 with micro models that see cells.
     """
 
-    kind: Literal["isolated", "consistent", "concurrent", "analytic"] = "consistent"
+    kind: Literal["isolated", "consistent", "concurrent", "analytic", "reference"] = "consistent"
     compliance: Literal["auto", "finite-element", "decomposed"] = "auto"
     newton: Literal["auto", "condensed", "full"] = "auto"
     love: Literal["mean", "centre"] = "mean"
@@ -73,18 +74,19 @@ class CouplingSection(Section):
             f"love = 'centre' does not go with {kind}",
             "love = 'mean', or kind = 'isolated'",
         )
+        lawless = self.kind in ("concurrent", "reference")
         yield (
-            self.kind == "concurrent" and self.table_tolerance is not None,
+            lawless and self.table_tolerance is not None,
             f"table_tolerance = {self.table_tolerance} does not go with {kind}",
             "leave it out: there are no laws",
         )
         for key, value, meant in (
-            ("compliance", self.compliance, "decomposed"),
+            ("compliance", self.compliance, "decomposed" if self.kind == "concurrent" else "auto"),
             ("newton", self.newton, "auto"),
             ("interface", self.interface, "patchwise"),
         ):
             yield (
-                self.kind == "concurrent" and value not in ("auto", meant),
+                lawless and value not in ("auto", meant),
                 f"{key} = '{value}' does not go with {kind}",
                 f"{key} = '{meant}'",
             )
@@ -107,11 +109,36 @@ class CouplingSection(Section):
     @property
     def decomposed(self) -> bool:
         """Whether the block is the half-space and a smooth correction."""
-        if self.kind in ("analytic", "concurrent"):
+        if self.kind in ("analytic", "concurrent", "reference"):
             return self.kind == "concurrent"
         if self.compliance != "auto":
             return self.compliance == "decomposed"
         return self.kind == "consistent" and self.interface != "pointwise" and self.newton != "full"
+
+
+class ReferenceSection(Section):
+    """The rough surface meshed, for ``coupling.kind = "reference"``; other couplings ignore it.
+
+    ``method``: how contact is found, see `macro.ObstacleBlock`. ``mesh``: ``hexahedra`` are those
+    of ``[block]``, ``tetrahedra`` small only where contact can occur; by default hexahedra where
+    ``block.cells`` is stated. ``meshes`` of falling size are pressed alike, and their results
+    extrapolated; one alone has no error bar. ``fine``: edge length of the finest tetrahedra where
+    contact can occur, by default from the surface and the load.
+    """
+
+    method: Literal["active-set", "augmented-lagrangian"] = "active-set"
+    mesh: Literal["auto", "hexahedra", "tetrahedra"] = "auto"
+    meshes: Annotated[int, Field(ge=1, le=3, strict=True)] = 2
+    fine: Annotated[Length, Field(gt=0)] | None = None
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        if self.mesh == "hexahedra" and self.fine is not None:
+            raise ValueError(
+                f"fine = {self.fine:g} mm does not go with mesh = 'hexahedra' "
+                "(allowed: leave it out, and state block.cells; or mesh = 'tetrahedra')"
+            )
+        return self
 
 
 class LoadSection(Section):

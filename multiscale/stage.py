@@ -16,7 +16,13 @@ from geometry.surface import Surface
 from micro import MODELS, AsperityModel, Choice, MicroModel, ScaledModel
 from multiscale.coupling import tilted_approaches
 from multiscale.ingredients import make_shape, make_surface
-from multiscale.micro_choice import chosen_model, furthest_plane, stated_model
+from multiscale.micro_choice import (
+    chosen_model,
+    expected_plane,
+    furthest_plane,
+    stated_model,
+)
+from multiscale.reference_meshes import ReferenceMeshes, reference_meshes
 from multiscale.refinement import MOST_ROWS
 from multiscale.scene import Scene
 from multiscale.stage_checks import check_patches, check_size
@@ -35,24 +41,37 @@ class Stage:
         scene: The scene.
         surface: Its rough surface.
         asperities: The surface's summits.
-        model: Micro model of the whole surface.
+        micro: Micro model of the whole surface; None in a reference, which has none.
         patches: Partition of the interface.
         mean_heights: Mean height of each patch, shape (N,) [mm].
         shape: The block's shape and mesh.
         furthest: Largest approach at the middle of the interface [mm] and the plane's slopes
             there; where force or moment are prescribed, those of the surface on a half-space.
         choice: Why this micro model, where the scene leaves it open.
+        meshes: The meshes of a reference; None with other couplings.
     """
 
     scene: Scene
     surface: Surface
     asperities: Asperities
-    model: MicroModel
+    micro: MicroModel | None
     patches: PatchGrid
     mean_heights: Array
     shape: BlockShape
     furthest: tuple[float, tuple[float, float]]
     choice: Choice | None = None
+    meshes: ReferenceMeshes | None = None
+
+    @property
+    def model(self) -> MicroModel:
+        """Micro model of the whole surface.
+
+        Raises:
+            ValueError: In a reference, which has none.
+        """
+        if self.micro is None:
+            raise ValueError("a reference has no micro model")
+        return self.micro
 
     @property
     def embedded(self) -> bool:
@@ -67,12 +86,12 @@ class Stage:
     @property
     def by_summits(self) -> bool:
         """Whether the micro model sees summits rather than the whole surface."""
-        return isinstance(self.model, AsperityModel | ScaledModel)
+        return isinstance(self.micro, AsperityModel | ScaledModel)
 
     @property
     def ignores_border(self) -> bool:
         """Whether maxima on the surface's border carry no load in the micro model."""
-        model = self.model
+        model = self.micro
         return self.by_summits and not (
             isinstance(model, ScaledModel) and model.border == "include"
         )
@@ -184,6 +203,8 @@ def make_stage(scene: Scene) -> Stage:
     patches = PatchGrid(grid=scene.patches.grid, lengths=surface.lengths)
     check_patches(scene, surface)
     asperities = find_asperities(surface, periodic=False)  # the block's sides are free
+    if scene.coupling.kind == "reference":
+        return _reference_stage(scene, surface, patches, asperities)
     by_summits = scene.micro.model in MODELS and scene.micro.border == "ignore"
     if by_summits and not len(asperities):
         raise InputError(
@@ -201,10 +222,28 @@ def make_stage(scene: Scene) -> Stage:
         scene=scene,
         surface=surface,
         asperities=asperities,
-        model=model,
+        micro=model,
         patches=patches,
         mean_heights=mean_heights,
         shape=shape,
         furthest=furthest_plane(scene.loading.programme, model, patches, mean_heights),
         choice=choice,
+    )
+
+
+def _reference_stage(
+    scene: Scene, surface: Surface, patches: PatchGrid, asperities: Asperities
+) -> Stage:
+    """Return the ingredients of a reference, which needs no micro model."""
+    furthest = expected_plane(scene, surface)
+    return Stage(
+        scene=scene,
+        surface=surface,
+        asperities=asperities,
+        micro=None,
+        patches=patches,
+        mean_heights=patch_means(surface, patches),
+        shape=make_shape(scene, surface),
+        furthest=furthest,
+        meshes=reference_meshes(scene, surface, furthest),
     )

@@ -39,7 +39,7 @@ def check_size(scene: Scene) -> None:
         ("surface.grid", scene.surface.grid, BYTES_PER_HEIGHT),
         ("patches.grid", scene.patches.grid, BYTES_PER_HEIGHT),
     ]
-    if scene.coupling.kind != "analytic":
+    if scene.coupling.kind not in ("analytic", "reference"):  # which checks its meshes itself
         sizes.append(("block.cells", block_cells(scene), BYTES_PER_CELL))
     for key, counts, each in sizes:
         if counts is not None and math.prod(counts) * each > memory:
@@ -61,7 +61,7 @@ def check_patches(scene: Scene, surface: Surface) -> None:
         fourths = (surface.grid[0] // 4, surface.grid[1] // 4)
         limits = [("fourths of the surface's heights", fourths)]
     on_mesh = not scene.coupling.decomposed or scene.output.fields
-    if scene.coupling.kind != "analytic" and on_mesh:
+    if scene.coupling.kind not in ("analytic", "reference") and on_mesh:
         limits.append(("cells of the interface (block.cells)", block_cells(scene)[:2]))
     for what, limit in limits:
         if any(patches > most for patches, most in zip(scene.patches.grid, limit, strict=True)):

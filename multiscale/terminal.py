@@ -144,7 +144,7 @@ def show_history(comm: Any, history: History) -> None:
     """
     if not speaks(comm):
         return
-    console = _wide_console()
+    console = _wide_console(100 if history.reference is None else 116)
     header, rows = curve_cells(history)
     table = Table(box=None, padding=(0, 2, 0, 0))
     for name in header:
@@ -158,10 +158,10 @@ def show_history(comm: Any, history: History) -> None:
         console.print(f"note: {escape(note)}")
 
 
-def _wide_console() -> Console:
-    """Return a console of at least 100 columns, which is what the tables need in a log file."""
+def _wide_console(least: int = 100) -> Console:
+    """Return a console of at least so many columns, which is what tables need in a log file."""
     console = Console(highlight=False)
-    console.width = max(console.width, 100)
+    console.width = max(console.width, least)
     return console
 
 

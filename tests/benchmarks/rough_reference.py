@@ -52,7 +52,7 @@ def report(surface, name, shape, scale):
     rough = surface.scaled(scale)
     mesh, _ = rough_block_mesh(shape, rough, COMM)
     block = ObstacleBlock(Block(mesh, MATERIAL), rough.highest - rough.mean_height)
-    states = [block.press(approach * scale) for approach in APPROACHES]
+    states = [block.press(Control(approach=approach * scale)) for approach in APPROACHES]
     if COMM.rank == 0:
         forces = ", ".join(f"{state.force / scale:.4f}" for state in states)
         sets = [state.active_sets for state in states]

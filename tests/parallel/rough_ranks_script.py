@@ -7,6 +7,7 @@ from mpi4py import MPI
 
 from geometry import (
     BlockShape,
+    Control,
     InputError,
     RefinedShape,
     Spectrum,
@@ -54,7 +55,7 @@ def run(shape, surface, sides):
     """Press a rough block and return what must not depend on the number of ranks."""
     mesh, quality = rough_block_mesh(shape, surface, COMM)
     block = ObstacleBlock(Block(mesh, MATERIAL, sides), surface.highest - surface.mean_height)
-    states = [block.press(approach, TILT) for approach in (6e-3, 10e-3, 8e-3)]
+    states = [block.press(Control(approach=at, tilt=TILT)) for at in (6e-3, 10e-3, 8e-3)]
     numbers = {
         "force": [state.force for state in states],
         "area": [state.contact_area for state in states],
@@ -67,7 +68,7 @@ def run(shape, surface, sides):
     return {
         "numbers": numbers,
         "reaction": reaction,
-        "top_nodes_of_ranks": COMM.allgather(len(block.dofs)),
+        "top_nodes_of_ranks": COMM.allgather(len(block.top.dofs)),
     }
 
 

@@ -59,7 +59,7 @@ def pressed(sphere, element, refinement):
     )
     mesh, _ = rough_block_mesh(shape, sphere, MPI.COMM_SELF)
     block = ObstacleBlock(Block(mesh, MATERIAL), sphere.highest - sphere.mean_height)
-    return block.press(APPROACH)
+    return block.press(Control(approach=APPROACH))
 
 
 def test_block_is_felt(expected):
@@ -101,7 +101,7 @@ def test_finite_slopes_soften_the_rough_block_as_estimated(seed):
         surface = rough.scaled(scale)
         mesh, _ = rough_block_mesh(shape, surface, MPI.COMM_SELF)
         block = ObstacleBlock(Block(mesh, MATERIAL), surface.highest - surface.mean_height)
-        forces.append(block.press(approach * scale).force / scale)
+        forces.append(block.press(Control(approach=approach * scale)).force / scale)
     measured = forces[1] / forces[0] - 1.0
     model = HalfSpaceModel(surface=rough, contact_modulus=MATERIAL.contact_modulus)
     estimate = finite_slope_effect(model, approach, poisson_ratio=MATERIAL.poisson_ratio)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from geometry import Spectrum, Surface, synthesise
+from geometry import Control, Spectrum, Surface, synthesise
 from geometry.meshes import BlockShape
 from macro import Block, Material
 from macro.obstacle import ObstacleBlock
@@ -27,16 +27,16 @@ def obstacle(surface=SURFACE, sides="free", shape=SHAPE):
 
 def test_top_is_the_surface():
     found = obstacle()
-    expected = SURFACE.height_at(found.x, found.y) - SURFACE.mean_height
-    np.testing.assert_allclose(found.height, expected, atol=1e-12)
-    assert found.area.sum() == pytest.approx(1.0, rel=1e-12)
+    expected = SURFACE.height_at(found.top.x, found.top.y) - SURFACE.mean_height
+    np.testing.assert_allclose(found.top.height, expected, atol=1e-12)
+    assert found.top.area.sum() == pytest.approx(1.0, rel=1e-12)
 
 
 def test_contact_conditions_and_balance():
     found = obstacle()
-    state = found.press(10e-3)
-    gap = SURFACE.highest - SURFACE.mean_height - 10e-3 - found.height
-    moved = state.displacement[found.dofs]
+    state = found.press(Control(approach=10e-3))
+    gap = SURFACE.highest - SURFACE.mean_height - 10e-3 - found.top.height
+    moved = state.displacement[found.top.dofs]
     assert state.force > 0.0
     assert np.all(moved <= gap + 1e-15)
     assert np.all(state.pressing >= 0.0)
@@ -48,17 +48,17 @@ def test_contact_conditions_and_balance():
 def test_unloading_and_direct_loading_lead_to_the_same_contact():
     one, other = obstacle(), obstacle()
     for approach in (4e-3, 12e-3, 8e-3):
-        state = one.press(approach, tilt=(2e-3, -1e-3))
-    direct = other.press(8e-3, tilt=(2e-3, -1e-3))
+        state = one.press(Control(approach=approach, tilt=(2e-3, -1e-3)))
+    direct = other.press(Control(approach=8e-3, tilt=(2e-3, -1e-3)))
     assert state.nodes == direct.nodes
     assert state.force == pytest.approx(direct.force, rel=1e-8)
 
 
 def test_plane_apart_finds_nothing():
     found = obstacle()
-    found.press(10e-3)
+    found.press(Control(approach=10e-3))
     for block in (obstacle(), found):
-        state = block.press(-1e-3)
+        state = block.press(Control(approach=-1e-3))
         assert (state.force, state.nodes, state.contact_area) == (0.0, 0, 0.0)
         assert not state.displacement.any()
 
@@ -69,7 +69,7 @@ def test_flat_top_on_rollers_is_a_column(element):
     # on quadratic triangles a uniform pressure has no force at the vertices
     state = obstacle(
         flat, sides="roller", shape=replace(SHAPE, cells=(6, 5, 3), element=element)
-    ).press(1e-3)
+    ).press(Control(approach=1e-3))
     # uniform strain: exact for any mesh
     assert state.force == pytest.approx(MATERIAL.confined_modulus * 1e-3, rel=1e-8)
     assert state.contact_area == pytest.approx(1.0, rel=1e-12)

@@ -1,0 +1,239 @@
+"""Contact at the nodes of a rough top by a primal-dual active set.
+
+The nodal displacements u minimise the elastic energy under d ≤ 0 at the nodes of the top, d their
+depth beyond the plane. With the nodal contact forces λ = −(K u)_z that is
+
+    d ≤ 0,   λ ≥ 0,   λ d = 0:    no penetration, no tension, force in contact alone.
+
+The active set holds the nodes that touch; in turn the block is solved with d = 0 on it, and it
+loses the nodes that are pulled and gains those that penetrate (Hintermüller, Ito & Kunisch 2002,
+doi 10.1137/S1052623401383558). Motions of the plane that follow from its loads are unknowns of the
+same linear solves: the active nodes move with the plane. Conjugate gradients are preconditioned by
+the multigrid of the block without contact.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from geometry.control import Control
+from geometry.errors import NotConverged
+from macro.block import Block
+from macro.free_solver import FreeSolver
+from macro.history_start import Start, StepHistory
+from macro.obstacle_state import Found
+from macro.rigid_plane import RigidPlane, Task
+from macro.settle import LOOSE
+from macro.top_nodes import TopNodes
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+TOLERANCE = 1e-10
+"""What a solution may miss: residual and complementarity, relative to the contact forces."""
+
+_LOOSE = 1e-3  # relative residual while the active set still changes
+_MOST_SETS = 80
+_PATIENCE = 10  # sets without progress before nodes change one by one
+_CLOSED = 1e-8  # gap, relative to the displacements, that is none
+_ROUNDING = 1e-15  # of the block's size: nothing
+_SOFT = 8.0  # springs under a plane that nothing holds yet: E* times this over the block's width
+
+
+class ActiveNodes:
+    """Presses the nodes of a rough top; see the module.
+
+    Args:
+        block: The block.
+        top: Its top.
+        plane: The plane over the nodes of the top.
+
+    Note:
+        Everything here is collective.
+    """
+
+    def __init__(self, block: Block, top: TopNodes, plane: RigidPlane) -> None:
+        self._block, self._top, self._plane = block, top, plane
+        self._solver = FreeSolver(block.stiffness, block.solver.pc)
+        self._work = block.stiffness.createVecRight()
+        self._history = StepHistory()
+        modulus, half = block.material.contact_modulus, plane.half
+        self._nothing = 1e-17 * modulus * half**2  # N
+        self._springs = top.area * modulus * _SOFT / (2.0 * half)
+
+    def press(self, control: Control) -> Found:
+        """Find the contact of a load step, starting from those before.
+
+        Raises:
+            NotConverged: When the active set does not settle, nothing can hold the plane, or a
+                linear solve fails; earlier solutions stay what they were.
+        """
+        start = self._history.start(control, self._block.owned_dofs, len(self._top.dofs))
+        task = self._plane.task(control, start.plane)
+        displacement = self._block.stiffness.createVecRight()
+        displacement.array[:] = start.displacement
+        plane, active = self._started(task, start, displacement)
+        spent, tolerance, fewest, waited = 0, _LOOSE, np.inf, 0
+        for sets in range(1, _MOST_SETS + 1):
+            held = self._held(task, active)
+            if held is None:
+                plane, active = self._resettled(task, plane, displacement, active)
+                continue
+            spent += self._solve(task, plane, displacement, active, held, tolerance)
+            forces, depth = self._forces(displacement), self._depth(plane, displacement)
+            large = self._largest(forces[active])
+            pulled = active & (forces < -TOLERANCE * large)
+            pressed = ~active & (depth > TOLERANCE * self._largest(displacement.array_r))
+            changed, total = self._count(pulled | pressed), self._count(active)
+            if not changed and tolerance <= TOLERANCE:
+                return self._found(control, plane, displacement, active, sets, spent)
+            fewest, waited = (changed, 0) if changed < fewest else (fewest, waited + 1)
+            # a settled or nearly settled set is worth solving for well
+            near = changed <= max(1, total // 200) or waited > _PATIENCE
+            tolerance = TOLERANCE if near else _LOOSE
+            moved = pulled | pressed
+            active = active ^ (self._first(moved) if waited > _PATIENCE else moved)
+        raise NotConverged(
+            f"the contact of the rough block under {_described(control)}",
+            reason="ACTIVE_SET_CYCLES",
+            iterations=_MOST_SETS,
+            remedy="take smaller load steps (load.steps)",
+        )
+
+    def _started(self, task: Task, start: Start, displacement: PETSc.Vec) -> tuple[Array, Flags]:
+        """Return the first plane and active set: those of before and nodes that penetrate."""
+        if task.free.any() and not self._count(start.active):
+            plane = self._plane.settled(task, self._sag(displacement), self._springs)
+        else:
+            plane = task.plane
+        return plane, start.active | self._beyond(plane, displacement)
+
+    def _resettled(
+        self, task: Task, plane: Array, displacement: PETSc.Vec, active: Flags
+    ) -> tuple[Array, Flags]:
+        """Let a plane that its active nodes cannot hold come to rest on springs."""
+        at = task._replace(plane=np.where(task.free, plane, task.plane))
+        plane = self._plane.settled(at, self._sag(displacement), self._springs)
+        return plane, active | self._beyond(plane, displacement)
+
+    def _held(self, task: Task, active: Flags) -> Array | None:
+        """Return the free motions that the active nodes resist, (k, k'), scaled to orthonormal.
+
+        None when there is a load along a motion that they do not resist.
+        """
+        levers = self._plane.levers(task.free)[active]
+        gram = self._sum(levers.T @ levers)
+        values, vectors = np.linalg.eigh(gram)
+        held = values > LOOSE * max(values.max(initial=0.0), 1.0)
+        lost = vectors[:, ~held].T @ task.wanted
+        if np.any(np.abs(lost) > TOLERANCE * (task.force or 0.0)):
+            return None
+        scaled: Array = vectors[:, held] / np.sqrt(values[held])
+        return scaled
+
+    def _solve(
+        self,
+        task: Task,
+        plane: Array,
+        displacement: PETSc.Vec,
+        active: Flags,
+        held: Array,
+        tolerance: float,
+    ) -> int:
+        """Solve with the active nodes on the plane, and move it; return the linear iterations."""
+        if not self._count(active):
+            displacement.set(0.0)
+            return 0
+        dofs, levers = self._top.dofs[active], self._plane.levers(task.free)[active]
+        motions = levers @ held
+        displacement.array[dofs] -= self._depth(plane, displacement)[active]
+        before = displacement.array_r[dofs].copy()
+        residual = self._residual(displacement)
+        scale = np.sqrt(float(self._sum(np.array(np.sum(residual.array_r[dofs] ** 2)))))
+        residual.array[dofs] -= motions @ (held.T @ task.wanted)
+        scale = max(scale, float(np.linalg.norm(held.T @ task.wanted)), self._nothing)
+        self._solver.hold(dofs, motions)
+        spent = self._solver.improve(displacement, residual, 0.5 * tolerance * scale)
+        shares = self._sum(motions.T @ (before - displacement.array_r[dofs]))
+        plane[task.free] += self._plane.unit[task.free] * (held @ shares)
+        return spent
+
+    def _found(
+        self,
+        control: Control,
+        plane: Array,
+        displacement: PETSc.Vec,
+        active: Flags,
+        sets: int,
+        spent: int,
+    ) -> Found:
+        depth = self._depth(plane, displacement)
+        displacement.array[self._top.dofs] -= np.where(active, depth, np.maximum(depth, 0.0))
+        forces = np.maximum(self._forces(displacement), 0.0)
+        # vertices of quadratic triangles touch without a force
+        touching = active | (depth > -_CLOSED * self._largest(displacement.array_r))
+        found = Found(
+            plane=plane,
+            displacement=displacement.array_r.copy(),
+            pressing=np.where(active, forces, 0.0),
+            touching=touching,
+            area=np.where(touching, self._top.area, 0.0),
+            contacts=self._contacts(touching),
+            active_sets=sets,
+            linear_iterations=spent,
+            reason="CONVERGED_ACTIVE_SET" if self._count(active) else "CONVERGED_NO_CONTACT",
+        )
+        force = float(self._plane.loads(found.pressing)[0])
+        self._history.add(Start(plane, found.displacement, active), force)
+        return found
+
+    def _contacts(self, active: Flags) -> int:
+        facets = self._top.facets
+        (flags,) = self._top.spread(active.astype(float))
+        return self._top.regions(facets, flags[facets] > 0.5)
+
+    def _residual(self, displacement: PETSc.Vec) -> PETSc.Vec:
+        """Return −K u, whose entries at the top are the contact forces with their sign turned."""
+        self._block.stiffness.mult(displacement, self._work)
+        self._work.scale(-1.0)
+        return self._work
+
+    def _forces(self, displacement: PETSc.Vec) -> Array:
+        return self._residual(displacement).array_r[self._top.dofs].copy()
+
+    def _sag(self, displacement: PETSc.Vec) -> Array:
+        return -displacement.array_r[self._top.dofs]
+
+    def _depth(self, plane: Array, displacement: PETSc.Vec) -> Array:
+        return self._plane.closure(plane, self._sag(displacement))
+
+    def _beyond(self, plane: Array, displacement: PETSc.Vec) -> Flags:
+        return self._depth(plane, displacement) > _ROUNDING * self._plane.half
+
+    def _first(self, moved: Flags) -> Flags:
+        """Keep the first of the flags, over all ranks (Murty 1974: such changes cannot cycle)."""
+        comm = self._block.mesh.comm
+        lowest = comm.allreduce(comm.rank if moved.any() else comm.size, op=MPI.MIN)
+        alone = np.zeros_like(moved)
+        if comm.rank == lowest:
+            alone[np.argmax(moved)] = True
+        return alone
+
+    def _largest(self, values: Array) -> float:
+        comm = self._block.mesh.comm
+        return float(comm.allreduce(float(np.abs(values).max(initial=0.0)), op=MPI.MAX))
+
+    def _count(self, which: Flags) -> int:
+        return int(self._block.mesh.comm.allreduce(int(np.count_nonzero(which))))
+
+    def _sum(self, values: Array) -> Array:
+        return self._block.mesh.comm.allreduce(values, op=MPI.SUM)
+
+
+def _described(control: Control) -> str:
+    if control.force is not None:
+        return f"a force of {control.force:.6g} N"
+    return f"an approach of {control.approach:.6g} mm"

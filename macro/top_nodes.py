@@ -1,0 +1,196 @@
+"""The nodes of a block's top, the triangles between them, and the patches that they belong to."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import connected_components
+
+from geometry.errors import InputError
+from geometry.patches import PatchGrid
+from macro import compat
+from macro.block import Block
+from macro.facets import top_facets
+from macro.mesh import TOP
+from macro.subfacets import FacetLattice, covered, facet_lattice
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+
+class TopNodes:
+    """Nodes of a block's top and what is measured with them.
+
+    The force and the area of a node on the border of patches are shared equally among the two or
+    four patches there. Facets are cut into triangles between neighbouring nodes, quadrilaterals
+    along both diagonals with half the weight each.
+
+    Args:
+        block: The block.
+        patches: Patches on its top.
+
+    Attributes:
+        dofs: Vertical degrees of freedom of this rank's nodes of the top, shape (n,).
+        x: Abscissae of this rank's nodes, shape (n,) [mm].
+        y: Their ordinates [mm].
+        height: Their heights [mm].
+        area: Their tributary areas, the integrals of their basis functions over the plane [mm²];
+            none at the vertices of quadratic triangles.
+        patches: The patches.
+
+    Raises:
+        InputError: When a patch holds no node of the top.
+
+    Note:
+        Everything here is collective. A rank may have no node.
+    """
+
+    def __init__(self, block: Block, patches: PatchGrid) -> None:
+        self._block, self.patches = block, patches
+        space = block.space
+        nodes = fem.locate_dofs_topological(space, 2, block.mesh.facet_tags.find(TOP))
+        nodes = np.sort(nodes[nodes < space.dofmap.index_map.size_local])
+        self.dofs = 3 * nodes + 2
+        self.x, self.y, self.height = space.tabulate_dof_coordinates()[nodes].T.copy()
+        self.area = self._areas()
+        self._patch_areas = self.patch_sums(self.area)
+        if not np.all(self._patch_areas > 0.0):
+            raise InputError(
+                "a patch holds no node of the top",
+                value=patches.grid,
+                allowed="fewer patches, inside the interface, or a finer mesh",
+            )
+
+    @cached_property
+    def facets(self) -> Index:
+        """Rank-local nodes of every facet of this rank's cells, shape (facets, nodes)."""
+        facets = top_facets(self._block.mesh)
+        cells = compat.cell_nodes(self._block.space)[facets.cell]
+        return np.take_along_axis(cells, self._lattice.nodes[facets.side], axis=1)
+
+    @cached_property
+    def triangles(self) -> tuple[Index, Array]:
+        """Rank-local nodes of the triangles, shape (m, 3), and their weighted areas (m,) [mm²]."""
+        triangles = self.facets[:, self._lattice.corners].reshape(-1, 3)
+        place = self._block.space.tabulate_dof_coordinates()[triangles, :2]
+        u, v = place[:, 1] - place[:, 0], place[:, 2] - place[:, 0]
+        weight = np.tile(0.5 * self._lattice.weight, len(self.facets))
+        return triangles, weight * np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+
+    @cached_property
+    def edges(self) -> Array:
+        """Lengths of the edges opposite the triangles' corners, in the plane, (m, 3) [mm]."""
+        place = self._block.space.tabulate_dof_coordinates()[self.triangles[0], :2]
+        return np.linalg.norm(np.roll(place, -1, axis=1) - np.roll(place, 1, axis=1), axis=2)
+
+    @cached_property
+    def _lattice(self) -> FacetLattice:
+        return facet_lattice(self._block.mesh.mesh.topology.cell_name(), self._block.degree)
+
+    def covered_area(self, touching: NDArray[np.bool_], pressing: Array, gap: Array) -> float:
+        """Return the contact area with its border within the facets; see `covered` [mm²].
+
+        Args:
+            touching: Whether this rank's nodes are in contact, shape (n,).
+            pressing: Their contact forces, shape (n,) [N].
+            gap: Their gaps, shape (n,) [mm].
+        """
+        triangles, area = self.triangles
+        pressure = pressing / (self._thirds * self._block.material.contact_modulus)
+        values = self.spread(touching.astype(float), pressure, gap)
+        flags, pressure, gap = (value[triangles] for value in values)
+        share = covered(flags > 0.5, pressure, gap, self.edges)
+        return float(self._block.mesh.comm.allreduce(float(area @ share)))
+
+    def spread(self, *values: Array) -> list[Array]:
+        """Give values of nodes to every rank that sees the nodes, by rank-local node.
+
+        Args:
+            values: Up to three values of this rank's nodes, shape (n,) each.
+        """
+        owned = np.zeros(self._block.owned_dofs)
+        for axis, part in enumerate(values):
+            owned[self.dofs - 2 + axis] = part
+        everywhere = self._block.function(owned).x.array
+        return [everywhere[axis::3].copy() for axis in range(len(values))]
+
+    def patch_sums(self, values: Array) -> Array:
+        """Return the sums of nodal values over every patch, shape (N,), on every rank."""
+        return self._sum(self._shares.T @ values)
+
+    def patch_means(self, values: Array) -> Array:
+        """Return the means of nodal values over every patch, shape (N,), on every rank."""
+        return self.patch_sums(self.area * values) / self._patch_areas
+
+    def regions(self, nodes: Index, linked: NDArray[np.bool_]) -> int:
+        """Count the connected regions of links, over all ranks.
+
+        Args:
+            nodes: Rank-local nodes of every link of this rank, shape (m, k).
+            linked: Which of them the link connects, shape (m, k).
+        """
+        some = linked.any(axis=1)
+        nodes, linked = nodes[some], linked[some]
+        numbers = self._block.space.dofmap.index_map.local_to_global(
+            nodes.ravel().astype(np.int32)
+        ).reshape(nodes.shape)
+        hub = np.where(linked, numbers, -1).max(axis=1, initial=-1)
+        pairs = np.stack([np.broadcast_to(hub[:, None], numbers.shape)[linked], numbers[linked]])
+        pairs = np.unique(pairs, axis=1)
+        everyone = np.concatenate(self._block.mesh.comm.allgather(pairs), axis=1)
+        names, ends = np.unique(everyone, return_inverse=True)
+        ends = ends.reshape(2, -1)
+        graph = coo_array((np.ones(ends.shape[1]), tuple(ends)), shape=(len(names),) * 2)
+        return int(connected_components(graph, directed=False)[0]) if len(names) else 0
+
+    @cached_property
+    def _shares(self) -> csr_array:
+        """Share of every patch in every node of this rank, (n, N)."""
+        slack = 1e-9 * max(self.patches.lengths)
+        sides = [
+            [np.searchsorted(borders, place + offset) - 1 for offset in (-slack, slack)]
+            for borders, place in (
+                (self.patches.borders_x, self.x),
+                (self.patches.borders_y, self.y),
+            )
+        ]
+        counts, at = self.patches.grid, np.arange(len(self.x))
+        parts = []
+        for ix in sides[0]:
+            for iy in sides[1]:
+                inside = (ix >= 0) & (ix < counts[0]) & (iy >= 0) & (iy < counts[1])
+                parts.append((at[inside], (ix * counts[1] + iy)[inside]))
+        rows, columns = (np.concatenate(part) for part in zip(*parts, strict=True))
+        found = np.bincount(rows, minlength=len(at))
+        entries = 1.0 / found[rows]
+        return coo_array((entries, (rows, columns)), shape=(len(at), self.patches.count)).tocsr()
+
+    def _areas(self) -> Array:
+        space, mesh = self._block.space, self._block.mesh
+        test = ufl.TestFunction(space)
+        ds = ufl.Measure("ds", domain=mesh.mesh, subdomain_data=mesh.facet_tags)
+        form = compat.compile_form(test[2] * ufl.FacetNormal(mesh.mesh)[2] * ds(TOP))
+        return compat.assemble_vector(form).array_r[self.dofs].copy()
+
+    @cached_property
+    def _thirds(self) -> Array:
+        """Thirds of the triangles around this rank's nodes [mm²]."""
+        triangles, area = self.triangles
+        vector = self._block.stiffness.createVecRight()
+        numbers = self._block.space.dofmap.index_map.local_to_global(
+            triangles.ravel().astype(np.int32)
+        )
+        rows = (3 * numbers.astype(np.int64) + 2).astype(PETSc.IntType)
+        vector.setValues(rows, np.repeat(area / 3.0, 3), addv=True)
+        vector.assemble()
+        return vector.array_r[self.dofs].copy()
+
+    def _sum(self, values: Array) -> Array:
+        return self._block.mesh.comm.allreduce(values, op=MPI.SUM)

@@ -1,0 +1,255 @@
+"""The meshed rough surface as a coupling: history, loads, error bars, files, refusals."""
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from geometry.errors import InputError
+from multiscale import Scene, make_stage, plan, run
+from multiscale.cli import main
+from multiscale.reference_record import reference_record
+from multiscale.report import curve_cells
+
+PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
+COARSE = [
+    "coupling.kind=reference",
+    "surface.spectrum.waves=[1, 3]",
+    "surface.grid=[32, 32]",
+    "block.cells=[12, 12, 4]",
+    "block.grading=3",
+    "patches.grid=[3, 2]",
+    "load.steps=2",
+]
+
+
+def scene(*more):
+    return Scene.load(PAPER, [*COARSE, *more])
+
+
+@pytest.fixture(scope="module")
+def history():
+    return run(scene("reference.meshes=3"))
+
+
+def test_history_is_like_that_of_every_coupling(history):
+    assert list(history.approach_mm) == [0.004, 0.008]
+    assert np.all(np.diff(np.append(0.0, history.force_N)) > 0.0)
+    assert np.all(history.contacts >= 1)
+    assert np.all(np.diff(history.mean_separation_mm) < 0.0)
+    assert np.all(history.newton_iterations > 0)
+    assert all(history.reason)
+    assert len(list(history.patch_rows())) == 12
+
+
+def test_patches_add_up(history):
+    pressure = history.patch_pressure_MPa.mean(axis=1)  # equal patches, 1 mm² together
+    np.testing.assert_allclose(pressure, history.mean_pressure_MPa, rtol=1e-12)  # rounding
+    areas = [step.patches.contact_area_fraction.mean() for step in history]
+    np.testing.assert_allclose(areas, history.contact_area_fraction, rtol=1e-12)
+    # a patch sinks by much less than the approach, and may rise beside its neighbour
+    assert np.all(np.abs(history.closure_mm / history.approach_mm[:, None] - 1.0) < 0.25)
+
+
+def test_support_bears_the_force(history):
+    # the residual is 1e-10 of the contact forces
+    assert max(abs(step.imbalance) for step in history) < 1e-9
+
+
+def test_finest_mesh_is_the_history_and_meshes_differ(history):
+    record = history.reference
+    assert np.array_equal(record.force_N[-1], history.force_N)
+    assert np.array_equal(record.contact_area_fraction[-1], history.contact_area_fraction)
+    assert np.all(np.diff(record.sizes) < 0.0)
+    assert np.all(np.diff(record.unknowns) > 0)
+    assert np.all(record.approach_mm == history.approach_mm)
+    assert np.all(record.approach.error == 0.0)
+    assert np.all(np.ptp(record.force_N, axis=0) > 0.0)
+    assert np.all(record.force.error > 0.0)
+
+
+def test_error_bar_is_told_everywhere(history):
+    label = history.reference.label
+    assert re.fullmatch(r"± [\d.e+]+ %", label)
+    header, rows = curve_cells(history)
+    assert header[-1] == "at size zero [N]"
+    assert all("±" in row[-1] for row in rows)
+    assert any(label in note for note in history.notes)
+
+
+def test_one_mesh_has_no_error_bar():
+    history = run(scene("reference.meshes=1", "load.steps=1"))
+    assert history.reference.label == "no error bar"
+    assert np.isnan(history.reference.force.error).all()
+    assert curve_cells(history)[1][0][-1] == "no error bar"
+    assert any("no error bar" in note for note in history.notes)
+
+
+@pytest.fixture(scope="module")
+def by_force():
+    data = scene("load.steps=1").model_dump(by_alias=True)
+    data["load"] = {"force": ["2 N", "0.5 N"], "steps": 1, "tilt": "free"}
+    return run(Scene.from_dict(data))
+
+
+def test_forces_and_no_moment(by_force):
+    np.testing.assert_allclose(by_force.force_N, [2.0, 0.5], rtol=1e-9)  # met to 1e-10
+    moments = [step.moment_N_mm for step in by_force]
+    assert np.abs(moments).max() < 1e-8
+    assert by_force.approach_mm[1] < by_force.approach_mm[0]
+    assert np.all(by_force.tilt_x != 0.0)
+
+
+def test_under_a_force_the_approach_has_the_error_bar(by_force):
+    record = by_force.reference
+    assert record.by_force
+    assert np.all(record.approach.error > 0.0)
+    assert curve_cells(by_force)[0][-1] == "at size zero [µm]"
+    assert "approach at mesh size zero" in record.sentence
+
+
+def test_large_changes_of_the_force_are_halved_on_all_meshes():
+    history = run(
+        scene(
+            "load.steps=1",
+            "load.force_change=0.6",
+            "load.tilt=[0.001, 0]",
+            "load.approach=['8 um', '1 um']",
+        )
+    )
+    assert len(history) > 2
+    assert history.reference.force_N.shape == (2, len(history))
+    assert np.all(history.tilt_x == 0.001)
+
+
+def test_no_contact_is_no_error():
+    """Nodes miss the highest point of the surface, or a tilted plane is still above it."""
+    history = run(scene("load.approach='1e-9 um'", "load.steps=1"))
+    assert list(history.force_N) == [0.0]
+    assert list(history.contacts) == [0]
+    assert np.all(history.patch_pressure_MPa == 0.0)
+    assert history.reference.force.error[0] == 0.0
+
+
+def test_unloading_comes_back():
+    history = run(scene("load.approach=['4 um', '8 um', '4 um']", "load.steps=1"))
+    # conditions hold exactly at every step: no path dependence without friction
+    assert history.force_N[2] == pytest.approx(history.force_N[0], rel=1e-8)
+
+
+def test_files(capsys, tmp_path):
+    words = ["run", str(PAPER), "--out", str(tmp_path), "--set", *COARSE, "output.fields=true"]
+    assert main(words) == 0
+    shown = capsys.readouterr().out
+    assert "keys of [micro] are not used" in shown
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {
+        "history.csv", "patches.csv", "reference.csv", "provenance.json", "report.html",
+        "surface.png", "curves.png", "pressures.png", "fields.xdmf", "fields.h5",
+    }  # fmt: skip
+    with (tmp_path / "reference.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    with (tmp_path / "history.csv").open(encoding="utf-8") as file:
+        forces = [row["force_N"] for row in csv.DictReader(file)]
+    assert [row["force_N_mesh_2"] for row in rows] == forces
+    value, error, finest = (
+        float(rows[-1][name]) for name in ("force_N", "force_error_N", "force_N_mesh_2")
+    )
+    assert 0.0 < abs(value - finest) < 4.0 * error
+    facts = json.loads((tmp_path / "provenance.json").read_text(encoding="utf-8"))
+    assert facts["micro_model"] is None
+    assert facts["unknowns"] == facts["reference"]["unknowns"][-1]
+    assert 0.0 < facts["reference"]["mesh_quality"][-1]["thinnest"] <= 1.0
+    assert "Discretisation error: ±" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_fields_are_those_of_the_rough_block(capsys, tmp_path):
+    words = ["run", str(PAPER), "--out", str(tmp_path), "--set", *COARSE, "output.fields=true"]
+    assert main([*words, "output.figures=false", "output.report=false"]) == 0
+    with h5py.File(tmp_path / "fields.h5") as file:
+        points = file["Mesh/mesh/geometry"][:]
+        moved, pressure = (
+            next(iter(file[f"Function/{name}"].values()))[:]
+            for name in ("displacement", "pressure")
+        )
+    surface = make_stage(scene()).surface
+    top = pressure[:, 0] > 1e-9  # interpolation leaves rounding elsewhere
+    assert 0 < top.sum() < 100
+    heights = surface.height_at(points[top, 0], points[top, 1]) - surface.mean_height
+    np.testing.assert_allclose(points[top, 2], heights, atol=1e-9)
+    # pressed nodes lie in the plane
+    level = surface.highest - surface.mean_height - 0.008
+    np.testing.assert_allclose(points[top, 2] + moved[top, 2], level, atol=1e-9)
+    assert pressure.max() > 10.0
+
+
+def test_tetrahedra_are_small_where_contact_can_occur():
+    stage = make_stage(scene("reference.mesh=tetrahedra"))
+    statements, told = dict(plan.statements(stage)), list(plan.warnings(stage))
+    assert "tetrahedra (P2)" in statements["block"]
+    assert "across a typical contact" in statements["block"]
+    assert any("block.cells is not used" in warning for warning in told)
+    with pytest.raises(ValueError, match="a reference has no micro model"):
+        _ = stage.model
+
+
+def test_plan_of_hexahedra():
+    stage = make_stage(scene("reference.meshes=1", "block.grading=1"))
+    statements, told = dict(plan.statements(stage)), " ".join(plan.warnings(stage))
+    assert "one mesh of 12 × 12 × 4 hexahedra (Q1)" in statements["block"]
+    assert f"{3 * 13 * 13 * 5} unknowns" in statements["block"]
+    assert "no error bar" in told
+    assert "larger block.grading" in told
+    assert "refine block.cells" in told
+
+
+REFUSED = {
+    "margin": (["block.margin='1 mm'"], "block.margin = 1.0: does not go with coupling.kind"),
+    "no cells": (["reference.mesh=hexahedra", "block.cells=none"], "block.cells"),
+    "element": (["block.element=P1"], "block.element = 'P1': does not go with a reference of hex"),
+    "memory": (["block.cells=[3000, 3000, 100]"], "block.cells = (3000, 3000, 100): the reference"),
+    "fine": (["reference.fine='1 nm'"], ": the reference needs about"),
+    "meshes": (["reference.meshes=4"], "reference.meshes = 4: must be less than or equal to 3"),
+    "unknown": (["reference.methods=penalty"], "unknown key; did you mean 'method'?"),
+    "method": (["reference.method=penalty"], "must be 'active-set' or 'augmented-lagrangian'"),
+    "fine cells": (
+        ["reference.mesh=hexahedra", "reference.fine='1 um'"],
+        "fine = 0.001 mm does not go with mesh = 'hexahedra'",
+    ),
+    "compliance": (["coupling.compliance=decomposed"], "compliance = 'decomposed' does not go wi"),
+    "newton": (["coupling.newton=full"], "newton = 'full' does not go with kind = 'reference'"),
+    "love": (["coupling.love=centre"], "love = 'centre' does not go with kind = 'reference'"),
+    "interface": (["coupling.interface=pointwise"], "interface = 'pointwise' does not go with k"),
+    "table": (["coupling.table_tolerance=1e-3"], "table_tolerance = 0.001 does not go with kind"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("overrides", "text"), REFUSED.values(), ids=REFUSED)
+def test_what_does_not_fit_is_refused(overrides, text):
+    with pytest.raises(InputError, match=re.escape(str(PAPER)) + ".*" + re.escape(text)):
+        make_stage(scene(*overrides))
+
+
+def test_steep_roughness_names_file_and_key():
+    steep = scene("surface.spectrum.rms_slope=8", "load.steps=1")
+    with pytest.raises(InputError, match=rf"{re.escape(str(PAPER))}: block.cells = .*inside out"):
+        run(steep)
+
+
+def test_patches_without_a_node_are_refused():
+    with pytest.raises(InputError, match=rf"{re.escape(str(PAPER))}: patches.grid = .*no node"):
+        run(scene("patches.grid=[30, 30]", "load.steps=1", "reference.meshes=1"))
+
+
+def test_other_couplings_ignore_the_section():
+    assert Scene.load(PAPER, ["reference.fine='1 um'"]).coupling.kind == "isolated"
+
+
+def test_record_of_no_step():
+    record = reference_record([], np.array([2.0, 1.0]), (10, 20), force_order=2.0, area_order=1.0)
+    assert record.label == "no error bar"
+    assert record.sentence.startswith("no load step")
