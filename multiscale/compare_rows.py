@@ -21,6 +21,7 @@ AGAINST: tuple[Against, ...] = ("reference", "concurrent", "half-space")
 """What levels can be compared against, the best first."""
 
 _KINDS = {"reference": "reference", "concurrent": "concurrent", "half-space": "analytic"}
+_IDLE = 0.7  # of the wall time: less work than that tells of a busy machine
 _PHASES = {"laws": "seconds_laws", "load steps": "seconds_steps"}
 
 
@@ -56,10 +57,11 @@ def compared(
     ranked = {one: _ranked(outcomes, one) for one in AGAINST}
     reached = [one for one in AGAINST if ranked[one]]
     chosen = against if against in reached else next(iter(reached), None)
-    warnings = []
+    warnings: list[str] = []
     if against is not None and chosen != against:
         instead = f"compared against the {chosen} instead" if chosen else "nothing to compare with"
         warnings.append(f"no level of kind {against} was reached: {instead}")
+    warnings += _busy(outcomes)
     programme = scene.loading.programme
     found = [one for one in outcomes if one.result.curves is not None]
     common: dict[str, Any] = {
@@ -95,6 +97,18 @@ def compared(
         warnings=tuple(warnings),
         **common,
     )
+
+
+def _busy(outcomes: Sequence[Outcome]) -> Iterator[str]:
+    """Yield a warning when levels had to wait for processors."""
+    results = [one.result for one in outcomes if one.result.seconds]
+    wall = sum(one.level.ranks * sum(one.result.seconds.values()) for one in outcomes)
+    worked = sum(result.cpu_s for result in results)
+    if worked < _IDLE * wall:
+        yield (
+            f"the levels worked {worked:.3g} s in {wall:.3g} s of their processes' wall time: the "
+            "machine was busy with something else, and times are too long"
+        )
 
 
 def _ranked(outcomes: Sequence[Outcome], against: Against) -> list[Outcome]:
@@ -233,6 +247,7 @@ def _row(one: Outcome, **found: Any) -> Row:
         unknowns=result.unknowns,
         ranks=level.ranks,
         seconds_start=result.start_s,
+        seconds_cpu=result.cpu_s,
         peak_MB=result.peak_MB,
         exit_code=result.exit_code,
         message=result.message,

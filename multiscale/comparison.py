@@ -34,6 +34,7 @@ class Row:
         seconds_laws: Of it, patch laws.
         seconds_steps: Of it, load steps.
         seconds_start: Wall time of interpreter, imports and compiled forms [s].
+        seconds_cpu: Processor time of all ranks together, without that of `seconds_start` [s].
         peak_MB: Largest memory, of all ranks together [MB].
         steps: Load steps accepted.
         approach_mm: Approach at the last of them [mm].
@@ -61,6 +62,7 @@ class Row:
     seconds_laws: float = float("nan")
     seconds_steps: float = float("nan")
     seconds_start: float = float("nan")
+    seconds_cpu: float = float("nan")
     peak_MB: float = float("nan")
     steps: int = 0
     approach_mm: float = float("nan")

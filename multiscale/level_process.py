@@ -64,14 +64,14 @@ def level_result(scene: Scene, comm: Any, *, key: str, slopes: bool) -> LevelRes
         Collective.
     """
     run, failure = None, None
-    began = time.perf_counter()
+    began, worked = time.perf_counter(), time.process_time()
     try:
         run = Run(scene, comm)
         for _ in run.load_steps():
             pass
     except PatchlawError as error:  # on all ranks
         failure = error
-    spent = time.perf_counter() - began
+    spent, worked = time.perf_counter() - began, time.process_time() - worked
     memory = _peak_megabytes()
     code = 0 if failure is None else failure.exit_code
     return LevelResult(
@@ -81,6 +81,7 @@ def level_result(scene: Scene, comm: Any, *, key: str, slopes: bool) -> LevelRes
         message="" if failure is None else str(failure),
         seconds={} if run is None else dict(run.seconds),
         start_s=-spent,  # whoever started the process adds its whole wall time
+        cpu_s=worked if comm is None else sum(comm.allgather(worked)),
         peak_MB=memory if comm is None else sum(comm.allgather(memory)),
         unknowns=None if run is None else run.unknowns,
         curves=None if run is None else curves_of(run.history()),

@@ -33,6 +33,7 @@ class LevelResult:
         seconds: Wall time of each phase [s].
         start_s: Wall time of everything else in its process: interpreter, imports, compiled
             forms [s].
+        cpu_s: Processor time of the phases, of all ranks together [s].
         peak_MB: Largest memory in use, of all ranks together [MB]; NaN when unknown.
         unknowns: Degrees of freedom of the block that was pressed, where one was.
         curves: The load steps accepted; None when there are none.
@@ -46,6 +47,7 @@ class LevelResult:
     message: str = ""
     seconds: dict[str, float] = field(default_factory=dict)
     start_s: float = float("nan")
+    cpu_s: float = float("nan")
     peak_MB: float = float("nan")
     unknowns: int | None = None
     curves: Curves | None = None
