@@ -76,27 +76,21 @@ def reference_shapes(
     """
     if isinstance(count, bool) or not isinstance(count, int) or count < 1:
         raise InputError("a family has at least one mesh", value=count, allowed="1, 2, 3 …")
-    coarser = [_SPAN ** (k / max(count - 1, 1)) for k in range(count)][::-1]
+    factors = [_SPAN ** (k / max(count - 1, 1)) for k in reversed(range(count))]
     if mesh == "hexahedra":
-        if cells is None:
-            raise InputError("hexahedra need their number along x, y and z", allowed="cells")
-        finest = BlockShape(
-            interface=surface.lengths,
-            height=height,
-            cells=cells,
-            grading=grading,
-            element=element or "Q1",
-        )
-        return tuple(_coarsened(finest, factor) for factor in coarser)
+        finest = _hexahedra(surface, height, cells, grading, element or "Q1")
+        return tuple(_coarsened(finest, factor) for factor in factors)
     if mesh != "tetrahedra":
         raise InputError(
             "these cells are unknown", value=mesh, allowed=", ".join(map(repr, get_args(Cells)))
         )
     radius = contact_radius(surface, approach, tilt=tilt)
-    finest_edge = radius / EDGES if fine is None else fine
+    smallest = radius / EDGES if fine is None else fine
+    if not 0.0 < smallest < math.inf:
+        raise InputError("the finest edge length is out of range", value=fine, allowed="> 0 mm")
     return tuple(
-        _tetrahedra(surface, approach, tilt, height, radius, finest_edge * factor, element or "P2")
-        for factor in coarser
+        _tetrahedra(surface, approach, tilt, height, radius, smallest * factor, element or "P2")
+        for factor in factors
     )
 
 
@@ -155,7 +149,12 @@ def contact_radius(
 
     Returns:
         The radius, at least the distance of the surface's samples.
+
+    Raises:
+        InputError: When a value is not finite.
     """
+    if not np.isfinite([approach, *tilt]).all():
+        raise InputError("approach and tilt must be finite", value=(approach, *tilt))
     x, y = (
         np.linspace(0.0, length, min(max(256, 2 * n), 1024) + 1)
         for length, n in zip(surface.lengths, surface.grid, strict=True)
@@ -184,8 +183,6 @@ def _tetrahedra(
     element: str,
 ) -> RefinedShape:
     """Return one member, whose sizes all follow from the edges along a contact's radius."""
-    if not 0.0 < fine < math.inf:
-        raise InputError("the finest edge length is out of range", value=fine, allowed="> 0 mm")
     edges = radius / fine
     coarse = min(*surface.lengths, height) / max(2.0, 2.0 * edges)
     return RefinedShape(
@@ -196,6 +193,23 @@ def _tetrahedra(
         coarse=max(coarse, fine),
         growth=_GROWTH / edges,
         element=element,
+    )
+
+
+def _hexahedra(
+    surface: Surface,
+    height: float,
+    cells: tuple[int, int, int] | None,
+    grading: float,
+    element: str,
+) -> BlockShape:
+    """Return the finest member."""
+    if cells is None:
+        raise InputError("hexahedra need their number along x, y and z", allowed="cells")
+    if element not in ("Q1", "Q2"):
+        raise InputError("not an element of hexahedra", value=element, allowed="Q1, Q2")
+    return BlockShape(
+        interface=surface.lengths, height=height, cells=cells, grading=grading, element=element
     )
 
 

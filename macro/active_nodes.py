@@ -25,8 +25,7 @@ from macro.block import Block
 from macro.free_solver import FreeSolver
 from macro.history_start import Start, StepHistory
 from macro.obstacle_state import Found
-from macro.rigid_plane import RigidPlane, Task
-from macro.settle import LOOSE
+from macro.rigid_plane import RigidPlane, Task, described
 from macro.top_nodes import TopNodes
 
 Array = NDArray[np.float64]
@@ -59,7 +58,7 @@ class ActiveNodes:
         self._block, self._top, self._plane = block, top, plane
         self._solver = FreeSolver(block.stiffness, block.solver.pc)
         self._work = block.stiffness.createVecRight()
-        self._history = StepHistory()
+        self._history = StepHistory(block.owned_dofs, len(top.dofs))
         modulus, half = block.material.contact_modulus, plane.half
         self._nothing = 1e-17 * modulus * half**2  # N
         self._springs = top.area * modulus * _SOFT / (2.0 * half)
@@ -71,7 +70,7 @@ class ActiveNodes:
             NotConverged: When the active set does not settle, nothing can hold the plane, or a
                 linear solve fails; earlier solutions stay what they were.
         """
-        start = self._history.start(control, self._block.owned_dofs, len(self._top.dofs))
+        start = self._history.start(control)
         task = self._plane.task(control, start.plane)
         displacement = self._block.stiffness.createVecRight()
         displacement.array[:] = start.displacement
@@ -97,7 +96,7 @@ class ActiveNodes:
             moved = pulled | pressed
             active = active ^ (self._first(moved) if waited > _PATIENCE else moved)
         raise NotConverged(
-            f"the contact of the rough block under {_described(control)}",
+            f"the contact of the rough block under {described(control)}",
             reason="ACTIVE_SET_CYCLES",
             iterations=_MOST_SETS,
             remedy="take smaller load steps (load.steps)",
@@ -105,11 +104,10 @@ class ActiveNodes:
 
     def _started(self, task: Task, start: Start, displacement: PETSc.Vec) -> tuple[Array, Flags]:
         """Return the first plane and active set: those of before and nodes that penetrate."""
-        if task.free.any() and not self._count(start.active):
+        active, plane = start.contact > 0.0, task.plane
+        if task.free.any() and not self._count(active):
             plane = self._plane.settled(task, self._sag(displacement), self._springs)
-        else:
-            plane = task.plane
-        return plane, start.active | self._beyond(plane, displacement)
+        return plane, active | self._beyond(plane, displacement)
 
     def _resettled(
         self, task: Task, plane: Array, displacement: PETSc.Vec, active: Flags
@@ -120,19 +118,14 @@ class ActiveNodes:
         return plane, active | self._beyond(plane, displacement)
 
     def _held(self, task: Task, active: Flags) -> Array | None:
-        """Return the free motions that the active nodes resist, (k, k'), scaled to orthonormal.
+        """Return the free motions that the active nodes resist; see `RigidPlane.held`.
 
         None when there is a load along a motion that they do not resist.
         """
-        levers = self._plane.levers(task.free)[active]
-        gram = self._sum(levers.T @ levers)
-        values, vectors = np.linalg.eigh(gram)
-        held = values > LOOSE * max(values.max(initial=0.0), 1.0)
-        lost = vectors[:, ~held].T @ task.wanted
-        if np.any(np.abs(lost) > TOLERANCE * (task.force or 0.0)):
-            return None
-        scaled: Array = vectors[:, held] / np.sqrt(values[held])
-        return scaled
+        held = self._plane.held(task.free, active)
+        borne = held @ np.linalg.lstsq(held, task.wanted, rcond=None)[0]
+        lost = np.abs(task.wanted - borne).max(initial=0.0)
+        return None if lost > TOLERANCE * (task.force or 0.0) else held
 
     def _solve(
         self,
@@ -187,7 +180,7 @@ class ActiveNodes:
             reason="CONVERGED_ACTIVE_SET" if self._count(active) else "CONVERGED_NO_CONTACT",
         )
         force = float(self._plane.loads(found.pressing)[0])
-        self._history.add(Start(plane, found.displacement, active), force)
+        self._history.add(Start(plane, found.displacement, found.pressing), force)
         return found
 
     def _contacts(self, active: Flags) -> int:
@@ -231,9 +224,3 @@ class ActiveNodes:
 
     def _sum(self, values: Array) -> Array:
         return self._block.mesh.comm.allreduce(values, op=MPI.SUM)
-
-
-def _described(control: Control) -> str:
-    if control.force is not None:
-        return f"a force of {control.force:.6g} N"
-    return f"an approach of {control.approach:.6g} mm"

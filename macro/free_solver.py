@@ -31,7 +31,7 @@ class FreeSolver:
     """
 
     def __init__(self, matrix: PETSc.Mat, preconditioner: PETSc.PC) -> None:
-        self._left = _Projection(matrix)
+        self._left = Projection(matrix.comm.tompi4py())
         operator = PETSc.Mat().createPython(
             matrix.getSizes(), _Projected(matrix.mult, self._left), comm=matrix.comm
         )
@@ -86,18 +86,24 @@ class FreeSolver:
         return int(self._ksp.its)
 
 
-class _Projection:
-    """The orthogonal projection P: identity on what is free, Q Qᵀ on what is held."""
+class Projection:
+    """The orthogonal projection P: identity on what is free, Q Qᵀ on what is held.
 
-    def __init__(self, matrix: PETSc.Mat) -> None:
-        self._comm = matrix.comm.tompi4py()
+    Args:
+        comm: MPI communicator.
+    """
+
+    def __init__(self, comm: Any) -> None:
+        self._comm = comm
         self._dofs: NDArray[np.intp] = np.empty(0, dtype=np.intp)
         self._motions: Array = np.empty((0, 0))
 
     def hold(self, dofs: NDArray[np.intp], motions: Array) -> None:
+        """Hold degrees of freedom but for motions Q; see `FreeSolver.hold`."""
         self._dofs, self._motions = dofs, motions
 
     def project(self, vector: PETSc.Vec) -> None:
+        """Project a vector in place; collective."""
         values, q = vector.array, self._motions
         shares = q.T @ values[self._dofs]
         if shares.size:
@@ -108,7 +114,7 @@ class _Projection:
 class _Projected:
     """A linear map on vectors of the range of a projection, back into that range."""
 
-    def __init__(self, apply: Any, left: _Projection) -> None:
+    def __init__(self, apply: Any, left: Projection) -> None:
         self._apply, self._left = apply, left
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:

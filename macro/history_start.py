@@ -20,18 +20,24 @@ class Start(NamedTuple):
     Attributes:
         plane: Approach [mm] and slopes of the plane, shape (3,).
         displacement: This rank's owned degrees of freedom [mm].
-        active: Whether its nodes of the top were in contact, shape (n,).
+        contact: Contact forces of its nodes, or pressures of its quadrature points, shape (n,).
     """
 
     plane: Array
     displacement: Array
-    active: NDArray[np.bool_]
+    contact: Array
 
 
 class StepHistory:
-    """The last two solutions."""
+    """The last two solutions.
 
-    def __init__(self) -> None:
+    Args:
+        dofs: Number of this rank's degrees of freedom.
+        places: Number of its nodes or quadrature points on the top.
+    """
+
+    def __init__(self, dofs: int, places: int) -> None:
+        self._rest = Start(np.zeros(3), np.zeros(dofs), np.zeros(places))
         self._last: list[tuple[Start, float]] = []
 
     def add(self, solution: Start, force: float) -> None:
@@ -43,26 +49,20 @@ class StepHistory:
         """
         self._last = [*self._last[-1:], (solution, force)]
 
-    def start(self, control: Control, dofs: int, nodes: int) -> Start:
+    def start(self, control: Control) -> Start:
         """Return the line through the last two solutions, at what a load step prescribes.
 
         Args:
             control: What the load step prescribes: its approach, or its force, leads along.
-            dofs: Number of this rank's degrees of freedom.
-            nodes: Number of its nodes of the top.
         """
         if not self._last:
-            return Start(np.zeros(3), np.zeros(dofs), np.zeros(nodes, dtype=bool))
-        (last, force) = self._last[-1]
-        plane, displacement = last.plane.copy(), last.displacement
-        if len(self._last) > 1:
-            before, least = self._last[0]
-            run, ahead = (
-                (last.plane[0] - before.plane[0], (control.approach or 0.0) - last.plane[0])
-                if control.force is None
-                else (force - least, control.force - force)
-            )
-            share = float(np.clip(ahead / run, -_FARTHEST, _FARTHEST)) if run else 0.0
-            plane = plane + share * (last.plane - before.plane)
-            displacement = displacement + share * (displacement - before.displacement)
-        return Start(plane, displacement, last.active)
+            return self._rest
+        last, force = self._last[-1]
+        before, least = self._last[0]
+        if control.approach is not None:
+            run, ahead = last.plane[0] - before.plane[0], control.approach - last.plane[0]
+        else:
+            run, ahead = force - least, (control.force or 0.0) - force
+        share = float(np.clip(ahead / run, -_FARTHEST, _FARTHEST)) if run else 0.0
+        pairs = zip(last, before, strict=True)
+        return Start(*(new + share * (new - old) for new, old in pairs))

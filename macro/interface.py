@@ -106,6 +106,8 @@ class Interface:
     Args:
         block: The elastic block.
         patches: Patches inside the block's interface.
+        degree: Polynomial degree that the quadrature is exact for; None: products of two basis
+            functions.
 
     Raises:
         InputError: When a patch reaches beyond the top.
@@ -116,6 +118,7 @@ class Interface:
 
     block: Block
     patches: PatchGrid
+    degree: int | None = None
 
     def __post_init__(self) -> None:
         if not np.allclose(self.areas, self.patches.area, rtol=1e-6):
@@ -127,9 +130,9 @@ class Interface:
 
     @cached_property
     def quadrature(self) -> FacetQuadrature:
-        """Quadrature points of this rank, exact for products of two basis functions."""
+        """Quadrature points of this rank."""
         shape = self.block.mesh.shape
-        degree = (4 if shape.hexahedral else 2) * shape.degree
+        degree = self.degree or (4 if shape.hexahedral else 2) * shape.degree
         return facet_quadrature(self.block.mesh, self.block.space, self.patches, degree=degree)
 
     @cached_property
@@ -154,7 +157,7 @@ class Interface:
         """Laws at quadrature points."""
         points = self.quadrature
         operator = PETSc.Mat()
-        self._points_by_dofs.transpose(operator)
+        self.points_by_dofs.transpose(operator)
         return Sampling(
             operator=operator,
             weight=points.weight,
@@ -173,7 +176,7 @@ class Interface:
             csr=_csr(np.arange(len(points.x) + 1), points.patch, np.ones(len(points.x))),
             comm=comm,
         )
-        operator = self._points_by_dofs.transposeMatMult(member)
+        operator = self.points_by_dofs.transposeMatMult(member)
         own = np.arange(*operator.getOwnershipRangeColumn())
         centres = self.patches.centres[own]
         return Sampling(
@@ -206,7 +209,7 @@ class Interface:
         return sampling.patch_sums(values.array_r / sampling.weight) / self.areas
 
     @cached_property
-    def _points_by_dofs(self) -> PETSc.Mat:
+    def points_by_dofs(self) -> PETSc.Mat:
         """−w φ of the vertical displacements behind every point, shape (points, dofs) [mm²]."""
         points, nodes = self.quadrature, self.block.space.dofmap.index_map
         used = np.abs(points.values) > 1e-12  # the nodes that are not on the facet

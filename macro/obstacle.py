@@ -11,6 +11,7 @@ from geometry.control import Control
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from macro.active_nodes import ActiveNodes
+from macro.augmented import AugmentedFacets
 from macro.block import Block
 from macro.obstacle_state import ObstacleState, measured
 from macro.rigid_plane import RigidPlane
@@ -58,13 +59,20 @@ class ObstacleBlock:
                 value=method,
                 allowed=", ".join(get_args(Method)),
             )
+        if penalty is not None and not 0.0 < penalty < np.inf:
+            raise InputError("the penalty must be positive", value=penalty, allowed="> 0 MPa/mm")
         lengths = block.mesh.shape.interface
         patches = patches or PatchGrid(grid=(1, 1), lengths=lengths)
         self.block, self.top = block, TopNodes(block, patches)
         self._plane = RigidPlane(
             self.top.x, self.top.y, highest - self.top.height, lengths, block.mesh.comm
         )
-        self._method = ActiveNodes(block, self.top, self._plane)
+        self._method: ActiveNodes | AugmentedFacets
+        if method == "active-set":
+            self._method = ActiveNodes(block, self.top, self._plane)
+        else:
+            exact = method == "augmented-lagrangian"
+            self._method = AugmentedFacets(block, self.top, self._plane, penalty, exact=exact)
 
     def press(self, control: Control) -> ObstacleState:
         """Find the contact of one load step, starting from those before.

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from geometry.control import Control
-from macro.settle import Excess, settle
+from macro.settle import LOOSE, Excess, settle
 
 Array = NDArray[np.float64]
 
@@ -102,6 +102,22 @@ class RigidPlane:
         """Return the change of closures by free motions that move the edge by one, (n, k)."""
         return self._lever[:, free] * self.unit[free]
 
+    def held(self, free: NDArray[np.bool_], at: NDArray[np.bool_]) -> Array:
+        """Return the combinations of free motions that move some of the places, shape (k, k').
+
+        They are scaled so that ``levers(free)[at] @ held(free, at)`` has orthonormal columns, all
+        ranks together.
+
+        Args:
+            free: Motions that are free, shape (3,).
+            at: Which of this rank's places are meant, shape (n,).
+        """
+        levers = self.levers(free)[at]
+        values, vectors = np.linalg.eigh(self._sum(levers.T @ levers))
+        found = values > LOOSE * max(values.max(initial=0.0), 1.0)
+        scaled: Array = vectors[:, found] / np.sqrt(values[found])
+        return scaled
+
     def settled(self, task: Task, sag: Array, stiffness: Array) -> Array:
         """Return where the plane comes to rest on springs at the places, shape (3,).
 
@@ -148,3 +164,10 @@ class _Springs:
         """Return the displacement of the plane's edge, at most [mm]."""
         fixed = np.where(self._task.free, 0.0, self._task.plane / self._plane.unit)
         return float(np.abs(fixed).sum() + np.abs(motion).sum())
+
+
+def described(control: Control) -> str:
+    """Say under what a load step presses, for an error."""
+    if control.force is not None:
+        return f"a force of {control.force:.6g} N"
+    return f"an approach of {control.approach:.6g} mm"

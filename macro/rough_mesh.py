@@ -24,14 +24,17 @@ _DECAY = 3.0
 _LEAST_VOLUME = 0.05
 """Volume relative to that of the flat block, below which cells are refused."""
 
+_STEEPEST = 2.0
+"""Slope between neighbouring nodes above which a top is refused: edges at 27° to each other."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeshQuality:
     """How far the roughness has deformed the cells.
 
     Attributes:
-        thinnest: Smallest volume that the edges of a cell's corner span, relative to that of the
-            flat block; negative in a cell turned inside out.
+        thinnest: Smallest volume at a node of a cell (the Jacobian of its map), relative to that
+            of the flat block; negative in a cell turned inside out.
         steepest: Largest slope of an edge of the top.
     """
 
@@ -47,24 +50,24 @@ def rough_block_mesh(
     The top becomes z = h(x, y) − <h>, from the surface's interpolant at the nodes; below, the
     movement fades as (1 + z/height)³. Every rank moves the nodes that it has.
 
+    Along every vertical line the movement keeps the order of points as long as the deepest valley
+    lies less than height/3 below the mean. Hexahedra, whose sides are vertical, then stay
+    hexahedra; tetrahedra are looked at one by one.
+
     Args:
         shape: The flat block, without margin; its interface is the surface's rectangle.
         surface: The rough surface.
         comm: MPI communicator.
 
     Raises:
-        InputError: When the rectangles differ, or the roughness is too high for the block and
-            turns a cell inside out.
+        InputError: When the rectangles differ, a valley is too deep for the block, the roughness
+            is too steep for the mesh, or it turns a cell inside out.
 
     Note:
         Collective.
     """
-    if shape.margin or not np.allclose(shape.interface, surface.lengths, rtol=1e-9, atol=0.0):
-        raise InputError(
-            "the rough surface must cover the block's top",
-            value=shape.interface,
-            allowed=f"an interface of {surface.lengths} mm without margin",
-        )
+    _check_cover(shape, surface)
+    _check_depth(shape, surface)
     flat = block_mesh(shape, comm)
     points = flat.mesh.geometry.x
     x, y = (np.clip(points[:, k], 0.0, surface.lengths[k]) for k in (0, 1))
@@ -75,15 +78,47 @@ def rough_block_mesh(
         thinnest=float(comm.allreduce(_thinnest(flat, moved), op=MPI.MIN)),
         steepest=float(comm.allreduce(_steepest(flat, rise), op=MPI.MAX)),
     )
+    if quality.steepest > _STEEPEST:
+        raise InputError(
+            "the roughness is too steep for a mesh",
+            value=quality.steepest,
+            allowed=f"slopes up to {_STEEPEST:g} between neighbouring nodes of the top",
+        )
     if quality.thinnest <= _LEAST_VOLUME:
         raise InputError(
-            "the roughness turns cells inside out: it is too high for the block, or for cells "
-            "that are much longer than its waves",
-            value=float(np.ptp(surface.heights)),
-            allowed=f"valleys not {shape.height / _DECAY:g} mm below the mean, or finer cells",
+            "the roughness turns cells inside out, which are much longer than its waves",
+            value=quality.thinnest,
+            allowed=f"cells that keep {_LEAST_VOLUME:.0%} of their volume at every node",
         )
     points[:] = moved
     return flat, quality
+
+
+def _check_cover(shape: BlockShape | RefinedShape, surface: Surface) -> None:
+    larger = np.array(surface.lengths) > np.array(shape.interface) * (1.0 + 1e-9)
+    if larger.any():
+        raise InputError(
+            "the rough surface is larger than the block's top",
+            value=surface.lengths,
+            allowed=f"{shape.interface} mm",
+        )
+    if shape.margin or not np.allclose(shape.interface, surface.lengths, rtol=1e-9, atol=0.0):
+        raise InputError(
+            "the rough surface must cover the block's top",
+            value=shape.interface,
+            allowed=f"an interface of {surface.lengths} mm without margin",
+        )
+
+
+def _check_depth(shape: BlockShape | RefinedShape, surface: Surface) -> None:
+    valley = surface.mean_height - float(surface.heights.min())
+    deepest = (1.0 - _LEAST_VOLUME) * shape.height / _DECAY
+    if valley > deepest:
+        raise InputError(
+            "a valley of the roughness is too deep for the block",
+            value=valley,
+            allowed=f"{deepest:.6g} mm below the mean, for a block {shape.height:g} mm high",
+        )
 
 
 def _thinnest(flat: BlockMesh, moved: Array) -> float:

@@ -138,9 +138,7 @@ class TopNodes:
         """
         some = linked.any(axis=1)
         nodes, linked = nodes[some], linked[some]
-        numbers = self._block.space.dofmap.index_map.local_to_global(
-            nodes.ravel().astype(np.int32)
-        ).reshape(nodes.shape)
+        numbers = self._numbers(nodes)
         hub = np.where(linked, numbers, -1).max(axis=1, initial=-1)
         pairs = np.stack([np.broadcast_to(hub[:, None], numbers.shape)[linked], numbers[linked]])
         pairs = np.unique(pairs, axis=1)
@@ -183,14 +181,25 @@ class TopNodes:
     def _thirds(self) -> Array:
         """Thirds of the triangles around this rank's nodes [mm²]."""
         triangles, area = self.triangles
+        return self.collect(triangles, np.repeat(area[:, None] / 3.0, 3, axis=1))
+
+    def collect(self, nodes: Index, values: Array) -> Array:
+        """Add up what all ranks have for this rank's nodes, shape (n,).
+
+        Args:
+            nodes: Rank-local nodes of the top, any shape.
+            values: Values for them, of the same shape.
+        """
         vector = self._block.stiffness.createVecRight()
-        numbers = self._block.space.dofmap.index_map.local_to_global(
-            triangles.ravel().astype(np.int32)
-        )
-        rows = (3 * numbers.astype(np.int64) + 2).astype(PETSc.IntType)
-        vector.setValues(rows, np.repeat(area / 3.0, 3), addv=True)
+        rows = (3 * self._numbers(nodes).astype(np.int64) + 2).astype(PETSc.IntType)
+        vector.setValues(rows.ravel(), values.ravel(), addv=True)
         vector.assemble()
         return vector.array_r[self.dofs].copy()
+
+    def _numbers(self, nodes: Index) -> Index:
+        """Return the numbers of rank-local nodes among those of all ranks."""
+        index_map = self._block.space.dofmap.index_map
+        return index_map.local_to_global(nodes.ravel().astype(np.int32)).reshape(nodes.shape)
 
     def _sum(self, values: Array) -> Array:
         return self._block.mesh.comm.allreduce(values, op=MPI.SUM)

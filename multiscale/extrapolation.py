@@ -15,7 +15,8 @@ LEAST_RATE, MOST_RATE = 0.5, 8.0
 """Rates outside are not believed: the meshes are not yet, or no more, in the asymptotic range."""
 
 _LESS = 0.75
-"""How far two meshes may be below the known order: c + a hᵖ (1 + b h) with b h > −0.4 is not."""
+"""How far two meshes may be below the known order, or half of it if that is less: from first order
+on, c + a hᵖ (1 + b h) with b h > −0.4 is not, with sizes that differ by a half or more."""
 
 _LESS_OBSERVED = 0.5
 """The same of a rate that three meshes show, which knows most of b h."""
@@ -44,10 +45,12 @@ def extrapolated(values: ArrayLike, sizes: ArrayLike, order: float | None = None
 
     With f = c + a hᵖ on meshes h₁ < h₂ the finest is wrong by a h₁ᵖ = (f₂ − f₁) / (rᵖ − 1),
     r = h₂ / h₁. The error bar reaches from there to what a slower rate would give: the order less
-    three quarters with two meshes, where the order is taken on trust; with three, half less than
-    the rate they show, or than the order if they seem to converge faster. Where three meshes do
-    not converge monotonically at a rate between 0.5 and 8, the finest value stands, with what a
-    rate of 0.25, or their spread if that is more, leaves open.
+    three quarters, but at least half the order, with two meshes, where the order is taken on
+    trust; with three, half less than the rate they show, or than the order if they seem to
+    converge faster. Where three meshes do not converge monotonically at a rate between 0.5 and 8,
+    the finest value stands, with what a rate of 0.25, or their spread if that is more, leaves
+    open. Meshes may also agree by accident: no relative bar is less than half the median of all
+    load steps.
 
     Args:
         values: Results of every mesh, the finest last, shape (meshes, steps).
@@ -69,7 +72,7 @@ def extrapolated(values: ArrayLike, sizes: ArrayLike, order: float | None = None
     if len(h) == 2:
         assert order is not None
         rate = np.full(len(difference), order)
-        slower = np.maximum(rate - _LESS, min(_SLOWEST, 0.25 * order))
+        slower = np.maximum(rate - _LESS, 0.5 * order)
     else:
         rate = _observed(results, h)
         slower = np.fmin(rate, np.inf if order is None else order) - _LESS_OBSERVED
@@ -80,9 +83,12 @@ def extrapolated(values: ArrayLike, sizes: ArrayLike, order: float | None = None
     cautious = np.abs(_correction(difference, ratio, np.full(len(rate), _SLOWEST)))
     cautious = np.maximum(cautious, np.ptp(results, axis=0))
     still = np.ptp(results, axis=0) == 0.0  # such as before first touch: nothing to be wrong
+    error = np.where(lost, cautious, bar)
+    size = np.abs(results[-1])
+    usual = np.median(error[size > 0.0] / size[size > 0.0]) if size.any() else 0.0
     return Estimate(
         value=results[-1] - np.where(lost, 0.0, correction),
-        error=np.where(lost, cautious, bar),
+        error=np.maximum(error, 0.5 * usual * size),
         rate=np.where(still, np.nan, rate),
     )
 

@@ -8,7 +8,7 @@ from geometry.meshes import BlockShape
 from multiscale.reference_meshes import ReferenceMeshes
 from multiscale.scene import Scene
 
-LEAST_ACROSS = {1: 6.0, 2: 2.0}
+LEAST_ACROSS = {1: 12.0, 2: 3.0}
 """Edges across a typical contact below which the force is wrong by several per cent, by the
 element's degree."""
 

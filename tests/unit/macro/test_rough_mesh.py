@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+import ufl
+from dolfinx import fem
 from mpi4py import MPI
 
 from geometry import BlockShape, InputError, RefinedShape, Spectrum, Surface, synthesise
-from macro import rough_block_mesh
+from macro import Block, Material, ObstacleBlock, rough_block_mesh
 
+COMM = MPI.COMM_SELF
 CUBE = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(8, 8, 6))
 HIGH = synthesise(
     Spectrum(hurst=0.9, waves=(2, 4), rms_slope=6.0, seed=2), grid=(64, 64), lengths=(1.0, 1.0)
@@ -16,30 +19,73 @@ SHORT_WAVES = synthesise(
 )
 
 
+def refined(element, fine=0.06, coarse=0.25):
+    places = np.array([[0.5, 0.5]])
+    return RefinedShape(
+        interface=(1.0, 1.0), height=1.0, places=places, fine=fine, coarse=coarse, element=element
+    )
+
+
+def wave(depth, waves=1):
+    """Return a ridge of some wavelengths, whose top is at the middle."""
+    x = (np.arange(64) + 0.5) / 64
+    ridge = -depth * np.cos(2.0 * np.pi * waves * x)
+    return Surface(heights=np.tile(ridge[:, None], 64), lengths=(1.0, 1.0), periodic=True)
+
+
 def test_quality_is_that_of_the_cells():
     x = (np.arange(32) + 0.5) / 32
     ridge = Surface(heights=np.tile(0.05 * np.cos(2.0 * np.pi * x), (32, 1)), lengths=(1.0, 1.0))
     shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(4, 8, 10))
-    _, quality = rough_block_mesh(shape, ridge, MPI.COMM_SELF)
+    _, quality = rough_block_mesh(shape, ridge, COMM)
     # the topmost edge, of 0.1, below the valley; the fall between neighbours half-way down
     assert quality.thinnest == pytest.approx(1.0 - 0.05 * (1.0 - 0.9**3) / 0.1, abs=2e-3)
     assert quality.steepest == pytest.approx(0.05 * np.cos(np.pi / 4) * 8, rel=0.01)
 
 
+@pytest.mark.parametrize(("element", "slack"), [("P1", 0.08), ("P2", 0.02)])
+def test_quality_of_tetrahedra_is_the_jacobian(element, slack):
+    """Below the valley a depth dz becomes 1 − 3 · 0.1 (1 + z)² of it."""
+    _, quality = rough_block_mesh(refined(element, coarse=0.08, fine=0.08), wave(0.1), COMM)
+    # gradients across a linear cell are averages, those of a quadratic one nearly exact
+    assert quality.thinnest == pytest.approx(0.7, abs=slack)
+    assert quality.steepest == pytest.approx(0.1 * 2.0 * np.pi, rel=0.02)
+
+
+@pytest.mark.parametrize("element", ["P1", "P2"])
+def test_all_nodes_of_the_top_lie_on_the_surface(element):
+    surface = wave(0.02, waves=2)
+    mesh, _ = rough_block_mesh(refined(element), surface, COMM)
+    block = ObstacleBlock(Block(mesh, Material(young_modulus=1.0, poisson_ratio=0.3)), 0.02)
+    # the nodes of the displacements: those in the middle of edges are no means of the ends
+    np.testing.assert_allclose(block.height, surface.height_at(block.x, block.y), atol=1e-12)
+
+
+def test_a_curved_top_has_the_volume_of_the_surface():
+    """Between nodes the top is a quadratic: its volume errs less than a faceted top's."""
+    errors = []
+    for element in ("P1", "P2"):
+        mesh, _ = rough_block_mesh(refined(element, coarse=0.15), wave(0.04, waves=2), COMM)
+        one = fem.Constant(mesh.mesh, 1.0)
+        volume = fem.assemble_scalar(fem.form(one * ufl.dx(domain=mesh.mesh)))
+        errors.append(abs(volume - 1.0))  # the mean of the heights is that of the waves
+    assert errors[1] < 0.1 * errors[0]
+
+
 def test_tetrahedra_longer_than_the_waves_are_refused():
-    places = np.array([[0.5, 0.5]])
-    shape = RefinedShape(interface=(1.0, 1.0), height=1.0, places=places, fine=0.06, coarse=0.25)
     with pytest.raises(InputError, match="much longer than its waves"):
-        rough_block_mesh(shape, SHORT_WAVES, MPI.COMM_SELF)
+        rough_block_mesh(refined("P1"), SHORT_WAVES, COMM)
 
 
 @pytest.mark.parametrize(
     ("surface", "text"),
     [
-        (Surface(heights=np.zeros((8, 8)), lengths=(2.0, 1.0)), "must cover the block's top"),
-        (HIGH, "turns cells inside out"),
+        (Surface(heights=np.zeros((8, 8)), lengths=(2.0, 1.0)), "is larger than the block's top"),
+        (Surface(heights=np.zeros((8, 8)), lengths=(1.0, 0.9)), "must cover the block's top"),
+        (HIGH, "valley of the roughness is too deep for the block"),
+        (wave(0.28, waves=2), "too steep for a mesh"),
     ],
 )
 def test_what_does_not_fit_is_refused(surface, text):
     with pytest.raises(InputError, match=text):
-        rough_block_mesh(CUBE, surface, MPI.COMM_SELF)
+        rough_block_mesh(CUBE, surface, COMM)

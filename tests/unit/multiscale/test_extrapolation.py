@@ -28,8 +28,8 @@ def missed(estimate):
     return np.mean(np.abs(estimate.value - LIMIT) > estimate.error * (1.0 + 1e-9))
 
 
-@pytest.mark.parametrize("order", [0.8, 1.0, 1.5, 2.0, 3.0])
-@pytest.mark.parametrize("ratio", RATIOS)
+@pytest.mark.parametrize("order", [1.0, 1.5, 2.0, 3.0])
+@pytest.mark.parametrize("ratio", [1.5, 2.0, 4.0])
 def test_two_meshes_of_known_order_contain_the_limit(order, ratio):
     sizes = np.array([ratio, 1.0])
     bend = np.linspace(-0.4, 30.0, 400) / ratio  # and far beyond where h² matters less than h
@@ -90,6 +90,12 @@ def test_swinging_results_contain_the_limit():
     random = np.random.default_rng(3)
     error = random.uniform(0.2, 1.0, (3, 500)) * np.array([[4.0], [-2.0], [1.0]])
     assert missed(extrapolated(LIMIT + error, [4.0, 2.0, 1.0], 1.0)) == 0.0
+
+
+def test_accidental_agreement_is_not_believed():
+    estimate = extrapolated([[1.1, 2.2, 3.0, 4.4], [1.0, 2.0, 3.0, 4.0]], [2.0, 1.0], 2.0)
+    relative = estimate.error / [1.0, 2.0, 3.0, 4.0]
+    np.testing.assert_allclose(relative, np.array([1.0, 1.0, 0.5, 1.0]) * relative[0], rtol=1e-12)
 
 
 def test_no_contact_has_no_error():

@@ -1,0 +1,228 @@
+"""Contact at the quadrature points of a rough top by an augmented Lagrangian, or by a penalty.
+
+With d the depth of a point beyond the plane and k a stiffness, the pressures are
+
+    p = ⟨p₀ + k d⟩,   ⟨·⟩ the positive part.
+
+Without multipliers p₀ that is the penalty method, p = k ⟨d⟩. The augmented Lagrangian takes the
+pressures found as the next multipliers until no point in contact is beyond the plane
+(Alart & Curnier 1991, doi 10.1016/0045-7825(91)90022-X); for every p₀ the generalised Newton's
+method finds the equilibrium, its steps shortened where the energy asks for it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from geometry.control import Control
+from geometry.errors import NotConverged
+from geometry.patches import PatchGrid
+from macro.block import Block
+from macro.contact import Contact
+from macro.equilibrium import Equilibrium
+from macro.history_start import Start, StepHistory
+from macro.interface import Interface
+from macro.obstacle_state import Found
+from macro.rigid_plane import RigidPlane, described
+from macro.solvers import reason_name
+from macro.stiff_preconditioner import StiffPreconditioner
+from macro.top_nodes import TopNodes
+
+Array = NDArray[np.float64]
+
+TOLERANCE = 1e-10
+"""Residual of the equilibrium that a solution may have, relative to its contact forces."""
+
+PENETRATION = 1e-8
+"""Depth of quadrature points beyond the plane, relative to the largest displacement."""
+
+_STIFF = 30.0  # default stiffness: E* times this over the size of a facet
+_LOOSEST, _SPARE = 0.03, 0.3  # relative residual of linear solves, and at the end
+_MOST_STEPS, _MOST_UPDATES, _HALVINGS = 60, 40, 30
+_ON = 1e-12  # of a basis function: its node is not on the facet
+_TINY = 1e-300
+_ENOUGH = 0.9  # share of the energy's slope that a step may leave
+
+
+class _AugmentedLaw:
+    """Pressures of this rank's quadrature points over their closures; a `ContactLaw`."""
+
+    def __init__(self, rest: Array, slope: Array) -> None:
+        self.rest, self.slope = rest, slope
+        self.multiplier = np.zeros_like(rest)
+
+    def pressure(self, closure: Array) -> Array:
+        return np.maximum(self.multiplier + self.slope * (closure - self.rest), 0.0)
+
+    def stiffness(self, closure: Array) -> Array:
+        return np.where(self.pressure(closure) > 0.0, self.slope, 0.0)
+
+
+class AugmentedFacets:
+    """Presses the facets of a rough top; see the module.
+
+    Args:
+        block: The block.
+        top: Its top.
+        plane: The plane over the nodes of the top.
+        penalty: The stiffness k [MPa/mm]; None: 30 E* over the size of each facet.
+        exact: Whether multipliers make up for the penetration.
+
+    Note:
+        Everything here is collective.
+    """
+
+    def __init__(
+        self, block: Block, top: TopNodes, plane: RigidPlane, penalty: float | None, *, exact: bool
+    ) -> None:
+        self._block, self._top, self._plane, self._exact = block, top, plane, exact
+        whole = PatchGrid(grid=(1, 1), lengths=block.mesh.shape.interface)
+        self._interface = interface = Interface(block, whole, degree=2 * block.degree)
+        self._sampling = sampling = interface.pointwise
+        (rest,) = top.spread(plane.rest)
+        points = interface.quadrature
+        stiff = _STIFF * block.material.contact_modulus / _sizes(points.cell, points.weight)
+        self._law = _AugmentedLaw(
+            np.sum(points.values * rest[points.nodes], axis=1),
+            stiff if penalty is None else np.full_like(stiff, penalty),
+        )
+        self._contact = Contact(interface, sampling, [self._law])
+        self._equilibrium = Equilibrium(block, sampling, self._contact)
+        self._preconditioner = StiffPreconditioner(
+            block.stiffness, block.solver.pc, interface.points_by_dofs
+        )
+        self._ksp = PETSc.KSP().create(block.stiffness.comm)
+        self._ksp.setPC(self._preconditioner.pc)
+        self._ksp.setOperators(self._equilibrium.tangent, block.stiffness)
+        self._ksp.setType("cg")
+        self._ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
+        self._history = StepHistory(block.owned_dofs, len(points.x))
+
+    def press(self, control: Control) -> Found:
+        """Find the contact of a load step, starting from those before.
+
+        Raises:
+            NotConverged: When an iteration fails or nothing can hold the plane; earlier solutions
+                stay what they were.
+        """
+        start = self._history.start(control)
+        task = self._plane.task(control, start.plane)
+        contact, law = self._contact, self._law
+        contact.plane, contact.free, contact.force = task.plane, task.free, task.force
+        law.multiplier = np.maximum(start.contact, 0.0) if self._exact else 0.0 * start.contact
+        displacement = self._block.stiffness.createVecRight()
+        displacement.array[:] = start.displacement
+        steps, spent, tolerance = 0, 0, _LOOSEST if self._exact else TOLERANCE
+        for _ in range(_MOST_UPDATES):
+            more, cycles = self._equilibrate(displacement, tolerance, control)
+            steps, spent = steps + more, spent + cycles
+            closure = self._equilibrium.closure(displacement)
+            depth = self._largest(np.maximum(closure - law.rest, 0.0))
+            excess = depth / max(PENETRATION * self._largest(displacement.array_r), _TINY)
+            if tolerance <= TOLERANCE and (excess <= 1.0 or not self._exact):
+                return self._found(control, displacement, steps, spent)
+            law.multiplier = law.pressure(closure)
+            tolerance = max(TOLERANCE, min(0.1 * tolerance, _SPARE * PENETRATION * excess))
+        raise self._failure(control, "MULTIPLIERS", _MOST_UPDATES)
+
+    def _equilibrate(
+        self, displacement: PETSc.Vec, tolerance: float, control: Control
+    ) -> tuple[int, int]:
+        """Solve under fixed multipliers; return Newton's steps and the linear iterations."""
+        equilibrium, spent = self._equilibrium, 0
+        residual, step = displacement.duplicate(), displacement.duplicate()
+        for steps in range(_MOST_STEPS):
+            equilibrium.residual(displacement, residual)
+            norm, scale = residual.norm(), equilibrium.scale
+            if norm <= tolerance * scale:
+                return steps, spent
+            if not scale:  # nothing presses
+                displacement.set(0.0)
+                continue
+            self._linearise(displacement)
+            rtol = max(min(_LOOSEST, norm / scale), _SPARE * tolerance * scale / norm)
+            self._ksp.setTolerances(rtol=rtol, max_it=1000)
+            self._ksp.solve(residual, step)
+            spent += int(self._ksp.its)
+            if self._ksp.reason < 0:
+                name = reason_name(PETSc.KSP.ConvergedReason, self._ksp.reason)
+                raise self._failure(control, name, spent)
+            self._advance(displacement, residual, step, control)
+        raise self._failure(control, "NEWTON", _MOST_STEPS)
+
+    def _linearise(self, displacement: PETSc.Vec) -> None:
+        """Move the tangent and its preconditioner to a displacement."""
+        self._equilibrium.update_tangent(displacement)
+        slope = self._law.stiffness(self._equilibrium.closure(displacement))
+        points = self._interface.quadrature
+        rows, columns = np.nonzero((np.abs(points.values) > _ON) & (slope > 0.0)[:, None])
+        marks = self._top.collect(points.nodes[rows, columns], np.ones(len(rows)))
+        sprung = marks > 0.0
+        free = self._contact.free
+        motions = self._plane.levers(free)[sprung] @ self._plane.held(free, sprung)
+        self._preconditioner.update(slope / self._sampling.weight, self._top.dofs[sprung], motions)
+
+    def _advance(
+        self, displacement: PETSc.Vec, residual: PETSc.Vec, step: PETSc.Vec, control: Control
+    ) -> None:
+        """Go back along a step until the slope of the energy along it has fallen."""
+        slope, low, high, share = residual.dot(step), 0.0, np.inf, 1.0
+        start = displacement.copy()
+        for _ in range(_HALVINGS):
+            displacement.waxpy(-share, step, start)
+            self._equilibrium.residual(displacement, residual)
+            left = residual.dot(step)
+            if abs(left) <= _ENOUGH * abs(slope):
+                return
+            low, high = (share, high) if left > 0.0 else (low, share)
+            share = 3.0 * share if high == np.inf else 0.5 * (low + high)
+        raise self._failure(control, "LINE_SEARCH", _HALVINGS)
+
+    def _found(self, control: Control, displacement: PETSc.Vec, steps: int, spent: int) -> Found:
+        closure, plane = self._equilibrium.closure(displacement), self._contact.plane.copy()
+        pressure, load = self._law.pressure(closure), displacement.duplicate()
+        samples = self._sampling.operator.createVecRight()
+        samples.array[:] = pressure
+        self._sampling.operator.mult(samples, load)
+        pressing, pressed = -load.array_r[self._top.dofs], pressure > 0.0
+        points = self._interface.quadrature
+        share = np.abs(points.values)
+        share *= (points.weight / share.sum(axis=1))[:, None]
+        around = self._top.collect(points.nodes, share)
+        area = self._top.collect(points.nodes, share * pressed[:, None])
+        contacts = self._top.regions(points.nodes[pressed], (share > 0.0)[pressed])
+        values = displacement.array_r.copy()
+        self._history.add(Start(plane, values, pressure), float(self._plane.loads(pressing)[0]))
+        reason = "CONVERGED_MULTIPLIERS" if self._exact else "CONVERGED_PENALTY"
+        return Found(
+            plane=plane,
+            displacement=values,
+            pressing=pressing,
+            touching=area > 0.5 * around,
+            area=area,
+            contacts=contacts,
+            active_sets=steps,
+            linear_iterations=spent,
+            reason=reason if contacts else "CONVERGED_NO_CONTACT",
+        )
+
+    def _failure(self, control: Control, reason: str, iterations: int) -> NotConverged:
+        return NotConverged(
+            f"the contact of the rough block under {described(control)}",
+            reason=reason,
+            iterations=iterations,
+            remedy="take smaller load steps (load.steps)",
+        )
+
+    def _largest(self, values: Array) -> float:
+        largest = float(np.abs(values).max(initial=0.0))
+        return float(self._block.mesh.comm.allreduce(largest, op=MPI.MAX))
+
+
+def _sizes(cell: NDArray[np.int32], weight: Array) -> Array:
+    """Return the size of the facet that every point lies on, shape (n,) [mm]."""
+    _, at = np.unique(cell, return_inverse=True)
+    return np.sqrt(np.bincount(at, weights=weight))[at] if len(at) else np.empty(0)

@@ -1,0 +1,95 @@
+"""Preconditioner of a block whose top stands on stiff springs."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.sparse import csc_array, csr_array
+from scipy.sparse.linalg import splu
+
+from macro.free_solver import Projection
+
+Array = NDArray[np.float64]
+
+
+class StiffPreconditioner:
+    """M⁻¹ = P B P + (1 − P) S⁻¹ (1 − P), for a matrix K + C with stiff springs C at some dofs.
+
+    B is a preconditioner of K. P holds the dofs with springs but for their motions with the plane;
+    S is the part of K + C between them, factorised by every rank for what it owns. The stiffer the
+    springs, the less the two parts see of each other.
+
+    Args:
+        matrix: K.
+        preconditioner: B.
+        points_by_dofs: −w φ of every quadrature point, shape (points, dofs) [mm²].
+
+    Attributes:
+        pc: The preconditioner for PETSc.
+
+    Note:
+        Everything here is collective.
+    """
+
+    def __init__(
+        self, matrix: PETSc.Mat, preconditioner: PETSc.PC, points_by_dofs: PETSc.Mat
+    ) -> None:
+        self._matrix, self._points = matrix, points_by_dofs
+        self._split = _Split(matrix, preconditioner)
+        self.pc = PETSc.PC().create(matrix.comm)
+        self.pc.setOperators(matrix)
+        self.pc.setType("python")
+        self.pc.setPythonContext(self._split)
+
+    def update(self, slope: Array, dofs: NDArray[np.intp], motions: Array) -> None:
+        """Move to other springs.
+
+        Args:
+            slope: Stiffness over weight of this rank's quadrature points [MPa/mm/mm²].
+            dofs: Vertical dofs of this rank that have springs, shape (n,).
+            motions: Their displacements by free motions of the plane, shape (n, k); orthonormal.
+        """
+        scale = self._points.createVecLeft()
+        scale.array[:] = slope
+        scaled = self._points.copy()
+        scaled.diagonalScale(scale)
+        springs = self._points.transposeMatMult(scaled)
+        part = sum(_square(m.getDiagonalBlock(), dofs) for m in (self._matrix, springs))
+        self._split.set(dofs, motions, csc_array(part))
+        springs.destroy()
+        scaled.destroy()
+
+
+def _square(matrix: PETSc.Mat, dofs: NDArray[np.intp]) -> csr_array:
+    rows, columns, entries = matrix.getValuesCSR()
+    return csr_array((entries, columns, rows), shape=matrix.getSize())[dofs][:, dofs]
+
+
+class _Split:
+    """What PETSc calls to apply the preconditioner."""
+
+    def __init__(self, matrix: PETSc.Mat, preconditioner: PETSc.PC) -> None:
+        self._preconditioner, self._part = preconditioner, matrix.createVecRight()
+        self._left = Projection(matrix.comm.tompi4py())
+        self._dofs: NDArray[np.intp] = np.empty(0, dtype=np.intp)
+        self._factors: object = None
+
+    def set(self, dofs: NDArray[np.intp], motions: Array, square: csc_array) -> None:
+        self._dofs = dofs
+        self._left.hold(dofs, motions)
+        self._factors = splu(square) if len(dofs) else None
+
+    def apply(self, _pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        x.copy(self._part)
+        self._left.project(self._part)
+        self._preconditioner.apply(self._part, y)
+        self._left.project(y)
+        self._part.axpby(1.0, -1.0, x)  # (1 − P) x, at the dofs with springs alone
+        rest = self._part.array_r[self._dofs]
+        self._part.set(0.0)
+        if self._factors is not None:
+            self._part.array[self._dofs] = self._factors.solve(rest)  # type: ignore[attr-defined]
+        y.axpy(1.0, self._part)
+        self._left.project(self._part)
+        y.axpy(-1.0, self._part)

@@ -1,0 +1,67 @@
+"""Scenes with a meshed rough surface: same numbers on 1, 2 and 3 ranks, same refusals."""
+
+import csv
+
+import numpy as np
+import pytest
+
+PAPER = "demos/scenes/paper.toml"
+SMALL = [
+    "coupling.kind=reference", "surface.spectrum.waves=[1, 3]", "surface.grid=[32, 32]",
+    "block.cells=[12, 12, 4]", "block.grading=3", "patches.grid=[3, 2]", "load.steps=2",
+    "output.figures=false", "output.report=false",
+]  # fmt: skip
+SCENES = {
+    "hexahedra, up and down, with fields": [
+        "load.approach=['8 um', '2 um']", "output.fields=true",
+    ],
+    "tetrahedra under a force, free to turn": [
+        "reference.fine='60 um'", "load.tilt=free", "load.steps=1",
+    ],
+}  # fmt: skip
+HISTORY = (
+    "approach_mm", "force_N", "contact_area_fraction", "mean_separation_mm", "contacts", "tilt_x",
+)  # fmt: skip
+REFERENCE = ("approach_mm", "force_N", "contact_area_fraction", "force_N_mesh_1")
+PATCHES = ("closure_mm", "pressure_MPa", "contact_area_fraction")
+
+
+def table(path, names):
+    with path.open(encoding="utf-8") as file:
+        return np.array([[float(row[name]) for name in names] for row in csv.DictReader(file)])
+
+
+@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
+def test_same_numbers_on_any_number_of_ranks(mpirun, root, tmp_path, scene):
+    path, text = tmp_path / "scene.toml", (root / PAPER).read_text(encoding="utf-8")
+    if "load.tilt=free" in scene:
+        text = text.replace('approach = "8 um"', 'force = "3 N"')
+    path.write_text(text, encoding="utf-8")
+    results = {}
+    for ranks in (1, 2, 3):
+        out = tmp_path / str(ranks)
+        words = ("-m", "multiscale", "run", path, "--out", out, "--set", *SMALL, *scene)
+        done = mpirun(ranks, *words)
+        assert done.returncode == 0, done.stderr
+        results[ranks] = [
+            table(out / f"{name}.csv", columns)
+            for name, columns in (
+                ("history", HISTORY), ("reference", REFERENCE), ("patches", PATCHES)
+            )
+        ]  # fmt: skip
+        assert (out / "fields.xdmf").exists() == ("output.fields=true" in scene)
+    for ranks in (2, 3):
+        for one, more in zip(results[1], results[ranks], strict=True):
+            # residuals of 1e-10 of the contact forces; the area's border follows them
+            assert np.all(np.abs(more - one) <= 1e-8 * np.abs(one).max(axis=0))
+
+
+def test_refusal_ends_all_ranks_with_one_message(mpirun, tmp_path):
+    out = tmp_path / "out"
+    steep = "surface.spectrum.rms_slope=8"
+    words = ("-m", "multiscale", "run", PAPER, "--out", out, "--set", *SMALL, steep)
+    done = mpirun(2, *words, timeout=60)
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.count("patchlaw: ") == 1
+    assert "block.cells = " in done.stderr
+    assert not out.exists()
