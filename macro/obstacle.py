@@ -37,8 +37,7 @@ class ObstacleBlock:
         top: Nodes of the top, of this rank.
 
     Raises:
-        InputError: When there is no such method, the penalty is not positive, or a patch holds no
-            node of the top.
+        InputError: When there is no such method, or the penalty is not positive.
 
     Note:
         Everything here is collective.

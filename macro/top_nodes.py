@@ -13,7 +13,6 @@ from petsc4py import PETSc
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
-from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from macro import compat
 from macro.block import Block
@@ -45,9 +44,6 @@ class TopNodes:
             none at the vertices of quadratic triangles.
         patches: The patches.
 
-    Raises:
-        InputError: When a patch holds no node of the top.
-
     Note:
         Everything here is collective. A rank may have no node.
     """
@@ -61,12 +57,6 @@ class TopNodes:
         self.x, self.y, self.height = space.tabulate_dof_coordinates()[nodes].T.copy()
         self.area = self._areas()
         self._patch_areas = self.patch_sums(self.area)
-        if not np.all(self._patch_areas > 0.0):
-            raise InputError(
-                "a patch holds no node of the top",
-                value=patches.grid,
-                allowed="fewer patches, inside the interface, or a finer mesh",
-            )
 
     @cached_property
     def facets(self) -> Index:
@@ -126,8 +116,16 @@ class TopNodes:
         return self._sum(self._shares.T @ values)
 
     def patch_means(self, values: Array) -> Array:
-        """Return the means of nodal values over every patch, shape (N,), on every rank."""
-        return self.patch_sums(self.area * values) / self._patch_areas
+        """Return the means of nodal values over every patch, shape (N,), on every rank.
+
+        A patch without a node has the value of the nearest.
+        """
+        empty, nearest = self._empty
+        means = np.empty(self.patches.count)
+        means[~empty] = self.patch_sums(self.area * values)[~empty] / self._patch_areas[~empty]
+        if empty.any():
+            means[empty] = self._sum(nearest.T @ values) / self._sum(nearest.sum(axis=0))
+        return means
 
     def regions(self, nodes: Index, linked: NDArray[np.bool_]) -> int:
         """Count the connected regions of links, over all ranks.
@@ -147,6 +145,15 @@ class TopNodes:
         ends = ends.reshape(2, -1)
         graph = coo_array((np.ones(ends.shape[1]), tuple(ends)), shape=(len(names),) * 2)
         return int(connected_components(graph, directed=False)[0]) if len(names) else 0
+
+    @cached_property
+    def _empty(self) -> tuple[NDArray[np.bool_], Array]:
+        """Which patches hold no node, shape (N,), and marks on the nodes nearest to them."""
+        empty = self._patch_areas <= 0.0
+        centres = self.patches.centres[empty]
+        apart = np.hypot(*(np.stack([self.x, self.y])[:, :, None] - centres.T[:, None]))
+        least = np.min(self._block.mesh.comm.allgather(apart.min(axis=0, initial=np.inf)), axis=0)
+        return empty, (apart <= (1.0 + 1e-9) * least).astype(float)  # all of several as near
 
     @cached_property
     def _shares(self) -> csr_array:

@@ -115,7 +115,7 @@ def make_reference(stage: Stage, comm: Any) -> ReferenceCoupling:
         comm: MPI communicator; None for this process alone.
 
     Raises:
-        InputError: When the roughness is too steep for a mesh, or patches are too small.
+        InputError: When the roughness is too steep for a mesh.
 
     Note:
         Collective.
@@ -133,15 +133,12 @@ def make_reference(stage: Stage, comm: Any) -> ReferenceCoupling:
         except InputError as error:
             raise error.located(key=stage.meshes.key, file=scene.file) from None
         block = Block(mesh, block_material(stage), sides=scene.block.sides)
-        try:
-            pressed = ObstacleBlock(
-                block,
-                surface.highest - surface.mean_height,
-                method=scene.reference.method,
-                patches=stage.patches if finest else None,
-            )
-        except InputError as error:
-            raise error.located(key="patches.grid", file=scene.file) from None
+        pressed = ObstacleBlock(
+            block,
+            surface.highest - surface.mean_height,
+            method=scene.reference.method,
+            patches=stage.patches if finest else None,
+        )
         blocks.append(pressed)
         qualities.append(quality)
     return ReferenceCoupling(blocks, stage.patches, qualities)

@@ -240,9 +240,15 @@ def test_steep_roughness_names_file_and_key():
         run(steep)
 
 
-def test_patches_without_a_node_are_refused():
-    with pytest.raises(InputError, match=rf"{re.escape(str(PAPER))}: patches.grid = .*no node"):
-        run(scene("patches.grid=[30, 30]", "load.steps=1", "reference.meshes=1"))
+def test_patches_without_a_node_are_closed_like_the_nearest():
+    history = run(scene("patches.grid=[30, 30]", "load.steps=1", "reference.meshes=1"))
+    few = run(scene("patches.grid=[12, 12]", "load.steps=1", "reference.meshes=1"))
+    pressed = history.patch_pressure_MPa[0].reshape(30, 30)
+    assert pressed.mean() == pytest.approx(history.mean_pressure_MPa[0], rel=1e-12)  # rounding
+    closure = history.closure_mm[0].reshape(30, 30)
+    assert np.all(np.abs(closure / 0.008 - 1.0) < 0.9)
+    # means over the same surface, by other nodes
+    assert closure.mean() == pytest.approx(few.closure_mm[0].mean(), rel=0.02)
 
 
 def test_other_couplings_ignore_the_section():
