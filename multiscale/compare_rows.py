@@ -112,14 +112,20 @@ def _busy(outcomes: Sequence[Outcome]) -> Iterator[str]:
 
 
 def _ranked(outcomes: Sequence[Outcome], against: Against) -> list[Outcome]:
-    """Return the finished levels that could be compared against, the best first."""
+    """Return the finished levels of a kind that could be compared against, the best first.
+
+    One mesh alone has no error bar, and is no reference.
+    """
     kind = _KINDS[against]
     fitting = [
         one
         for one in outcomes
         if one.done and one.level.kind == kind and one.level.model in ("", "half-space")
     ]
-    return sorted(fitting, key=_fineness, reverse=True)
+    ranked = sorted(fitting, key=_fineness, reverse=True)
+    if against == "reference" and ranked and _fineness(ranked[0])[0] < 2:
+        return []
+    return ranked
 
 
 def _fineness(one: Outcome) -> tuple[float, ...]:
@@ -132,7 +138,7 @@ def _fineness(one: Outcome) -> tuple[float, ...]:
     own = one.level.kind == "reference"
     return (
         reference["meshes"] if own else 0,
-        -reference.get("fine", 0.0) if own else 0.0,  # by default finer than what levels state
+        -reference.get("fine", 0.0) if own else 0.0,
         math.prod(cells),
         math.prod(one.level.heights),
     )

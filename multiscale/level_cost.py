@@ -29,8 +29,14 @@ CORRECTION = 0.4
 FACTORISATION = 9e-7
 """Seconds to factorise and solve the smooth rest, per unknown to the power 3/2."""
 
-REFERENCE = 10.0
-"""Seconds of a load step with the roughness meshed, per mesh."""
+REFERENCE = 2.5
+"""Seconds of a load step on the finest mesh of the roughness, with the typical edge."""
+
+TYPICAL_EDGE = 0.01
+"""Edge of the finest tetrahedra that this was measured with [mm]."""
+
+COARSER = 0.35
+"""What each further mesh of the roughness costs, relative to the finest."""
 
 
 def predicted_seconds(scene: Scene, heights: tuple[int, int]) -> float:
@@ -43,7 +49,8 @@ def predicted_seconds(scene: Scene, heights: tuple[int, int]) -> float:
     kind, model = scene.coupling.kind, scene.micro.model
     steps = len(scene.loading.programme.targets)
     if kind == "reference":
-        return REFERENCE * steps * scene.model_dump().get("reference", {}).get("meshes", 1)
+        fine = TYPICAL_EDGE / (scene.reference.fine or TYPICAL_EDGE)
+        return REFERENCE * steps * fine**2 * (1.0 + COARSER * (scene.reference.meshes - 1))
     by_cells = model in ("half-space", "islands", "auto")
     whole = CELL * math.prod(heights) if by_cells else SUMMITS
     if kind == "analytic":

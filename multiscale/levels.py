@@ -45,8 +45,8 @@ CELLS_PER_PATCH = 2
 SMOOTH_CELLS = ((8, 8, 6), (16, 16, 12), (24, 24, 16))
 """Elements of blocks that only correct the half-space: coarse, as by default, fine."""
 
-COARSER = 2.0
-"""Edges of the coarse mesh of a reference relative to those by default."""
+STEP = 2.0**0.5
+"""Ratio of the finest edges of neighbouring references."""
 
 OWN = "the scene as it is"
 """Name of the level that runs the scene as its file has it."""
@@ -223,30 +223,33 @@ class _Family:
 
     def _references(self) -> Iterator[Level | None]:
         stated = self._base["reference"]
-        kind = {"coupling": {"kind": "reference"}}
-        if stated["mesh"] == "auto":
-            stated = stated | {"mesh": "tetrahedra"}
-        if stated["mesh"] == "tetrahedra":
-            kind["block"] = self._block(None)
-            coarse = self._coarse_edge(stated.get("fine"))
-            if coarse is not None:
-                single = {"reference": stated | {"meshes": 1, "fine": coarse}}
-                name = "reference, 1 coarse mesh"
-                yield self._level(name, self._base | kind | single, self._heights)
-        for meshes in (1, 2, 3):
-            several = {"reference": stated | {"meshes": meshes}}
-            name = f"reference, {meshes} mesh{'es' * (meshes > 1)}"
-            yield self._level(name, self._base | kind | several, self._heights)
+        if stated["mesh"] == "hexahedra":
+            for meshes in (1, 2, 3):
+                yield self._reference(stated | {"meshes": meshes}, self._base["block"])
+            return
+        stated, block = stated | {"mesh": "tetrahedra"}, self._block(None)
+        fine = stated.get("fine") or self._finest_edge()
+        if fine is None:
+            for meshes in (1, 2, 3):
+                yield self._reference(stated | {"meshes": meshes}, block)
+            return
+        for meshes, factor in ((1, STEP * STEP), (1, 1.0), (2, 1.0), (3, 1.0), (3, 1.0 / STEP)):
+            edge = float(f"{factor * fine:.4g}")
+            yield self._reference(stated | {"meshes": meshes, "fine": edge}, block)
 
-    def _coarse_edge(self, fine: float | None) -> float | None:
-        """Return twice the edge of the finest tetrahedra; None where the load does not tell it."""
-        if fine is not None:
-            return COARSER * fine
+    def _reference(self, section: Content, block: Content) -> Level | None:
+        several = f"{section['meshes']} mesh{'es' * (section['meshes'] > 1)}"
+        edge = f", {1e3 * section['fine']:.3g} µm" if "fine" in section else ""
+        changes = {"coupling": {"kind": "reference"}, "reference": section, "block": block}
+        return self._level(f"reference, {several}{edge}", self._base | changes, self._heights)
+
+    def _finest_edge(self) -> float | None:
+        """Return the edge of the finest tetrahedra by default; None where the load leaves it open."""
         programme = self._scene.loading.programme
         if programme.quantity == "force" or programme.tilt is None:
             return None
         surface = make_surface(self._scene)
-        return COARSER * suggested_fine(surface, programme.largest, tilt=programme.tilt)
+        return suggested_fine(surface, programme.largest, tilt=programme.tilt)
 
     def _block(self, cells: Any) -> Content:
         block = {key: value for key, value in self._base["block"].items() if key != "cells"}
