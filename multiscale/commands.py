@@ -127,17 +127,20 @@ def print_schema(choice: argparse.Namespace, options: list[str], comm: Any) -> N
         print(json.dumps(Scene.model_json_schema(by_alias=True), indent=2))
 
 
-def scene_and_folder(choice: argparse.Namespace, comm: Any) -> tuple[Scene, Path]:
+def scene_and_folder(
+    choice: argparse.Namespace, comm: Any, *, ending: str = ""
+) -> tuple[Scene, Path]:
     """Read the scene on rank 0 and settle where results would go.
 
     Args:
         choice: Parsed words of the command line.
         comm: MPI communicator; None for a process on its own.
+        ending: What the folder's name has behind the scene's, unless the user names a folder.
     """
 
     def read() -> tuple[Scene, Path]:
         scene = Scene.load(choice.scene, choice.set)
-        folder = choice.out or Path("results") / scene.name
+        folder = choice.out or Path("results") / f"{scene.name}{ending}"
         _check_folder(folder)
         return scene, folder
 

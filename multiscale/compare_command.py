@@ -52,7 +52,7 @@ def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         )
     if options:
         raise InputError("levels take no PETSc options", key="--", value=" ".join(options))
-    scene, folder = scene_and_folder(choice, comm)
+    scene, folder = scene_and_folder(choice, comm, ending="-compare")
     with terminal.following(comm) as (begun, ended):
         found = compare(
             scene,

@@ -42,12 +42,12 @@ def pareto_figure(comparison: Comparison) -> Figure:
     """
     response = comparison.response
     panels = (
-        (f"{response}_max", f"error of the {response}, largest over the curve"),
-        ("area_max", "error of the contact area, largest over the curve"),
-        ("distribution", "distance of the pressure distributions [mean pressures]"),
+        (f"{response}_max", f"{response}: largest error over the curve"),
+        ("area_max", "contact area: largest error over the curve"),
+        ("distribution", "distribution of pressures: distance / mean"),
     )
-    figure = Figure(figsize=(13.2, 5.6), layout="constrained")
-    drawn, below = _with_legend(figure, 3)
+    figure = Figure(figsize=(13.2, 6.4), layout="constrained")
+    drawn, below = _with_legend(figure, 3, 0.1)
     for axes, (error, title) in zip(drawn, panels, strict=True):
         _draw_pareto(axes, comparison, error)
         axes.set_title(title, fontsize=10.5)
@@ -64,11 +64,24 @@ def pareto_figure(comparison: Comparison) -> Figure:
         below.plot([], [], "-", color="0.25", lw=1.2, label="frontier")[0],
         below.fill_between([], [], [], color="#e8eaed", label="within the error bar"),
     ]
-    below.legend(handles=handles, loc="center", ncol=9, frameon=False)
+    below.legend(handles=handles, loc="center", ncol=5, frameon=False)
+    figure.supxlabel(_names(comparison, [error for error, _ in panels]), fontsize=8.5)
     return figure
 
 
-def _with_legend(figure: Figure, panels: int, share: float = 0.06) -> tuple[list[Any], Any]:
+def _names(comparison: Comparison, errors: Sequence[str], across: int = 3) -> str:
+    """Say which levels the numbers on the frontiers are, several in a line."""
+    ahead = {row.name for error in errors for row in comparison.frontier(error)}
+    told = [
+        f"{number}: {row.name}"
+        for number, row in enumerate(comparison.rows, 1)
+        if row.name in ahead or row.is_measure
+    ]
+    lines = [told[first : first + across] for first in range(0, len(told), across)]
+    return "\n".join("      ".join(line) for line in lines)
+
+
+def _with_legend(figure: Figure, panels: int, share: float) -> tuple[list[Any], Any]:
     """Return panels side by side, and empty axes below them that hold a legend."""
     grid = figure.add_gridspec(2, panels, height_ratios=(1.0, share))
     below = figure.add_subplot(grid[1, :])
@@ -164,7 +177,7 @@ def curves_figure(comparison: Comparison) -> Figure:
     for index, row in enumerate(told_rows(comparison)):
         found = comparison.curves[row.name]
         look: dict[str, Any] = {
-            "color": "0.1" if row.is_measure else _COLOURS[row.kind],
+            "color": _colour(row),
             "ls": "-" if row.is_measure else _STYLES[index % len(_STYLES)],
             "marker": _MARKS[row.kind],
             "ms": 4.0,
@@ -187,6 +200,12 @@ def curves_figure(comparison: Comparison) -> Figure:
     handles, labels = curves.get_legend_handles_labels()
     below.legend(handles, labels, loc="center", ncol=2, frameon=False, fontsize=8.5)
     return figure
+
+
+def _colour(row: Row) -> str:
+    if row.is_measure:
+        return "0.1"
+    return "0.55" if row.name == OWN else _COLOURS[row.kind]
 
 
 def _scaled(curves: Any, quantity: str) -> Any:

@@ -244,7 +244,7 @@ class _Family:
         return self._level(f"reference, {several}{edge}", self._base | changes, self._heights)
 
     def _finest_edge(self) -> float | None:
-        """Return the edge of the finest tetrahedra by default; None where the load leaves it open."""
+        """Return the edge of tetrahedra that fits the contacts; None where they are unknown."""
         programme = self._scene.loading.programme
         if programme.quantity == "force" or programme.tilt is None:
             return None
