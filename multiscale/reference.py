@@ -131,7 +131,7 @@ def make_reference(stage: Stage, comm: Any) -> ReferenceCoupling:
         try:
             mesh, quality = rough_block_mesh(shape, surface, comm or MPI.COMM_SELF)
         except InputError as error:
-            raise error.located(key=stage.meshes.key, file=scene.file) from None
+            raise error.located(key="surface", file=scene.file) from None
         block = Block(mesh, block_material(stage), sides=scene.block.sides)
         pressed = ObstacleBlock(
             block,

@@ -234,10 +234,11 @@ def test_what_does_not_fit_is_refused(overrides, text):
         make_stage(scene(*overrides))
 
 
-def test_steep_roughness_names_file_and_key():
-    steep = scene("surface.spectrum.rms_slope=8", "load.steps=1")
-    with pytest.raises(InputError, match=rf"{re.escape(str(PAPER))}: block.cells = .*inside out"):
-        run(steep)
+def test_roughness_that_no_mesh_carries_names_file_and_key():
+    high = scene("surface.spectrum.rms_slope=8", "load.steps=1")
+    text = rf"{re.escape(str(PAPER))}: surface = .*valley of the roughness is too deep"
+    with pytest.raises(InputError, match=text):
+        run(high)
 
 
 def test_patches_without_a_node_are_closed_like_the_nearest():
