@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from geometry.errors import InputError
-from multiscale.compare_rows import AGAINST, Against, Outcome, compared
+from multiscale.compare_rows import compared
 from multiscale.comparison import Comparison
+from multiscale.level import Level
 from multiscale.level_results import LevelResult
 from multiscale.level_runs import Launch, check_launchable, run_levels
-from multiscale.levels import Level, levels
+from multiscale.levels import levels
+from multiscale.outcomes import AGAINST, Against, Outcome
 from multiscale.scene import Scene
 
 

@@ -10,10 +10,10 @@ from multiscale import terminal
 from multiscale.commands import scene_and_folder
 from multiscale.compare import compare
 from multiscale.compare_report import bargains, headline, write_comparison
-from multiscale.compare_rows import AGAINST
+from multiscale.level import Level
 from multiscale.level_results import LevelResult
 from multiscale.level_runs import check_launchable
-from multiscale.levels import Level
+from multiscale.outcomes import AGAINST
 from multiscale.quantities import parse_quantity
 
 KEPT = "levels"

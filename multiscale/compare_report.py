@@ -38,13 +38,13 @@ def _drawn(folder: Path, comparison: Comparison) -> Iterator[tuple[str, Path]]:
     """Draw what there is to be seen; yield captions and files."""
     if not comparison.curves:
         return
-    from multiscale import compare_figures
+    from multiscale import compare_figures, pareto_figure
 
     if comparison.measure is not None:
         yield (
             "Error against wall time. No other level is both faster and closer than one on the "
             "frontier; numbers are those of the table. The measure stands at its own uncertainty.",
-            write_figure(folder / "pareto.png", compare_figures.pareto_figure(comparison)),
+            write_figure(folder / "pareto.png", pareto_figure.pareto_figure(comparison)),
         )
     yield (
         "Curves of the measure, the scene as it is and the closest levels; on the right what they "

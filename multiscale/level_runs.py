@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Protocol
 
 from geometry.errors import InputError
+from multiscale.level import Level
 from multiscale.level_results import LevelResult, read_result, write_result
-from multiscale.levels import Level
 
 _NO_CACHE = {"PATCHLAW_CACHE": "off"}
 _IN_MPI = ("OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_SIZE", "PMI_RANK", "SLURM_STEP_TASKS_PER_NODE")

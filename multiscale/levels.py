@@ -7,31 +7,19 @@ their results over the patches that pressures are compared on (`pressure_grid`).
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from functools import cached_property
-from importlib.metadata import version
-from pathlib import Path
+from dataclasses import replace
 from typing import Any
 
 from geometry.errors import InputError
 from geometry.reference_meshes import suggested_fine
 from micro import MODEL_NAMES
 from multiscale.ingredients import make_surface
+from multiscale.level import OWN, Content, Level, content_of
 from multiscale.level_cost import predicted_seconds
+from multiscale.level_grids import Grid, coarser_grids, pressure_grid
 from multiscale.scene import Scene
 from multiscale.stage_checks import EMBEDDED_CELLS
-
-Grid = tuple[int, int]
-Content = dict[str, Any]
-
-FEWEST_HEIGHTS = 32
-"""Heights along a side, at least, of coarser versions of a surface."""
-
-HEIGHTS_PER_WAVE = 3
-"""Heights per shortest wave of the spectrum, at least, of coarser versions."""
 
 LAW_HEIGHTS = 128
 """Heights along a side, at most, of the half-space behind consistent laws."""
@@ -47,54 +35,6 @@ SMOOTH_CELLS = ((8, 8, 6), (16, 16, 12), (24, 24, 16))
 
 STEP = 2.0**0.5
 """Ratio of the finest edges of neighbouring references."""
-
-OWN = "the scene as it is"
-"""Name of the level that runs the scene as its file has it."""
-
-OPTIONS: Content = {"figures": False, "report": False, "fields": False}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Level:
-    """One way to compute a scene.
-
-    Attributes:
-        name: What tells it from the others, for tables and legends.
-        kind: Its coupling.
-        content: The complete scene, as `Scene.from_dict` takes it.
-        heights: Heights of its surface.
-        cost: Predicted wall time [s]; orders the levels.
-        slopes: Whether the effect of finite slopes is estimated after the run.
-        ranks: Processes that it runs on.
-    """
-
-    name: str
-    kind: str
-    content: Content
-    heights: Grid
-    cost: float
-    slopes: bool = False
-    ranks: int = 1
-
-    @cached_property
-    def scene(self) -> Scene:
-        """The scene of this level."""
-        return Scene.from_dict(self.content)
-
-    @property
-    def model(self) -> str:
-        """The micro model; an explicit reference has none."""
-        return "" if self.kind == "reference" else str(self.content["micro"]["model"])
-
-    @property
-    def key(self) -> str:
-        """Hash of all that its results depend on."""
-        told = {"scene": self.content, "version": version("patchlaw"), "ranks": self.ranks}
-        file = self.content["surface"].get("file")
-        if file is not None:
-            told["heights"] = hashlib.sha256(Path(file).read_bytes()).hexdigest()
-        text = json.dumps(told, sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()[:20]
 
 
 def levels(scene: Scene, ranks: int = 1) -> tuple[Level, ...]:
@@ -114,20 +54,15 @@ def levels(scene: Scene, ranks: int = 1) -> tuple[Level, ...]:
     return tuple(sorted(found.values(), key=lambda level: level.cost))
 
 
-def pressure_grid(scene: Scene) -> Grid:
-    """Return the patches that pressures are compared on: the scene's, divided to at least 4 × 4."""
-    nx, ny = (count * -(-4 // count) for count in scene.patches.grid)
-    return nx, ny
-
-
 class _Family:
     """Makes the levels of one scene."""
 
     def __init__(self, scene: Scene, ranks: int) -> None:
         self._scene, self._ranks = scene, ranks
-        self._base = _content(scene)
+        self._base = content_of(scene)
         stated = scene.surface.grid
         self._heights: Grid = stated if isinstance(stated, tuple) else make_surface(scene).grid
+        self._grids = coarser_grids(self._heights, scene.surface.spectrum)
         self._base["patches"] = {"grid": list(pressure_grid(scene))}
 
     def all(self) -> Iterator[Level]:
@@ -269,7 +204,7 @@ class _Family:
         return Level(
             name=name,
             kind=kind,
-            content=_content(scene),
+            content=content_of(scene),
             heights=heights,
             cost=predicted_seconds(scene, heights),
             slopes=slopes,
@@ -299,34 +234,6 @@ class _Family:
         """The finest of the surface's grids that laws can be made on without much waiting."""
         fitting = [grid for grid in self._grids if max(grid) <= LAW_HEIGHTS]
         return fitting[-1] if fitting else self._grids[0]
-
-    @cached_property
-    def _grids(self) -> list[Grid]:
-        """Grids of the surface, coarsest first; heights from a file are taken as they are."""
-        grids, spectrum = [self._heights], self._scene.surface.spectrum
-        while spectrum is not None and all(count % 2 == 0 for count in grids[0]):
-            coarser = (grids[0][0] // 2, grids[0][1] // 2)
-            waves = _shortest(spectrum)
-            fewest = [max(FEWEST_HEIGHTS, HEIGHTS_PER_WAVE * count) for count in waves]
-            if any(count < least for count, least in zip(coarser, fewest, strict=True)):
-                break
-            grids.insert(0, coarser)
-        return grids
-
-
-def _content(scene: Scene) -> Content:
-    """Return a scene as it would stand in a file, alone in the world."""
-    content = scene.model_dump(by_alias=True, mode="json", exclude_none=True)
-    if scene.surface_path is not None:
-        content["surface"]["file"] = str(scene.surface_path.resolve())
-    content["load"].pop("force_change", None)
-    return content | {"output": OPTIONS}
-
-
-def _shortest(spectrum: Any) -> tuple[float, float]:
-    """Return the largest numbers of waves per side."""
-    bands = [band or spectrum.waves for band in (spectrum.waves_x, spectrum.waves_y)]
-    return bands[0][1], bands[1][1]
 
 
 def _carries(cells: tuple[int, ...], grid: Grid) -> bool:

@@ -11,9 +11,9 @@ from geometry.errors import InputError
 from multiscale import compare
 from multiscale.cli import main
 from multiscale.compare_command import budget_seconds
+from multiscale.level import OWN
 from multiscale.level_process import level_result
 from multiscale.level_results import LevelResult
-from multiscale.levels import OWN
 from multiscale.run import run
 from multiscale.scene import Scene
 

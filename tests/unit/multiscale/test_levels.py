@@ -5,7 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from multiscale.levels import OWN, levels, pressure_grid
+from multiscale.level import OWN
+from multiscale.level_grids import pressure_grid
+from multiscale.levels import levels
 from multiscale.scene import Scene
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
