@@ -28,7 +28,7 @@ def told_rows(comparison: Comparison, error: str | None = None, *, most: int = 7
     """
     usable = [row for row in comparison.rows if row.steps]
     picked = [row for row in usable if row.is_measure]
-    picked += [row for row in usable if row.name == OWN]
+    picked += [row for row in usable if row.name.startswith(OWN)]
     for kind in MARKS:
         ended = [row for row in usable if row.kind == kind and row.status == "done"]
         picked += sorted(ended, key=lambda row: (comparison.error(row, error), row.seconds))[:1]
@@ -73,7 +73,7 @@ def curves_figure(comparison: Comparison) -> Figure:
 def _colour(row: Row) -> str:
     if row.is_measure:
         return "0.1"
-    return "0.55" if row.name == OWN else COLOURS[row.kind]
+    return "0.55" if row.name.startswith(OWN) else COLOURS[row.kind]
 
 
 def _scaled(curves: Any, quantity: str) -> Any:

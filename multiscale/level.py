@@ -16,7 +16,7 @@ from multiscale.scene import Scene
 Content = dict[str, Any]
 
 OWN = "the scene as it is"
-"""Name of the level that runs the scene as its file has it."""
+"""How the name begins of the level that runs the scene as its file has it."""
 
 OPTIONS: Content = {"figures": False, "report": False, "fields": False}
 
@@ -47,6 +47,11 @@ class Level:
     def scene(self) -> Scene:
         """The scene of this level."""
         return Scene.from_dict(self.content)
+
+    @property
+    def is_own(self) -> bool:
+        """Whether this is the scene as its file has it."""
+        return self.name.startswith(OWN)
 
     @property
     def model(self) -> str:

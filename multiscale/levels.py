@@ -80,7 +80,13 @@ class _Family:
     def _own(self) -> Level | None:
         content = {key: self._base[key] for key in self._base if key != "patches"}
         whole = content | {"patches": {"grid": list(self._scene.patches.grid)}}
-        return self._level(OWN, whole, self._heights)
+        kind, model = self._scene.coupling.kind, self._scene.micro.model
+        parts = [kind]
+        if kind not in ("analytic", "reference"):
+            parts.append(f"{_times(self._patches)} patches")
+        if kind != "reference":
+            parts.append(model)
+        return self._level(f"{OWN}: {', '.join(parts)}", whole, self._heights)
 
     def _analytic(self) -> Iterator[Level | None]:
         fitted = {"model": "elliptic", "curvature": "contact", "border": "include"}

@@ -11,7 +11,6 @@ from geometry.errors import InputError
 from multiscale import compare
 from multiscale.cli import main
 from multiscale.compare_command import budget_seconds
-from multiscale.level import OWN
 from multiscale.level_process import level_result
 from multiscale.level_results import LevelResult
 from multiscale.run import run
@@ -21,6 +20,7 @@ PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 TINY = [
     "surface.grid=[64, 64]", "load.steps=2", "patches.grid=[2, 2]", "block.cells=[8, 8, 4]",
 ]  # fmt: skip
+OWN_NAME = "the scene as it is: isolated, 2 × 2 patches, circular"
 PICKED = (
     "analytic, half-space", "analytic, elliptic", "concurrent, half-space 64 × 64, 8",
     "concurrent, half-space 32 × 32, 8", "consistent, 2 × 2 patches, half-space",
@@ -32,7 +32,7 @@ RUN = {}  # levels that were run already, by key: several tests want the same
 
 def launched(level, seconds):
     """Run some of the levels here; the others fail as a crash does."""
-    if level.name == OWN or level.name.startswith(PICKED):
+    if level.is_own or level.name.startswith(PICKED):
         if level.key not in RUN:
             result = level_result(level.scene, None, key=level.key, slopes=level.slopes)
             RUN[level.key] = replace(result, cpu_s=sum(result.seconds.values()))
@@ -64,7 +64,7 @@ def test_best_level_is_the_measure(found):
 
 def test_errors_are_those_of_the_forces(found):
     right = found.curves[found.measure].force
-    for name in (OWN, "analytic, elliptic"):
+    for name in (OWN_NAME, "analytic, elliptic"):
         expected = np.abs(found.curves[name].force - right).max() / right.max()
         assert found[name].errors.force_max == pytest.approx(expected, rel=1e-12)  # the same sums
 
@@ -200,13 +200,13 @@ def test_command_writes_table_figures_and_report(capsys, tmp_path, monkeypatch):
     assert "Levels without a result" in report
 
     def none_again(level, seconds):
-        assert level.name != OWN and not level.name.startswith(PICKED)
+        assert not level.is_own and not level.name.startswith(PICKED)
         return launched(level, seconds)
 
     monkeypatch.setattr("multiscale.level_runs.launch_process", none_again)
     code, shown, _ = call(capsys, "--out", str(tmp_path))
     assert code == 0
-    assert f"{OWN}: done, kept" in shown
+    assert f"{OWN_NAME}: done, kept" in shown
 
 
 def test_command_tells_when_the_measure_was_not_reached(capsys, tmp_path, monkeypatch):

@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from multiscale.level import OWN
 from multiscale.level_grids import pressure_grid
 from multiscale.levels import levels
 from multiscale.scene import Scene
@@ -29,7 +28,7 @@ def test_paper_has_every_kind_and_the_scene_itself():
     for kind in ("isolated", "consistent"):
         grids = {level.content["patches"]["grid"][0] for level in found if level.kind == kind}
         assert grids == {1, 2, 4, 8, 16}
-    (own,) = [level for level in found if level.name == OWN]
+    (own,) = [level for level in found if level.is_own]
     assert own.scene.coupling == Scene.load(PAPER).coupling
     assert own.scene.block == Scene.load(PAPER).block
 
