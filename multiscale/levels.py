@@ -81,7 +81,7 @@ class _Family:
         content = {key: self._base[key] for key in self._base if key != "patches"}
         whole = content | {"patches": {"grid": list(self._scene.patches.grid)}}
         kind, model = self._scene.coupling.kind, self._scene.micro.model
-        parts = [kind]
+        parts: list[str] = [kind]
         if kind not in ("analytic", "reference"):
             parts.append(f"{_times(self._patches)} patches")
         if kind != "reference":
