@@ -27,7 +27,8 @@ class Causes:
         micro: By the micro model: what it errs on the half-space.
         coupling: By what the coupling leaves out; on the mesh, by its elements too.
         block: By the half-space in place of the finite block.
-        slopes: By slopes taken as small, as estimated to first order.
+        slopes: By slopes taken as small: from an explicit reference with heights and load that
+            are ten times smaller, on the same mesh; without one, estimated to first order.
         discretisation: By grids and meshes, and all that could not be told apart.
     """
 
@@ -46,7 +47,7 @@ class Best:
         half_space: Force, or approach, of the finest half-space.
         block: That of the finest concurrent coupling.
         rough: That of the best explicit reference.
-        slopes: Estimated effect of finite slopes relative to the force; None when unknown.
+        slopes: Effect of finite slopes relative to the force, or approach; None when unknown.
     """
 
     half_space: float | None
@@ -87,7 +88,7 @@ def causes(
         "micro": 0.0 if cells else micro,
         "coupling": None if own is None or micro is None else own - micro,
         "block": _block(best, place, goal, against),
-        "slopes": _slopes(best, place, goal),
+        "slopes": _slopes(best, place, goal, against),
     }
     if not laws:
         shares["coupling"] = 0.0
@@ -107,10 +108,11 @@ def _block(best: Best, place: int, goal: int, scale: float) -> float | None:
     return share if share is None or place == 0 else -share
 
 
-def _slopes(best: Best, place: int, goal: int) -> float | None:
+def _slopes(best: Best, place: int, goal: int, scale: float) -> float | None:
     """Return the share of small slopes where just one of two levels has the roughness meshed."""
     if (place == 2) == (goal == 2):
         return 0.0
     if best.slopes is None:
         return None
-    return -best.slopes if goal == 2 else best.slopes
+    change = best.slopes * (scale if best.block is None else best.block) / scale
+    return -change if goal == 2 else change

@@ -33,6 +33,7 @@ class Level:
         cost: Predicted wall time [s]; orders the levels.
         slopes: Whether the effect of finite slopes is estimated after the run.
         ranks: Processes that it runs on.
+        scale: Heights and load relative to those of the scene compared; results are divided by it.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Level:
     cost: float
     slopes: bool = False
     ranks: int = 1
+    scale: float = 1.0
 
     @cached_property
     def scene(self) -> Scene:
@@ -76,3 +78,30 @@ def content_of(scene: Scene) -> Content:
         content["surface"]["file"] = str(scene.surface_path.resolve())
     content["load"].pop("force_change", None)
     return content | {"output": OPTIONS}
+
+
+def flattened(content: Content, scale: float) -> Content | None:
+    """Return a scene with heights and load scaled together; None where heights are from a file.
+
+    As slopes become small, the force and all lengths normal to the surface scale alike (Hertz's
+    limit), and what is left between the two are the slopes.
+
+    Args:
+        content: The scene.
+        scale: Factor of heights, approach or force, and tilt.
+    """
+    surface, load = content["surface"], content["load"]
+    if "spectrum" not in surface:
+        return None
+    powers = {"rms_slope": 1, "rms_height": 1, "s0": 2}
+    spectrum = {
+        key: value * scale ** powers[key] if key in powers else value
+        for key, value in surface["spectrum"].items()
+    }
+    load = dict(load)
+    for name in ("approach", "force"):
+        if name in load:
+            load[name] = [scale * point for point in load[name]]
+    if load["tilt"] != "free":
+        load["tilt"] = [scale * slope for slope in load["tilt"]]
+    return content | {"surface": surface | {"spectrum": spectrum}, "load": load}

@@ -15,7 +15,7 @@ from geometry.errors import InputError
 from geometry.reference_meshes import suggested_fine
 from micro import MODEL_NAMES
 from multiscale.ingredients import make_surface
-from multiscale.level import OWN, Content, Level, content_of
+from multiscale.level import OWN, Content, Level, content_of, flattened
 from multiscale.level_cost import predicted_seconds
 from multiscale.level_grids import Grid, coarser_grids, pressure_grid
 from multiscale.scene import Scene
@@ -32,6 +32,9 @@ CELLS_PER_PATCH = 2
 
 SMOOTH_CELLS = ((8, 8, 6), (16, 16, 12), (24, 24, 16))
 """Elements of blocks that only correct the half-space: coarse, as by default, fine."""
+
+SMALL = 0.1
+"""Heights and load of a reference with small slopes, relative to the scene's."""
 
 STEP = 2.0**0.5
 """Ratio of the finest edges of neighbouring references."""
@@ -175,8 +178,19 @@ class _Family:
                 yield self._reference(stated | {"meshes": meshes}, block)
             return
         for meshes, factor in ((1, STEP * STEP), (1, 1.0), (2, 1.0), (3, 1.0), (3, 1.0 / STEP)):
-            edge = float(f"{factor * fine:.4g}")
-            yield self._reference(stated | {"meshes": meshes, "fine": edge}, block)
+            section = stated | {"meshes": meshes, "fine": float(f"{factor * fine:.4g}")}
+            level = self._reference(section, block)
+            yield level
+            if (meshes, factor) == (1, 1.0) and level is not None:
+                yield self._small_slopes(level)
+
+    def _small_slopes(self, level: Level) -> Level | None:
+        """Return a reference with low heights under a small load, on the same mesh."""
+        content = flattened(level.content, SMALL)
+        if content is None:
+            return None
+        small = self._level(f"{level.name}, heights × {SMALL:g}", content, self._heights)
+        return None if small is None else replace(small, scale=SMALL)
 
     def _reference(self, section: Content, block: Content) -> Level | None:
         several = f"{section['meshes']} mesh{'es' * (section['meshes'] > 1)}"

@@ -21,7 +21,7 @@ uncertainty is defined by the same formulas.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,6 +71,14 @@ class Curves:
 
     def __len__(self) -> int:
         return self.force.size
+
+    def divided(self, scale: float) -> Curves:
+        """Return the curves of a load and heights that are larger by 1 / scale, slopes small."""
+        if scale == 1.0:
+            return self
+        forces = ("force", "force_error", "patch_pressure")
+        names = (*forces, "approach", "approach_error", "separation")
+        return replace(self, **{name: getattr(self, name) / scale for name in names})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

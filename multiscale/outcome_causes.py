@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from multiscale.causes import Best, Causes, causes
@@ -34,8 +34,7 @@ class Split:
         self._steps = len(ranked[against][0].curves)
         self._goal = against
         tops = {one: self._value(found[0]) if found else None for one, found in ranked.items()}
-        slopes = [one.result.finite_slopes for one in outcomes]
-        told = [one for one in slopes if one is not None and self.response == "force"]
+        told = [*self._measured_slopes(outcomes), *self._estimated_slopes(outcomes)]
         self._best = Best(
             half_space=tops["half-space"],
             block=tops["concurrent"],
@@ -50,7 +49,7 @@ class Split:
     def causes(self, one: Outcome) -> Causes:
         """Return the causes of a level's error, where it came to the last step."""
         value = self._value(one)
-        if value is None or not self._against:
+        if value is None or not self._against or one.level.scale != 1.0:
             return Causes()
         return causes(
             value,
@@ -61,6 +60,23 @@ class Split:
             twin=self._alone.get(_micro(one.level)),
             cells=one.level.model == "half-space",
         )
+
+    def _measured_slopes(self, outcomes: Sequence[Outcome]) -> Iterator[float]:
+        """Yield what slopes change by a reference with small ones, on the same mesh."""
+        for small in outcomes:
+            if small.level.scale == 1.0:
+                continue
+            same = small.level.name.rpartition(",")[0]
+            for steep in outcomes:
+                values = self._value(steep), self._value(small)
+                if steep.level.name == same and values[0] and values[1]:
+                    yield values[0] / values[1] - 1.0
+
+    def _estimated_slopes(self, outcomes: Sequence[Outcome]) -> Iterator[float]:
+        """Yield what slopes change to first order, which is known of the force."""
+        for one in outcomes:
+            if one.result.finite_slopes is not None and self.response == "force":
+                yield one.result.finite_slopes
 
     def _value(self, one: Outcome) -> float | None:
         """Return force or approach at the last step."""

@@ -19,8 +19,8 @@ def row_of(one: Outcome, **found: Any) -> Row:
         **found: What the comparison adds: fields of a `Row`.
     """
     level, result = one.level, one.result
-    curves = result.curves
-    if curves is not None:
+    if result.curves is not None:
+        curves = one.curves
         found |= {
             "steps": len(curves),
             "approach_mm": float(curves.approach[-1]),

@@ -39,9 +39,9 @@ class Outcome:
 
     @property
     def curves(self) -> Curves:
-        """What was found; only where something was."""
+        """What was found, of the scene that is compared; only where something was."""
         assert self.result.curves is not None
-        return self.result.curves
+        return self.result.curves.divided(self.level.scale)
 
 
 def ranked(outcomes: Sequence[Outcome], against: Against) -> list[Outcome]:
@@ -57,7 +57,10 @@ def ranked(outcomes: Sequence[Outcome], against: Against) -> list[Outcome]:
     fitting = [
         one
         for one in outcomes
-        if one.done and one.level.kind == kind and one.level.model in ("", "half-space")
+        if one.done
+        and one.level.kind == kind
+        and one.level.model in ("", "half-space")
+        and one.level.scale == 1.0
     ]
     found = sorted(fitting, key=_fineness, reverse=True)
     if against == "reference" and found and _fineness(found[0])[0] < 2:

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from geometry.errors import InputError
+from geometry.patches import PatchGrid
 from multiscale import compare
 from multiscale.cli import main
 from multiscale.compare_command import budget_seconds
 from multiscale.level_process import level_result
 from multiscale.level_results import LevelResult
+from multiscale.measures import Curves
 from multiscale.run import run
 from multiscale.scene import Scene
 
@@ -135,6 +137,34 @@ def test_prescribed_force_is_measured_by_the_approach():
     expected = mine / right.approach_mm - 1.0
     assert coarse.errors.approach_last == pytest.approx(expected, rel=1e-9)  # a difference
     assert coarse.causes.discretisation == pytest.approx(expected, rel=1e-9)
+
+
+def test_slopes_are_measured_by_a_reference_with_small_ones():
+    forces = {"reference, 2": 2.0, "reference, 1": 2.1, "concurrent": 2.3}
+
+    def pressed(level, seconds):
+        known = [force for start, force in forces.items() if level.name.startswith(start)]
+        if not known:
+            return LevelResult(key=level.key, status="not started")
+        force = np.array([known[0], 2.0 * known[0]])
+        if level.scale != 1.0:
+            force = 1.05 * level.scale * force  # stiffer by 5 % where slopes are small
+        nan = np.full(2, np.nan)
+        errors = {"force_error": 0.01 * force, "approach_error": nan, "area_error": nan}
+        curves = Curves(
+            patches=PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)), force=force, area=force,
+            approach=force, separation=force, patch_pressure=force[:, None], **errors,
+        )  # fmt: skip
+        return LevelResult(key=level.key, status="done", curves=curves, seconds={"laws": 1.0})
+
+    by_reference = compare(Scene.load(PAPER, TINY), launch=pressed)
+    assert by_reference.measure.startswith("reference, 2 meshes")
+    (small,) = [row for row in by_reference.rows if row.name.endswith("heights × 0.1")]
+    assert small.force_N == pytest.approx(1.05 * 4.2, rel=1e-12)  # as if heights were the scene's
+    (concurrent, *_) = [row for row in by_reference.rows if row.kind == "concurrent"]
+    lost = 1.0 - 1.0 / 1.05
+    assert concurrent.causes.slopes == pytest.approx(lost * 4.6 / 4.0, rel=1e-12)
+    assert small.causes.slopes is None
 
 
 @pytest.mark.parametrize(

@@ -84,7 +84,8 @@ def test_only_couplings_use_ranks():
 def test_all_levels_take_the_same_steps():
     for level in made("load.force_change=0.2", "load.steps=3"):
         assert level.scene.loading.force_change is None
-        assert level.scene.loading.programme.targets == pytest.approx([8e-3 / 3, 16e-3 / 3, 8e-3])
+        targets = np.divide(level.scene.loading.programme.targets, level.scale)
+        assert targets == pytest.approx([8e-3 / 3, 16e-3 / 3, 8e-3])
 
 
 @pytest.mark.parametrize(
@@ -103,3 +104,14 @@ def test_load_by_force_or_free_tilt_has_levels_too():
         else:
             found = made(*overrides)
         assert {"analytic", "concurrent", "reference"} <= {level.kind for level in found}
+
+
+def test_small_slopes_scale_heights_and_load_together():
+    found = made("load.tilt=[0.01, 0]")
+    (small,) = [level for level in found if level.scale != 1.0]
+    (steep,) = [level for level in found if f"{level.name}, heights × 0.1" == small.name]
+    assert (steep.scale, small.scale) == (1.0, 0.1)
+    assert small.scene.surface.spectrum.rms_slope == pytest.approx(0.0215, rel=1e-12)  # rounding
+    assert small.scene.loading.approach == pytest.approx((0.8e-3,), rel=1e-12)
+    assert small.scene.loading.tilt == pytest.approx((1e-3, 0.0), rel=1e-12)
+    assert small.scene.reference == steep.scene.reference
