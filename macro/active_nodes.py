@@ -165,16 +165,14 @@ class ActiveNodes:
     ) -> Found:
         depth = self._depth(plane, displacement)
         displacement.array[self._top.dofs] -= np.where(active, depth, np.maximum(depth, 0.0))
-        forces = np.maximum(self._forces(displacement), 0.0)
+        pressing = np.where(active, np.maximum(self._forces(displacement), 0.0), 0.0)
         # vertices of quadratic triangles touch without a force
         touching = active | (depth > -_CLOSED * self._largest(displacement.array_r))
         found = Found(
             plane=plane,
             displacement=displacement.array_r.copy(),
-            pressing=np.where(active, forces, 0.0),
+            pressing=pressing,
             touching=touching,
-            area=np.where(touching, self._top.area, 0.0),
-            contacts=self._contacts(touching),
             active_sets=sets,
             linear_iterations=spent,
             reason="CONVERGED_ACTIVE_SET" if self._count(active) else "CONVERGED_NO_CONTACT",
@@ -182,11 +180,6 @@ class ActiveNodes:
         force = float(self._plane.loads(found.pressing)[0])
         self._history.add(Start(plane, found.displacement, found.pressing), force)
         return found
-
-    def _contacts(self, active: Flags) -> int:
-        facets = self._top.facets
-        (flags,) = self._top.spread(active.astype(float))
-        return self._top.regions(facets, flags[facets] > 0.5)
 
     def _residual(self, displacement: PETSc.Vec) -> PETSc.Vec:
         """Return −K u, whose entries at the top are the contact forces with their sign turned."""

@@ -20,6 +20,7 @@ from petsc4py import PETSc
 from geometry.control import Control
 from geometry.errors import NotConverged
 from geometry.patches import PatchGrid
+from macro.augmented_law import AugmentedLaw, facet_sizes
 from macro.block import Block
 from macro.contact import Contact
 from macro.equilibrium import Equilibrium
@@ -36,29 +37,20 @@ Array = NDArray[np.float64]
 TOLERANCE = 1e-10
 """Residual of the equilibrium that a solution may have, relative to its contact forces."""
 
-PENETRATION = 1e-8
-"""Depth of quadrature points beyond the plane, relative to the largest displacement."""
+PENETRATION = {1: 1e-8, 2: 1e-5}
+"""Depth of quadrature points beyond the plane, relative to the largest displacement, by the
+element's degree: on quadratic facets points nearly repeat each other's conditions, and multipliers
+that share one load settle slowly."""
 
-_STIFF = 30.0  # default stiffness: E* times this over the size of a facet
+_SOFT, _HARD = 30.0, 1000.0  # stiffness at first and at last: E* times this over a facet's size
 _LOOSEST, _SPARE = 0.03, 0.3  # relative residual of linear solves, and at the end
+_HARDER, _HARDEST = 10.0, 10.0  # growth of the stiffness between updates, and all in all
+_FALL = 0.1  # of the penetration by an update; else springs are too soft
 _MOST_STEPS, _MOST_UPDATES, _HALVINGS = 60, 40, 30
 _ON = 1e-12  # of a basis function: its node is not on the facet
+_NO_FORCE = 1e-6  # of the largest nodal force: none
 _TINY = 1e-300
 _ENOUGH = 0.9  # share of the energy's slope that a step may leave
-
-
-class _AugmentedLaw:
-    """Pressures of this rank's quadrature points over their closures; a `ContactLaw`."""
-
-    def __init__(self, rest: Array, slope: Array) -> None:
-        self.rest, self.slope = rest, slope
-        self.multiplier = np.zeros_like(rest)
-
-    def pressure(self, closure: Array) -> Array:
-        return np.maximum(self.multiplier + self.slope * (closure - self.rest), 0.0)
-
-    def stiffness(self, closure: Array) -> Array:
-        return np.where(self.pressure(closure) > 0.0, self.slope, 0.0)
 
 
 class AugmentedFacets:
@@ -84,11 +76,11 @@ class AugmentedFacets:
         self._sampling = sampling = interface.pointwise
         (rest,) = top.spread(plane.rest)
         points = interface.quadrature
-        stiff = _STIFF * block.material.contact_modulus / _sizes(points.cell, points.weight)
-        self._law = _AugmentedLaw(
-            np.sum(points.values * rest[points.nodes], axis=1),
-            stiff if penalty is None else np.full_like(stiff, penalty),
-        )
+        unit = block.material.contact_modulus / facet_sizes(points.cell, points.weight)
+        self._stiff = _HARD * unit if penalty is None else np.full_like(unit, penalty)
+        self._soft = np.minimum(_SOFT * unit, self._stiff)
+        self._penetration = PENETRATION[block.degree]
+        self._law = AugmentedLaw(np.sum(points.values * rest[points.nodes], axis=1))
         self._contact = Contact(interface, sampling, [self._law])
         self._equilibrium = Equilibrium(block, sampling, self._contact)
         self._preconditioner = StiffPreconditioner(
@@ -115,17 +107,26 @@ class AugmentedFacets:
         law.multiplier = np.maximum(start.contact, 0.0) if self._exact else 0.0 * start.contact
         displacement = self._block.stiffness.createVecRight()
         displacement.array[:] = start.displacement
-        steps, spent, tolerance = 0, 0, _LOOSEST if self._exact else TOLERANCE
+        steps, spent, tolerance, before = 0, 0, _LOOSEST, np.inf
+        law.slope, hardest = self._soft, self._stiff
         for _ in range(_MOST_UPDATES):
             more, cycles = self._equilibrate(displacement, tolerance, control)
             steps, spent = steps + more, spent + cycles
             closure = self._equilibrium.closure(displacement)
             depth = self._largest(np.maximum(closure - law.rest, 0.0))
-            excess = depth / max(PENETRATION * self._largest(displacement.array_r), _TINY)
-            if tolerance <= TOLERANCE and (excess <= 1.0 or not self._exact):
+            excess = depth / max(self._penetration * self._largest(displacement.array_r), _TINY)
+            hard = bool(np.all(law.slope >= self._stiff))
+            hard = bool(self._block.mesh.comm.allreduce(hard, op=MPI.LAND))
+            if hard and tolerance <= TOLERANCE and (excess <= 1.0 or not self._exact):
                 return self._found(control, displacement, steps, spent)
-            law.multiplier = law.pressure(closure)
-            tolerance = max(TOLERANCE, min(0.1 * tolerance, _SPARE * PENETRATION * excess))
+            if self._exact:
+                law.multiplier = law.pressure(closure)
+            if self._exact and hard and excess > _FALL * before:
+                hardest = np.minimum(_HARDER * hardest, _HARDEST * self._stiff)
+            before = excess
+            law.slope = np.minimum(_HARDER * law.slope, hardest)
+            near = min(0.1 * tolerance, _SPARE * self._penetration * excess) if self._exact else 0.0
+            tolerance = max(TOLERANCE, near) if hard or not self._exact else tolerance
         raise self._failure(control, "MULTIPLIERS", _MOST_UPDATES)
 
     def _equilibrate(
@@ -187,13 +188,11 @@ class AugmentedFacets:
         samples = self._sampling.operator.createVecRight()
         samples.array[:] = pressure
         self._sampling.operator.mult(samples, load)
-        pressing, pressed = -load.array_r[self._top.dofs], pressure > 0.0
-        points = self._interface.quadrature
-        share = np.abs(points.values)
-        share *= (points.weight / share.sum(axis=1))[:, None]
-        around = self._top.collect(points.nodes, share)
-        area = self._top.collect(points.nodes, share * pressed[:, None])
-        contacts = self._top.regions(points.nodes[pressed], (share > 0.0)[pressed])
+        pressing = -load.array_r[self._top.dofs]
+        gap = -self._plane.closure(plane, -displacement.array_r[self._top.dofs])
+        touching = pressing > _NO_FORCE * self._largest(pressing)
+        if self._exact:
+            touching |= gap < self._penetration * self._largest(displacement.array_r)
         values = displacement.array_r.copy()
         self._history.add(Start(plane, values, pressure), float(self._plane.loads(pressing)[0]))
         reason = "CONVERGED_MULTIPLIERS" if self._exact else "CONVERGED_PENALTY"
@@ -201,12 +200,10 @@ class AugmentedFacets:
             plane=plane,
             displacement=values,
             pressing=pressing,
-            touching=area > 0.5 * around,
-            area=area,
-            contacts=contacts,
+            touching=touching,
             active_sets=steps,
             linear_iterations=spent,
-            reason=reason if contacts else "CONVERGED_NO_CONTACT",
+            reason=reason if self._largest(pressing) else "CONVERGED_NO_CONTACT",
         )
 
     def _failure(self, control: Control, reason: str, iterations: int) -> NotConverged:
@@ -220,9 +217,3 @@ class AugmentedFacets:
     def _largest(self, values: Array) -> float:
         largest = float(np.abs(values).max(initial=0.0))
         return float(self._block.mesh.comm.allreduce(largest, op=MPI.MAX))
-
-
-def _sizes(cell: NDArray[np.int32], weight: Array) -> Array:
-    """Return the size of the facet that every point lies on, shape (n,) [mm]."""
-    _, at = np.unique(cell, return_inverse=True)
-    return np.sqrt(np.bincount(at, weights=weight))[at] if len(at) else np.empty(0)

@@ -30,8 +30,8 @@ class ObstacleState:
         moment: First moments of the contact forces along x and y, about the middle of the
             interface, shape (2,) [N mm].
         reaction: Force that the bottom bears [N]; equals ``force`` in equilibrium.
-        contact_area: Tributary area of the nodes, or of the quadrature points, in contact [mm²].
-        contact_area_fine: The same with its border within the facets; see `covered` [mm²].
+        contact_area: Tributary area of the nodes in contact [mm²].
+        contact_area_fine: Area with the border of contact between nodes, as `covered` tells [mm²].
         nodes: Number of nodes in contact.
         contacts: Number of connected regions of contact.
         mean_separation: Mean gap between the plane and the top [mm].
@@ -72,8 +72,6 @@ class Found(NamedTuple):
         displacement: Owned degrees of freedom [mm].
         pressing: Contact forces of the nodes of the top, shape (n,) [N].
         touching: Whether these nodes are in contact, shape (n,).
-        area: Their areas in contact, shape (n,) [mm²].
-        contacts: Number of connected regions of contact, over all ranks.
         active_sets: Active sets that were solved for.
         linear_iterations: Iterations of the linear solver.
         reason: Why the iteration stopped.
@@ -83,8 +81,6 @@ class Found(NamedTuple):
     displacement: Array
     pressing: Array
     touching: Flags
-    area: Array
-    contacts: int
     active_sets: int
     linear_iterations: int
     reason: str
@@ -108,8 +104,10 @@ def measured(block: Block, top: TopNodes, plane: RigidPlane, found: Found) -> Ob
     gap = -plane.closure(found.plane, sag)
     loads = plane.loads(found.pressing)
     lean = (top.patches.centres - plane.middle) @ found.plane[1:]
-    weight = np.stack([top.area, top.area * gap, found.area, found.touching], axis=1)
-    whole, room, area, nodes = block.mesh.comm.allreduce(weight.sum(axis=0), op=MPI.SUM)
+    pressing, touching = np.maximum(found.pressing, 0.0), found.touching
+    area = np.where(touching, top.area, 0.0)
+    weight = np.stack([top.area, top.area * gap, area, touching], axis=1)
+    whole, room, contact, nodes = block.mesh.comm.allreduce(weight.sum(axis=0), op=MPI.SUM)
     return ObstacleState(
         approach=float(found.plane[0]),
         tilt=(float(found.plane[1]), float(found.plane[2])),
@@ -118,13 +116,13 @@ def measured(block: Block, top: TopNodes, plane: RigidPlane, found: Found) -> Ob
         force=float(loads[0]),
         moment=loads[1:],
         reaction=block.reaction(displacement),
-        contact_area=float(area),
-        contact_area_fine=top.covered_area(found.touching, found.pressing, np.maximum(gap, 0.0)),
+        contact_area=float(contact),
+        contact_area_fine=top.covered_area(touching, pressing, np.maximum(gap, 0.0)),
         nodes=round(nodes),
-        contacts=found.contacts,
+        contacts=top.regions(touching),
         mean_separation=float(room / whole),
         patch_force=top.patch_sums(found.pressing),
-        patch_area=top.patch_sums(found.area),
+        patch_area=top.patch_sums(area),
         patch_closure=found.plane[0] + lean - top.patch_means(sag),
         active_sets=found.active_sets,
         linear_iterations=found.linear_iterations,

@@ -122,16 +122,17 @@ def _check_depth(shape: BlockShape | RefinedShape, surface: Surface) -> None:
 
 
 def _thinnest(flat: BlockMesh, moved: Array) -> float:
-    """Return the smallest ratio of the volumes at nodes of cells after and before a movement."""
+    """Return the smallest ratio of the volumes at nodes of cells after and before a movement.
+
+    Nodes move along z alone, which changes one row of the Jacobian matrix.
+    """
     cells, points = compat.cell_vertices(flat.mesh), flat.mesh.geometry.x
+    x, y, before, after = (row[cells] for row in (*points.T, moved[:, 2]))
     thinnest = 1.0
     for slopes in _slopes(cells.shape[1]) if len(cells) else ():
-        used = np.flatnonzero(slopes.any(axis=1))
-        before, after = (
-            np.linalg.det(np.einsum("cni,nj->cij", place[cells[:, used]], slopes[used]))
-            for place in (points, moved)
-        )
-        thinnest = min(thinnest, float(np.min(after / before)))
+        normal = np.cross(x @ slopes, y @ slopes)
+        volumes = (np.einsum("ci,ci->c", normal, z @ slopes) for z in (after, before))
+        thinnest = min(thinnest, float(np.divide(*volumes).min()))
     return thinnest
 
 
@@ -170,6 +171,7 @@ def _steepest(flat: BlockMesh, rise: Array) -> float:
     points = flat.mesh.geometry.x
     cells = compat.cell_vertices(flat.mesh)
     top = np.abs(points[:, 2]) < 1e-9 * flat.shape.height
+    cells = cells[top[cells].any(axis=1)]
     steepest = 0.0
     for i in range(cells.shape[1]):
         for j in range(i):

@@ -127,13 +127,14 @@ class TopNodes:
             means[empty] = self._sum(nearest.T @ values) / self._sum(nearest.sum(axis=0))
         return means
 
-    def regions(self, nodes: Index, linked: NDArray[np.bool_]) -> int:
-        """Count the connected regions of links, over all ranks.
+    def regions(self, touching: NDArray[np.bool_]) -> int:
+        """Count the regions of nodes in contact that facets connect, over all ranks.
 
         Args:
-            nodes: Rank-local nodes of every link of this rank, shape (m, k).
-            linked: Which of them the link connects, shape (m, k).
+            touching: Whether this rank's nodes are in contact, shape (n,).
         """
+        (flags,) = self.spread(touching.astype(float))
+        nodes, linked = self.facets, flags[self.facets] > 0.5
         some = linked.any(axis=1)
         nodes, linked = nodes[some], linked[some]
         numbers = self._numbers(nodes)

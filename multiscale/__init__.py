@@ -2,7 +2,7 @@
 
 A `Scene` becomes a stage (surface, summits, patches, micro model), the micro model gives every
 patch its law, the laws go onto the flat interface of an elastic block, and load steps become a
-`History`.
+`History`. A reference meshes the rough surface itself instead, and tells its own error.
 """
 
 from multiscale.compare import compare
@@ -11,11 +11,14 @@ from multiscale.concurrent import ConcurrentCoupling
 from multiscale.condensed import CondensedCoupling
 from multiscale.consistent import consistent_laws
 from multiscale.coupling import AnalyticCoupling, EmbeddedCoupling
+from multiscale.extrapolation import Estimate, extrapolated
 from multiscale.history import History, LoadStep, PatchState
 from multiscale.law_files import LawTable, read_laws, write_laws
 from multiscale.laws import PatchLaw
 from multiscale.loading import Programme, load_steps
 from multiscale.patch_laws import PatchLaws
+from multiscale.reference import ReferenceCoupling
+from multiscale.reference_record import ReferenceRecord
 from multiscale.run import Run, run
 from multiscale.scene import Scene
 from multiscale.spread import ContactSpread
@@ -30,6 +33,7 @@ __all__ = [
     "CondensedCoupling",
     "ContactSpread",
     "EmbeddedCoupling",
+    "Estimate",
     "History",
     "LawTable",
     "LoadStep",
@@ -37,6 +41,8 @@ __all__ = [
     "PatchLaws",
     "PatchState",
     "Programme",
+    "ReferenceCoupling",
+    "ReferenceRecord",
     "Row",
     "Run",
     "Scene",
@@ -45,6 +51,7 @@ __all__ = [
     "UniformLoads",
     "compare",
     "consistent_laws",
+    "extrapolated",
     "isolated_laws",
     "load_steps",
     "make_stage",

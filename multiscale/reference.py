@@ -64,7 +64,7 @@ class ReferenceCoupling:
         return tuple(block.block.dofs for block in self._blocks)
 
     @property
-    def state(self) -> ObstacleState:
+    def latest(self) -> ObstacleState:
         """The finest block at the latest load step.
 
         Raises:

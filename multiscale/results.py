@@ -87,9 +87,10 @@ def _figures(run: Run) -> Iterator[tuple[str, str, Figure]]:
         "The rough surface with its summits and the patches.",
         figures.surface_figure(stage.surface, stage.asperities, stage.patches),
     )
+    bands = "" if history.reference is None else " Bands: error bars about mesh size zero."
     yield (
         "curves",
-        "Mean pressure, contact area and mean separation.",
+        f"Mean pressure, contact area and mean separation.{bands}",
         figures.history_figure({run.scene.coupling.kind: history}),
     )
     yield (
@@ -142,7 +143,7 @@ def _write_xdmf(path: Path, run: Run) -> None:
     import macro
 
     if isinstance(run.coupling, ReferenceCoupling):
-        macro.write_rough_fields(path, run.coupling.finest, run.coupling.state)
+        macro.write_rough_fields(path, run.coupling.finest, run.coupling.latest)
         return
     interface, displacement = run.last_field()
     macro.write_fields(path, interface, displacement, run.steps[-1].patches.pressure_MPa)

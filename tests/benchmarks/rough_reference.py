@@ -1,8 +1,8 @@
 """The rough block meshed in itself beside the concurrent coupling, with times and iterations.
 
-Run by hand: `.venv/bin/python tests/benchmarks/rough_reference.py [--large]`; several minutes, or
-half an hour with 1.2 million unknowns. Heights and approach scaled by 0.1 show the limit of small
-slopes that all models of flat interfaces share; as they are, what finite slopes change.
+Run by hand: `.venv/bin/python tests/benchmarks/rough_reference.py [--large]`; minutes, or half an
+hour with 1.7 million unknowns in hexahedra. Heights and approach scaled by 0.1 show the limit of
+small slopes that all models of flat interfaces share; as they are, what finite slopes change.
 """
 
 import os
@@ -18,10 +18,11 @@ from geometry import (
     BlockShape,
     Control,
     PatchGrid,
-    RefinedShape,
     Spectrum,
+    characteristic_size,
     patch_means,
-    places_in_reach,
+    reference_shapes,
+    suggested_fine,
     synthesise,
 )
 from macro import Block, Material, ObstacleBlock, make_correction, rough_block_mesh
@@ -34,34 +35,25 @@ APPROACHES = (4e-3, 8e-3)
 COMM = MPI.COMM_WORLD
 
 
-def refined(surface, fine):
-    """All sizes follow the finest one."""
-    return RefinedShape(
-        interface=surface.lengths,
-        height=1.0,
-        places=places_in_reach(surface, APPROACHES[-1], spacing=fine),
-        fine=fine,
-        coarse=min(0.2, 20.0 * fine),
-        growth=0.3,
-    )
-
-
 def report(surface, name, shape, scale):
-    """Print what one mesh finds."""
-    start = time.perf_counter()
+    """Print what one mesh finds, and return the forces."""
+    start = time.process_time()
     rough = surface.scaled(scale)
     mesh, _ = rough_block_mesh(shape, rough, COMM)
     block = ObstacleBlock(Block(mesh, MATERIAL), rough.highest - rough.mean_height)
     states = [block.press(Control(approach=approach * scale)) for approach in APPROACHES]
+    forces = [state.force / scale for state in states]
     if COMM.rank == 0:
-        forces = ", ".join(f"{state.force / scale:.4f}" for state in states)
+        told = ", ".join(f"{force:.4f}" for force in forces)
         sets = [state.active_sets for state in states]
         cycles = [state.linear_iterations for state in states]
         print(
-            f"{name:24s} {block.block.dofs:8d} unknowns, heights × {scale:3.1f}: F = {forces} N, "
-            f"active sets {sets}, cycles {cycles}, {time.perf_counter() - start:.0f} s",
+            f"{name}, {1e3 * characteristic_size(shape):5.2f} µm, {block.block.dofs:7d} unknowns, "
+            f"heights × {scale:3.1f}: F = {told} N, active sets {sets}, cycles {cycles}, "
+            f"{time.process_time() - start:.1f} s of this rank",
             flush=True,
         )
+    return forces
 
 
 def concurrent(surface, count):
@@ -91,16 +83,28 @@ def main():
         print(f"finite slopes change the force, to first order, by {told}", flush=True)
     for count in (8, 16, 32) if choice.large else (8, 16):
         concurrent(surface, count)
-    sizes = [(32, 12), (64, 16), (128, 24)][: 3 if choice.large else 2]
-    for cells, layers in sizes:
-        shape = BlockShape(
-            interface=surface.lengths, height=1.0, cells=(cells, cells, layers), grading=layers
-        )
-        for scale in (0.1, 1.0) if cells < 128 else (0.1,):
-            report(surface, f"hexahedra {cells} × {cells} × {layers}", shape, scale)
-    for fine in (10e-3, 5e-3, 3.5e-3, 2.5e-3):
-        for scale in (0.1, 1.0):
-            report(surface, f"tetrahedra, {1e3 * fine:g} µm", refined(surface, fine), scale)
+    families(surface, choice.large)
+
+
+def families(surface, large):
+    """Families of meshes and what they tend to, with the order of their elements' theory."""
+    top = APPROACHES[-1]
+    linear = suggested_fine(surface, top, edges=8.0)
+    cells = (128, 128, 32) if large else (64, 64, 16)
+    asked = {
+        "P2": (3.0, {}),
+        "P1": (2.0, {"element": "P1", "fine": linear}),
+        "Q1": (2.0, {"mesh": "hexahedra", "cells": cells}),
+    }
+    for scale in (0.1, 1.0):
+        for name, (order, options) in asked.items():
+            shapes = reference_shapes(surface, top, 1.0, count=2, **options)
+            coarse, fine = (report(surface, name, shape, scale) for shape in shapes)
+            ratio = characteristic_size(shapes[0]) / characteristic_size(shapes[1])
+            limits = [b - (a - b) / (ratio**order - 1.0) for a, b in zip(coarse, fine, strict=True)]
+            if COMM.rank == 0:
+                told = ", ".join(f"{limit:.4f}" for limit in limits)
+                print(f"{name}, extrapolated with order {order:g}: F = {told} N", flush=True)
 
 
 if __name__ == "__main__":

@@ -23,15 +23,20 @@ def found(mpirun, root):
 
 
 @pytest.mark.parametrize("ranks", [2, 3])
-@pytest.mark.parametrize("case", ["hexahedra", "one facet", "linear", "quadratic"])
+@pytest.mark.parametrize(
+    "case", ["hexahedra", "one facet", "linear", "quadratic", "free plane", "points"]
+)
 def test_contact_does_not_depend_on_the_ranks(found, case, ranks):
     serial, parallel = (found[n][case] for n in (1, ranks))
     assert parallel["numbers"]["nodes"] == serial["numbers"]["nodes"]
     assert min(serial["numbers"]["nodes"]) > 0
     for name, value in serial["numbers"].items():
         # residuals of 1e-9 of the contact forces on both sides
-        np.testing.assert_allclose(parallel["numbers"][name], value, rtol=1e-8, err_msg=name)
-    assert parallel["reaction"] == pytest.approx(parallel["numbers"]["force"], rel=1e-8)
+        # (forces of 1e-9 N on patches out of reach)
+        np.testing.assert_allclose(
+            parallel["numbers"][name], value, rtol=1e-8, atol=1e-9, err_msg=name
+        )
+    assert parallel["reaction"] == pytest.approx(parallel["numbers"]["force"], rel=1e-9)
 
 
 def test_the_cases_are_what_they_claim(found):
@@ -41,6 +46,6 @@ def test_the_cases_are_what_they_claim(found):
 
 @pytest.mark.parametrize("ranks", [2, 3])
 def test_refusal_reaches_every_rank(found, ranks):
-    texts = found[ranks]["inside out"]
-    assert texts == found[1]["inside out"] * ranks
-    assert "turns cells inside out" in texts[0]
+    texts = found[ranks]["too steep"]
+    assert texts == found[1]["too steep"] * ranks
+    assert "too steep for a mesh" in texts[0]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from geometry import InputError, Surface
-from geometry.refined_block import RefinedShape, places_in_reach
+from geometry.refined_block import RefinedShape, depth_below_plane, places_in_reach
 
 
 def shape(**changes):
@@ -45,6 +45,21 @@ def test_sizes_follow_the_distance():
     assert np.median(length / wanted) == pytest.approx(1.0, abs=0.3)
 
 
+@pytest.mark.parametrize(("element", "kind"), [("P1", 4), ("P2", 11)])
+def test_geometry_has_the_order_of_the_element(element, kind):
+    with shape(element=element).meshed() as model:
+        kinds, _, _ = model.mesh.getElements(3)
+    assert list(kinds) == [kind]  # gmsh's numbers of tetrahedra with 4 and 10 nodes
+
+
+def test_meshes_are_the_same_on_every_run():
+    found = []
+    for _ in range(2):
+        with shape(fine=0.01).meshed() as model:
+            found.append(model.mesh.getNodes()[1])
+    np.testing.assert_array_equal(*found)
+
+
 def test_sizes_of_the_callers_session_do_not_count():
     with shape().meshed() as model:
         expected = len(model.mesh.getNodes()[0])
@@ -68,6 +83,15 @@ def test_places_are_where_the_plane_can_come():
     assert radius.max() == pytest.approx(0.1, abs=0.01)  # r² / 2 = 5e-3
     assert len(places) == pytest.approx(np.pi * 10**2, rel=0.1)
     assert len(places_in_reach(surface, 0.0, spacing=0.3)) == 1
+
+
+def test_depth_is_counted_from_the_tilted_plane():
+    x = (np.arange(16) + 0.5) / 16
+    slope = Surface(heights=np.tile(0.1 * x[:, None], 16), lengths=(1.0, 1.0))
+    at_x, at_y = np.array([0.0, 0.5, 1.0]), np.array([0.5, 0.5, 1.0])
+    depth = depth_below_plane(slope, at_x, at_y, 0.01, tilt=(0.2, 0.4))
+    # the summit, 0.1 high, is at x = 1
+    np.testing.assert_allclose(depth, [0.01 - 0.1 - 0.1, 0.01 - 0.05, 0.01 + 0.1 + 0.2], atol=1e-12)
 
 
 @pytest.mark.parametrize(

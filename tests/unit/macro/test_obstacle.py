@@ -1,14 +1,15 @@
 """The rough block under a rigid plane: complementarity, balance, history."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
-from geometry import Control, Spectrum, Surface, synthesise
+from geometry import Control, InputError, NotConverged, PatchGrid, Spectrum, Surface, synthesise
 from geometry.meshes import BlockShape
-from macro import Block, Material
+from macro import Block, Material, active_nodes
 from macro.obstacle import ObstacleBlock
 from macro.rough_mesh import rough_block_mesh
 
@@ -19,10 +20,15 @@ SURFACE = synthesise(
 SHAPE = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(16, 16, 6), grading=4.0)
 
 
-def obstacle(surface=SURFACE, sides="free", shape=SHAPE):
+@cache
+def block_below(surface, sides, shape, material):
     mesh, _ = rough_block_mesh(shape, surface, MPI.COMM_SELF)
-    block = Block(mesh, MATERIAL, sides=sides)
-    return ObstacleBlock(block, surface.highest - surface.mean_height)
+    return Block(mesh, material, sides=sides)
+
+
+def obstacle(surface=SURFACE, sides="free", shape=SHAPE, material=MATERIAL, **options):
+    block = block_below(surface, sides, shape, material)
+    return ObstacleBlock(block, surface.highest - surface.mean_height, **options)
 
 
 def test_top_is_the_surface():
@@ -73,3 +79,103 @@ def test_flat_top_on_rollers_is_a_column(element):
     # uniform strain: exact for any mesh
     assert state.force == pytest.approx(MATERIAL.confined_modulus * 1e-3, rel=1e-8)
     assert state.contact_area == pytest.approx(1.0, rel=1e-12)
+
+
+def test_force_and_approach_are_two_ways_to_the_same_contact():
+    lean = (5e-3, 0.0)  # 5 µm per mm
+    by_approach, by_force = obstacle(), obstacle()
+    iterations = np.zeros(2)
+    for approach in (4e-3, 6e-3, 12e-3, 3e-3):
+        one = by_approach.press(Control(approach=approach, tilt=lean))
+        other = by_force.press(Control(force=one.force, tilt=lean))
+        # both are converged to 1e-10 of the contact forces
+        assert other.approach == pytest.approx(approach, rel=1e-8)
+        assert other.force == pytest.approx(one.force, rel=1e-9)
+        assert (other.nodes, other.contacts) == (one.nodes, one.contacts)
+        iterations += one.linear_iterations, other.linear_iterations
+    assert iterations[1] < 1.5 * iterations[0]  # measured 1.1: no search around the solves
+
+
+def test_free_plane_turns_until_there_is_no_moment():
+    found = obstacle()
+    for force in (1e-6, 0.5, 4.0):
+        state = found.press(Control(force=force, tilt=None))
+        assert state.force == pytest.approx(force, rel=1e-9)
+        assert state.reaction == pytest.approx(force, rel=1e-9)
+        np.testing.assert_allclose(state.moment, 0.0, atol=1e-9 * force)
+        assert state.nodes >= 3  # fewer cannot hold a plane
+    held = obstacle().press(Control(approach=state.approach, tilt=state.tilt))
+    assert held.force == pytest.approx(force, rel=1e-8)
+    turned = obstacle().press(Control(approach=state.approach, tilt=None))
+    assert turned.force == pytest.approx(force, rel=1e-8)
+
+
+@pytest.mark.parametrize("method", ["active-set", "augmented-lagrangian", "penalty"])
+def test_no_force_is_first_touch(method):
+    found = obstacle(method=method)
+    touch = SURFACE.highest - SURFACE.mean_height - found.top.height.max()
+    for control in (Control(force=0.0), Control(force=1.0), Control(force=0.0)):
+        state = found.press(control)
+        assert (state.nodes > 0) == (state.force > 0.0) == bool(control.force)
+    assert state.approach == pytest.approx(touch, rel=1e-12)
+    assert state.reason == "CONVERGED_NO_CONTACT"
+    assert not state.displacement.any()
+    assert state.patch_closure == pytest.approx(touch, rel=1e-12)
+
+
+@pytest.mark.parametrize("poisson_ratio", [0.15, 0.49])
+def test_one_step_to_merged_contacts(poisson_ratio):
+    material = replace(MATERIAL, poisson_ratio=poisson_ratio)
+    found, slow = obstacle(material=material), obstacle(material=material)
+    state = found.press(Control(approach=25e-3))
+    for approach in (10e-3, 18e-3, 25e-3):
+        small = slow.press(Control(approach=approach))
+    assert state.force == pytest.approx(small.force, rel=1e-9)
+    assert state.contact_area > 0.1
+    assert small.active_sets <= 6
+    # far back in one step
+    back = found.press(Control(approach=2e-3))
+    assert back.force == pytest.approx(
+        obstacle(material=material).press(Control(approach=2e-3)).force, rel=1e-8
+    )
+
+
+def test_patches_share_force_area_and_closure():
+    patches = PatchGrid(grid=(4, 2), lengths=(1.0, 1.0))
+    found = obstacle(patches=patches)
+    state = found.press(Control(approach=12e-3, tilt=(2e-3, 1e-3)))
+    assert state.patch_force.shape == (8,)
+    assert state.patch_force.sum() == pytest.approx(state.force, rel=1e-12)
+    assert state.patch_area.sum() == pytest.approx(state.contact_area, rel=1e-12)
+    lean = (patches.centres - 0.5) @ state.tilt
+    sag = found.top.patch_means(-state.displacement[found.top.dofs])
+    np.testing.assert_allclose(state.patch_closure, 12e-3 + lean - sag, rtol=1e-12)
+    # what the whole top moves is the mean over equal patches
+    assert state.patch_closure.mean() == pytest.approx(
+        obstacle().press(Control(approach=12e-3, tilt=(2e-3, 1e-3))).patch_closure[0], rel=1e-9
+    )
+    # gap and displacement of the top make up the separation
+    rest = (
+        SURFACE.highest - SURFACE.mean_height - np.average(found.top.height, weights=found.top.area)
+    )
+    assert state.mean_separation == pytest.approx(rest - 12e-3 + sag.mean(), rel=1e-9)
+
+
+def test_failed_step_changes_nothing(monkeypatch):
+    found = obstacle()
+    found.press(Control(approach=4e-3))
+    monkeypatch.setattr(active_nodes, "_MOST_SETS", 1)
+    with pytest.raises(NotConverged, match=r"an approach of 0\.02 mm did not converge: ACTIVE_SET"):
+        found.press(Control(approach=20e-3))
+    monkeypatch.undo()
+    again = found.press(Control(approach=8e-3))
+    assert again.force == pytest.approx(obstacle().press(Control(approach=8e-3)).force, rel=1e-8)
+
+
+def test_wrong_input_is_refused():
+    with pytest.raises(InputError, match=r"unknown contact of the reference.*active-set, augm"):
+        obstacle(method="barrier")
+    with pytest.raises(InputError, match="the penalty must be positive"):
+        obstacle(method="penalty", penalty=0.0)
+    with pytest.raises(InputError, match="a patch holds no node"):
+        obstacle(patches=PatchGrid(grid=(40, 1), lengths=(1.0, 1.0)))

@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -12,6 +13,7 @@ import pytest
 from geometry.errors import InputError
 from multiscale import Scene, make_stage, plan, run
 from multiscale.cli import main
+from multiscale.figures import history_figure, pressure_figure
 from multiscale.reference_record import reference_record
 from multiscale.report import curve_cells
 
@@ -87,6 +89,35 @@ def test_one_mesh_has_no_error_bar():
     assert np.isnan(history.reference.force.error).all()
     assert curve_cells(history)[1][0][-1] == "no error bar"
     assert any("no error bar" in note for note in history.notes)
+
+
+def test_figures_show_the_error_bar_or_that_there_is_none(history):
+    (force, area, _) = history_figure({"reference": history}).axes
+    assert [band.get_label() for band in force.collections] == [history.reference.label]
+    assert len(area.collections) == 1
+    alone = replace(
+        history,
+        reference=reference_record(
+            [replace(step, meshes=step.meshes[-1:]) for step in history],
+            history.reference.sizes[-1:],
+            history.reference.unknowns[-1:],
+            force_order=2.0,
+            area_order=1.0,
+        ),
+    )
+    (force, area, _) = history_figure({"reference": alone}).axes
+    assert not force.collections
+    assert not area.collections
+    assert "(no error bar)" in force.get_legend_handles_labels()[1]
+    assert "no error bar" in pressure_figure(alone).axes[0].get_title()
+
+
+def test_augmented_lagrangian_finds_the_contact_too(history):
+    """Points of the facets may not penetrate, where nodes alone may not: the plane holds more."""
+    other = run(scene("reference.meshes=1", "reference.method=augmented-lagrangian"))
+    # less than an edge in the contact: alike, no more
+    np.testing.assert_allclose(other.force_N, history.force_N, rtol=0.6)
+    assert max(abs(step.imbalance) for step in other) < 1e-8
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,86 @@
+"""Contact at quadrature points: it agrees with nodes, holds exactly, and a penalty tends to it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from geometry import BlockShape, Control, Surface
+from macro import Block, Material, ObstacleBlock, rough_block_mesh
+from macro.augmented import PENETRATION
+
+MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.3)
+X = (np.arange(65) + 0.5) / 65 - 0.5
+SPHERE = Surface(heights=-((X[:, None] - 0.02) ** 2 + X**2) / 4.0, lengths=(1.0, 1.0))
+FLAT = Surface(heights=np.zeros((8, 8)), lengths=(1.0, 1.0))
+SHAPE = BlockShape(interface=(1.0, 1.0), height=0.5, cells=(8, 8, 3), grading=2.0)
+
+
+def obstacle(shape, method, surface=SPHERE, sides="free", **options):
+    mesh, _ = rough_block_mesh(shape, surface, MPI.COMM_SELF)
+    block = Block(mesh, MATERIAL, sides)
+    return ObstacleBlock(block, surface.highest - surface.mean_height, method=method, **options)
+
+
+def forces(shape, control):
+    methods = ("active-set", "augmented-lagrangian")
+    return [obstacle(shape, method).press(control).force for method in methods]
+
+
+@pytest.mark.parametrize("element", ["Q1", "P1", "Q2", "P2"])
+def test_points_and_nodes_agree_to_the_discretisation(element):
+    cells = (5, 5, 2) if element.endswith("2") else (12, 12, 3)
+    nodes, points = forces(replace(SHAPE, cells=cells, element=element), Control(approach=0.04))
+    assert points == pytest.approx(nodes, rel=LIMIT[element])
+
+
+# measured: see the figures; the radius of contact is 3.4 nodes wide
+LIMIT = {"Q1": 5e-3, "P1": 5e-3, "Q2": 0.02, "P2": 0.02}
+
+
+@pytest.mark.parametrize("element", ["Q1", "P2"])
+def test_no_point_penetrates_and_none_is_pulled(element):
+    found = obstacle(replace(SHAPE, cells=(5, 5, 2), element=element), "augmented-lagrangian")
+    state = found.press(Control(force=30.0, tilt=None))
+    method = found._method
+    displacement = found.block.stiffness.createVecRight()
+    displacement.array[:] = state.displacement
+    closure = method._equilibrium.closure(displacement)
+    depth = closure - method._law.rest
+    pressure = method._law.pressure(closure)
+    assert depth.max() <= PENETRATION[int(element[1])] * np.abs(state.displacement).max()
+    assert pressure.min() == 0.0 < pressure.max()
+    assert state.force == pytest.approx(30.0, rel=1e-9)
+    assert state.reaction == pytest.approx(30.0, rel=1e-9)
+    np.testing.assert_allclose(state.moment, 0.0, atol=1e-8)
+
+
+def test_error_of_the_penalty_is_its_inverse():
+    exact = obstacle(SHAPE, "augmented-lagrangian").press(Control(approach=0.02)).force
+    stiff = np.array([1e7, 1e8, 1e9])
+    found = [
+        obstacle(SHAPE, "penalty", penalty=k).press(Control(approach=0.02)).force for k in stiff
+    ]
+    errors = 1.0 - np.array(found) / exact
+    assert np.all(errors > 0.0)  # points sink in: too soft
+    rates = -np.diff(np.log10(errors))
+    np.testing.assert_allclose(rates, 1.0, atol=0.1)
+
+
+@pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2"])
+def test_flat_top_on_rollers_is_a_column(element):
+    shape = replace(SHAPE, cells=(4, 4, 2), element=element)
+    state = obstacle(shape, "augmented-lagrangian", FLAT, "roller").press(Control(approach=1e-3))
+    # uniform strain on every mesh; the last penetration is 1e-8 of the approach
+    assert state.force == pytest.approx(MATERIAL.confined_modulus * 1e-3 / 0.5, rel=1e-7)
+    assert state.contact_area == pytest.approx(1.0, rel=1e-12)
+    assert state.contacts == 1
+
+
+def test_history_does_not_matter():
+    found = obstacle(SHAPE, "augmented-lagrangian")
+    for approach in (0.01, 0.02, 0.04, 0.015):
+        state = found.press(Control(approach=approach))
+    direct = obstacle(SHAPE, "augmented-lagrangian").press(Control(force=state.force))
+    assert direct.approach == pytest.approx(0.015, rel=1e-6)  # penetration of 1e-8 on both sides

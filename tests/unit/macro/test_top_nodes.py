@@ -1,0 +1,60 @@
+"""Nodes of the top: areas, shares of patches, connected regions."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from geometry import BlockShape, PatchGrid
+from macro import Block, Material, block_mesh
+from macro.top_nodes import TopNodes
+
+MATERIAL = Material(young_modulus=4e3, poisson_ratio=0.2)
+
+
+def top_of(element="Q1", cells=(6, 4, 1), grid=(2, 2)):
+    shape = BlockShape(interface=(3.0, 2.0), height=1.0, cells=cells, element=element)
+    block = Block(block_mesh(shape, MPI.COMM_SELF), MATERIAL)
+    return TopNodes(block, PatchGrid(grid=grid, lengths=(3.0, 2.0)))
+
+
+@pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2"])
+def test_areas_tile_the_top(element):
+    top = top_of(element)
+    triangles, area = top.triangles
+    assert top.area.sum() == pytest.approx(6.0, rel=1e-12)
+    assert area.sum() == pytest.approx(6.0, rel=1e-12)
+    every = np.ones(len(top.x), dtype=bool)
+    assert top.covered_area(every, top.area, 0.0 * top.x) == pytest.approx(6.0, rel=1e-12)
+    x, y = top.spread(top.x, top.y)
+    # edges lie opposite the corners
+    a, b = triangles[:, 1], triangles[:, 2]
+    np.testing.assert_allclose(top.edges[:, 0], np.hypot(x[a] - x[b], y[a] - y[b]), rtol=1e-12)
+
+
+def test_nodes_on_borders_are_shared_equally():
+    top = top_of()
+    for x, y, expected in [
+        (0.5, 0.5, [1.0, 0.0, 0.0, 0.0]),
+        (0.0, 2.0, [0.0, 1.0, 0.0, 0.0]),
+        (1.5, 0.5, [0.5, 0.0, 0.5, 0.0]),
+        (2.0, 1.0, [0.0, 0.0, 0.5, 0.5]),
+        (1.5, 1.0, [0.25, 0.25, 0.25, 0.25]),
+    ]:
+        at = np.isclose(top.x, x) & np.isclose(top.y, y)
+        assert at.sum() == 1
+        np.testing.assert_allclose(top.patch_sums(at.astype(float)), expected)
+    np.testing.assert_allclose(top.patch_means(top.x), [0.75, 0.75, 2.25, 2.25])
+
+
+@pytest.mark.parametrize("element", ["Q1", "P2"])
+def test_regions_are_joined_by_facets(element):
+    top = top_of(element)
+    near = np.hypot(top.x - 0.5, top.y - 0.5) < 0.6
+    far = np.hypot(top.x - 2.5, top.y - 1.5) < 0.3
+    assert top.regions(near & far) == 0
+    assert top.regions(near) == 1
+    assert top.regions(near | far) == 2
+    assert top.regions(np.ones_like(near)) == 1
+    # two nodes with one between them do not touch each other
+    apart = np.isclose(top.y, 1.0) & (np.isclose(top.x, 0.5) | np.isclose(top.x, 1.5))
+    assert top.regions(apart) == 2
