@@ -24,7 +24,10 @@ SOLUTION = 2.5e-6
 """Seconds of a load step, or of the compliance of a patch, per unknown."""
 
 CORRECTION = 0.4
-"""Seconds for the loads of the smooth rest of a block, whatever its mesh."""
+"""Seconds for the loads of the smooth rest of a block, with the fewest of them."""
+
+FEWEST_LOADS = 16
+"""Rectangles of load along a side, at least."""
 
 FACTORISATION = 9e-7
 """Seconds to factorise and solve the smooth rest, per unknown to the power 3/2."""
@@ -58,7 +61,9 @@ def predicted_seconds(scene: Scene, heights: tuple[int, int]) -> float:
     unknowns = 3.0 * math.prod(count + 1 for count in block_cells(scene))
     if scene.coupling.decomposed:
         solutions = 8 * steps if kind == "concurrent" else 2 * SOLUTIONS_OF_LAWS
-        return START + CORRECTION + FACTORISATION * unknowns**1.5 + solutions * whole
+        sides = (count * -(-FEWEST_LOADS // count) for count in scene.patches.grid)
+        loads = CORRECTION * (math.prod(sides) / FEWEST_LOADS**2) ** 2
+        return START + loads + FACTORISATION * unknowns**1.5 + solutions * whole
     count = math.prod(scene.patches.grid)
     laws = SOLUTIONS_OF_LAWS * (whole if by_cells or kind == "consistent" else whole * count)
     return START + laws + unknowns * (ASSEMBLY + SOLUTION * min(count, steps))

@@ -33,6 +33,10 @@ CELLS_PER_PATCH = 2
 SMOOTH_CELLS = ((8, 8, 6), (16, 16, 12), (24, 24, 16))
 """Elements of blocks that only correct the half-space: coarse, as by default, fine."""
 
+FINE_LOADS = 32
+"""Rectangles along a side, at least, that tell a block of the contacts' forces where they are told
+finely; patches decide how many they are, and contacts next to the block's sides feel them."""
+
 SMALL = 0.1
 """Heights and load of a reference with small slopes, relative to the scene's."""
 
@@ -164,6 +168,11 @@ class _Family:
             }
             name = f"concurrent, half-space {_times(grid)}, {_times(cells)} elements"
             yield self._level(name, self._base | changes, grid)
+            if (grid, cells) == (self._grids[-1], usual):
+                nx, ny = (count * -(-FINE_LOADS // count) for count in self._patches)
+                loads = {"patches": {"grid": [nx, ny]}}
+                name = f"{name}, {_times((nx, ny))} loads"
+                yield self._level(name, self._base | changes | loads, grid)
 
     def _references(self) -> Iterator[Level | None]:
         stated = self._base["reference"]

@@ -71,7 +71,8 @@ def ranked(outcomes: Sequence[Outcome], against: Against) -> list[Outcome]:
 def _fineness(one: Outcome) -> tuple[float, ...]:
     """Return what makes a level better than another of its kind.
 
-    These are the number of meshes, the edges of the finest in a contact, elements and heights.
+    These are the number of meshes, the edges of the finest in a contact, rectangles of load,
+    elements and heights.
     """
     content = one.level.content
     cells, reference = content["block"].get("cells", (1,)), content["reference"]
@@ -79,6 +80,7 @@ def _fineness(one: Outcome) -> tuple[float, ...]:
     return (
         reference["meshes"] if own else 0,
         -reference.get("fine", 0.0) if own else 0.0,
+        math.prod(content["patches"]["grid"]) if one.level.kind == "concurrent" else 0,
         math.prod(cells),
         math.prod(one.level.heights),
     )
@@ -92,7 +94,7 @@ def refinements(best_first: Sequence[Outcome]) -> Iterator[tuple[Outcome, Outcom
     Args:
         best_first: Finished levels of one kind, the best first.
     """
-    for which in range(1, 4):
+    for which in range(1, 5):
         groups: dict[tuple[float, ...], list[Outcome]] = {}
         for one in best_first:  # in groups too
             others = tuple(value for k, value in enumerate(_fineness(one)) if k != which)
