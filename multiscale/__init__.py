@@ -6,6 +6,8 @@ patch its law, the laws go onto the flat interface of an elastic block, and load
 """
 
 from multiscale.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
+from multiscale.compare import compare
+from multiscale.comparison import Comparison, Row
 from multiscale.concurrent import ConcurrentCoupling
 from multiscale.condensed import CondensedCoupling
 from multiscale.consistent import consistent_laws
@@ -28,6 +30,7 @@ from multiscale.yielding import SpreadLoads, UniformLoads
 __all__ = [
     "AnalyticCoupling",
     "Checkpoint",
+    "Comparison",
     "ConcurrentCoupling",
     "CondensedCoupling",
     "ContactSpread",
@@ -42,11 +45,13 @@ __all__ = [
     "Programme",
     "ReferenceCoupling",
     "ReferenceRecord",
+    "Row",
     "Run",
     "Scene",
     "SpreadLoads",
     "Stage",
     "UniformLoads",
+    "compare",
     "consistent_laws",
     "extrapolated",
     "isolated_laws",

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from geometry.errors import InputError, PatchlawError
-from multiscale import commands, doctor_command, terminal
+from multiscale import commands, compare_command, doctor_command, terminal
 
 _MOST_PATIENT = 5.0  # with other ranks, at the end [s]
 _SOLVER_OPTIONS = ("-snes_", "-ksp_", "-pc_", "-mg_")
@@ -101,6 +101,7 @@ def _parser() -> argparse.ArgumentParser:
     for name, command in {
         "run": commands.run_scene,
         "plan": commands.plan_scene,
+        "compare": compare_command.compare_scene,
         "laws": commands.tabulate_scene,
         "surface": commands.describe_surface,
     }.items():
@@ -118,6 +119,8 @@ def _parser() -> argparse.ArgumentParser:
             metavar="KEY=VALUE",
             help="change keys of the scene, such as load.approach='4 um'",
         )
+        if command is compare_command.compare_scene:
+            compare_command.add_options(sub)
     schema = subparsers.add_parser("schema", help=_summary(commands.print_schema))
     schema.set_defaults(command=commands.print_schema)
     doctor_command.add_commands(subparsers)

@@ -33,7 +33,7 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
         comm: MPI communicator; None for a process on its own.
     """
     with Interruption(comm, _limit(choice.max_time)) as interruption:
-        scene, folder = _scene_and_folder(choice, comm)
+        scene, folder = scene_and_folder(choice, comm)
         run = Run(scene, comm)
         with locked(folder, comm) as lock:
             keeper = Keeper(folder, run, lock)
@@ -113,7 +113,7 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    scene, _ = _scene_and_folder(choice, comm)
+    scene, _ = scene_and_folder(choice, comm)
     terminal.show_plan(comm, on_root(comm, lambda: make_stage(scene)))
 
 
@@ -125,7 +125,7 @@ def tabulate_scene(choice: argparse.Namespace, options: list[str], comm: Any) ->
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    scene, folder = _scene_and_folder(choice, comm)
+    scene, folder = scene_and_folder(choice, comm)
     run = Run(scene, comm)
     terminal.show_plan(comm, run.stage)
     table = run.make_laws()
@@ -149,7 +149,7 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    scene, folder = _scene_and_folder(choice, comm)
+    scene, folder = scene_and_folder(choice, comm)
     stage = on_root(comm, lambda: make_stage(scene))
     rough = roughness(stage.surface)
     pairs = [
@@ -184,12 +184,20 @@ def print_schema(choice: argparse.Namespace, options: list[str], comm: Any) -> N
         print(json.dumps(Scene.model_json_schema(by_alias=True), indent=2))
 
 
-def _scene_and_folder(choice: argparse.Namespace, comm: Any) -> tuple[Scene, Path]:
-    """Read the scene on rank 0 and settle where results would go."""
+def scene_and_folder(
+    choice: argparse.Namespace, comm: Any, *, ending: str = ""
+) -> tuple[Scene, Path]:
+    """Read the scene on rank 0 and settle where results would go.
+
+    Args:
+        choice: Parsed words of the command line.
+        comm: MPI communicator; None for a process on its own.
+        ending: What the folder's name has behind the scene's, unless the user names a folder.
+    """
 
     def read() -> tuple[Scene, Path]:
         scene = Scene.load(choice.scene, choice.set)
-        folder = choice.out or Path("results") / scene.name
+        folder = choice.out or Path("results") / f"{scene.name}{ending}"
         _check_folder(folder)
         return scene, folder
 

@@ -19,6 +19,9 @@ from multiscale.law_files import LawTable
 _STYLES = ("-", "--", "-.", ":", (0, (3, 1, 1, 1, 1, 1)))
 _COLOURS = ("#0b3c5d", "#d1495b", "#1b998b", "#edae49", "#6a4c93")
 
+PRESSURE_LABEL = "mean pressure of the patch [MPa]"
+"""What colour bars of pressure maps say."""
+
 
 def surface_figure(surface: Surface, asperities: Asperities, patches: PatchGrid) -> Figure:
     """Draw heights over the mean plane with summits, border maxima and patch borders.
@@ -49,7 +52,7 @@ def draw_surface(
     extent = (0, surface.lengths[0], 0, surface.lengths[1])
     image = axes.imshow(heights, origin="lower", extent=extent, cmap="cividis")
     figure.colorbar(image, ax=axes, label="height over the mean plane [µm]")
-    _patch_lines(axes, patches, colour="white")
+    patch_lines(axes, patches, colour="white")
     summits: dict[str, Any] = {"marker": "o", "ms": 5, "mfc": "#d1495b", "mec": "white"}
     cut: dict[str, Any] = {"marker": "x", "ms": 6, "color": "black"}
     for x, y, look, label in (
@@ -138,30 +141,41 @@ def pressure_figure(history: History) -> Figure:
 
 
 def draw_pressures(
-    figure: Figure, axes: Any, patches: PatchGrid, pressure: NDArray[np.float64]
-) -> None:
+    figure: Figure,
+    axes: Any,
+    patches: PatchGrid,
+    pressure: NDArray[np.float64],
+    *,
+    top: float | None = None,
+) -> Any:
     """Draw one map of patch pressures into given axes.
 
     Args:
-        figure: Owner of the axes; gets a colour bar.
+        figure: Owner of the axes; gets a colour bar, unless the scale is given.
         axes: Where to draw.
         patches: The partition.
         pressure: Mean pressure of each patch, shape (N,) [MPa].
+        top: End of the colour scale, for maps that share one [MPa].
+
+    Returns:
+        The map, as a colour bar takes it.
     """
     values = pressure.reshape(patches.grid)
     image = axes.pcolormesh(
-        patches.borders_x, patches.borders_y, values.T, cmap="magma_r", vmin=0.0
+        patches.borders_x, patches.borders_y, values.T, cmap="magma_r", vmin=0.0, vmax=top
     )
-    figure.colorbar(image, ax=axes, label="mean pressure of the patch [MPa]")
-    _patch_lines(axes, patches, colour="0.7")
+    if top is None:
+        figure.colorbar(image, ax=axes, label=PRESSURE_LABEL)
+    patch_lines(axes, patches, colour="0.7")
     if patches.count <= 100:
-        dark = 0.55 * max(values.max(), 1e-300)
+        dark = 0.55 * max(top or values.max(), 1e-300)
         for (x, y), value in zip(patches.centres, pressure, strict=True):
             text = f"{value:.2g}" if value > 0 else "open"
             axes.text(
                 x, y, text, ha="center", va="center", color="white" if value > dark else "black"
             )
     axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
+    return image
 
 
 def law_figure(table: LawTable) -> Figure:
@@ -217,7 +231,14 @@ def _finish(figure: Figure) -> None:
         first.legend(frameon=False)
 
 
-def _patch_lines(axes: Any, patches: PatchGrid, colour: str) -> None:
+def patch_lines(axes: Any, patches: PatchGrid, colour: str) -> None:
+    """Draw the borders between patches.
+
+    Args:
+        axes: Where to draw.
+        patches: The partition.
+        colour: Colour of the lines.
+    """
     lines: Sequence[tuple[Any, NDArray[np.float64]]] = (
         (axes.axvline, patches.borders_x[1:-1]),
         (axes.axhline, patches.borders_y[1:-1]),

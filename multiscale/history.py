@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -166,6 +166,14 @@ class History:
         """Yield the rows of ``history.csv``."""
         for step in self.steps:
             yield tuple(getattr(step, name) for name in COLUMNS)
+
+    def records(self) -> list[dict[str, Any]]:
+        """Return the rows of ``history.csv`` by column, as data frames take them."""
+        return [dict(zip(COLUMNS, row, strict=True)) for row in self.rows()]
+
+    def patch_records(self) -> list[dict[str, Any]]:
+        """Return the rows of ``patches.csv`` by column, as data frames take them."""
+        return [dict(zip(PATCH_COLUMNS, row, strict=True)) for row in self.patch_rows()]
 
     def patch_rows(self) -> Iterator[tuple]:
         """Yield the rows of ``patches.csv``."""

@@ -77,13 +77,13 @@ def write_tables(folder: Path, history: History) -> list[Path]:
         The files.
     """
     files = [
-        _write_csv(folder / "history.csv", COLUMNS, history.rows()),
-        _write_csv(folder / "patches.csv", PATCH_COLUMNS, history.patch_rows()),
+        write_csv(folder / "history.csv", COLUMNS, history.rows()),
+        write_csv(folder / "patches.csv", PATCH_COLUMNS, history.patch_rows()),
     ]
     record = history.reference
     if record is not None:
         rows = record.rows(history.steps)
-        files.append(_write_csv(folder / "reference.csv", record.columns, rows))
+        files.append(write_csv(folder / "reference.csv", record.columns, rows))
     return files
 
 
@@ -118,16 +118,14 @@ def write_text(path: Path, text: str) -> Path:
     return write_whole(path, lambda partial: _write_text(partial, text))
 
 
-def _write_text(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
+def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> Path:
+    """Write rows; numbers keep all their digits (Python's shortest exact form).
 
-
-def _write_bytes(path: Path, content: bytes) -> None:
-    path.write_bytes(content)
-
-
-def _write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> Path:
-    """Write rows; numbers keep all their digits (Python's shortest exact form)."""
+    Args:
+        path: File to write.
+        header: Names of the columns.
+        rows: Their values; None leaves a cell empty.
+    """
 
     def write(partial: Path) -> None:
         with partial.open("w", newline="", encoding="utf-8") as file:
@@ -136,6 +134,14 @@ def _write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]])
             writer.writerows([_plain(value) for value in row] for row in rows)
 
     return write_whole(path, write)
+
+
+def _write_bytes(path: Path, content: bytes) -> None:
+    path.write_bytes(content)
+
+
+def _write_text(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
 
 
 def _plain(value: Any) -> Any:

@@ -18,6 +18,7 @@ th, td { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid #d5d
 th:first-child, td:first-child { text-align: left; } th { background: #f4f6f7; }
 td.text { text-align: left; } figure { margin: 1.2rem 0; } img { max-width: 100%; }
 figcaption, .note { color: #566573; }
+.wide { overflow-x: auto; font-size: .85rem; } .wide td, .wide th { padding: .2rem .45rem; }
 .warning { border-left: 4px solid #d68910; padding-left: .8rem; }
 """
 
@@ -47,14 +48,24 @@ def report_html(
         _headline(history),
         *(f'<p class="warning">{escape(text)}</p>' for text in warnings),
         "<h2>What was done</h2>",
-        _table(("topic", "what"), statements, text_columns={1}),
+        table(("topic", "what"), statements, text_columns={1}),
         "<h2>Force–approach curve</h2>",
-        _table(*curve_cells(history)),
-        *(_figure(caption, path) for caption, path in figures.items()),
+        table(*curve_cells(history)),
+        *(figure_element(caption, path) for caption, path in figures.items()),
         "<h2>Where the time went</h2>",
-        _table(("phase", "s"), [(name, f"{s:.2f}") for name, s in history.seconds.items()]),
+        table(("phase", "s"), [(name, f"{s:.2f}") for name, s in history.seconds.items()]),
         *(f'<p class="note">{escape(note)}</p>' for note in history.notes),
     ]
+    return page(title, parts)
+
+
+def page(title: str, parts: Iterable[str]) -> str:
+    """Return a complete HTML document that needs no network.
+
+    Args:
+        title: Its title.
+        parts: Elements of its body.
+    """
     head = f'<meta charset="utf-8"><title>{escape(title)}</title><style>{_STYLE}</style>'
     body = "\n".join(parts)
     return f'<!doctype html>\n<html lang="en"><head>{head}</head><body>{body}</body></html>\n'
@@ -101,11 +112,18 @@ def _headline(history: History) -> str:
     )
 
 
-def _table(
+def table(
     header: Sequence[str],
     rows: Iterable[Sequence[str]],
     text_columns: frozenset[int] | set[int] = frozenset(),
 ) -> str:
+    """Return a table.
+
+    Args:
+        header: Heads of the columns.
+        rows: Texts of the cells.
+        text_columns: Columns that are aligned to the left.
+    """
     head = "".join(f"<th>{escape(name)}</th>" for name in header)
     body = "".join(
         "<tr>"
@@ -121,7 +139,13 @@ def _table(
     return f"<table><tr>{head}</tr>{body}</table>"
 
 
-def _figure(caption: str, path: Path) -> str:
+def figure_element(caption: str, path: Path) -> str:
+    """Return a figure with its caption, the picture inside the page.
+
+    Args:
+        caption: What it shows.
+        path: PNG file.
+    """
     data = base64.b64encode(path.read_bytes()).decode()
     return (
         f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{data}">'

@@ -113,6 +113,31 @@ def _in_short(step: LoadStep) -> str:
     return f"{1e3 * step.approach_mm:.3g} µm, {step.force_N:.4g} N"
 
 
+@contextmanager
+def following(comm: Any) -> Iterator[tuple[Callable[[str], None], Callable[[str], None]]]:
+    """Follow work of many parts: what is under way, where there is a terminal, and what is done.
+
+    Args:
+        comm: MPI communicator, or None.
+
+    Yields:
+        The functions to call with what begins, and with a line on what has ended.
+    """
+    console = Console(soft_wrap=True, highlight=False)
+    if not speaks(comm):
+        yield _nothing, _nothing
+        return
+    with console.status("") as status:
+        yield (
+            lambda text: status.update(escape(text)),
+            lambda text: console.print(escape(text)),
+        )
+
+
+def _nothing(text: str) -> None:
+    """Say nothing."""
+
+
 def show_history(comm: Any, history: History) -> None:
     """Print the force–approach table and where the time went.
 

@@ -1,0 +1,222 @@
+"""How far two runs of the same load programme lie apart: every error measure, defined once.
+
+With R the run that is compared against and k the load steps that both have,
+
+* of force, approach and contact area, relative to their largest in R over these steps,
+
+      max_k |X_k − R_k| / max_k |R_k|,    and signed at R's last step,    (X − R) / R;
+
+* of the mean separation likewise, but relative to R's at the same step, as it falls under load;
+* of the patch pressures at R's last step, on the patches of a common grid, the L1 distance
+
+      Σ_i |p_i − r_i| / Σ_i r_i;
+
+* of their distribution there, the Wasserstein distance of p / <p> and r / <r>, which is the area
+  between the two distribution functions: blind to where pressures are and to the force.
+
+What R's last step asks of a run that stopped before it is unknown (NaN). A measure of R's own
+uncertainty is defined by the same formulas.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.errors import InputError
+from geometry.patches import PatchGrid
+
+Array = NDArray[np.float64]
+
+_UNKNOWN = float("nan")
+_NOTHING = 1e-9  # of the largest: a force or area below it is none to divide by
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Curves:
+    """What is compared of a run: m load steps, N patches.
+
+    Attributes:
+        patches: The partition of the interface.
+        approach: Approach of the plane at the middle, shape (m,) [mm].
+        force: Force, shape (m,) [N].
+        area: Contact area fraction, shape (m,).
+        separation: Mean separation, shape (m,) [mm].
+        patch_pressure: Mean pressure of each patch, shape (m, N) [MPa].
+        approach_error: The run's own error bar of the approach, shape (m,) [mm]; NaN where unknown.
+        force_error: That of the force, shape (m,) [N].
+        area_error: That of the area fraction, shape (m,).
+    """
+
+    patches: PatchGrid
+    approach: Array
+    force: Array
+    area: Array
+    separation: Array
+    patch_pressure: Array
+    approach_error: Array
+    force_error: Array
+    area_error: Array
+
+    def __post_init__(self) -> None:
+        if self.patch_pressure.shape != (self.force.size, self.patches.count):
+            raise InputError(
+                "patch pressures do not fit the load steps and patches",
+                value=self.patch_pressure.shape,
+                allowed=f"{(self.force.size, self.patches.count)}",
+            )
+
+    def __len__(self) -> int:
+        return self.force.size
+
+    def divided(self, scale: float) -> Curves:
+        """Return the curves of a load and heights that are larger by 1 / scale, slopes small."""
+        if scale == 1.0:
+            return self
+        forces = ("force", "force_error", "patch_pressure")
+        names = (*forces, "approach", "approach_error", "separation")
+        return replace(self, **{name: getattr(self, name) / scale for name in names})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measures:
+    """Errors of a run against another; relative, NaN where unknown.
+
+    Attributes:
+        force_max: Of the force, the largest over the curve.
+        force_last: Of the force at the last step, signed.
+        approach_max: Of the approach, the largest over the curve.
+        approach_last: Of the approach at the last step, signed.
+        area_max: Of the contact area, the largest over the curve.
+        area_last: Of the contact area at the last step, signed.
+        separation_max: Of the mean separation, the largest over the curve.
+        separation_last: Of the mean separation at the last step, signed.
+        pressure_l1: L1 distance of the patch pressures at the last step.
+        distribution: Wasserstein distance of the distributions of patch pressures there, in units
+            of the mean pressure.
+    """
+
+    force_max: float = _UNKNOWN
+    force_last: float = _UNKNOWN
+    approach_max: float = _UNKNOWN
+    approach_last: float = _UNKNOWN
+    area_max: float = _UNKNOWN
+    area_last: float = _UNKNOWN
+    separation_max: float = _UNKNOWN
+    separation_last: float = _UNKNOWN
+    pressure_l1: float = _UNKNOWN
+    distribution: float = _UNKNOWN
+
+
+def measures(run: Curves, against: Curves, grid: PatchGrid) -> Measures:
+    """Measure how far a run lies from another.
+
+    Args:
+        run: The run.
+        against: The run that counts as right.
+        grid: Patches on which pressures are compared.
+    """
+    common = min(len(run), len(against))
+    if not common:
+        return Measures()
+    found: dict[str, float] = {}
+    for name in ("force", "approach", "area", "separation"):
+        mine, right = getattr(run, name), getattr(against, name)
+        scale = np.abs(right[:common])
+        if name != "separation":
+            scale[:] = scale.max()
+        found[f"{name}_max"] = largest(mine[:common] - right[:common], scale)
+        if common == len(against):
+            floor = _NOTHING * float(np.abs(right).max())
+            found[f"{name}_last"] = ratio(mine[common - 1] - right[-1], right[-1], floor)
+    if common == len(against):
+        mine = on_grid(run.patch_pressure[common - 1], run.patches, grid)
+        right = on_grid(against.patch_pressure[-1], against.patches, grid)
+        found["pressure_l1"] = l1_distance(mine, right)
+        found["distribution"] = distribution_distance(mine, right)
+    return Measures(**found)
+
+
+def uncertainty(
+    against: Curves, pairs: Sequence[tuple[Curves, Curves]], grid: PatchGrid
+) -> Measures:
+    """Measure the uncertainty of the run that others are compared against; all values positive.
+
+    Force, approach and area take the run's own error bars where it has them. The rest is the sum of
+    the distances between runs that differ by one refinement each: with an error that at least
+    halves by it, that of the finer run is no larger.
+
+    Args:
+        against: The run.
+        pairs: A coarser and a finer run for each refinement; without any, nothing is known.
+        grid: Patches on which pressures are compared.
+    """
+    apart = [measures(coarser, finer, grid) for coarser, finer in pairs] or [Measures()]
+    found = {
+        name: float(sum(abs(getattr(one, name)) for one in apart)) for name in Measures.__slots__
+    }
+    for name in ("force", "approach", "area"):
+        value, error = getattr(against, name), getattr(against, f"{name}_error")
+        if np.isfinite(error).all():
+            top = float(np.abs(value).max())
+            found[f"{name}_max"] = largest(error, np.full(error.shape, top))
+            found[f"{name}_last"] = ratio(error[-1], value[-1], _NOTHING * top)
+    return Measures(**found)
+
+
+def on_grid(pressure: Array, patches: PatchGrid, grid: PatchGrid) -> Array:
+    """Return patch pressures on other patches; the force is conserved.
+
+    Pressures are uniform on the patches they are given on, and averaged over the new ones.
+
+    Args:
+        pressure: Mean pressures, shape (N,) [MPa].
+        patches: Their patches.
+        grid: The patches wanted, of the same rectangle.
+
+    Returns:
+        Mean pressures, shape (grid.count,) [MPa].
+    """
+    shares = [
+        _shares(patches.borders_x, grid.borders_x),
+        _shares(patches.borders_y, grid.borders_y),
+    ]
+    return np.asarray((shares[0] @ pressure.reshape(patches.grid) @ shares[1].T).ravel())
+
+
+def _shares(old: Array, new: Array) -> Array:
+    """Return the share of every old interval in every new one's mean, shape (new, old)."""
+    upper = np.minimum(new[1:, None], old[None, 1:])
+    lower = np.maximum(new[:-1, None], old[None, :-1])
+    return np.asarray(np.clip(upper - lower, 0.0, None) / np.diff(new)[:, None])
+
+
+def l1_distance(pressure: Array, right: Array) -> float:
+    """Return Σ |p − r| / Σ r over patches of equal area; NaN when r carries nothing."""
+    return ratio(float(np.abs(pressure - right).sum()), float(right.sum()))
+
+
+def distribution_distance(pressure: Array, right: Array) -> float:
+    """Return the Wasserstein distance of p / <p> and r / <r> over equal numbers of patches.
+
+    Of two samples of the same size it is the mean distance of their values in order (Villani 2009,
+    doi 10.1007/978-3-540-71050-9, remark 2.19). NaN when either carries nothing.
+    """
+    means = float(pressure.mean()), float(right.mean())
+    if min(means) <= 0.0:
+        return _UNKNOWN
+    return float(np.abs(np.sort(pressure) / means[0] - np.sort(right) / means[1]).mean())
+
+
+def largest(error: Array, scale: Array) -> float:
+    """Return the largest |error| / scale; NaN where every scale is zero."""
+    usable = scale > 0.0
+    return float(np.max(np.abs(error[usable]) / scale[usable])) if usable.any() else _UNKNOWN
+
+
+def ratio(error: float, right: float, floor: float = 0.0) -> float:
+    """Return error / right; NaN when that is not above a floor in size."""
+    return float(error / right) if abs(right) > floor else _UNKNOWN

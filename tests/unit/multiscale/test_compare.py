@@ -1,0 +1,276 @@
+"""Comparisons end to end: records, report, command line; levels run in this process."""
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from geometry.errors import InputError
+from geometry.patches import PatchGrid
+from multiscale import compare
+from multiscale.cli import main
+from multiscale.compare_command import budget_seconds
+from multiscale.level_process import level_result
+from multiscale.level_results import LevelResult
+from multiscale.measures import Curves
+from multiscale.run import run
+from multiscale.scene import Scene
+
+PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
+TINY = [
+    "surface.grid=[64, 64]", "load.steps=2", "patches.grid=[2, 2]", "block.cells=[8, 8, 4]",
+]  # fmt: skip
+OWN_NAME = "the scene as it is: isolated, 2 × 2 patches, circular"
+PICKED = (
+    "analytic, half-space", "analytic, elliptic", "concurrent, half-space 64 × 64, 8",
+    "concurrent, half-space 32 × 32, 8", "consistent, 2 × 2 patches, half-space",
+)  # fmt: skip
+
+
+RUN = {}  # levels that were run already, by key: several tests want the same
+
+
+def launched(level, seconds):
+    """Run some of the levels here; the others fail as a crash does."""
+    if level.is_own or level.name.startswith(PICKED):
+        if level.key not in RUN:
+            result = level_result(level.scene, None, key=level.key, slopes=level.slopes)
+            RUN[level.key] = replace(result, cpu_s=sum(result.seconds.values()))
+        return RUN[level.key]
+    return LevelResult(key=level.key, status="failed", exit_code=-9, message="killed")
+
+
+@pytest.fixture(autouse=True)
+def few_elements(monkeypatch):
+    """Blocks of few elements: the numbers are not what is tested here."""
+    monkeypatch.setattr("multiscale.levels.SMOOTH_CELLS", ((4, 4, 4), (6, 6, 4), (8, 8, 6)))
+
+
+@pytest.fixture(scope="module")
+def found():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("multiscale.levels.SMOOTH_CELLS", ((4, 4, 4), (6, 6, 4), (8, 8, 6)))
+        return compare(Scene.load(PAPER, TINY), launch=launched)
+
+
+def test_best_level_is_the_measure(found):
+    assert (found.against, found.response) == ("concurrent", "force")
+    assert found.measure == "concurrent, half-space 64 × 64, 8 × 8 × 6 elements"
+    measure = found[found.measure]
+    assert measure.is_measure
+    assert measure.errors == found.uncertainty
+    assert 0.0 < found.uncertainty.force_max < 0.1  # half the heights change a few per cent
+
+
+def test_errors_are_those_of_the_forces(found):
+    right = found.curves[found.measure].force
+    for name in (OWN_NAME, "analytic, elliptic"):
+        expected = np.abs(found.curves[name].force - right).max() / right.max()
+        assert found[name].errors.force_max == pytest.approx(expected, rel=1e-12)  # the same sums
+
+
+def test_causes_of_every_level_add_up(found):
+    for record in found.records():
+        shares = [record[name] for name in record if name.startswith("share_")]
+        if record["is_measure"] or record["error_force_last"] is None:
+            continue
+        total = sum(share for share in shares if share is not None)
+        assert total == pytest.approx(record["error_force_last"], abs=1e-12)  # a sum of five
+
+
+def test_failed_levels_have_rows_and_no_errors(found):
+    failed = [row for row in found.rows if row.status == "failed"]
+    assert len(failed) > 10
+    for row in failed:
+        assert (row.exit_code, row.message) == (-9, "killed")
+        assert np.isnan([row.seconds, row.errors.force_max]).all()
+
+
+def test_other_measure_can_be_forced():
+    forced = compare(Scene.load(PAPER, TINY), against="half-space", launch=launched)
+    assert forced.measure == "analytic, half-space 64 × 64"
+    assert forced.warnings == ()
+
+
+def test_measure_that_is_not_reached_is_told():
+    missed = compare(Scene.load(PAPER, TINY), against="reference", launch=launched)
+    assert missed.against == "concurrent"
+    assert missed.warnings == (
+        "no level of kind reference was reached: compared against the concurrent instead",
+    )
+
+
+def test_busy_machine_is_told():
+    def slow(level, seconds):
+        return replace(launched(level, seconds), cpu_s=0.0)
+
+    (warning,) = compare(Scene.load(PAPER, TINY), launch=slow).warnings
+    assert "the machine was busy with something else" in warning
+
+
+def test_nothing_reached_is_no_comparison():
+    def never(level, seconds):
+        return LevelResult(key=level.key, status="failed")
+
+    empty = compare(Scene.load(PAPER, TINY), launch=never)
+    assert (empty.measure, empty.frontier()) == (None, ())
+    assert len(empty.records()) == len(empty)
+
+
+def test_prescribed_force_is_measured_by_the_approach():
+    scene = Scene.load(PAPER, TINY).model_dump(by_alias=True, mode="json", exclude_none=True)
+    scene["load"] = {"force": 2.0, "steps": 2, "tilt": "free"}
+
+    def analytic(level, seconds):
+        assert level.scene.loading.tilt == "free"
+        if level.name.startswith("analytic, half-space"):
+            return level_result(level.scene, None, key=level.key, slopes=level.slopes)
+        return LevelResult(key=level.key, status="not started")
+
+    by_force = compare(Scene.from_dict(scene), launch=analytic)
+    coarse = by_force["analytic, half-space 32 × 32"]
+    right, mine = by_force[by_force.measure], coarse.approach_mm
+    assert by_force.response == "approach"
+    assert coarse.errors.force_max < 1e-6  # what the balance of the force leaves
+    expected = mine / right.approach_mm - 1.0
+    assert coarse.errors.approach_last == pytest.approx(expected, rel=1e-9)  # a difference
+    assert coarse.causes.discretisation == pytest.approx(expected, rel=1e-9)
+
+
+def test_slopes_are_measured_by_a_reference_with_small_ones():
+    forces = {"reference, 2": 2.0, "reference, 1": 2.1, "concurrent": 2.3}
+
+    def pressed(level, seconds):
+        known = [force for start, force in forces.items() if level.name.startswith(start)]
+        if not known:
+            return LevelResult(key=level.key, status="not started")
+        force = np.array([known[0], 2.0 * known[0]])
+        if level.scale != 1.0:
+            force = 1.05 * level.scale * force  # stiffer by 5 % where slopes are small
+        nan = np.full(2, np.nan)
+        errors = {"force_error": 0.01 * force, "approach_error": nan, "area_error": nan}
+        curves = Curves(
+            patches=PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)), force=force, area=force,
+            approach=force, separation=force, patch_pressure=force[:, None], **errors,
+        )  # fmt: skip
+        return LevelResult(key=level.key, status="done", curves=curves, seconds={"laws": 1.0})
+
+    by_reference = compare(Scene.load(PAPER, TINY), launch=pressed)
+    assert by_reference.measure.startswith("reference, 2 meshes")
+    (small,) = [row for row in by_reference.rows if row.name.endswith("heights × 0.1")]
+    assert small.force_N == pytest.approx(1.05 * 4.2, rel=1e-12)  # as if heights were the scene's
+    (concurrent, *_) = [row for row in by_reference.rows if row.kind == "concurrent"]
+    lost = 1.0 - 1.0 / 1.05
+    assert concurrent.causes.slopes == pytest.approx(lost * 4.6 / 4.0, rel=1e-12)
+    assert small.causes.slopes is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ({"against": "experiment"}, r"'experiment': is nothing to compare against \(allowed: ref"),
+        ({"budget_s": 0.0}, "is no budget"),
+        ({"comm": type("Comm", (), {"size": 2})()}, "not possible inside an MPI job"),
+    ],
+)
+def test_wrong_arguments(arguments, text):
+    with pytest.raises(InputError, match=text):
+        compare(Scene.load(PAPER, TINY), launch=launched, **arguments)
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds"), [("5min", 300.0), ("90 s", 90.0), ("0.5 h", 1800.0), ("1e3 ms", 1.0)]
+)
+def test_budget(text, seconds):
+    assert budget_seconds(text) == pytest.approx(seconds, rel=1e-12)  # a change of unit
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        (
+            "5",
+            r"--budget = '5': has no unit \(allowed: a quantity in units of s, such as \"5 min\"",
+        ),
+        ("5 mm", "has the wrong unit"),
+        ("soon", "cannot be read as a quantity"),
+        ("-1 s", r"is no budget \(allowed: more than 0 s\)"),
+    ],
+)
+def test_no_budget(text, problem):
+    with pytest.raises(InputError, match=problem):
+        budget_seconds(text)
+
+
+def call(capsys, *words):
+    code = main(["compare", str(PAPER), *words, "--set", *TINY])
+    shown = capsys.readouterr()
+    return code, shown.out, shown.err
+
+
+def test_command_writes_table_figures_and_report(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr("multiscale.level_runs.launch_process", launched)
+    code, shown, err = call(capsys, "--out", str(tmp_path))
+    assert (code, err) == (0, "")
+    assert "They are compared with “concurrent, half-space 64 × 64" in shown
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {
+        "compare.csv", "pareto.png", "curves.png", "pressures.png", "report.html", "levels",
+    }  # fmt: skip
+    with (tmp_path / "compare.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    measure = [row for row in rows if row["is_measure"] == "True"]
+    assert [row["kind"] for row in measure] == ["concurrent"]
+    assert float(rows[0]["error_force_max"]) > 0.0
+    report = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert report.count("data:image/png;base64,") == 3
+    assert "://" not in report  # it needs no network
+    assert "Levels without a result" in report
+
+    def none_again(level, seconds):
+        assert not level.is_own and not level.name.startswith(PICKED)
+        return launched(level, seconds)
+
+    monkeypatch.setattr("multiscale.level_runs.launch_process", none_again)
+    code, shown, _ = call(capsys, "--out", str(tmp_path))
+    assert code == 0
+    assert f"{OWN_NAME}: done, kept" in shown
+
+
+def test_command_tells_when_the_measure_was_not_reached(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr("multiscale.level_runs.launch_process", launched)
+    code, shown, err = call(capsys, "--out", str(tmp_path), "--against", "reference")
+    assert code == 3
+    assert "the comparison against reference did not converge: LEVEL_NOT_REACHED" in err
+    assert "compared against the concurrent instead" in shown
+    assert (tmp_path / "report.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["--against", "truth"], "--against = 'truth': is nothing to compare against (allowed: re"),
+        (["--budget", "soon"], "--budget = 'soon': cannot be read as a quantity"),
+        (["--ranks", "0"], "--ranks = 0: is no number of processes"),
+    ],
+)
+def test_command_refuses_before_anything_is_run(capsys, tmp_path, words, text):
+    code, _, err = call(capsys, "--out", str(tmp_path / "out"), *words)
+    assert code == 2
+    assert text in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_history_gives_records():
+    scene = Scene.load(PAPER, [*TINY, "coupling.kind=analytic", "micro.model=islands"])
+    history = run(scene)
+    records, patches = history.records(), history.patch_records()
+    assert [record["force_N"] for record in records] == list(history.force_N)
+    assert [record["pressure_MPa"] for record in patches] == list(
+        history.patch_pressure_MPa.ravel()
+    )
+    assert set(patches[0]) == {
+        "step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area_fraction",
+    }  # fmt: skip

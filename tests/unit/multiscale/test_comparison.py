@@ -1,0 +1,85 @@
+"""The frontier against brute force, and the comparison as plain records."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.errors import InputError
+from geometry.patches import PatchGrid
+from multiscale.comparison import Comparison, Row
+from multiscale.measures import Measures
+
+PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
+
+
+def row(name, seconds, error, status="done"):
+    return Row(
+        name=name, kind="analytic", model="elliptic", heights="8x8", patches="2x2", cells="",
+        status=status, seconds=seconds, errors=Measures(force_max=error, approach_max=2 * error),
+    )  # fmt: skip
+
+
+def comparison(rows, bar=float("nan"), quantity="approach"):
+    return Comparison(
+        scene="some", rows=tuple(rows), quantity=quantity, steps=2, grid=PATCHES, measure="best",
+        uncertainty=Measures(force_max=bar),
+    )  # fmt: skip
+
+
+def beaten(one, other, bar):
+    """Tell whether another level is at least as good in both, and better in one."""
+    mine = one.seconds, max(one.errors.force_max, bar)
+    theirs = other.seconds, max(other.errors.force_max, bar)
+    return theirs != mine and theirs[0] <= mine[0] and theirs[1] <= mine[1]
+
+
+@pytest.mark.parametrize("bar", [0.0, 3.0])
+@pytest.mark.parametrize("seed", range(20))
+def test_frontier_is_that_of_brute_force(seed, bar):
+    rng = np.random.default_rng(seed)
+    # few different values: many ties in time, in error and in both
+    values = rng.integers(1, 8, size=(25, 2)).astype(float)
+    rows = [row(str(number), *value) for number, value in enumerate(values)]
+    oracle = {one.name for one in rows if not any(beaten(one, other, bar) for other in rows)}
+    found = comparison(rows, bar).frontier()
+    assert {one.name for one in found} == oracle
+    assert [one.seconds for one in found] == sorted(one.seconds for one in found)
+
+
+def test_frontier_leaves_out_what_did_not_end_or_is_unknown():
+    rows = [
+        row("stopped", 1.0, 0.01, "not converged"),
+        row("unmeasured", 1.0, float("nan")),
+        row("untimed", float("nan"), 0.01),
+        row("slow", 3.0, 0.1),
+    ]
+    assert [one.name for one in comparison(rows).frontier()] == ["slow"]
+
+
+def test_response_is_what_the_load_does_not_prescribe():
+    rows = [row("one", 1.0, 0.1)]
+    assert comparison(rows).error(rows[0]) == 0.1
+    assert comparison(rows, quantity="force").error(rows[0]) == 0.2
+
+
+def test_unknown_measure_is_refused():
+    with pytest.raises(InputError, match=r"'speed': is no error measure \(allowed: force_max"):
+        comparison([row("one", 1.0, 0.1)]).frontier("speed")
+
+
+def test_records_are_plain():
+    found = comparison([row("one", 1.0, 0.1), replace(row("two", 2.0, 0.2), exit_code=3)])
+    records = found.records()
+    assert records[0]["error_force_max"] == 0.1
+    assert records[0]["error_area_max"] is None
+    assert records[0]["share_block"] is None
+    assert {type(value) for record in records for value in record.values()} <= {
+        str, float, int, bool, type(None),
+    }  # fmt: skip
+    columns = found.to_dict()
+    assert columns["exit_code"] == [None, 3]
+    assert list(columns) == list(records[0])
+    assert found["two"].seconds == 2.0
+    with pytest.raises(KeyError, match="three"):
+        found["three"]

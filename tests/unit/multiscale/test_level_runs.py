@@ -1,0 +1,192 @@
+"""Levels one after another: budget, interruption, what is kept, and processes of their own."""
+
+import os
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from geometry.errors import InputError, NotConverged
+from multiscale import level_process, level_runs
+from multiscale.level_results import LevelResult, read_result, write_result
+from multiscale.level_runs import check_launchable, launch_process, run_levels
+from multiscale.levels import levels
+from multiscale.run import Run, run
+from multiscale.scene import Scene
+
+PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
+TINY = ["surface.grid=[32, 32]", "load.steps=2", "patches.grid=[2, 2]"]
+
+
+@pytest.fixture(scope="module")
+def some():
+    """Three levels by summits."""
+    found = levels(Scene.load(PAPER, TINY))
+    return [level for level in found if level.kind == "analytic"][:3]
+
+
+def named(levels_, name):
+    return next(level for level in levels_ if level.name.startswith(name))
+
+
+class Fake:
+    """Stands for launching: counts, takes time on its own clock, and ends as it is told."""
+
+    def __init__(self, seconds=1.0, ends=None):
+        self.now, self.seconds, self.ends, self.run = 0.0, seconds, ends or {}, []
+
+    def __call__(self, level, seconds):
+        self.run.append(level.name)
+        end = self.ends.get(level.name, "done")
+        if end is KeyboardInterrupt:
+            raise KeyboardInterrupt
+        if seconds is not None and self.seconds > seconds:
+            self.now += seconds
+            return LevelResult(key=level.key, status="over budget")
+        self.now += self.seconds
+        return LevelResult(key=level.key, status=end, seconds={"load steps": self.seconds})
+
+    def clock(self):
+        return self.now
+
+    def all(self, levels_, folder, budget=None):
+        found = run_levels(levels_, folder=folder, budget_s=budget, launch=self, clock=self.clock)
+        return [(level.name, result.status, kept) for level, result, kept in found]
+
+
+def test_budget_ends_one_level_and_starts_no_more(some, tmp_path):
+    fake = Fake(seconds=2.0)
+    found = fake.all(some, tmp_path, budget=3.0)
+    assert [status for _, status, _ in found] == ["done", "over budget", "not started"]
+    assert fake.run == [level.name for level in some[:2]]
+    # with another budget only what has no result is run
+    again = Fake(seconds=2.0)
+    assert [end[1:] for end in again.all(some, tmp_path, budget=5.0)] == [
+        ("done", True), ("done", False), ("done", False),
+    ]  # fmt: skip
+    assert again.run == [level.name for level in some[1:]]
+
+
+def test_interrupted_runs_go_on_where_they_were(some, tmp_path):
+    fake = Fake(ends={some[1].name: KeyboardInterrupt})
+    with pytest.raises(KeyboardInterrupt):
+        fake.all(some, tmp_path)
+    again = Fake()
+    assert [kept for *_, kept in again.all(some, tmp_path)] == [True, False, False]
+    assert again.run == [level.name for level in some[1:]]
+
+
+def test_what_ends_alike_is_not_repeated_and_what_may_not_is(some, tmp_path):
+    statuses = ("refused", "not converged", "failed")
+    ends = {level.name: status for level, status in zip(some, statuses, strict=True)}
+    Fake(ends=ends).all(some, tmp_path)
+    again = Fake()
+    assert [end[1:] for end in again.all(some, tmp_path)] == [
+        ("refused", True), ("not converged", True), ("done", False),
+    ]  # fmt: skip
+
+
+def test_levels_of_a_changed_scene_are_run_again(some, tmp_path):
+    Fake().all(some, tmp_path)
+    other = levels(Scene.load(PAPER, [*TINY, "load.approach=7 um"]))
+    fake = Fake()
+    fake.all([named(other, some[0].name), some[1]], tmp_path)
+    assert fake.run == [some[0].name]
+
+
+def test_torn_files_are_run_again(some, tmp_path):
+    Fake().all(some, tmp_path)
+    path = tmp_path / f"{some[0].key}.json"
+    path.write_text(path.read_text(encoding="utf-8")[:-20], encoding="utf-8")
+    fake = Fake()
+    fake.all(some, tmp_path)
+    assert fake.run == [some[0].name]
+
+
+def test_result_survives_its_file(some, tmp_path):
+    level = named(some, "analytic")
+    result = level_process.level_result(level.scene, None, key=level.key, slopes=True)
+    again = read_result(write_result(tmp_path / "level.json", result))
+    assert replace(again, curves=None, start_s=0.0) == replace(result, curves=None, start_s=0.0)
+    for name in result.curves.__slots__:
+        if name == "patches":
+            assert again.curves.patches == result.curves.patches
+        else:
+            np.testing.assert_array_equal(getattr(again.curves, name), getattr(result.curves, name))
+
+
+def test_level_is_the_scene_run(some):
+    level = named(some, "analytic")
+    result = level_process.level_result(level.scene, None, key=level.key, slopes=False)
+    history = run(level.scene)
+    assert (result.status, result.exit_code, result.message) == ("done", 0, "")
+    np.testing.assert_array_equal(result.curves.force, history.force_N)
+    np.testing.assert_array_equal(result.curves.patch_pressure, history.patch_pressure_MPa)
+    assert set(result.seconds) == set(history.seconds)
+
+
+def test_level_that_stops_keeps_its_steps(some, monkeypatch):
+    whole = Run.load_steps
+
+    def stopping(self):
+        yield next(whole(self))
+        raise NotConverged("load step 2", reason="LAW_RANGE", iterations=4, remedy="take care")
+
+    monkeypatch.setattr(Run, "load_steps", stopping)
+    result = level_process.level_result(some[0].scene, None, key="some", slopes=False)
+    assert (result.status, result.exit_code, len(result.curves)) == ("not converged", 3, 1)
+    assert result.message.startswith("load step 2 did not converge: LAW_RANGE after 4 iterations")
+
+
+def test_refused_level_tells_why():
+    scene = Scene.load(PAPER, ["patches.grid=[64, 64]", "block.cells=[8, 8, 4]"])
+    result = level_process.level_result(scene, None, key="some", slopes=False)
+    assert (result.status, result.exit_code, result.curves) == ("refused", 2, None)
+    assert "more patches than cells of the interface" in result.message
+
+
+def test_process_of_its_own_gives_the_same_and_its_own_memory(some):
+    level = named(some, "analytic")
+    ballast = np.ones(40_000_000)  # 320 MB that the parent has, and the level has not
+    result = launch_process(level, 60.0)
+    assert result.status == "done", result.message
+    here = level_process.level_result(level.scene, None, key=level.key, slopes=False)
+    np.testing.assert_array_equal(result.curves.force, here.curves.force)
+    assert 20.0 < result.peak_MB < 8e-6 * ballast.size
+    assert result.start_s > 0.0
+
+
+def test_process_is_ended_when_its_time_is_over(some, monkeypatch, tmp_path):
+    pid = tmp_path / "pid"
+    code = f"import os, time; open({str(pid)!r}, 'w').write(str(os.getpid())); time.sleep(60)"
+    monkeypatch.setattr(level_runs, "_command", lambda *_: [sys.executable, "-c", code])
+    began = time.monotonic()
+    result = launch_process(some[0], 1.0)
+    assert result.status == "over budget"
+    assert "ended after 1." in result.message
+    assert time.monotonic() - began < 30.0  # it did not wait for the minute
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(pid.read_text(encoding="utf-8")), 0)
+
+
+def test_crash_is_recorded_with_its_last_words(some, monkeypatch):
+    code = "import sys; print('a line', file=sys.stderr); sys.exit('out of luck')"
+    monkeypatch.setattr(level_runs, "_command", lambda *_: [sys.executable, "-c", code])
+    result = launch_process(some[0], None)
+    assert (result.status, result.exit_code, result.message) == ("failed", 1, "out of luck")
+
+
+def test_levels_are_not_launched_from_an_mpi_job(monkeypatch):
+    monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "2")
+    with pytest.raises(InputError, match=r"not possible inside an MPI job \(OMPI_COMM_WORLD_SIZE"):
+        check_launchable(1)
+
+
+@pytest.mark.parametrize(("ranks", "text"), [(0, "is no number of"), (2, "there is no mpirun")])
+def test_ranks_that_cannot_be_launched(ranks, text, monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    with pytest.raises(InputError, match=text):
+        check_launchable(ranks)

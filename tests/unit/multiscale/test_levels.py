@@ -1,0 +1,117 @@
+"""Which levels a scene has, in which order, and what tells them apart."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from multiscale.level_grids import pressure_grid
+from multiscale.levels import levels
+from multiscale.scene import Scene
+
+PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
+
+
+def made(*overrides, ranks=1):
+    return levels(Scene.load(PAPER, overrides), ranks)
+
+
+def test_paper_has_every_kind_and_the_scene_itself():
+    found = made()
+    kinds = {level.kind for level in found}
+    assert kinds == {"analytic", "isolated", "consistent", "concurrent", "reference"}
+    models = {level.model for level in found if level.kind == "analytic"}
+    assert models >= {
+        "elliptic", "circular", "elliptic-independent", "circular-independent", "islands",
+        "half-space",
+    }  # fmt: skip
+    for kind in ("isolated", "consistent"):
+        grids = {level.content["patches"]["grid"][0] for level in found if level.kind == kind}
+        assert grids == {1, 2, 4, 8, 16}
+    (own,) = [level for level in found if level.is_own]
+    assert own.scene.coupling == Scene.load(PAPER).coupling
+    assert own.scene.block == Scene.load(PAPER).block
+
+
+def test_cheapest_come_first_and_none_twice():
+    found = made()
+    costs = [level.cost for level in found]
+    assert costs == sorted(costs)
+    assert found[0].kind == "analytic"
+    assert found[-1].kind == "reference"
+    assert len({level.key for level in found}) == len({level.name for level in found}) == len(found)
+
+
+def test_coarser_surfaces_still_carry_the_band():
+    halves = [level.heights[0] for level in made() if level.name.startswith("analytic, half-space")]
+    assert sorted(halves) == [32, 64, 128, 256]
+    waves = made("surface.spectrum.waves=[2, 30]")
+    halves = [level.heights[0] for level in waves if level.name.startswith("analytic, half-space")]
+    assert sorted(halves) == [128, 256]  # three heights per wave
+
+
+def test_heights_from_a_file_are_taken_as_they_are(tmp_path):
+    file = tmp_path / "scan.npy"
+    np.save(file, 1e-3 * np.random.default_rng(1).normal(size=(40, 20)))
+    text = (
+        "[surface]\nfile = 'scan.npy'\nlengths = [2, 1]\n[block]\nyoung_modulus = '4 GPa'\n"
+        "poisson_ratio = 0.3\n[load]\napproach = '1 um'\n"
+    )
+    (tmp_path / "scan.toml").write_text(text, encoding="utf-8")
+    scene = Scene.load(tmp_path / "scan.toml")
+    found = levels(scene)
+    assert {level.heights for level in found} == {(40, 20)}
+    assert {level.content["surface"]["file"] for level in found} == {str(file)}
+    before = {level.key for level in found}
+    np.save(file, 1e-3 * np.random.default_rng(2).normal(size=(40, 20)))
+    assert not before & {level.key for level in levels(scene)}  # other heights, other results
+
+
+def test_same_scene_same_keys_and_other_scene_other_keys():
+    keys = {level.key for level in made()}
+    assert keys == {level.key for level in made()}
+    assert not keys & {level.key for level in made("surface.spectrum.seed=2")}
+    assert keys & {level.key for level in made("patches.grid=[2, 2]")}  # what does not see patches
+
+
+def test_only_couplings_use_ranks():
+    ranks = {(level.kind == "analytic", level.ranks) for level in made(ranks=3)}
+    assert ranks == {(True, 1), (False, 3)}
+    more, one = made(ranks=3), made()
+    assert {level.key for level in more if level.ranks == 3}.isdisjoint(level.key for level in one)
+
+
+def test_all_levels_take_the_same_steps():
+    for level in made("load.force_change=0.2", "load.steps=3"):
+        assert level.scene.loading.force_change is None
+        targets = np.divide(level.scene.loading.programme.targets, level.scale)
+        assert targets == pytest.approx([8e-3 / 3, 16e-3 / 3, 8e-3])
+
+
+@pytest.mark.parametrize(
+    ("grid", "common"), [((1, 1), (4, 4)), ((3, 8), (6, 8)), ((5, 2), (5, 4)), ((4, 4), (4, 4))]
+)
+def test_pressures_are_compared_on_multiples_of_the_patches(grid, common):
+    assert pressure_grid(Scene.load(PAPER, [f"patches.grid={list(grid)}"])) == common
+
+
+def test_load_by_force_or_free_tilt_has_levels_too():
+    for overrides in (["load.tilt=free"], ["load.force=3 N"]):
+        scene = Scene.load(PAPER).model_dump(by_alias=True, mode="json", exclude_none=True)
+        if overrides == ["load.force=3 N"]:
+            scene["load"] = {"force": 3.0, "steps": 2}
+            found = levels(Scene.from_dict(scene))
+        else:
+            found = made(*overrides)
+        assert {"analytic", "concurrent", "reference"} <= {level.kind for level in found}
+
+
+def test_small_slopes_scale_heights_and_load_together():
+    found = made("load.tilt=[0.01, 0]")
+    (small,) = [level for level in found if level.scale != 1.0]
+    (steep,) = [level for level in found if f"{level.name}, heights × 0.1" == small.name]
+    assert (steep.scale, small.scale) == (1.0, 0.1)
+    assert small.scene.surface.spectrum.rms_slope == pytest.approx(0.0215, rel=1e-12)  # rounding
+    assert small.scene.loading.approach == pytest.approx((0.8e-3,), rel=1e-12)
+    assert small.scene.loading.tilt == pytest.approx((1e-3, 0.0), rel=1e-12)
+    assert small.scene.reference == steep.scene.reference
