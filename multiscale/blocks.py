@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from geometry.patches import PatchGrid
 from micro import HalfSpace, influence_matrix
 from multiscale.law_files import LawTable
-from multiscale.stage import Stage
 from multiscale.yielding import SpreadLoads, UniformLoads, Yielding
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import Correction, Interface, Material
+    from multiscale.stage import Stage
 
 Array = NDArray[np.float64]
 
@@ -131,6 +131,28 @@ def smooth_correction(stage: Stage, loads: PatchGrid, comm: Any) -> Correction:
         HalfSpace(material.young_modulus, material.poisson_ratio),
         comm or MPI.COMM_SELF,
     )
+
+
+def correction_known(stage: Stage) -> bool:
+    """Tell whether the smooth correction of a scene is on disk from an earlier run.
+
+    Args:
+        stage: The scene's ingredients.
+    """
+    from macro import correction_is_kept
+
+    return correction_is_kept(
+        stage.shape, _material(stage), stage.scene.block.sides, scene_loads(stage)
+    )
+
+
+def scene_loads(stage: Stage) -> PatchGrid:
+    """Return the rectangles that the correction of a scene's decomposed block is made for.
+
+    Args:
+        stage: The scene's ingredients.
+    """
+    return stage.patches if stage.scene.coupling.kind == "isolated" else fine_loads(stage)
 
 
 def _material(stage: Stage) -> Material:

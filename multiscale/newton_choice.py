@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from multiscale.stage import Stage
+if TYPE_CHECKING:  # which is made with what is said here
+    from multiscale.stage import Stage
+
 
 CYCLES_PER_STEP = 8
 """Multigrid cycles that a load step of the full Newton takes, starts from earlier steps included

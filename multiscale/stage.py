@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,12 +16,15 @@ from geometry.meshes import BlockShape
 from geometry.patches import PatchGrid, patch_means
 from geometry.surface import Surface
 from micro import MODELS, AsperityModel, Choice, MicroModel, ScaledModel
+from multiscale.choices import SETTLED_LATE, Decision, cheapest, open_keys, provisional
+from multiscale.contact_estimate import Contacts, contacts
 from multiscale.coupling import tilted_approaches
 from multiscale.ingredients import make_shape, make_surface
-from multiscale.micro_choice import chosen_model, furthest_plane, stated_model
+from multiscale.micro_choice import chosen_model, furthest_plane, nearest, stated_model
 from multiscale.refinement import MOST_ROWS
 from multiscale.scene import Scene
 from multiscale.stage_checks import check_patches, check_size
+from multiscale.surface_choice import chosen_surface, micro_tolerance
 
 Array = NDArray[np.float64]
 
@@ -32,7 +37,7 @@ class Stage:
     """Everything that is known before laws and finite elements are made.
 
     Attributes:
-        scene: The scene.
+        scene: The scene, what it left open settled but for ``micro.model``.
         surface: Its rough surface.
         asperities: The surface's summits.
         model: Micro model of the whole surface.
@@ -42,6 +47,8 @@ class Stage:
         furthest: Largest approach at the middle of the interface [mm] and the plane's slopes
             there; where force or moment are prescribed, those of the surface on a half-space.
         choice: Why this micro model, where the scene leaves it open.
+        decision: Why this coupling, these patches and cells, where the scene leaves them open.
+        seconds: Wall time of making the surface and of choosing the micro model [s].
     """
 
     scene: Scene
@@ -53,6 +60,8 @@ class Stage:
     shape: BlockShape
     furthest: tuple[float, tuple[float, float]]
     choice: Choice | None = None
+    decision: Decision | None = None
+    seconds: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def embedded(self) -> bool:
@@ -89,6 +98,16 @@ class Stage:
     def table_rows(self) -> int:
         """Rows that laws may take to get there; models that see cells pay for each."""
         return 400 if self.by_summits else MOST_ROWS
+
+    @property
+    def nearest(self) -> float:
+        """How near the plane at the largest load comes anywhere [mm]."""
+        return nearest(self.furthest, self.surface)
+
+    @cached_property
+    def contacts(self) -> Contacts:
+        """What is known of the contacts before; solves a half-space of few cells once."""
+        return contacts(self.surface, self.model.contact_modulus, self.furthest)
 
     @cached_property
     def deepest(self) -> float:
@@ -174,16 +193,49 @@ class Stage:
 
 
 def make_stage(scene: Scene) -> Stage:
-    """Make or read the surface, find its summits and check that everything fits together.
+    """Make or read the surface, find its summits, settle what is open, check that all fits.
 
     Raises:
         InputError: When something cannot be made or does not fit; names file, key and value.
     """
-    check_size(scene)
-    surface = make_surface(scene)
-    patches = PatchGrid(grid=scene.patches.grid, lengths=surface.lengths)
-    check_patches(scene, surface)
+    began = time.perf_counter()
+    free = open_keys(scene)
+    start = provisional(scene, free)
+    check_size(start)
+    surface = make_surface(start) if "surface.grid" not in free else chosen_surface(start)
+    check_patches(start, surface)
+    patches = PatchGrid(grid=start.patches.grid, lengths=surface.lengths)
     asperities = find_asperities(surface, periodic=False)  # the block's sides are free
+    _check_summits(start, asperities)
+    shape = make_shape(start, surface)
+    made = time.perf_counter()
+    choice = None
+    if start.micro.model == "auto":
+        choice = chosen_model(start, surface, patches, micro_tolerance(scene, start, surface))
+    model = choice.model if choice else stated_model(start, surface)
+    chosen = time.perf_counter()
+    mean_heights = patch_means(surface, patches)
+    stage = Stage(
+        scene=start,
+        surface=surface,
+        asperities=asperities,
+        model=model,
+        patches=patches,
+        mean_heights=mean_heights,
+        shape=shape,
+        furthest=furthest_plane(start.loading.programme, model, patches, mean_heights),
+        choice=choice,
+    )
+    if free & SETTLED_LATE:
+        stage = cheapest(stage, scene, free)
+    spent = time.perf_counter() - chosen
+    seconds = {"surface": made - began + spent}
+    if choice is not None:
+        seconds["micro choice"] = chosen - made
+    return replace(stage, seconds=seconds)
+
+
+def _check_summits(scene: Scene, asperities: Asperities) -> None:
     by_summits = scene.micro.model in MODELS and scene.micro.border == "ignore"
     if by_summits and not len(asperities):
         raise InputError(
@@ -193,18 +245,3 @@ def make_stage(scene: Scene) -> Stage:
             allowed="half-space, islands",
             file=scene.file,
         )
-    shape = make_shape(scene, surface)
-    choice = chosen_model(scene, surface, patches) if scene.micro.model == "auto" else None
-    model = choice.model if choice else stated_model(scene, surface)
-    mean_heights = patch_means(surface, patches)
-    return Stage(
-        scene=scene,
-        surface=surface,
-        asperities=asperities,
-        model=model,
-        patches=patches,
-        mean_heights=mean_heights,
-        shape=shape,
-        furthest=furthest_plane(scene.loading.programme, model, patches, mean_heights),
-        choice=choice,
-    )

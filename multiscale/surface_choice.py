@@ -1,0 +1,85 @@
+"""Chooses the grid of a synthesised surface, and how much error its micro model may have."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from geometry.surface import Surface
+from micro import MODELS
+from micro.auto_errors import grid_error
+from micro.auto_measures import contact_measures
+from multiscale.choices import SMOOTH_CELLS, accuracy_of, open_keys
+from multiscale.expected_errors import block_error, coupling_error
+from multiscale.ingredients import make_surface
+from multiscale.micro_choice import estimated_contacts, estimated_plane, nearest
+from multiscale.scene import Scene
+from multiscale.stage_checks import block_cells
+
+CELLS_PER_WAVE = (8, 12, 16, 24, 32, 48, 64)
+"""Heights along the shortest wavelength that are tried."""
+
+_FOR_SUMMITS = 16  # heights per wavelength that show the curvature of summits
+_LEAST, _MOST = 32, 2048  # heights along a side
+_LEAST_SHARE = 0.3  # of the accuracy, that is left to the micro model in any case
+_SPARE = 0.9  # of the tolerance, that a grid is chosen for
+
+
+def chosen_surface(scene: Scene) -> Surface:
+    """Return the surface on the coarsest grid whose half-space model is expected to do.
+
+    Args:
+        scene: A scene with a spectrum, whose grid is open and whose other keys have values.
+    """
+    if scene.micro.model in MODELS:
+        return make_surface(_on(scene, _FOR_SUMMITS))
+    surface = make_surface(_on(scene, CELLS_PER_WAVE[0]))
+    tolerance = _SPARE * micro_tolerance(scene, scene, surface)
+    plane = nearest(estimated_plane(scene, surface), surface)
+    loads = [contact_measures(surface, part * plane, periodic=False) for part in (0.5, 1.0)]
+    grid = surface.grid
+    for cells in CELLS_PER_WAVE:
+        finer = _on(scene, cells)
+        grid = finer.surface.grid  # type: ignore[assignment]
+        factor = float(np.min(np.divide(grid, surface.grid)))
+        if max(grid_error(at, factor) for at in loads) <= tolerance:
+            break
+    return surface if grid == surface.grid else make_surface(finer)
+
+
+def micro_tolerance(given: Scene, scene: Scene, surface: Surface) -> float:
+    """Return the error that the micro model may have, after what coupling and block leave.
+
+    Args:
+        given: The scene as it was given.
+        scene: The scene with values for its open keys.
+        surface: The surface, or one on another grid.
+    """
+    accuracy = accuracy_of(given)
+    if scene.micro.tolerance is not None:
+        return scene.micro.tolerance
+    alone = given.accuracy is None and open_keys(given) <= {"micro.model"}
+    if alone or scene.coupling.kind == "analytic":
+        return accuracy
+    at = estimated_contacts(scene, surface)
+    cells = block_cells(scene)
+    if "block.cells" in open_keys(given) and scene.coupling.decomposed:
+        cells = SMOOTH_CELLS[-1]
+    rest = block_error(scene, cells, scene.patches.grid, at)
+    rest += coupling_error(scene, scene.patches.grid, max(surface.lengths), at)
+    return max(accuracy - rest, _LEAST_SHARE * accuracy)
+
+
+def _on(scene: Scene, cells: int) -> Scene:
+    """Return the scene on a grid with so many heights along the shortest wavelength."""
+    section = scene.surface
+    if section.spectrum is None or section.lengths is None:  # refused when the scene was read
+        return scene
+    spectrum, (length_x, length_y) = section.spectrum, section.lengths
+    if spectrum.waves is not None:
+        waves = (spectrum.waves[1], spectrum.waves[1] * length_y / length_x)
+    else:
+        waves = tuple(band[1] if band else 1.0 for band in (spectrum.waves_x, spectrum.waves_y))
+    grid = tuple(min(max(8 * math.ceil(cells * k / 8), _LEAST), _MOST) for k in waves)
+    return scene.model_copy(update={"surface": section.model_copy(update={"grid": grid})})
