@@ -17,7 +17,13 @@ from multiscale.ingredients import make_shape
 from multiscale.machine import this_machine
 from multiscale.scene import Scene
 from multiscale.sections import CouplingSection
-from multiscale.stage_checks import EMBEDDED_CELLS, check_patches, check_size
+from multiscale.stage_checks import (
+    EMBEDDED_CELLS,
+    PROVISIONAL_PATCHES,
+    check_patches,
+    check_size,
+    patch_grid,
+)
 
 if TYPE_CHECKING:  # which is made with what is chosen here
     from multiscale.stage import Stage
@@ -37,7 +43,6 @@ MESH_CELLS = ((24, 24, 15), EMBEDDED_CELLS, (64, 64, 32))
 SETTLED_LATE = frozenset({"coupling.kind", "patches.grid", "block.cells"})
 """Keys that are settled when surface and micro model are known."""
 
-_PROVISIONAL = (4, 4)  # patches
 _TOLD = 3  # alternatives that the sentence names
 
 
@@ -65,6 +70,11 @@ class Alternative:
         text = f"{self.kind}, {self.patches[0]} × {self.patches[1]} patches"
         return text + (f", block of {' × '.join(map(str, self.cells))} cells" if self.cells else "")
 
+    @property
+    def price(self) -> str:
+        """Expected error and predicted time in words."""
+        return f"{100 * self.error:.2g} % in {self.seconds:.2g} s"
+
 
 @dataclass(frozen=True, kw_only=True)
 class Decision:
@@ -89,12 +99,12 @@ class Decision:
     def sentence(self) -> str:
         """What was taken, why, and what others would have cost."""
         taken, others = self.taken, [a for a in self.alternatives if a is not self.taken]
-        why = f"the cheapest that promises an accuracy of {self.accuracy:.2%}"
+        asked = f"an accuracy of {100 * self.accuracy:.3g} %"
+        why = f"the cheapest that promises {asked}"
         if not self.promised:
-            why = f"the least expected error, for none promises an accuracy of {self.accuracy:.2%}"
-        told = [f"{a.label}: {a.seconds:.2g} s and {a.error:.1%}" for a in _telling(taken, others)]
-        text = f"{taken.label}: {why}; expected error {taken.error:.1%}, {taken.seconds:.2g} s"
-        return "; instead, ".join([text, "; ".join(told)]) if told else text
+            why = f"the least expected error, for none promises {asked}"
+        told = "; ".join(f"{each.label}: {each.price}" for each in _telling(taken, others))
+        return f"{taken.label}: {why}, {taken.price}" + (f"; instead, {told}" if told else "")
 
 
 def decided(found: list[Alternative], accuracy: float) -> Decision:
@@ -164,7 +174,7 @@ def provisional(scene: Scene, free: frozenset[str]) -> Scene:
     if "block.cells" in free:
         changes["block"] = scene.block.model_copy(update={"cells": None})
     if "patches.grid" in free:
-        changes["patches"] = scene.patches.model_copy(update={"grid": _PROVISIONAL})
+        changes["patches"] = scene.patches.model_copy(update={"grid": PROVISIONAL_PATCHES})
     return _changed(scene, changes)
 
 
@@ -207,7 +217,7 @@ def _with(stage: Stage, scene: Scene) -> Stage:
     """Return a stage of the same surface and micro model for another scene."""
     check_size(scene)
     check_patches(scene, stage.surface)
-    patches = PatchGrid(grid=scene.patches.grid, lengths=stage.surface.lengths)
+    patches = PatchGrid(grid=patch_grid(scene), lengths=stage.surface.lengths)
     shape = make_shape(scene, stage.surface)
     means = patch_means(stage.surface, patches)
     return replace(stage, scene=scene, patches=patches, mean_heights=means, shape=shape)

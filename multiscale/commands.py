@@ -12,12 +12,13 @@ from geometry.collective import on_root
 from geometry.errors import InputError, NotConverged
 from geometry.statistics import roughness
 from multiscale import plan, terminal
+from multiscale.forecast import Forecast, forecast
 from multiscale.law_files import write_laws
 from multiscale.outputs import write_whole
 from multiscale.results import write_fields, write_figure, write_results
 from multiscale.run import Run
 from multiscale.scene import Scene
-from multiscale.stage import make_stage
+from multiscale.stage import Stage, make_stage
 
 
 def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -30,7 +31,7 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
     """
     scene, folder = _scene_and_folder(choice, comm)
     run = Run(scene, comm)
-    terminal.show_plan(comm, run.stage)
+    terminal.show_plan(comm, run.stage, run.forecast)
     failure = None
     with terminal.progress(comm, scene.loading.programme) as advance:
         try:
@@ -39,10 +40,11 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
         except NotConverged as error:  # on all ranks; what was accepted before it is kept
             failure = error
     if run.steps:
-        terminal.show_history(comm, run.history())
         files = on_root(comm, lambda: write_results(folder, run, options=options))
+        terminal.show_history(comm, run.history())
         if scene.output.fields:
             files += write_fields(folder, run)
+        terminal.show_comparison(comm, run.forecast, run.seconds)
         terminal.show_files(comm, files)
     if failure is not None:
         raise failure
@@ -57,7 +59,13 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
         comm: MPI communicator; None for a process on its own.
     """
     scene, _ = _scene_and_folder(choice, comm)
-    terminal.show_plan(comm, on_root(comm, lambda: make_stage(scene)))
+    stage, made = on_root(comm, lambda: _planned(scene))
+    terminal.show_plan(comm, stage, made)
+
+
+def _planned(scene: Scene) -> tuple[Stage, Forecast]:
+    stage = make_stage(scene)
+    return stage, forecast(stage)
 
 
 def tabulate_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -70,7 +78,7 @@ def tabulate_scene(choice: argparse.Namespace, options: list[str], comm: Any) ->
     """
     scene, folder = _scene_and_folder(choice, comm)
     run = Run(scene, comm)
-    terminal.show_plan(comm, run.stage)
+    terminal.show_plan(comm, run.stage, run.forecast)
     table = run.make_laws()
 
     def write() -> list[Path]:
@@ -96,7 +104,7 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
     stage = on_root(comm, lambda: make_stage(scene))
     rough = roughness(stage.surface)
     pairs = [
-        ("surface", dict(plan.statements(stage))["surface"]),
+        ("surface", plan.surface_statement(stage)),
         ("Sa, Sq, Sz", f"{1e3 * rough.sa:.4g}, {1e3 * rough.sq:.4g}, {1e3 * rough.sz:.4g} µm"),
         ("Ssk, Sku, Sdq", f"{rough.ssk:.4g}, {rough.sku:.4g}, {rough.sdq:.4g}"),
         ("m0, m2, m4", f"{rough.m0:.4g} mm², {rough.m2:.4g}, {rough.m4:.4g} 1/mm² (profile)"),

@@ -115,10 +115,10 @@ def _block(stage: Stage) -> Work:
         return Work(call=1_000)
     coupling = stage.scene.coupling
     if coupling.decomposed:
-        work = import_work() + Work(call=160_000)  # and the sag by every rectangle
-        if correction_known(stage):
-            return work
-        return work + smooth_work(stage.shape, scene_loads(stage).grid)
+        ready = Work(call=160_000)  # the sag by every rectangle
+        if correction_known(stage):  # this loads the finite elements
+            return ready
+        return ready + smooth_work(stage.shape, scene_loads(stage).grid)
     work = import_work() + mesh_work(stage.shape)
     if newton_choice(stage).condensed:
         work += cycle_work(stage.shape, CYCLES_PER_PATCH * stage.patches.count)
@@ -126,11 +126,11 @@ def _block(stage: Stage) -> Work:
 
 
 def _load_steps(stage: Stage) -> Work:
-    steps = step_count(stage)
+    steps = step_count(stage.scene.loading.programme)
     if not stage.embedded:
         return steps * press_work(stage, sagging=False)
     if not stage.by_laws:
-        return presses(stage) * press_work(stage, sagging=True)
+        return presses(stage.scene.loading.programme) * press_work(stage, sagging=True)
     if _on_mesh(stage):
         return cycle_work(stage.shape, CYCLES_PER_STEP * steps)
     patches = stage.patches.count
@@ -143,7 +143,7 @@ def _memory(stage: Stage) -> float:
     model, shape = stage.model, stage.shape
     cells = float(np.prod(model.surface.grid)) if isinstance(model, HalfSpaceModel) else 0.0
     micro = _BYTES_PER_CELL * cells + _BYTES_PER_HEIGHT * stage.surface.heights.size
-    patches, steps = stage.patches.count, step_count(stage)
+    patches, steps = stage.patches.count, step_count(stage.scene.loading.programme)
     kept = 8.0 * (10.0 * patches**2 + 3.0 * steps * patches)
     block = 0.0
     if stage.embedded:
@@ -153,10 +153,10 @@ def _memory(stage: Stage) -> float:
         elif not correction_known(stage):
             block += smooth_bytes(shape, scene_loads(stage).grid)
     drawn = stage.scene.output.figures and "matplotlib" not in sys.modules
-    return _in_use() + max(micro, block) + kept + _PICTURES * drawn
+    return peak_memory() + max(micro, block) + kept + _PICTURES * drawn
 
 
-def _in_use() -> float:
+def peak_memory() -> float:
     """Return the largest memory of this process so far [B]."""
     unit = 1 if sys.platform == "darwin" else 1024
     return float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit)

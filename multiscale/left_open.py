@@ -27,7 +27,9 @@ class OrAuto:
     ) -> CoreSchema:
         """Return a schema that asks the type's own only for other values."""
         return core_schema.no_info_wrap_validator_function(
-            _checked, handler.generate_schema(self.values)
+            _checked,
+            handler.generate_schema(self.values),
+            serialization=core_schema.plain_serializer_function_ser_schema(_unchanged),
         )
 
     def __get_pydantic_json_schema__(
@@ -39,3 +41,7 @@ class OrAuto:
 
 def _checked(value: Any, check: core_schema.ValidatorFunctionWrapHandler) -> Any:
     return value if isinstance(value, str) and value == "auto" else check(value)
+
+
+def _unchanged(value: Any) -> Any:
+    return value

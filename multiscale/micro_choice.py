@@ -17,7 +17,11 @@ from micro import (
 from multiscale.contact_estimate import Contacts, contacts, rough_half_space
 from multiscale.coupling import AnalyticCoupling
 from multiscale.loading import Programme
+from multiscale.machine import this_machine
+from multiscale.press_work import kind_work, presses, reach
 from multiscale.scene import Scene
+
+_FEW_SUMMITS = 30  # that interact, for the cost of models that may be taken
 
 SOLUTIONS_OF_LAWS = 40
 """Approaches that a table of laws takes, roughly."""
@@ -46,15 +50,24 @@ def chosen_model(scene: Scene, surface: Surface, patches: PatchGrid, tolerance: 
         patches: Its patches.
         tolerance: Relative error of the force.
     """
-    programme = scene.loading.programme
-    laws = scene.coupling.kind in ("isolated", "consistent")
+    kind, plane = scene.coupling.kind, estimated_plane(scene, surface)
+    at = reach(surface, plane, summits=_FEW_SUMMITS)
+    by_laws = kind in ("isolated", "consistent")
+    solutions = SOLUTIONS_OF_LAWS if by_laws else len(scene.loading.programme.targets)
+    count = solutions if kind != "concurrent" else presses(scene.loading.programme)
+
+    def cost(model: str, cells: int) -> float:
+        work = kind_work(model, cells, at, sagging=kind in ("consistent", "concurrent"))
+        return count * work.seconds(this_machine())
+
     return choose(
         surface,
         contact_modulus=_modulus(scene),
-        approach=nearest(estimated_plane(scene, surface), surface),
+        approach=nearest(plane, surface),
         tolerance=tolerance,
         patches=patches if scene.coupling.kind != "analytic" else None,
-        solutions=SOLUTIONS_OF_LAWS if laws else len(programme.targets),
+        solutions=solutions,
+        cost=cost,
     )
 
 

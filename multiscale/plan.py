@@ -6,13 +6,19 @@ from collections.abc import Iterator
 
 from geometry.statistics import roughness
 from multiscale.block_plan import block_statement, block_warnings
+from multiscale.forecast import Forecast, forecast_statements
 from multiscale.newton_choice import newton_choice
 from multiscale.stage import Stage
 
 
-def statements(stage: Stage) -> Iterator[tuple[str, str]]:
-    """Yield pairs of topic and sentence that say what will be done and why."""
-    yield "surface", _surface(stage)
+def statements(stage: Stage, made: Forecast | None = None) -> Iterator[tuple[str, str]]:
+    """Yield pairs of topic and sentence that say what will be done and why.
+
+    Args:
+        stage: The scene's ingredients.
+        made: What is predicted; None leaves it out.
+    """
+    yield "surface", surface_statement(stage)
     yield "contact", _contact(stage)
     yield "micro model", _model(stage)
     yield "coupling", _coupling(stage)
@@ -21,15 +27,27 @@ def statements(stage: Stage) -> Iterator[tuple[str, str]]:
     if stage.by_laws:
         yield "newton", _newton(stage)
     yield "load", _load(stage)
+    if stage.decision is not None:
+        yield "choice", stage.decision.sentence
+    if made is not None:
+        yield from forecast_statements(made)
 
 
-def warnings(stage: Stage) -> Iterator[str]:
-    """Yield what a user should know about the validity of the scene."""
+def warnings(stage: Stage, made: Forecast | None = None) -> Iterator[str]:
+    """Yield what a user should know about the validity of the scene.
+
+    Args:
+        stage: The scene's ingredients.
+        made: What is predicted; None leaves it out.
+    """
     yield from _surface_warnings(stage)
     if stage.by_laws:
         yield from _patch_warnings(stage)
     if stage.embedded:
         yield from block_warnings(stage)
+    missed = None if made is None else made.broken_promise
+    if missed:
+        yield missed
 
 
 def _surface_warnings(stage: Stage) -> Iterator[str]:
@@ -68,7 +86,12 @@ def _patch_warnings(stage: Stage) -> Iterator[str]:
         )
 
 
-def _surface(stage: Stage) -> str:
+def surface_statement(stage: Stage) -> str:
+    """Say what the surface is.
+
+    Args:
+        stage: The scene's ingredients.
+    """
     surface, rough = stage.surface, roughness(stage.surface)
     return (
         f"{surface.source}; {surface.grid[0]} × {surface.grid[1]} heights on "

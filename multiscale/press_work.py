@@ -7,12 +7,14 @@ that they were measured on. They hold within a factor of 1.5.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from geometry.surface import Surface
 from micro import HalfSpaceModel, ScaledModel
-from micro.islands import IslandModel
+from multiscale.loading import Programme
 from multiscale.work import Work
 
 if TYPE_CHECKING:  # which is made with what is said here
@@ -32,26 +34,64 @@ _MANY_STEPS = 24
 """Load steps beyond which each takes a press less, for it starts near."""
 
 
-def box_cells(stage: Stage, cells: tuple[int, int]) -> float:
-    """Return the cells of the box around what the plane reaches, in the mean over loads.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reach:
+    """What a plane reaches of a surface, for the work of pressing it.
 
-    That is the part of a half-space grid that is solved on.
+    Attributes:
+        heights: Heights of the surface.
+        box: Part of the surface in the box around what the plane reaches, in the mean over loads.
+        summits: Summits within the largest approach.
+    """
+
+    heights: int
+    box: float
+    summits: int
+
+
+def reach(surface: Surface, plane: tuple[float, tuple[float, float]], summits: int) -> Reach:
+    """Measure what a plane reaches; the box is the part of a grid that a half-space is solved on.
 
     Args:
-        stage: The scene's ingredients.
-        cells: Cells of the grid in x and y.
+        surface: The surface.
+        plane: Largest approach at the middle [mm] and slopes.
+        summits: Summits within it.
     """
-    surface, (end, tilt) = stage.surface, stage.furthest
+    end, tilt = plane
     dx, dy = surface.x - 0.5 * surface.lengths[0], surface.y - 0.5 * surface.lengths[1]
-    lean = tilt[0] * dx[:, None] + tilt[1] * dy
-    overlap = end + lean - (surface.highest - surface.heights)
+    overlap = end + tilt[0] * dx[:, None] + tilt[1] * dy - (surface.highest - surface.heights)
     deepest = float(overlap.max())
-    shares = []
+    boxes = []
     for load in _LOADS:
         i, j = np.nonzero(overlap > (1.0 - load) * deepest)
-        shares.append((np.ptp(i) + 1) * (np.ptp(j) + 1) if i.size else 0)
-    scale = float(np.prod(cells)) / surface.heights.size
-    return max(float(np.mean(shares)) * scale, 1.0)
+        touched = i.size and deepest > 0.0
+        boxes.append(float((np.ptp(i) + 1) * (np.ptp(j) + 1)) if touched else 1.0)
+    size = surface.heights.size
+    return Reach(heights=size, box=float(np.mean(boxes)) / size, summits=summits)
+
+
+def kind_work(kind: str, cells: int, at: Reach, *, sagging: bool) -> Work:
+    """Return the work of one press of a micro model, started from one nearby.
+
+    Args:
+        kind: Its name; ``scaled`` for asperities at the scale of the contact.
+        cells: Cells of its grid, for ``half-space``.
+        at: What the plane reaches.
+        sagging: Whether the plane sags as the block does, and forces are gathered on rectangles.
+    """
+    if kind == "half-space":
+        padded = 4.0 * max(at.box * cells, 1.0)
+        # 20 to 30 iterations of a product and a preconditioner, on a box of twice the sides
+        transforms = 75.0 * padded * np.log2(padded)
+        solved = Work(call=12_000, passes=60.0 * cells, transform=float(transforms))
+        return solved + Work(call=9_000, passes=50.0 * cells) * sagging
+    if kind == "islands":
+        around = Work(call=700_000, passes=2_000.0 * at.heights)
+        return around if sagging else Work(call=60_000, passes=80.0 * at.heights)
+    each = Work(call=4_000 + 50 * at.summits, function=40.0 * at.summits**2)
+    if kind == "scaled":
+        return Work(call=70_000) + each if sagging else Work(call=18_000) + each
+    return Work(call=12_000) + each if sagging else each
 
 
 def press_work(stage: Stage, *, sagging: bool) -> Work:
@@ -61,21 +101,12 @@ def press_work(stage: Stage, *, sagging: bool) -> Work:
         stage: The scene's ingredients.
         sagging: Whether the plane sags as the block does, and forces are gathered on rectangles.
     """
-    model, heights = stage.model, stage.surface.heights.size
+    model, cells = stage.model, 0
+    kind = "scaled" if isinstance(model, ScaledModel) else model.name
     if isinstance(model, HalfSpaceModel):
         cells = int(np.prod(model.surface.grid))
-        padded = 4.0 * box_cells(stage, model.surface.grid)
-        # 20 to 30 iterations of a product and a preconditioner, on a box of twice the sides
-        solved = Work(call=12_000, passes=60.0 * cells, transform=75.0 * padded * np.log2(padded))
-        return solved + Work(call=9_000, passes=50.0 * cells) * sagging
-    if isinstance(model, IslandModel):
-        around = Work(call=700_000, passes=2_000.0 * heights)
-        return around if sagging else Work(call=60_000, passes=80.0 * heights)
-    reached = int(stage.reached.sum())
-    each = Work(call=4_000 + 50 * reached, function=40.0 * reached**2)
-    if isinstance(model, ScaledModel):
-        return Work(call=70_000) + each if sagging else Work(call=18_000) + each
-    return Work(call=12_000) + each if sagging else each
+    at = reach(stage.surface, stage.furthest, int(stage.reached.sum()))
+    return kind_work(kind, cells, at, sagging=sagging)
 
 
 def law_work(stage: Stage) -> Work:
@@ -101,26 +132,25 @@ def law_work(stage: Stage) -> Work:
     return rows * (each + Work(call=15 * stage.patches.count))
 
 
-def step_count(stage: Stage) -> int:
+def step_count(programme: Programme) -> int:
     """Return the number of load steps, as far as it is known before.
 
     Args:
-        stage: The scene's ingredients.
+        programme: What the plane is made to do.
     """
-    programme = stage.scene.loading.programme
     steps = len(programme.targets)
     if programme.force_change is None:
         return steps
     return max(steps, int(np.ceil(len(programme.points) / programme.force_change)))
 
 
-def presses(stage: Stage) -> float:
+def presses(programme: Programme) -> float:
     """Return the presses of the concurrent coupling over all load steps.
 
     Args:
-        stage: The scene's ingredients.
+        programme: What the plane is made to do.
     """
-    programme, steps = stage.scene.loading.programme, step_count(stage)
+    steps = step_count(programme)
     how = "free" if programme.tilt is None else programme.quantity
     few = min(steps, _MANY_STEPS)
     return PRESSES[how] * few + (PRESSES[how] - 1.0) * (steps - few)

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
+from multiscale.forecast import Forecast, comparison
 from multiscale.history import History
 
 _STYLE = """
@@ -29,6 +30,7 @@ def report_html(
     warnings: Sequence[str],
     history: History,
     figures: Mapping[str, Path],
+    made: Forecast,
 ) -> str:
     """Compose the page.
 
@@ -38,6 +40,7 @@ def report_html(
         warnings: What a user should know about validity.
         history: The run.
         figures: PNG files by caption; embedded into the page.
+        made: What was predicted.
 
     Returns:
         A complete HTML document.
@@ -51,8 +54,10 @@ def report_html(
         "<h2>Force–approach curve</h2>",
         _table(*curve_cells(history)),
         *(_figure(caption, path) for caption, path in figures.items()),
-        "<h2>Where the time went</h2>",
-        _table(("phase", "s"), [(name, f"{s:.2f}") for name, s in history.seconds.items()]),
+        "<h2>What it took</h2>",
+        _table(("what", "predicted", "real"), comparison(made, history.seconds)),
+        "<h2>What the force may be off by</h2>",
+        _table(("cause", "at most"), _errors(made)),
         *(f'<p class="note">{escape(note)}</p>' for note in history.notes),
     ]
     head = f'<meta charset="utf-8"><title>{escape(title)}</title><style>{_STYLE}</style>'
@@ -82,6 +87,12 @@ def curve_cells(history: History) -> tuple[tuple[str, ...], list[tuple[str, ...]
         for step in history
     ]
     return header, rows
+
+
+def _errors(made: Forecast) -> Iterable[tuple[str, str]]:
+    yield from ((cause, f"{error:.2%}") for cause, error in made.errors.items())
+    yield "altogether", f"{made.error:.2%}"
+    yield "finite slopes, outside of it, about", f"{made.slopes:.1%}"
 
 
 def _headline(history: History) -> str:

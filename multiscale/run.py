@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from geometry.collective import on_root
 from multiscale.assemble import assemble, make_table
 from multiscale.blocks import final_field
 from multiscale.coupling import EmbeddedCoupling
+from multiscale.forecast import Forecast, forecast
 from multiscale.history import History, LoadStep
 from multiscale.law_files import LawTable
 from multiscale.loading import Coupling, load_steps
@@ -36,6 +38,7 @@ class Run:
 
     Attributes:
         stage: The scene's ingredients, made at once: surface, summits, patches, micro model.
+        scene: The scene, what it left open settled.
         seconds: Wall time of each phase so far [s].
         table: The patch laws, once made.
         interface: The interface of the block that is pressed itself, once made.
@@ -44,19 +47,19 @@ class Run:
     """
 
     def __init__(self, scene: Scene, comm: Any = None) -> None:
-        self.scene, self.comm = scene, comm
-        self.seconds: dict[str, float] = {}
+        self.comm = comm
         self.steps: list[LoadStep] = []
         self.table: LawTable | None = None
         self.interface: Interface | None = None
         self.coupling: Coupling | None = None
-        with self._phase("surface"):
-            self.stage: Stage = on_root(comm, lambda: make_stage(scene))
+        self.stage: Stage = on_root(comm, lambda: make_stage(scene))
+        self.scene = self.stage.scene
+        self.seconds = dict(self.stage.seconds)
 
     def make_laws(self) -> LawTable:
         """Tabulate the laws of all patches, once."""
         if self.table is None:
-            with self._phase("laws"):
+            with self.phase("laws"):
                 self.table = make_table(self.stage, self.comm)
         return self.table
 
@@ -67,9 +70,9 @@ class Run:
             NotConverged: When a step fails for good; `history` holds those before it.
         """
         table = self.make_laws() if self.stage.by_laws else None
-        with self._phase("block"):
+        with self.phase("block"):
             self.coupling, self.interface = assemble(self.stage, table, self.comm)
-        with self._phase("load steps"):
+        with self.phase("load steps"):
             for step in load_steps(self.coupling, self.scene.loading.programme):
                 self.steps.append(step)
                 yield step
@@ -96,6 +99,12 @@ class Run:
             notes=tuple(notes),
         )
 
+    @cached_property
+    def forecast(self) -> Forecast:
+        """What this run was predicted to take and to err by; ask for it before the load steps."""
+        with self.phase("plan"):
+            return on_root(self.comm, lambda: forecast(self.stage))
+
     @property
     def unknowns(self) -> int | None:
         """Degrees of freedom of the block that is pressed, where one is."""
@@ -108,11 +117,16 @@ class Run:
         """
         if isinstance(self.coupling, EmbeddedCoupling) and self.interface is not None:
             return self.interface, self.coupling.displacement
-        with self._phase("field"):
+        with self.phase("field"):
             return final_field(self.stage, self.steps[-1].patches.pressure_MPa, self.comm)
 
     @contextmanager
-    def _phase(self, name: str) -> Iterator[None]:
+    def phase(self, name: str) -> Iterator[None]:
+        """Take the wall time of a phase.
+
+        Args:
+            name: Its name in `seconds`.
+        """
         start = time.perf_counter()
         try:
             yield

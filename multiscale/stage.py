@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -23,7 +23,7 @@ from multiscale.ingredients import make_shape, make_surface
 from multiscale.micro_choice import chosen_model, furthest_plane, nearest, stated_model
 from multiscale.refinement import MOST_ROWS
 from multiscale.scene import Scene
-from multiscale.stage_checks import check_patches, check_size
+from multiscale.stage_checks import check_patches, check_size, patch_grid
 from multiscale.surface_choice import chosen_surface, micro_tolerance
 
 Array = NDArray[np.float64]
@@ -202,18 +202,22 @@ def make_stage(scene: Scene) -> Stage:
     free = open_keys(scene)
     start = provisional(scene, free)
     check_size(start)
-    surface = make_surface(start) if "surface.grid" not in free else chosen_surface(start)
+    if "surface.grid" in free:
+        start, surface = chosen_surface(scene, start)
+    else:
+        surface = make_surface(start)
     check_patches(start, surface)
-    patches = PatchGrid(grid=start.patches.grid, lengths=surface.lengths)
+    patches = PatchGrid(grid=patch_grid(start), lengths=surface.lengths)
     asperities = find_asperities(surface, periodic=False)  # the block's sides are free
     _check_summits(start, asperities)
     shape = make_shape(start, surface)
     made = time.perf_counter()
+    seconds = {"surface": made - began}
     choice = None
     if start.micro.model == "auto":
         choice = chosen_model(start, surface, patches, micro_tolerance(scene, start, surface))
+        seconds["micro choice"] = time.perf_counter() - made
     model = choice.model if choice else stated_model(start, surface)
-    chosen = time.perf_counter()
     mean_heights = patch_means(surface, patches)
     stage = Stage(
         scene=start,
@@ -225,14 +229,9 @@ def make_stage(scene: Scene) -> Stage:
         shape=shape,
         furthest=furthest_plane(start.loading.programme, model, patches, mean_heights),
         choice=choice,
+        seconds=seconds,
     )
-    if free & SETTLED_LATE:
-        stage = cheapest(stage, scene, free)
-    spent = time.perf_counter() - chosen
-    seconds = {"surface": made - began + spent}
-    if choice is not None:
-        seconds["micro choice"] = chosen - made
-    return replace(stage, seconds=seconds)
+    return cheapest(stage, scene, free) if free & SETTLED_LATE else stage
 
 
 def _check_summits(scene: Scene, asperities: Asperities) -> None:

@@ -32,6 +32,10 @@ DECOMPOSED_CELLS = (16, 16, 12)
 """Cells of a block that only corrects the half-space: a cube's compliance to 0.05 %."""
 
 
+PROVISIONAL_PATCHES = (4, 4)
+"""Patches of a scene that leaves them open, until they are chosen."""
+
+
 def block_cells(scene: Scene) -> tuple[int, int, int]:
     """Return the cells of the block: those asked for, or as many as its part needs.
 
@@ -42,6 +46,12 @@ def block_cells(scene: Scene) -> tuple[int, int, int]:
     if cells is None or cells == "auto":
         return DECOMPOSED_CELLS if scene.coupling.decomposed else EMBEDDED_CELLS
     return cells
+
+
+def patch_grid(scene: Scene) -> tuple[int, int]:
+    """Return the patches along x and y: those asked for, or what stands for them until chosen."""
+    grid = scene.patches.grid
+    return PROVISIONAL_PATCHES if grid == "auto" else grid
 
 
 def check_size(scene: Scene) -> None:
@@ -96,12 +106,13 @@ def check_patches(scene: Scene, surface: Surface) -> None:
     on_mesh = not scene.coupling.decomposed or scene.output.fields
     if scene.coupling.kind != "analytic" and on_mesh:
         limits.append(("cells of the interface (block.cells)", block_cells(scene)[:2]))
+    grid = patch_grid(scene)
     for what, limit in limits:
-        if any(patches > most for patches, most in zip(scene.patches.grid, limit, strict=True)):
+        if any(patches > most for patches, most in zip(grid, limit, strict=True)):
             raise InputError(
                 f"more patches than {what}",
                 key="patches.grid",
-                value=list(scene.patches.grid),
+                value=list(grid),
                 allowed=f"at most {list(limit)}",
                 file=scene.file,
             )

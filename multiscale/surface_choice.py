@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from geometry.surface import Surface
 from micro import MODELS
 from micro.auto_errors import grid_error
@@ -15,7 +13,7 @@ from multiscale.expected_errors import block_error, coupling_error
 from multiscale.ingredients import make_surface
 from multiscale.micro_choice import estimated_contacts, estimated_plane, nearest
 from multiscale.scene import Scene
-from multiscale.stage_checks import block_cells
+from multiscale.stage_checks import block_cells, patch_grid
 
 CELLS_PER_WAVE = (8, 12, 16, 24, 32, 48, 64)
 """Heights along the shortest wavelength that are tried."""
@@ -26,26 +24,27 @@ _LEAST_SHARE = 0.3  # of the accuracy, that is left to the micro model in any ca
 _SPARE = 0.9  # of the tolerance, that a grid is chosen for
 
 
-def chosen_surface(scene: Scene) -> Surface:
-    """Return the surface on the coarsest grid whose half-space model is expected to do.
+def chosen_surface(given: Scene, scene: Scene) -> tuple[Scene, Surface]:
+    """Return the coarsest grid whose half-space model is expected to do, and the surface on it.
 
     Args:
-        scene: A scene with a spectrum, whose grid is open and whose other keys have values.
+        given: The scene as it was given, with a spectrum and an open grid.
+        scene: The same with values for its other open keys.
     """
     if scene.micro.model in MODELS:
-        return make_surface(_on(scene, _FOR_SUMMITS))
-    surface = make_surface(_on(scene, CELLS_PER_WAVE[0]))
-    tolerance = _SPARE * micro_tolerance(scene, scene, surface)
-    plane = nearest(estimated_plane(scene, surface), surface)
+        scene = _on(scene, _FOR_SUMMITS)
+        return scene, make_surface(scene)
+    coarse = _on(scene, CELLS_PER_WAVE[0])
+    surface = make_surface(coarse)
+    tolerance = _SPARE * micro_tolerance(given, coarse, surface)
+    plane = nearest(estimated_plane(coarse, surface), surface)
     loads = [contact_measures(surface, part * plane, periodic=False) for part in (0.5, 1.0)]
-    grid = surface.grid
     for cells in CELLS_PER_WAVE:
-        finer = _on(scene, cells)
-        grid = finer.surface.grid  # type: ignore[assignment]
-        factor = float(np.min(np.divide(grid, surface.grid)))
+        scene = _on(scene, cells)
+        factor = cells / CELLS_PER_WAVE[0]
         if max(grid_error(at, factor) for at in loads) <= tolerance:
             break
-    return surface if grid == surface.grid else make_surface(finer)
+    return scene, make_surface(scene)
 
 
 def micro_tolerance(given: Scene, scene: Scene, surface: Surface) -> float:
@@ -66,8 +65,8 @@ def micro_tolerance(given: Scene, scene: Scene, surface: Surface) -> float:
     cells = block_cells(scene)
     if "block.cells" in open_keys(given) and scene.coupling.decomposed:
         cells = SMOOTH_CELLS[-1]
-    rest = block_error(scene, cells, scene.patches.grid, at)
-    rest += coupling_error(scene, scene.patches.grid, max(surface.lengths), at)
+    rest = block_error(scene, cells, patch_grid(scene), at)
+    rest += coupling_error(scene, patch_grid(scene), max(surface.lengths), at)
     return max(accuracy - rest, _LEAST_SHARE * accuracy)
 
 
@@ -77,9 +76,7 @@ def _on(scene: Scene, cells: int) -> Scene:
     if section.spectrum is None or section.lengths is None:  # refused when the scene was read
         return scene
     spectrum, (length_x, length_y) = section.spectrum, section.lengths
-    if spectrum.waves is not None:
-        waves = (spectrum.waves[1], spectrum.waves[1] * length_y / length_x)
-    else:
-        waves = tuple(band[1] if band else 1.0 for band in (spectrum.waves_x, spectrum.waves_y))
+    waves = [spectrum.waves[1], spectrum.waves[1] * length_y / length_x] if spectrum.waves else []
+    waves += [band[1] for band in (spectrum.waves_x, spectrum.waves_y) if band]
     grid = tuple(min(max(8 * math.ceil(cells * k / 8), _LEAST), _MOST) for k in waves)
     return scene.model_copy(update={"surface": section.model_copy(update={"grid": grid})})
