@@ -50,11 +50,11 @@ def scene(number):
         "rms_slope": float(random.uniform(0.08, 0.25)),
         "seed": number,
     }
-    load = {"approach": float(random.uniform(2e-3, 16e-3)), "steps": any_of(2, 4, 8, 8, 16, 40)}
+    load = {"approach": float(random.uniform(4e-3, 16e-3)), "steps": any_of(2, 4, 8, 8, 16, 40)}
     if number % 7 == 3:
         load = {"force": float(random.uniform(0.5, 5.0)), "steps": load["steps"]}
     if number % 3 == 1:
-        load["tilt"] = [float(random.uniform(-5e-3, 5e-3)) for _ in range(2)]
+        load["tilt"] = [float(random.uniform(-3e-3, 3e-3)) for _ in range(2)]
     data = {
         "accuracy": any_of(0.01, 0.02, 0.02, 0.05, 0.1),
         "surface": {"spectrum": spectrum, "grid": "auto", "lengths": [1.0, 1.0]},
