@@ -99,7 +99,7 @@ def _surface(heights: int) -> Work:
 def _micro_choice(stage: Stage) -> Work:
     """Count a cold solution on a grid of twice the sides, and what the candidates ask for."""
     heights = 4.0 * stage.surface.heights.size
-    return Work(call=150_000, passes=300.0 * heights, transform=120.0 * heights * np.log2(heights))
+    return Work(call=200_000, passes=300.0 * heights, transform=350.0 * heights * np.log2(heights))
 
 
 def _bends(stage: Stage) -> bool:

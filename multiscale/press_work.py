@@ -7,7 +7,7 @@ that they were measured on. They hold within a factor of 1.5.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -94,18 +94,22 @@ def kind_work(kind: str, cells: int, at: Reach, *, sagging: bool) -> Work:
     return Work(call=12_000) + each if sagging else each
 
 
-def press_work(stage: Stage, *, sagging: bool) -> Work:
+def press_work(stage: Stage, *, sagging: bool, alone: bool = False) -> Work:
     """Return the work of one press of a scene's micro model, started from one nearby.
 
     Args:
         stage: The scene's ingredients.
         sagging: Whether the plane sags as the block does, and forces are gathered on rectangles.
+        alone: Whether one of the patches is pressed by itself.
     """
     model, cells = stage.model, 0
     kind = "scaled" if isinstance(model, ScaledModel) else model.name
     if isinstance(model, HalfSpaceModel):
         cells = int(np.prod(model.surface.grid))
     at = reach(stage.surface, stage.furthest, int(stage.reached.sum()))
+    if alone:
+        count = max(stage.reached_patches, 1)
+        at = replace(at, box=at.box / stage.patches.count, summits=at.summits // count)
     return kind_work(kind, cells, at, sagging=sagging)
 
 
@@ -117,10 +121,7 @@ def law_work(stage: Stage) -> Work:
     """
     rows = ROWS["summits" if stage.by_summits else "cells"]
     if stage.scene.coupling.kind == "isolated":
-        alone = press_work(stage, sagging=False)
-        return (1.5 * rows * stage.reached_patches / stage.patches.count) * alone + (
-            rows * stage.reached_patches
-        ) * Work(call=3_000)
+        return rows * stage.reached_patches * press_work(stage, sagging=False, alone=True)
     decomposed = stage.scene.coupling.decomposed
     once = bent = press_work(stage, sagging=False)
     if stage.by_summits:  # rows follow each other closely

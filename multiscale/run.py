@@ -101,9 +101,12 @@ class Run:
 
     @cached_property
     def forecast(self) -> Forecast:
-        """What this run was predicted to take and to err by; ask for it before the load steps."""
+        """What this run was predicted to take and to err by; to be asked for before it starts.
+
+        Not collective: every rank that asks measures its own core.
+        """
         with self.phase("plan"):
-            return on_root(self.comm, lambda: forecast(self.stage))
+            return forecast(self.stage)
 
     @property
     def unknowns(self) -> int | None:
