@@ -33,7 +33,7 @@ FACTOR = 2.0
 KINDS = ("auto", "auto", "auto", "concurrent", "consistent", "isolated", "analytic", "mesh")
 BANDS = ((2, 10), (1, 6), (2, 16), (3, 24), (2, 8))
 SCENES = 40
-FINE_CELLS, FINE_LOADS, MOST = (24, 24, 16), (32, 32), 512
+FINE_CELLS, FINE_LOADS, MOST = (24, 24, 16), (32, 32), 384
 
 
 def scene(number):

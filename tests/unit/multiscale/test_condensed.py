@@ -1,5 +1,6 @@
 """The condensed block against the full Newton on the same mesh and laws."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -171,7 +172,10 @@ def test_plan_states_what_the_smooth_rest_costs():
     assert "11271 unknowns, made once in about " in text
     assert not any("smooth rest" in note for note in notes)
     _, notes = told([40, 40, 25])
-    assert any("146247 unknowns, and takes about 25 s and 2.8 GB" in note for note in notes)
+    # MUMPS itself took 2.8 GB; the seconds are this machine's
+    said = re.search(r"146247 unknowns, and takes about ([\d.]+) s and ([\d.]+) GB", str(notes))
+    assert said is not None
+    assert 0.5 * 2.8 < float(said[2]) < 2.0 * 2.8
     assert any("16 × 16 × 12 cells give the compliance" in note for note in notes)
 
 
