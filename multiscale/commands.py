@@ -12,6 +12,7 @@ from geometry.collective import on_root
 from geometry.errors import InputError, NotConverged
 from geometry.statistics import roughness
 from multiscale import plan, terminal
+from multiscale.blocks import load_together
 from multiscale.forecast import Forecast, forecast
 from multiscale.law_files import write_laws
 from multiscale.outputs import write_whole
@@ -59,6 +60,7 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
         comm: MPI communicator; None for a process on its own.
     """
     scene, _ = _scene_and_folder(choice, comm)
+    load_together(scene, comm)
     stage, made = on_root(comm, lambda: _planned(scene))
     terminal.show_plan(comm, stage, made)
 

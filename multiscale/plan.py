@@ -9,6 +9,7 @@ from multiscale.block_plan import block_statement, block_warnings
 from multiscale.forecast import Forecast, forecast_statements
 from multiscale.newton_choice import newton_choice
 from multiscale.stage import Stage
+from multiscale.surface_choice import heights_per_wave
 
 
 def statements(stage: Stage, made: Forecast | None = None) -> Iterator[tuple[str, str]]:
@@ -96,8 +97,16 @@ def surface_statement(stage: Stage) -> str:
     return (
         f"{surface.source}; {surface.grid[0]} × {surface.grid[1]} heights on "
         f"{surface.lengths[0]:g} × {surface.lengths[1]:g} mm, rms height {1e3 * rough.sq:.3g} µm, "
-        f"rms gradient {rough.sdq:.3g}"
+        f"rms gradient {rough.sdq:.3g}{_along_waves(stage)}"
     )
+
+
+def _along_waves(stage: Stage) -> str:
+    spectrum = stage.scene.surface.spectrum
+    if spectrum is None:
+        return ""
+    waves = heights_per_wave(spectrum, stage.surface.grid, stage.surface.lengths)
+    return f", {waves:.3g} heights along the shortest wavelength"
 
 
 def _contact(stage: Stage) -> str:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from geometry.collective import on_root
 from multiscale.assemble import assemble, make_table
-from multiscale.blocks import final_field
+from multiscale.blocks import final_field, load_together
 from multiscale.coupling import EmbeddedCoupling
 from multiscale.forecast import Forecast, forecast
 from multiscale.history import History, LoadStep
@@ -52,6 +52,7 @@ class Run:
         self.table: LawTable | None = None
         self.interface: Interface | None = None
         self.coupling: Coupling | None = None
+        load_together(scene, comm)
         self.stage: Stage = on_root(comm, lambda: make_stage(scene))
         self.scene = self.stage.scene
         self.seconds = dict(self.stage.seconds)

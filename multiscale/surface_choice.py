@@ -12,7 +12,7 @@ from multiscale.choices import SMOOTH_CELLS, accuracy_of, open_keys
 from multiscale.expected_errors import block_error, coupling_error
 from multiscale.ingredients import make_surface
 from multiscale.micro_choice import estimated_contacts, estimated_plane, nearest
-from multiscale.scene import Scene
+from multiscale.scene import Scene, SpectrumSection
 from multiscale.stage_checks import block_cells, patch_grid
 
 CELLS_PER_WAVE = (8, 12, 16, 24, 32, 48, 64)
@@ -70,13 +70,32 @@ def micro_tolerance(given: Scene, scene: Scene, surface: Surface) -> float:
     return max(accuracy - rest, _LEAST_SHARE * accuracy)
 
 
+def heights_per_wave(
+    spectrum: SpectrumSection, grid: tuple[int, int], lengths: tuple[float, float]
+) -> float:
+    """Return the heights along the shortest wavelength of a spectrum.
+
+    Args:
+        spectrum: The spectrum.
+        grid: Heights in x and y.
+        lengths: Sides of the surface [mm].
+    """
+    waves = _most_waves(spectrum, lengths)
+    return min(n / most for n, most in zip(grid, waves, strict=True))
+
+
+def _most_waves(spectrum: SpectrumSection, lengths: tuple[float, float]) -> list[float]:
+    """Return the most waves along each side."""
+    if spectrum.waves is not None:  # counted along x
+        return [spectrum.waves[1], spectrum.waves[1] * lengths[1] / lengths[0]]
+    return [band[1] for band in (spectrum.waves_x, spectrum.waves_y) if band]
+
+
 def _on(scene: Scene, cells: int) -> Scene:
     """Return the scene on a grid with so many heights along the shortest wavelength."""
     section = scene.surface
     if section.spectrum is None or section.lengths is None:  # refused when the scene was read
         return scene
-    spectrum, (length_x, length_y) = section.spectrum, section.lengths
-    waves = [spectrum.waves[1], spectrum.waves[1] * length_y / length_x] if spectrum.waves else []
-    waves += [band[1] for band in (spectrum.waves_x, spectrum.waves_y) if band]
+    waves = _most_waves(section.spectrum, section.lengths)
     grid = tuple(min(max(8 * math.ceil(cells * k / 8), _LEAST), _MOST) for k in waves)
     return scene.model_copy(update={"surface": section.model_copy(update={"grid": grid})})

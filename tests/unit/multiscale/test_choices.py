@@ -211,3 +211,18 @@ def test_sizes_that_fit_no_memory_are_refused_before_anything_is_made(
     monkeypatch.setattr("multiscale.stage_checks.os.sysconf", pages.__getitem__)
     with pytest.raises(InputError, match=problem):
         make_stage(scene(**sections))
+
+
+def test_open_keys_survive_a_dump_and_are_in_the_schema():
+    given = scene({"grid": "auto"}, accuracy=0.03, **OPEN)
+    again = Scene.from_dict(given.model_dump(by_alias=True, mode="json"))
+    assert open_keys(again) == open_keys(given) == {
+        "surface.grid", "micro.model", "coupling.kind", "patches.grid", "block.cells",
+    }  # fmt: skip
+    patches = Scene.model_json_schema(by_alias=True)["$defs"]["PatchesSection"]
+    assert {"const": "auto"} in patches["properties"]["grid"]["anyOf"]
+
+
+def test_the_plan_says_how_fine_the_heights_are():
+    said = dict(statements(make_stage(scene())))["surface"]
+    assert "8 heights along the shortest wavelength" in said  # 48 heights, 6 waves
