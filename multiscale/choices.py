@@ -37,7 +37,7 @@ PATCHES_ACROSS = (8, 16)
 SMOOTH_CELLS = ((8, 8, 8), (16, 16, 12), (24, 24, 16))
 """Cells of the smooth rest of a decomposed block."""
 
-MESH_CELLS = ((24, 24, 15), EMBEDDED_CELLS, (64, 64, 32))
+MESH_CELLS = ((24, 24, 15), EMBEDDED_CELLS)
 """Cells of a mesh under laws."""
 
 SETTLED_LATE = frozenset({"coupling.kind", "patches.grid", "block.cells"})

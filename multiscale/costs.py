@@ -20,7 +20,7 @@ from multiscale.block_work import (
 )
 from multiscale.blocks import correction_known, scene_loads
 from multiscale.machine import Machine
-from multiscale.newton_choice import CYCLES_PER_PATCH, CYCLES_PER_STEP, newton_choice
+from multiscale.newton_choice import CYCLES_PER_PATCH, full_cycles, newton_choice
 from multiscale.press_work import law_work, press_work, presses, step_count
 from multiscale.work import Work
 
@@ -132,7 +132,7 @@ def _load_steps(stage: Stage) -> Work:
     if not stage.by_laws:
         return presses(stage.scene.loading.programme) * press_work(stage, sagging=True)
     if _on_mesh(stage):
-        return cycle_work(stage.shape, CYCLES_PER_STEP * steps)
+        return cycle_work(stage.shape, full_cycles(stage, steps))
     patches = stage.patches.count
     dense = Work(call=1_200, passes=60.0 * patches**2, flop=patches**3 / 3)
     return (_LAW_NEWTON * steps) * dense
