@@ -16,9 +16,10 @@ from geometry.meshes import BlockShape
 from geometry.patches import PatchGrid, patch_means
 from geometry.surface import Surface
 from micro import MODELS, AsperityModel, Choice, MicroModel, ScaledModel
-from multiscale.choices import SETTLED_LATE, Decision, cheapest, open_keys, provisional
+from multiscale.choices import SETTLED_LATE, cheapest, open_keys, provisional
 from multiscale.contact_estimate import Contacts, contacts
 from multiscale.coupling import tilted_approaches
+from multiscale.decision import Decision
 from multiscale.ingredients import make_shape, make_surface
 from multiscale.micro_choice import chosen_model, furthest_plane, nearest, stated_model
 from multiscale.refinement import MOST_ROWS

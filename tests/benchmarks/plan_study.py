@@ -96,7 +96,7 @@ def truth(data, stage):
     """Return the force at half the largest load and at the largest; approaches under a force."""
     model = stage.model
     cells = model.surface.grid[0] if isinstance(model, HalfSpaceModel) else stage.surface.grid[0]
-    grid = [min(max(2 * cells, 192), MOST)] * 2
+    grid = [min(max(2 * cells, 192), max(cells, MOST))] * 2
     alone = stage.scene.coupling.kind == "analytic"
     finer = {
         "surface": data["surface"] | {"grid": grid},

@@ -9,7 +9,8 @@ import pytest
 
 from geometry.errors import InputError
 from multiscale import Scene, make_stage
-from multiscale.choices import Alternative, decided, open_keys
+from multiscale.choices import open_keys
+from multiscale.decision import Alternative, decided
 from multiscale.forecast import forecast
 from multiscale.plan import statements, warnings
 
