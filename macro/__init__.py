@@ -13,7 +13,7 @@ from macro.condense import HalfSpaceField, make_correction
 from macro.correction import Correction, Sag
 from macro.elasticity import Material
 from macro.interface import ContactLaw, Interface
-from macro.kept import cached_correction
+from macro.kept import cached_correction, correction_is_kept
 from macro.mesh import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
 from macro.obstacle import ObstacleBlock, ObstacleState
 from macro.output import write_fields, write_rough_fields
@@ -39,6 +39,7 @@ __all__ = [
     "Sag",
     "block_mesh",
     "cached_correction",
+    "correction_is_kept",
     "make_correction",
     "plain_compliance",
     "rough_block_mesh",

@@ -61,9 +61,7 @@ def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], co
     Note:
         Collective.
     """
-    directory = cache_directory() if comm.rank == 0 else None
-    digest = hashlib.sha256(repr(_spelt((_FORMAT, kind, key))).encode()).hexdigest()[:32]
-    path = directory / f"{kind}-{digest}.npz" if directory else None
+    path = _place(kind, key) if comm.rank == 0 else None
     found: Arrays | None = comm.bcast(_read(path) if path else None, root=0)
     if found is not None:
         return found
@@ -74,6 +72,23 @@ def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], co
             _clear(path.parent)
     kept: Arrays = comm.bcast(made, root=0)
     return kept
+
+
+def is_kept(kind: str, key: tuple[object, ...]) -> bool:
+    """Tell whether `cached` would find arrays, without reading them.
+
+    Args:
+        kind: Name of what is kept.
+        key: All that it depends on, as for `cached`.
+    """
+    path = _place(kind, key)
+    return path is not None and path.is_file()
+
+
+def _place(kind: str, key: tuple[object, ...]) -> Path | None:
+    directory = cache_directory()
+    digest = hashlib.sha256(repr(_spelt((_FORMAT, kind, key))).encode()).hexdigest()[:32]
+    return directory / f"{kind}-{digest}.npz" if directory else None
 
 
 def _spelt(value: object) -> object:

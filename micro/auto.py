@@ -18,7 +18,7 @@ import numpy as np
 
 from geometry import PatchGrid, Surface
 from geometry.errors import InputError
-from micro.auto_candidates import Candidate, Option, options
+from micro.auto_candidates import Candidate, Cost, Option, options
 from micro.auto_check import Check
 from micro.auto_measures import contact_measures
 from micro.models import MicroModel
@@ -55,6 +55,7 @@ def choose(
     solutions: int = 40,
     patches: PatchGrid | None = None,
     periodic: bool = False,
+    cost: Cost | None = None,
 ) -> Choice:
     """Choose a micro model of a surface.
 
@@ -72,6 +73,8 @@ def choose(
         solutions: Approaches that the model will be solved for; set-up is shared among them.
         patches: Patches that must hold at least 8 cells of a grid along each side.
         periodic: Whether surface and pressures continue periodically; else the border is free.
+        cost: Predicted time of all solutions, of a kind of model (its name, or ``scaled``) on so
+            many cells [s]; by default what one core took when it was measured.
 
     Raises:
         InputError: When approach, tolerance or number of solutions is out of range, or a surface
@@ -92,6 +95,7 @@ def choose(
         solutions=solutions,
         patches=patches,
         periodic=periodic,
+        cost=cost,
     )
     return _Search(sorted(found, key=lambda o: o.candidate.cost), tolerance, check).choice()
 

@@ -39,6 +39,10 @@ _COSTS = {
 """Seconds to set up, and per cell; seconds per approach, and per cell: minima on one core."""
 
 
+Cost = Callable[[str, int], float]
+"""Time of all solutions of a kind of model on so many cells [s]."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Candidate:
     """A model that could be taken.
@@ -81,6 +85,7 @@ def options(
     solutions: int,
     patches: PatchGrid | None,
     periodic: bool,
+    cost: Cost | None = None,
 ) -> Iterator[Option]:
     """Yield the models that a surface and its patches allow.
 
@@ -91,21 +96,24 @@ def options(
         solutions: Approaches to be solved for.
         patches: Patches that must hold at least 8 cells of a grid along each side.
         periodic: Whether only periodic models are wanted.
+        cost: Predicted time of all solutions of a kind on so many cells [s]; by default what one
+            core took when it was measured.
     """
+    seconds = cost or partial(_cost, solutions=solutions)
     parts = patches.grid if patches else (1, 1)
     if not periodic:
         for kind, label, made in _by_contacts(surface, contact_modulus, parts):
             error = max(contact_error(kind, at) for at in measures)
-            cost = _cost(kind, surface.heights.size, solutions)
+            spent = seconds(kind, surface.heights.size)
             yield Option(
-                candidate=Candidate(label=label, expected_error=error, cost=cost), make=made
+                candidate=Candidate(label=label, expected_error=error, cost=spent), make=made
             )
     for factor, cells in _grids(surface, parts):
         yield Option(
             candidate=Candidate(
                 label=f"half-space on {cells[0]} × {cells[1]} cells",
                 expected_error=max(grid_error(at, factor) for at in measures),
-                cost=_cost("half-space", cells[0] * cells[1], solutions),
+                cost=seconds("half-space", cells[0] * cells[1]),
             ),
             make=partial(half_space, surface, cells, contact_modulus, periodic),
             cells=cells,

@@ -6,15 +6,13 @@ from collections.abc import Iterator
 
 from geometry.meshes import alignment
 from geometry.smooth_shape import smooth_shape
+from multiscale.block_work import smooth_bytes, smooth_work
+from multiscale.blocks import correction_known, scene_loads
+from multiscale.machine import this_machine
 from multiscale.stage import Stage
 from multiscale.stage_checks import DECOMPOSED_CELLS
 
-FACTORISATION = 4.5e-7
-"""Seconds that a factorisation takes per unknown to the power 3/2, on one core
-(11 thousand unknowns: 0.56 s; 32 thousand: 3.1 s; 146 thousand: 25 s)."""
-
-MEMORY = 50.0
-"""Bytes that it takes per unknown to the power 3/2 (146 thousand unknowns: 3 GB)."""
+_LONG = 5.0  # seconds that a user should know of
 
 
 def block_statement(stage: Stage) -> str:
@@ -43,21 +41,23 @@ def _elements(stage: Stage) -> str:
 
 
 def _smooth_rest(stage: Stage) -> str:
-    unknowns, seconds = _smooth_cost(stage)
+    unknowns, seconds, _ = _smooth_cost(stage)
+    made = f"made once in about {seconds:.2g} s"
+    if correction_known(stage):
+        made = "kept on disk by an earlier run"
     return (
         "decomposed, for contacts feel the half-space's own near field: finite elements only for "
         f"the smooth rest, quadratic hexahedra with the nodes of {_times(stage.shape.cells)} "
-        f"trilinear ones under the interface, {unknowns} unknowns, factorised once in about "
-        f"{seconds:.2g} s"
+        f"trilinear ones under the interface, {unknowns} unknowns, {made}"
     )
 
 
 def _smooth_warnings(stage: Stage) -> Iterator[str]:
-    unknowns, seconds = _smooth_cost(stage)
-    if seconds > 5.0:
+    unknowns, seconds, memory = _smooth_cost(stage)
+    if seconds > _LONG and not correction_known(stage):
         yield (
             f"the smooth rest of the block has {unknowns} unknowns, and takes about {seconds:.2g} "
-            f"s and {MEMORY * unknowns**1.5 / 1e9:.2g} GB on every rank: "
+            f"s and {memory / 1e9:.2g} GB on every rank: "
             f"{_times(DECOMPOSED_CELLS)} cells give the compliance of a cube to 0.05 %"
         )
 
@@ -74,9 +74,11 @@ def _element_warnings(stage: Stage) -> Iterator[str]:
         yield fit.sentence
 
 
-def _smooth_cost(stage: Stage) -> tuple[int, float]:
-    unknowns = smooth_shape(stage.shape).unknowns
-    return unknowns, FACTORISATION * unknowns**1.5
+def _smooth_cost(stage: Stage) -> tuple[int, float, float]:
+    """Return unknowns, seconds and bytes of the smooth rest."""
+    loads = scene_loads(stage).shape
+    seconds = smooth_work(stage.shape, loads).seconds(this_machine())
+    return smooth_shape(stage.shape).unknowns, seconds, smooth_bytes(stage.shape, loads)
 
 
 def _times(cells: tuple[int, ...]) -> str:

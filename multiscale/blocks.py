@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,11 +11,12 @@ from numpy.typing import NDArray
 from geometry.partition import Partition, UnevenPartition
 from micro import HalfSpace, influence_matrix
 from multiscale.law_files import LawTable
-from multiscale.stage import Stage
+from multiscale.scene import Scene
 from multiscale.yielding import SpreadLoads, UniformLoads, Yielding
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import Correction, Interface, Material
+    from multiscale.stage import Stage
 
 Array = NDArray[np.float64]
 
@@ -147,6 +149,53 @@ def smooth_correction(stage: Stage, loads: Partition, comm: Any) -> Correction:
         HalfSpace(material.young_modulus, material.poisson_ratio),
         comm or MPI.COMM_SELF,
     )
+
+
+def load_together(scene: Scene, comm: Any) -> None:
+    """Load the finite elements on all ranks where a scene may need them.
+
+    PETSc starts with collective calls on all processes of the job: one rank alone must not.
+
+    Args:
+        scene: The scene.
+        comm: MPI communicator; None for this process alone, which loads them when it needs them.
+
+    Note:
+        Collective.
+    """
+    if comm is not None and scene.coupling.kind != "analytic":
+        import macro  # noqa: F401
+
+
+def correction_known(stage: Stage) -> bool:
+    """Tell whether the smooth correction of a scene is on disk from an earlier run.
+
+    Not collective: a rank of a job that has not loaded the finite elements does not know.
+
+    Args:
+        stage: The scene's ingredients.
+    """
+    if "macro" not in sys.modules and _one_of_many():
+        return False
+    from macro import correction_is_kept
+
+    return correction_is_kept(
+        stage.shape, block_material(stage), stage.scene.block.sides, scene_loads(stage)
+    )
+
+
+def _one_of_many() -> bool:
+    mpi = sys.modules.get("mpi4py.MPI")
+    return mpi is not None and mpi.COMM_WORLD.size > 1
+
+
+def scene_loads(stage: Stage) -> Partition:
+    """Return the rectangles that the correction of a scene's decomposed block is made for.
+
+    Args:
+        stage: The scene's ingredients.
+    """
+    return stage.patches if stage.scene.coupling.kind == "isolated" else fine_loads(stage)
 
 
 def block_material(stage: Stage) -> Material:

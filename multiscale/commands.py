@@ -12,7 +12,9 @@ from geometry.collective import on_root
 from geometry.errors import InputError, NotConverged, PatchlawError
 from geometry.statistics import roughness
 from multiscale import plan, terminal
+from multiscale.blocks import load_together
 from multiscale.folder_lock import locked
+from multiscale.forecast import Forecast, forecast
 from multiscale.interruption import Interruption, Stopped
 from multiscale.law_files import write_laws
 from multiscale.outputs import write_whole
@@ -21,7 +23,7 @@ from multiscale.results import write_fields, write_figure, write_results
 from multiscale.resuming import Keeper, is_finished
 from multiscale.run import Run
 from multiscale.scene import Scene
-from multiscale.stage import make_stage
+from multiscale.stage import Stage, make_stage
 
 
 def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -45,6 +47,7 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
                 files = on_root(comm, lambda: write_results(folder, run, options=options))
                 if scene.output.fields:
                     files += write_fields(folder, run)
+                terminal.show_comparison(comm, run.forecast, run.seconds)
                 terminal.show_files(comm, files)
             if failure is not None:
                 raise failure
@@ -63,7 +66,7 @@ def _begun(resume: bool, folder: Path, run: Run, keeper: Keeper) -> bool:
         said = f"nothing to resume in {folder}: begins with the first load step"
     elif on_root(comm, keeper.exists):
         said = f"replaces the interrupted run in {folder} (to go on with it: --resume)"
-    terminal.show_plan(comm, run.stage)
+    terminal.show_plan(comm, run.stage, run.forecast)
     if said:
         terminal.say(comm, said)
     return True
@@ -114,7 +117,14 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
         comm: MPI communicator; None for a process on its own.
     """
     scene, _ = scene_and_folder(choice, comm)
-    terminal.show_plan(comm, on_root(comm, lambda: make_stage(scene)))
+    load_together(scene, comm)
+    stage, made = on_root(comm, lambda: _planned(scene))
+    terminal.show_plan(comm, stage, made)
+
+
+def _planned(scene: Scene) -> tuple[Stage, Forecast]:
+    stage = make_stage(scene)
+    return stage, forecast(stage)
 
 
 def tabulate_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -127,7 +137,7 @@ def tabulate_scene(choice: argparse.Namespace, options: list[str], comm: Any) ->
     """
     scene, folder = scene_and_folder(choice, comm)
     run = Run(scene, comm)
-    terminal.show_plan(comm, run.stage)
+    terminal.show_plan(comm, run.stage, run.forecast)
     table = run.make_laws()
 
     def write() -> list[Path]:
@@ -153,7 +163,7 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
     stage = on_root(comm, lambda: make_stage(scene))
     rough = roughness(stage.surface)
     pairs = [
-        ("surface", dict(plan.statements(stage))["surface"]),
+        ("surface", plan.surface_statement(stage)),
         ("Sa, Sq, Sz", f"{1e3 * rough.sa:.4g}, {1e3 * rough.sq:.4g}, {1e3 * rough.sz:.4g} µm"),
         ("Ssk, Sku, Sdq", f"{rough.ssk:.4g}, {rough.sku:.4g}, {rough.sdq:.4g}"),
         ("m0, m2, m4", f"{rough.m0:.4g} mm², {rough.m2:.4g}, {rough.m4:.4g} 1/mm² (profile)"),

@@ -6,7 +6,7 @@ import math
 
 from multiscale.micro_choice import SOLUTIONS_OF_LAWS
 from multiscale.scene import Scene
-from multiscale.stage_checks import block_cells
+from multiscale.stage_checks import block_cells, patch_grid
 
 START = 0.05
 """Seconds for a surface and its summits."""
@@ -61,9 +61,9 @@ def predicted_seconds(scene: Scene, heights: tuple[int, int]) -> float:
     unknowns = 3.0 * math.prod(count + 1 for count in block_cells(scene))
     if scene.coupling.decomposed:
         solutions = 8 * steps if kind == "concurrent" else 2 * SOLUTIONS_OF_LAWS
-        sides = (count * -(-FEWEST_LOADS // count) for count in scene.patches.grid)
+        sides = (count * -(-FEWEST_LOADS // count) for count in patch_grid(scene))
         loads = CORRECTION * (math.prod(sides) / FEWEST_LOADS**2) ** 2
         return START + loads + FACTORISATION * unknowns**1.5 + solutions * whole
-    count = math.prod(scene.patches.grid)
+    count = math.prod(patch_grid(scene))
     laws = SOLUTIONS_OF_LAWS * (whole if by_cells or kind == "consistent" else whole * count)
     return START + laws + unknowns * (ASSEMBLY + SOLUTION * min(count, steps))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from multiscale.scene import Scene, SpectrumSection
+from multiscale.stage_checks import patch_grid
 
 Grid = tuple[int, int]
 
@@ -15,7 +16,7 @@ HEIGHTS_PER_WAVE = 3
 
 def pressure_grid(scene: Scene) -> Grid:
     """Return the patches that pressures are compared on: the scene's, divided to at least 4 × 4."""
-    nx, ny = (count * -(-4 // count) for count in scene.patches.grid)
+    nx, ny = (count * -(-4 // count) for count in patch_grid(scene))
     return nx, ny
 
 

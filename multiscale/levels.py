@@ -19,7 +19,7 @@ from multiscale.level import OWN, Content, Level, content_of, flattened
 from multiscale.level_cost import predicted_seconds
 from multiscale.level_grids import Grid, coarser_grids, pressure_grid
 from multiscale.scene import Scene
-from multiscale.stage_checks import EMBEDDED_CELLS
+from multiscale.stage_checks import EMBEDDED_CELLS, patch_grid
 
 LAW_HEIGHTS = 128
 """Heights along a side, at most, of the half-space behind consistent laws."""
@@ -249,8 +249,7 @@ class _Family:
     @property
     def _patches(self) -> Grid:
         """The scene's own patches."""
-        nx, ny = self._scene.patches.grid
-        return nx, ny
+        return patch_grid(self._scene)
 
     @property
     def _patch_grids(self) -> list[Grid]:

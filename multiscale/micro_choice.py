@@ -9,24 +9,22 @@ from geometry.patches import PatchGrid, patch_means
 from geometry.surface import Surface
 from micro import (
     Choice,
-    HalfSpaceModel,
     MicroModel,
     choose,
     contact_modulus,
     micro_model,
-    resampled,
 )
+from multiscale.contact_estimate import Contacts, contacts, rough_half_space
 from multiscale.coupling import AnalyticCoupling
 from multiscale.loading import Programme
+from multiscale.machine import this_machine
+from multiscale.press_work import kind_work, presses, reach
 from multiscale.scene import Scene
 
-DEFAULT_TOLERANCE = 0.02
-"""Relative error of the force that a micro model is chosen for, unless the scene says."""
+_FEW_SUMMITS = 30  # that interact, for the cost of models that may be taken
 
 SOLUTIONS_OF_LAWS = 40
 """Approaches that a table of laws takes, roughly."""
-
-_ESTIMATE_CELLS = 96
 
 
 def stated_model(scene: Scene, surface: Surface) -> MicroModel:
@@ -41,38 +39,54 @@ def stated_model(scene: Scene, surface: Surface) -> MicroModel:
     )
 
 
-def chosen_model(scene: Scene, surface: Surface, patches: PatchGrid) -> Choice:
-    """Choose the micro model at the load that brings the plane nearest anywhere."""
-    programme = scene.loading.programme
-    approach, tilt = expected_plane(scene, surface)
-    rise = 0.5 * float(np.abs(np.multiply(surface.lengths, tilt)).sum())
-    laws = scene.coupling.kind in ("isolated", "consistent")
+def chosen_model(scene: Scene, surface: Surface, patches: PatchGrid, tolerance: float) -> Choice:
+    """Choose the micro model at the load that brings the plane nearest anywhere.
+
+    Where the force or the moment is prescribed, a half-space of few cells tells how near that is.
+
+    Args:
+        scene: The scene.
+        surface: Its surface.
+        patches: Its patches.
+        tolerance: Relative error of the force.
+    """
+    kind, plane = scene.coupling.kind, estimated_plane(scene, surface)
+    at = reach(surface, plane, summits=_FEW_SUMMITS)
+    by_laws = kind in ("isolated", "consistent")
+    solutions = SOLUTIONS_OF_LAWS if by_laws else len(scene.loading.programme.targets)
+    count = solutions if kind != "concurrent" else presses(scene.loading.programme)
+
+    def cost(model: str, cells: int) -> float:
+        work = kind_work(model, cells, at, sagging=kind in ("consistent", "concurrent"))
+        return count * work.seconds(this_machine())
+
     return choose(
         surface,
         contact_modulus=_modulus(scene),
-        approach=approach + rise,
-        tolerance=scene.micro.tolerance or DEFAULT_TOLERANCE,
+        approach=nearest(plane, surface),
+        tolerance=tolerance,
         patches=patches if scene.coupling.kind != "analytic" else None,
-        solutions=SOLUTIONS_OF_LAWS if laws else len(programme.targets),
+        solutions=solutions,
+        cost=cost,
     )
 
 
-def expected_plane(scene: Scene, surface: Surface) -> tuple[float, tuple[float, float]]:
-    """Return the largest approach and the slopes there, before there is a micro model.
-
-    Where the force or the moment is prescribed, a half-space of few cells tells them.
-    """
-    programme = scene.loading.programme
-    if programme.quantity == "approach" and programme.tilt is not None:
-        return programme.largest, programme.tilt
-    cells = min(surface.grid[0], _ESTIMATE_CELLS), min(surface.grid[1], _ESTIMATE_CELLS)
-    rough = HalfSpaceModel(
-        surface=resampled(surface, cells),
-        contact_modulus=_modulus(scene),
-        highest=surface.highest,
-    )
+def estimated_plane(scene: Scene, surface: Surface) -> tuple[float, tuple[float, float]]:
+    """Return `furthest_plane`, from a half-space of few cells where loads are prescribed."""
+    rough = rough_half_space(surface, _modulus(scene))
     whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
-    return furthest_plane(programme, rough, whole, patch_means(surface, whole))
+    return furthest_plane(scene.loading.programme, rough, whole, patch_means(surface, whole))
+
+
+def nearest(plane: tuple[float, tuple[float, float]], surface: Surface) -> float:
+    """Return how near a tilted plane comes anywhere: its approach at the nearest corner [mm]."""
+    approach, tilt = plane
+    return approach + 0.5 * float(np.abs(np.multiply(surface.lengths, tilt)).sum())
+
+
+def estimated_contacts(scene: Scene, surface: Surface) -> Contacts:
+    """Return the contacts at the largest load, from a half-space of few cells."""
+    return contacts(surface, _modulus(scene), estimated_plane(scene, surface))
 
 
 def furthest_plane(

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from multiscale.stage import Stage
+if TYPE_CHECKING:  # which is made with what is said here
+    from multiscale.stage import Stage
 
-CYCLES_PER_STEP = 8
-"""Multigrid cycles that a load step of the full Newton takes, starts from earlier steps included
-(the paper's cube with 4 × 4 patches: 65 in 8 steps)."""
+
+MOST_CYCLES_PER_STEP = 12
+"""Multigrid cycles that a load step of the full Newton takes at most, starts from earlier steps
+included; with fewer patches in reach about one for each (the paper's cube with 4 × 4 patches: 65
+to 101 in 8 steps; with 2 of 64 in reach 36 in 40)."""
 
 CYCLES_PER_PATCH = 21
 """Multigrid cycles that the compliance of one patch takes (likewise, and with 8 × 8 patches)."""
@@ -25,6 +29,16 @@ class NewtonChoice:
 
     condensed: bool
     why: str
+
+
+def full_cycles(stage: Stage, steps: int) -> int:
+    """Return the multigrid cycles that load steps on the mesh are predicted to take.
+
+    Args:
+        stage: The scene's ingredients.
+        steps: Load steps.
+    """
+    return steps * min(max(stage.reached_patches, 1), MOST_CYCLES_PER_STEP)
 
 
 def newton_choice(stage: Stage) -> NewtonChoice:
@@ -45,7 +59,7 @@ def newton_choice(stage: Stage) -> NewtonChoice:
         return NewtonChoice(condensed=coupling.newton == "condensed", why="as the scene asks")
     patches, steps = stage.patches.count, len(stage.scene.loading.programme.targets)
     compliance = CYCLES_PER_PATCH * patches
-    full = CYCLES_PER_STEP * steps
+    full = full_cycles(stage, steps)
     fewer = "fewer" if compliance < full else "more"
     return NewtonChoice(
         condensed=compliance < full,

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from geometry.statistics import roughness
 from multiscale.block_plan import block_statement, block_warnings
+from multiscale.forecast import Forecast, forecast_statements
 from multiscale.newton_choice import newton_choice
 from multiscale.reference_plan import (
     NO_MICRO_MODEL,
@@ -14,11 +15,17 @@ from multiscale.reference_plan import (
     reference_warnings,
 )
 from multiscale.stage import Stage
+from multiscale.surface_choice import heights_per_wave
 
 
-def statements(stage: Stage) -> Iterator[tuple[str, str]]:
-    """Yield pairs of topic and sentence that say what will be done and why."""
-    yield "surface", _surface(stage)
+def statements(stage: Stage, made: Forecast | None = None) -> Iterator[tuple[str, str]]:
+    """Yield pairs of topic and sentence that say what will be done and why.
+
+    Args:
+        stage: The scene's ingredients.
+        made: What is predicted; None leaves it out.
+    """
+    yield "surface", surface_statement(stage)
     yield "contact", _contact(stage)
     yield "micro model", _model(stage)
     yield "coupling", _coupling(stage)
@@ -29,10 +36,19 @@ def statements(stage: Stage) -> Iterator[tuple[str, str]]:
     if stage.by_laws:
         yield "newton", _newton(stage)
     yield "load", _load(stage)
+    if stage.decision is not None:
+        yield "choice", stage.decision.sentence
+    if made is not None:
+        yield from forecast_statements(made)
 
 
-def warnings(stage: Stage) -> Iterator[str]:
-    """Yield what a user should know about the validity of the scene."""
+def warnings(stage: Stage, made: Forecast | None = None) -> Iterator[str]:
+    """Yield what a user should know about the validity of the scene.
+
+    Args:
+        stage: The scene's ingredients.
+        made: What is predicted; None leaves it out.
+    """
     yield from _surface_warnings(stage)
     if stage.by_laws:
         yield from _patch_warnings(stage)
@@ -40,6 +56,9 @@ def warnings(stage: Stage) -> Iterator[str]:
         yield from reference_warnings(stage.scene, stage.meshes)
     elif stage.embedded:
         yield from block_warnings(stage)
+    missed = None if made is None else made.broken_promise
+    if missed:
+        yield missed
 
 
 def _surface_warnings(stage: Stage) -> Iterator[str]:
@@ -78,13 +97,26 @@ def _patch_warnings(stage: Stage) -> Iterator[str]:
         )
 
 
-def _surface(stage: Stage) -> str:
+def surface_statement(stage: Stage) -> str:
+    """Say what the surface is.
+
+    Args:
+        stage: The scene's ingredients.
+    """
     surface, rough = stage.surface, roughness(stage.surface)
     return (
         f"{surface.source}; {surface.grid[0]} × {surface.grid[1]} heights on "
         f"{surface.lengths[0]:g} × {surface.lengths[1]:g} mm, rms height {1e3 * rough.sq:.3g} µm, "
-        f"rms gradient {rough.sdq:.3g}"
+        f"rms gradient {rough.sdq:.3g}{_along_waves(stage)}"
     )
+
+
+def _along_waves(stage: Stage) -> str:
+    spectrum = stage.scene.surface.spectrum
+    if spectrum is None:
+        return ""
+    waves = heights_per_wave(spectrum, stage.surface.grid, stage.surface.lengths)
+    return f", {waves:.3g} heights along the shortest wavelength"
 
 
 def _contact(stage: Stage) -> str:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy
 import scipy
 
+from multiscale.costs import peak_memory
 from multiscale.reference import ReferenceCoupling
 from multiscale.run import Run
 from multiscale.stage import Stage
@@ -50,12 +51,29 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "unknowns": run.unknowns,
         "reference": _reference(run),
         "seconds": history.seconds,
+        "memory_bytes": peak_memory(),
+        "predicted": _predicted(run),
         "steps": len(history),
         "finished": run.finished,
         "reasons": sorted(set(history.reason)) if len(history) else [],
         "notes": list(history.notes),
         "versions": _versions(),
         "machine": platform.platform(),
+    }
+
+
+def _predicted(run: Run) -> dict[str, Any]:
+    """Return the forecast and, where keys were left open, what they became out of what."""
+    made, decision = run.forecast, run.stage.decision
+    return {
+        "seconds": dict(made.seconds),
+        "memory_bytes": made.memory,
+        "force_error": made.error,
+        "force_error_by_cause": dict(made.errors),
+        "finite_slopes": made.slopes,
+        "accuracy": made.accuracy,
+        "promised": made.broken_promise is None,
+        "alternatives": [asdict(each) for each in decision.alternatives] if decision else [],
     }
 
 

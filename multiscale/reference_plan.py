@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from geometry.meshes import BlockShape
 from multiscale.reference_meshes import ReferenceMeshes
 from multiscale.scene import Scene
+from multiscale.stage_checks import patch_grid
 
 LEAST_ACROSS = {1: 12.0, 2: 3.0}
 """Edges across a typical contact below which the force is wrong by several per cent, by the
@@ -17,7 +18,7 @@ NO_MICRO_MODEL = "none: contacts are meshed, and the keys of [micro] are not use
 
 def reference_coupling(scene: Scene) -> str:
     """Say how a reference finds contact."""
-    nx, ny = scene.patches.grid
+    nx, ny = patch_grid(scene)
     return (
         f"reference: the rough surface itself, meshed and pressed by {scene.reference.method}; "
         f"{nx} × {ny} patches gather the results"

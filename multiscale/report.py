@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
+from multiscale.forecast import Forecast, comparison
 from multiscale.history import History
 
 _STYLE = """
@@ -30,6 +31,7 @@ def report_html(
     warnings: Sequence[str],
     history: History,
     figures: Mapping[str, Path],
+    made: Forecast,
 ) -> str:
     """Compose the page.
 
@@ -39,6 +41,7 @@ def report_html(
         warnings: What a user should know about validity.
         history: The run.
         figures: PNG files by caption; embedded into the page.
+        made: What was predicted.
 
     Returns:
         A complete HTML document.
@@ -52,8 +55,10 @@ def report_html(
         "<h2>Force–approach curve</h2>",
         table(*curve_cells(history)),
         *(figure_element(caption, path) for caption, path in figures.items()),
-        "<h2>Where the time went</h2>",
-        table(("phase", "s"), [(name, f"{s:.2f}") for name, s in history.seconds.items()]),
+        "<h2>What it took</h2>",
+        table(("what", "predicted", "real"), comparison(made, history.seconds)),
+        "<h2>What the force may be off by</h2>",
+        table(("cause", "at most"), _errors(made)),
         *(f'<p class="note">{escape(note)}</p>' for note in history.notes),
     ]
     return page(title, parts)
@@ -97,6 +102,12 @@ def curve_cells(history: History) -> tuple[tuple[str, ...], list[tuple[str, ...]
         header = (*header, heading)
         rows = [(*row, cell) for row, cell in zip(rows, cells, strict=True)]
     return header, rows
+
+
+def _errors(made: Forecast) -> Iterable[tuple[str, str]]:
+    yield from ((cause, f"{error:.2%}") for cause, error in made.errors.items())
+    yield "altogether", f"{made.error:.2%}"
+    yield "finite slopes, outside of it, about", f"{made.slopes:.1%}"
 
 
 def _headline(history: History) -> str:

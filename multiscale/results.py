@@ -37,26 +37,29 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
     Returns:
         The files written.
     """
+    made = run.forecast
     history = run.history()
     _remove_older(folder)
     files = write_tables(folder, history)
     table = run.table
     if table is not None:
         files.append(write_whole(folder / "laws.h5", lambda path: write_laws(path, table)))
-    files.append(write_json(folder / "provenance.json", provenance(run, options=options)))
     output = run.scene.output
     drawn = {}
     if output.figures and len(history):
-        for name, caption, figure in _figures(run):
-            drawn[caption] = write_figure(folder / f"{name}.png", figure)
+        with run.phase("output"):
+            for name, caption, figure in _figures(run):
+                drawn[caption] = write_figure(folder / f"{name}.png", figure)
         files.extend(drawn.values())
+    files.append(write_json(folder / "provenance.json", provenance(run, options=options)))
     if output.report:
         page = report_html(
             title=f"patchlaw: {run.scene.name}",
-            statements=plan.statements(run.stage),
-            warnings=list(plan.warnings(run.stage)),
-            history=history,
+            statements=plan.statements(run.stage, made),
+            warnings=list(plan.warnings(run.stage, made)),
+            history=run.history(),
             figures=drawn,
+            made=made,
         )
         files.append(write_text(folder / "report.html", page))
     return files

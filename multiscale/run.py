@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from geometry.collective import on_root
 from multiscale.assemble import assemble, make_table
-from multiscale.blocks import final_field
+from multiscale.blocks import final_field, load_together
 from multiscale.checkpoint import Checkpoint, digest
 from multiscale.coupling import EmbeddedCoupling
+from multiscale.forecast import Forecast, forecast
 from multiscale.history import History, LoadStep
 from multiscale.law_files import LawTable, read_laws, write_laws
 from multiscale.loading import Coupling, Drive, Position, Restorable
@@ -41,6 +42,7 @@ class Run:
 
     Attributes:
         stage: The scene's ingredients, made at once: surface, summits, patches, micro model.
+        scene: The scene, what it left open settled.
         seconds: Wall time of each phase so far [s].
         table: The patch laws, once made.
         interface: The interface of the block that is pressed itself, once made.
@@ -50,8 +52,7 @@ class Run:
     """
 
     def __init__(self, scene: Scene, comm: Any = None) -> None:
-        self.scene, self.comm = scene, comm
-        self.seconds: dict[str, float] = {}
+        self.comm = comm
         self.steps: list[LoadStep] = []
         self.position = Position()
         self._resumed: Checkpoint | None = None
@@ -59,13 +60,15 @@ class Run:
         self.table: LawTable | None = None
         self.interface: Interface | None = None
         self.coupling: Coupling | None = None
-        with self._phase("surface"):
-            self.stage: Stage = on_root(comm, lambda: make_stage(scene))
+        load_together(scene, comm)
+        self.stage: Stage = on_root(comm, lambda: make_stage(scene))
+        self.scene = self.stage.scene
+        self.seconds = dict(self.stage.seconds)
 
     def make_laws(self) -> LawTable:
         """Tabulate the laws of all patches, once."""
         if self.table is None:
-            with self._phase("laws"):
+            with self.phase("laws"):
                 self.table = make_table(self.stage, self.comm)
         return self.table
 
@@ -73,7 +76,7 @@ class Run:
         """Make what finds the load steps, once, and what it needs."""
         if self.coupling is None:
             table = self.make_laws() if self.stage.by_laws else None
-            with self._phase("block"):
+            with self.phase("block"):
                 coupling, self.interface = assemble(self.stage, table, self.comm)
                 if self._resumed and self._resumed.state and isinstance(coupling, Restorable):
                     coupling.restore(self._resumed.state)
@@ -87,7 +90,7 @@ class Run:
             NotConverged: When a step fails for good; `history` holds those before it.
         """
         drive = Drive(self.make_coupling(), self.scene.loading.programme, self.position)
-        with self._phase("load steps"):
+        with self.phase("load steps"):
             for step in drive:
                 self.steps.append(step)
                 self.position = drive.position
@@ -182,6 +185,15 @@ class Run:
             reference=record,
         )
 
+    @cached_property
+    def forecast(self) -> Forecast:
+        """What this run was predicted to take and to err by; to be asked for before it starts.
+
+        Not collective: every rank that asks measures its own core.
+        """
+        with self.phase("plan"):
+            return forecast(self.stage)
+
     @property
     def unknowns(self) -> int | None:
         """Degrees of freedom of the block that is pressed, where one is."""
@@ -196,11 +208,16 @@ class Run:
         """
         if isinstance(self.coupling, EmbeddedCoupling) and self.interface is not None:
             return self.interface, self.coupling.displacement
-        with self._phase("field"):
+        with self.phase("field"):
             return final_field(self.stage, self.steps[-1].patches.pressure_MPa, self.comm)
 
     @contextmanager
-    def _phase(self, name: str) -> Iterator[None]:
+    def phase(self, name: str) -> Iterator[None]:
+        """Take the wall time of a phase.
+
+        Args:
+            name: Its name in `seconds`.
+        """
         start = time.perf_counter()
         try:
             yield

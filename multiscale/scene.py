@@ -11,6 +11,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from geometry.errors import InputError
 from geometry.spectrum import Spectrum
+from multiscale.left_open import Open, OrAuto
 from multiscale.quantities import Length, Pressure, Slope, SpectralAmplitude
 from multiscale.refusals import first_refusal
 from multiscale.sections import (
@@ -56,7 +57,14 @@ class SurfaceSection(Section):
 
     spectrum: SpectrumSection | None = None
     file: str | None = None
-    grid: Annotated[tuple[Heights, Heights], Field(description="heights in x, y")] | None = None
+    grid: (
+        Annotated[
+            tuple[Heights, Heights] | Open,
+            OrAuto(tuple[Heights, Heights]),
+            Field(description="heights in x, y"),
+        ]
+        | None
+    ) = None
     lengths: tuple[PositiveLength, PositiveLength] | None = None
     detrend: Literal["none", "mean", "plane", "quadratic"] = "none"
 
@@ -66,6 +74,10 @@ class SurfaceSection(Section):
             raise ValueError("needs exactly one source (allowed: either 'spectrum' or 'file')")
         if self.spectrum is not None and (self.grid is None or self.lengths is None):
             raise ValueError("a 'spectrum' needs 'grid' and 'lengths' beside it")
+        if self.file is not None and self.grid == "auto":
+            raise ValueError(
+                "grid = 'auto' needs a 'spectrum' (allowed: the grid of the file, or leave it out)"
+            )
         return self
 
 
@@ -78,7 +90,8 @@ class BlockSection(Section):
     sides: Literal["free", "roller"] = "free"
     cells: (
         Annotated[
-            tuple[Count, Count, Count],
+            tuple[Count, Count, Count] | Open,
+            OrAuto(tuple[Count, Count, Count]),
             Field(description="cells in x, y, z; by default as fine as the coupling needs"),
         ]
         | None
@@ -93,15 +106,16 @@ class BlockSection(Section):
 class PatchesSection(Section):
     """The partition of the interface."""
 
-    grid: Pair = (4, 4)
+    grid: Annotated[Pair | Open, OrAuto(Pair)] = (4, 4)
 
 
 class MicroSection(Section):
     """The micro model that gives the laws.
 
     ``model = "auto"`` takes the cheapest whose expected error of the force is below ``tolerance``
-    (by default 2 %) at the largest load and half of it, and checks it at one load. The promise is
-    about the micro model of the whole surface, not about what isolated laws leave out.
+    (by default what the scene's accuracy leaves for it, or 2 %) at the largest load and half of it,
+    and checks it at one load. The promise is about the micro model of the whole surface, not about
+    what isolated laws leave out.
     """
 
     model: Literal[
@@ -143,8 +157,14 @@ class Scene(Section):
     """A complete scene. Lengths in mm, pressures in MPa.
 
     The section ``[load]`` is the attribute `loading`, for `Scene.load` reads a file.
+
+    ``accuracy`` is the error of the force that may be left. Of ``surface.grid``, ``micro.model``,
+    ``coupling.kind``, ``patches.grid`` and ``block.cells``, those that are ``"auto"`` become what
+    is predicted to keep it at the least cost; with an accuracy so do those that are not stated.
+    Without one, ``"auto"`` means 2 %.
     """
 
+    accuracy: Annotated[Number, Field(gt=0, lt=0.5)] | None = None
     surface: SurfaceSection
     block: BlockSection
     patches: PatchesSection = PatchesSection()

@@ -35,7 +35,8 @@ class CouplingSection(Section):
     (where the plane is free, that which it takes on a half-space at the largest load);
     ``concurrent`` solves the whole surface on the block at every load step, without laws;
     ``analytic`` is the micro model alone on a half-space; ``reference`` meshes the rough surface
-    itself and has no micro model, see `ReferenceSection`.
+    itself and has no micro model, see `ReferenceSection`; ``auto`` is concurrent or consistent,
+    whichever keeps the scene's accuracy at less cost.
 
     ``compliance`` of the block under its patches: ``finite-element`` from the plain mesh under the
     laws; ``decomposed`` is the half-space exactly and finite elements for the smooth rest. By
@@ -50,7 +51,9 @@ class CouplingSection(Section):
     and 1e-3 with micro models that see cells.
     """
 
-    kind: Literal["isolated", "consistent", "concurrent", "analytic", "reference"] = "consistent"
+    kind: Literal["isolated", "consistent", "concurrent", "analytic", "reference", "auto"] = (
+        "consistent"
+    )
     compliance: Literal["auto", "finite-element", "decomposed"] = "auto"
     newton: Literal["auto", "condensed", "full"] = "auto"
     love: Literal["mean", "centre"] = "mean"
@@ -69,6 +72,8 @@ class CouplingSection(Section):
         if self.kind == "analytic":  # ignores what is about patches and finite elements
             return
         kind, points = f"kind = '{self.kind}'", self.interface == "pointwise"
+        if self.kind == "auto":
+            kind = "a kind that is left to the plan"
         yield (
             self.kind != "isolated" and self.love == "centre",
             f"love = 'centre' does not go with {kind}",

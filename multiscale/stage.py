@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -14,18 +16,23 @@ from geometry.meshes import BlockShape
 from geometry.patches import PatchGrid, patch_means
 from geometry.surface import Surface
 from micro import MODELS, AsperityModel, Choice, MicroModel, ScaledModel
+from multiscale.choices import SETTLED_LATE, cheapest, open_keys, provisional
+from multiscale.contact_estimate import Contacts, contacts
 from multiscale.coupling import tilted_approaches
+from multiscale.decision import Decision
 from multiscale.ingredients import make_shape, make_surface
 from multiscale.micro_choice import (
     chosen_model,
-    expected_plane,
+    estimated_plane,
     furthest_plane,
+    nearest,
     stated_model,
 )
 from multiscale.reference_meshes import ReferenceMeshes, reference_meshes
 from multiscale.refinement import MOST_ROWS
 from multiscale.scene import Scene
-from multiscale.stage_checks import check_patches, check_size
+from multiscale.stage_checks import check_patches, check_size, patch_grid
+from multiscale.surface_choice import chosen_surface, micro_tolerance
 
 Array = NDArray[np.float64]
 
@@ -38,7 +45,7 @@ class Stage:
     """Everything that is known before laws and finite elements are made.
 
     Attributes:
-        scene: The scene.
+        scene: The scene, what it left open settled but for ``micro.model``.
         surface: Its rough surface.
         asperities: The surface's summits.
         micro: Micro model of the whole surface; None in a reference, which has none.
@@ -49,6 +56,8 @@ class Stage:
             there; where force or moment are prescribed, those of the surface on a half-space.
         choice: Why this micro model, where the scene leaves it open.
         meshes: The meshes of a reference; None with other couplings.
+        decision: Why this coupling, these patches and cells, where the scene leaves them open.
+        seconds: Wall time of making the surface and of choosing the micro model [s].
     """
 
     scene: Scene
@@ -61,6 +70,8 @@ class Stage:
     furthest: tuple[float, tuple[float, float]]
     choice: Choice | None = None
     meshes: ReferenceMeshes | None = None
+    decision: Decision | None = None
+    seconds: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def model(self) -> MicroModel:
@@ -108,6 +119,16 @@ class Stage:
     def table_rows(self) -> int:
         """Rows that laws may take to get there; models that see cells pay for each."""
         return 400 if self.by_summits else MOST_ROWS
+
+    @property
+    def nearest(self) -> float:
+        """How near the plane at the largest load comes anywhere [mm]."""
+        return nearest(self.furthest, self.surface)
+
+    @cached_property
+    def contacts(self) -> Contacts:
+        """What is known of the contacts before; solves a half-space of few cells once."""
+        return contacts(self.surface, self.model.contact_modulus, self.furthest)
 
     @cached_property
     def deepest(self) -> float:
@@ -193,18 +214,50 @@ class Stage:
 
 
 def make_stage(scene: Scene) -> Stage:
-    """Make or read the surface, find its summits and check that everything fits together.
+    """Make or read the surface, find its summits, settle what is open, check that all fits.
 
     Raises:
         InputError: When something cannot be made or does not fit; names file, key and value.
     """
-    check_size(scene)
-    surface = make_surface(scene)
-    patches = PatchGrid(grid=scene.patches.grid, lengths=surface.lengths)
-    check_patches(scene, surface)
+    began = time.perf_counter()
+    free = open_keys(scene)
+    start = provisional(scene, free)
+    check_size(start)
+    if "surface.grid" in free:
+        start, surface = chosen_surface(scene, start)
+    else:
+        surface = make_surface(start)
+    check_patches(start, surface)
+    patches = PatchGrid(grid=patch_grid(start), lengths=surface.lengths)
     asperities = find_asperities(surface, periodic=False)  # the block's sides are free
-    if scene.coupling.kind == "reference":
-        return _reference_stage(scene, surface, patches, asperities)
+    if start.coupling.kind == "reference":
+        return _reference_stage(start, surface, patches, asperities, began)
+    _check_summits(start, asperities)
+    shape = make_shape(start, surface)
+    made = time.perf_counter()
+    seconds = {"surface": made - began}
+    choice = None
+    if start.micro.model == "auto":
+        choice = chosen_model(start, surface, patches, micro_tolerance(scene, start, surface))
+        seconds["micro choice"] = time.perf_counter() - made
+    model = choice.model if choice else stated_model(start, surface)
+    mean_heights = patch_means(surface, patches)
+    stage = Stage(
+        scene=start,
+        surface=surface,
+        asperities=asperities,
+        micro=model,
+        patches=patches,
+        mean_heights=mean_heights,
+        shape=shape,
+        furthest=furthest_plane(start.loading.programme, model, patches, mean_heights),
+        choice=choice,
+        seconds=seconds,
+    )
+    return cheapest(stage, scene, free) if free & SETTLED_LATE else stage
+
+
+def _check_summits(scene: Scene, asperities: Asperities) -> None:
     by_summits = scene.micro.model in MODELS and scene.micro.border == "ignore"
     if by_summits and not len(asperities):
         raise InputError(
@@ -214,28 +267,13 @@ def make_stage(scene: Scene) -> Stage:
             allowed="half-space, islands",
             file=scene.file,
         )
-    shape = make_shape(scene, surface)
-    choice = chosen_model(scene, surface, patches) if scene.micro.model == "auto" else None
-    model = choice.model if choice else stated_model(scene, surface)
-    mean_heights = patch_means(surface, patches)
-    return Stage(
-        scene=scene,
-        surface=surface,
-        asperities=asperities,
-        micro=model,
-        patches=patches,
-        mean_heights=mean_heights,
-        shape=shape,
-        furthest=furthest_plane(scene.loading.programme, model, patches, mean_heights),
-        choice=choice,
-    )
 
 
 def _reference_stage(
-    scene: Scene, surface: Surface, patches: PatchGrid, asperities: Asperities
+    scene: Scene, surface: Surface, patches: PatchGrid, asperities: Asperities, began: float
 ) -> Stage:
     """Return the ingredients of a reference, which needs no micro model."""
-    furthest = expected_plane(scene, surface)
+    furthest = estimated_plane(scene, surface)
     return Stage(
         scene=scene,
         surface=surface,
@@ -246,4 +284,5 @@ def _reference_stage(
         shape=make_shape(scene, surface),
         furthest=furthest,
         meshes=reference_meshes(scene, surface, furthest),
+        seconds={"surface": time.perf_counter() - began},
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from geometry.errors import InputError
 from geometry.surface import Surface
@@ -16,11 +16,24 @@ BYTES_PER_HEIGHT = 100
 BYTES_PER_CELL = 5000
 """Memory that mesh, stiffness and multigrid take per cell, roughly [B]."""
 
+BYTES_PER_PAIR = 40
+"""Memory that dense matrices take per pair of patches: compliance, tangent, factors [B]."""
+
+BYTES_PER_LAW = 15_000
+"""Memory that a law takes: 65 rows of 7 numbers, while more are put between them [B]."""
+
+BYTES_PER_STATE = 24
+"""Memory of what a patch carries at one load step [B]."""
+
 EMBEDDED_CELLS = (40, 40, 25)
 """Cells of a block that carries the laws itself: those of Waddad et al. 2016."""
 
 DECOMPOSED_CELLS = (16, 16, 12)
 """Cells of a block that only corrects the half-space: a cube's compliance to 0.05 %."""
+
+
+PROVISIONAL_PATCHES = (4, 4)
+"""Patches of a scene that leaves them open, until they are chosen."""
 
 
 def block_cells(scene: Scene) -> tuple[int, int, int]:
@@ -29,27 +42,58 @@ def block_cells(scene: Scene) -> tuple[int, int, int]:
     Laws on the plain mesh need it fine under every patch; the smooth correction of the half-space
     does not.
     """
-    return scene.block.cells or (DECOMPOSED_CELLS if scene.coupling.decomposed else EMBEDDED_CELLS)
+    cells = scene.block.cells
+    if cells is None or cells == "auto":
+        return DECOMPOSED_CELLS if scene.coupling.decomposed else EMBEDDED_CELLS
+    return cells
+
+
+def patch_grid(scene: Scene) -> tuple[int, int]:
+    """Return the patches along x and y: those asked for, or what stands for them until chosen."""
+    grid = scene.patches.grid
+    return PROVISIONAL_PATCHES if grid == "auto" else grid
 
 
 def check_size(scene: Scene) -> None:
-    """Refuse what could never fit into this machine's memory, before anything is allocated."""
+    """Refuse what could never fit into this machine's memory, before anything is allocated.
+
+    Keys that are left to the plan are passed over: it takes nothing that would be refused.
+
+    Raises:
+        InputError: Names the key, its value and what is allowed.
+    """
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    sizes: list[tuple[str, Sequence[int] | None, int]] = [
-        ("surface.grid", scene.surface.grid, BYTES_PER_HEIGHT),
-        ("patches.grid", scene.patches.grid, BYTES_PER_HEIGHT),
-    ]
-    if scene.coupling.kind not in ("analytic", "reference"):  # which checks its meshes itself
-        sizes.append(("block.cells", block_cells(scene), BYTES_PER_CELL))
-    for key, counts, each in sizes:
-        if counts is not None and math.prod(counts) * each > memory:
+    for key, value, what, needed in _sizes(scene):
+        if needed > memory:
             raise InputError(
-                f"needs about {math.prod(counts) * each / 1e9:.3g} GB of memory",
+                f"{what}needs about {needed / 1e9:.3g} GB of memory",
                 key=key,
-                value=list(counts),
+                value=list(value) if isinstance(value, tuple) else value,
                 allowed=f"what fits into {memory / 1e9:.3g} GB",
                 file=scene.file,
             )
+
+
+def _sizes(scene: Scene) -> Iterator[tuple[str, object, str, float]]:
+    """Yield keys, their values, what of them takes memory, and how much [B]."""
+    grid, patches = scene.surface.grid, scene.patches.grid
+    if isinstance(grid, tuple):
+        yield "surface.grid", grid, "", math.prod(grid) * BYTES_PER_HEIGHT
+    meshed = scene.coupling.kind not in ("analytic", "reference")  # which checks its meshes itself
+    if meshed and scene.block.cells != "auto":
+        cells = block_cells(scene)
+        yield "block.cells", cells, "", math.prod(cells) * BYTES_PER_CELL
+    if not isinstance(patches, tuple):
+        return
+    count, steps = math.prod(patches), scene.loading.steps * len(scene.loading.programme.points)
+    yield "patches.grid", patches, "", count * BYTES_PER_HEIGHT
+    if meshed:
+        what = "the interaction of all patches with each other "
+        yield "patches.grid", patches, what, count**2 * BYTES_PER_PAIR
+    if scene.coupling.kind in ("isolated", "consistent"):
+        yield "patches.grid", patches, "a law for every patch ", count * BYTES_PER_LAW
+    what = f"the history of {count} patches "
+    yield "load.steps", scene.loading.steps, what, steps * (count * BYTES_PER_STATE + 1000)
 
 
 def check_patches(scene: Scene, surface: Surface) -> None:
@@ -63,12 +107,13 @@ def check_patches(scene: Scene, surface: Surface) -> None:
     on_mesh = not scene.coupling.decomposed or scene.output.fields
     if scene.coupling.kind not in ("analytic", "reference") and on_mesh:
         limits.append(("cells of the interface (block.cells)", block_cells(scene)[:2]))
+    grid = patch_grid(scene)
     for what, limit in limits:
-        if any(patches > most for patches, most in zip(scene.patches.grid, limit, strict=True)):
+        if any(patches > most for patches, most in zip(grid, limit, strict=True)):
             raise InputError(
                 f"more patches than {what}",
                 key="patches.grid",
-                value=list(scene.patches.grid),
+                value=list(grid),
                 allowed=f"at most {list(limit)}",
                 file=scene.file,
             )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from rich.table import Table
 
 from geometry.errors import PatchlawError
 from multiscale import plan
+from multiscale.forecast import Forecast, comparison
 from multiscale.history import History, LoadStep
 from multiscale.loading import Programme
 from multiscale.report import curve_cells
@@ -67,15 +68,29 @@ def show_pairs(comm: Any, pairs: Sequence[tuple[str, str]], warnings: Sequence[s
         console.print(f"[yellow]note:[/] {escape(warning)}")
 
 
-def show_plan(comm: Any, stage: Stage) -> None:
+def show_plan(comm: Any, stage: Stage, made: Forecast) -> None:
     """Print what a run will do, and why.
 
     Args:
         comm: MPI communicator, or None.
         stage: The scene's ingredients.
+        made: What is predicted of it.
     """
     if speaks(comm):
-        show_pairs(comm, list(plan.statements(stage)), list(plan.warnings(stage)))
+        show_pairs(comm, list(plan.statements(stage, made)), list(plan.warnings(stage, made)))
+
+
+def show_comparison(comm: Any, made: Forecast, seconds: Mapping[str, float]) -> None:
+    """Print what was predicted beside what came out.
+
+    Args:
+        comm: MPI communicator, or None.
+        made: What was predicted.
+        seconds: Wall time of the phases [s].
+    """
+    if speaks(comm):
+        rows = [f"{what} {real} ({foreseen})" for what, foreseen, real in comparison(made, seconds)]
+        _wide_console().print(f"real (predicted): {', '.join(rows)}", markup=False)
 
 
 @contextmanager
@@ -139,7 +154,7 @@ def _nothing(text: str) -> None:
 
 
 def show_history(comm: Any, history: History) -> None:
-    """Print the force–approach table and where the time went.
+    """Print the force–approach table and what the run says of itself.
 
     Args:
         comm: MPI communicator, or None.
@@ -155,8 +170,6 @@ def show_history(comm: Any, history: History) -> None:
     for row in rows:
         table.add_row(*row)
     console.print(table)
-    times = ", ".join(f"{name} {seconds:.2f} s" for name, seconds in history.seconds.items())
-    console.print(f"wall time: {times}")
     for note in history.notes:
         console.print(f"note: {escape(note)}")
 

@@ -1,5 +1,6 @@
 """The condensed block against the full Newton on the same mesh and laws."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -150,7 +151,7 @@ def test_fields_are_those_of_the_patch_pressures():
     ("overrides", "condensed", "why"),
     [
         ([], False, "the compliance of 8 patches takes about 168 multigrid cycles, more than 3"),
-        (["load.steps=30"], True, "fewer than 30 load steps on the mesh with about 240"),
+        (["load.steps=60"], True, "fewer than 60 load steps on the mesh with about 240"),
         (["coupling.newton=condensed"], True, "as the scene asks"),
         (["coupling.interface=pointwise"], False, "laws at points need the whole mesh"),
         (["coupling.compliance=decomposed"], True, "the decomposed block is its compliance"),
@@ -168,10 +169,13 @@ def test_plan_states_what_the_smooth_rest_costs():
         return dict(statements(stage))["block"], list(warnings(stage))
 
     text, notes = told([16, 16, 12])
-    assert "11271 unknowns, factorised once in about 0.54 s" in text
+    assert "11271 unknowns, made once in about " in text
     assert not any("smooth rest" in note for note in notes)
     _, notes = told([40, 40, 25])
-    assert any("146247 unknowns, and takes about 25 s and 2.8 GB" in note for note in notes)
+    # MUMPS itself took 2.8 GB; the seconds are this machine's
+    said = re.search(r"146247 unknowns, and takes about ([\d.]+) s and ([\d.]+) GB", str(notes))
+    assert said is not None
+    assert 0.5 * 2.8 < float(said[2]) < 2.0 * 2.8
     assert any("16 × 16 × 12 cells give the compliance" in note for note in notes)
 
 

@@ -1,0 +1,160 @@
+"""Predicted work against counted work, and what becomes of a prediction."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from geometry import BlockShape, PatchGrid
+from geometry.smooth_shape import smooth_shape
+from macro.side_loads import sides
+from micro import HalfSpaceModel
+from multiscale import Run, Scene, make_stage
+from multiscale.block_work import _side_points, mesh_unknowns, reference_work, smooth_bytes
+from multiscale.costs import predicted_cost, run_work
+from multiscale.loading import Programme
+from multiscale.machine import Machine, this_machine
+from multiscale.press_work import presses, step_count
+from multiscale.results import write_results
+from multiscale.work import Work
+
+
+class Unit(Machine):
+    """A machine on which every unit of work takes a second."""
+
+    call = passes = transform = function = flop = product = 1.0
+
+
+def scene(kind="concurrent", grid=64, cells=(4, 4, 4), **sections):
+    spectrum = {"hurst": 0.95, "waves": [2, 8], "rms_slope": 0.215, "seed": 1}
+    return Scene.from_dict(
+        {
+            "surface": {"spectrum": spectrum, "grid": [grid, grid], "lengths": [1.0, 1.0]},
+            "block": {"young_modulus": 4000.0, "poisson_ratio": 0.15, "cells": list(cells)},
+            "micro": {"model": "half-space"},
+            "coupling": {"kind": kind},
+            "load": {"approach": 0.008, "steps": 4},
+            "output": {"figures": False},
+        }
+        | sections
+    )
+
+
+def test_work_adds_up():
+    one = Work(call=2.0, flop=3.0)
+    two = 2.0 * one + Work(product=5.0)
+    assert two == Work(call=4.0, flop=6.0, product=5.0)
+    assert two.seconds(Unit()) == 15.0
+
+
+def test_rates_of_this_machine_are_those_of_a_computer():
+    machine = this_machine()
+    assert machine is this_machine()  # measured once per process
+    rates = [getattr(machine, kind) for kind in Work.__slots__]
+    # between a thousandth of a 2020 core and a thousand times its speed
+    assert all(1e-14 < rate < 1e-3 for rate in rates)
+    assert machine.flop < machine.call
+
+
+@pytest.fixture
+def pressed(monkeypatch):
+    """Presses of half-spaces, by their number of cells."""
+    made: dict[int, int] = {}
+    press = HalfSpaceModel._pressed
+
+    def counted(self, plane, start):
+        cells = self.surface.heights.size
+        made[cells] = made.get(cells, 0) + 1
+        return press(self, plane, start)
+
+    monkeypatch.setattr(HalfSpaceModel, "_pressed", counted)
+    return made
+
+
+@pytest.mark.parametrize(
+    "load", [{"approach": 0.008}, {"force": 2.0}, {"approach": 0.008, "tilt": "free"}]
+)
+def test_presses_are_as_many_as_predicted(pressed, load):
+    run = Run(scene(load=load | {"steps": 4}))
+    foreseen = presses(run.scene.loading.programme)
+    pressed.clear()
+    list(run.load_steps())
+    # measured counts scatter by as much between surfaces
+    assert foreseen / 1.6 <= pressed[64**2] <= 1.6 * foreseen
+
+
+@pytest.mark.parametrize(("kind", "each"), [("consistent", 2), ("isolated", 1)])
+def test_rows_of_laws_are_as_many_as_predicted(pressed, kind, each):
+    run = Run(scene(kind))
+    pressed.clear()
+    run.make_laws()
+    tables = run.stage.reached_patches if kind == "isolated" else 1
+    # refinement takes 33 to 65 rows of the 56 that are predicted, and some to find its ends
+    assert 56 * each * tables / 1.7 <= pressed[64**2] <= 1.7 * 56 * each * tables
+
+
+@pytest.mark.parametrize("cells", [(8, 8, 8), (16, 16, 12), (24, 24, 16)])
+@pytest.mark.parametrize("across", [8, 16])
+def test_points_on_the_sides_are_counted_as_they_are(cells, across):
+    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=cells)
+    loads = PatchGrid(grid=(across, across), lengths=(1.0, 1.0))
+    true = sum(len(side.points[0]) for side in sides(smooth_shape(shape), loads))
+    assert _side_points(shape, loads.grid) == pytest.approx(true, rel=0.03)  # ticks may coincide
+
+
+@pytest.mark.parametrize("element", ["Q1", "Q2"])
+def test_unknowns_of_a_mesh(element):
+    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(3, 4, 5), element=element)
+    degree = int(element[1])
+    assert mesh_unknowns(shape) == 3 * math.prod(degree * n + 1 for n in (3, 4, 5))
+
+
+def test_work_grows_with_what_is_asked():
+    def total(**sections):
+        stage = make_stage(scene(**sections))
+        return predicted_cost(stage, Unit()).total
+
+    assert total(load={"approach": 0.008, "steps": 40}) > total()
+    assert total(grid=128) > total()
+    assert total(output={"figures": True}) > total()
+    assert total(kind="analytic") < total()
+    assert reference_work(2e5, 8).seconds(Unit()) > 2.0 * reference_work(1e5, 3).seconds(Unit())
+    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(16, 16, 12))
+    assert smooth_bytes(shape, (32, 32)) > smooth_bytes(shape, (16, 16)) > 1e8
+
+
+def test_a_block_that_is_kept_costs_no_factorisation(tmp_path, monkeypatch):
+    monkeypatch.setenv("PATCHLAW_CACHE", str(tmp_path))
+    stage = make_stage(scene())
+    assert run_work(stage)["block"].flop > 0.0
+    list(Run(scene()).load_steps())
+    assert run_work(stage)["block"].flop == 0.0
+
+
+def test_steps_that_may_be_halved_are_counted():
+    plain = Programme(quantity="approach", points=(0.008, 0.002), steps=3, tilt=(0.0, 0.0))
+    assert step_count(plain) == 6
+    fine = Programme(
+        quantity="approach", points=(0.008,), steps=3, tilt=(0.0, 0.0), force_change=0.05
+    )
+    assert step_count(fine) == 20
+
+
+def test_report_and_provenance_compare_prediction_with_outcome(tmp_path):
+    run = Run(scene("analytic", grid=32, accuracy=0.1))
+    made = run.forecast
+    list(run.load_steps())
+    write_results(tmp_path, run, options=[])
+    kept = json.loads((tmp_path / "provenance.json").read_text())
+    assert kept["predicted"]["seconds"] == dict(made.seconds)
+    assert kept["predicted"]["force_error"] == pytest.approx(sum(made.errors.values()), rel=1e-12)
+    assert kept["memory_bytes"] > 1e6
+    assert set(made.seconds) <= set(kept["seconds"]) | {"output"}
+    page = (tmp_path / "report.html").read_text()
+    assert "<h2>What it took</h2>" in page
+    assert "predicted</th><th>real" in page
+    assert "What the force may be off by" in page
+    assert np.isclose(kept["predicted"]["accuracy"], 0.1)

@@ -1,0 +1,182 @@
+"""What a scene does not ask for is not done: counted calls and modules, not only outputs."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import micro.interaction
+import multiscale.results
+from geometry import Asperities, PatchGrid
+from micro import HalfSpaceModel, asperity_model
+from multiscale import Run, Scene, make_stage
+from multiscale.forecast import forecast
+from multiscale.results import write_results
+
+FINITE_ELEMENTS = ("dolfinx", "petsc4py", "macro", "gmsh")
+PICTURES = ("matplotlib",)
+
+
+def data(kind="analytic", model="half-space", grid=32, **sections):
+    spectrum = {"hurst": 0.95, "waves": [2, 6], "rms_slope": 0.2, "seed": 1}
+    return {
+        "surface": {"spectrum": spectrum, "grid": [grid, grid], "lengths": [1.0, 1.0]},
+        "block": {"young_modulus": 4000.0, "poisson_ratio": 0.15},
+        "micro": {"model": model},
+        "coupling": {"kind": kind},
+        "load": {"approach": 0.008, "steps": 2},
+        "output": {"figures": False, "report": False},
+    } | sections
+
+
+def loaded(tmp_path: Path, command: str, given: dict) -> set[str]:
+    """Return the modules that a command has loaded in a process of its own."""
+    lines = [f"{name} = {_toml(section)}" for name, section in given.items()]
+    scene = tmp_path / "scene.toml"
+    scene.write_text("\n".join(lines))
+    code = (
+        "import json, sys\nfrom multiscale.cli import main\n"
+        f"code = main(['{command}', {str(scene)!r}, '--out', {str(tmp_path / 'out')!r}])\n"
+        "print(json.dumps([code, sorted(sys.modules)]))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120
+    )
+    code, names = json.loads(done.stdout.splitlines()[-1])
+    assert code == 0
+    return set(names)
+
+
+def _toml(value) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_toml(part)}" for key, part in value.items()) + " }"
+    return json.dumps(value)
+
+
+@pytest.mark.parametrize(("command", "accuracy"), [("run", {"accuracy": 0.1}), ("plan", {})])
+def test_a_half_space_scene_loads_neither_finite_elements_nor_pictures(tmp_path, command, accuracy):
+    names = loaded(tmp_path, command, data() | accuracy)
+    assert not names.intersection(FINITE_ELEMENTS + PICTURES)
+
+
+def test_figures_load_the_pictures_that_others_do_without(tmp_path):
+    """The witness of the test above can fail."""
+    assert "matplotlib" in loaded(tmp_path, "run", data(output={"report": False}))
+
+
+def never(*given, **options):
+    raise AssertionError("this was not asked for")
+
+
+def test_only_the_force_curve(monkeypatch, tmp_path):
+    monkeypatch.setattr(multiscale.results, "_figures", never)
+    monkeypatch.setattr(multiscale.results, "report_html", never)
+    monkeypatch.setattr(sys.modules["multiscale.run"], "final_field", never)
+    run = Run(Scene.from_dict(data("concurrent", block=data()["block"] | {"cells": [4, 4, 4]})))
+    assert len(list(run.load_steps())) == 2
+    names = {path.name for path in write_results(tmp_path, run, options=[])}
+    assert names == {"history.csv", "patches.csv", "provenance.json"}
+
+
+@pytest.fixture
+def presses(monkeypatch):
+    """Cells of every grid that the half-space is solved on."""
+    made: list[int] = []
+    pressed = HalfSpaceModel._pressed
+
+    def counted(self, plane, start):
+        made.append(self.surface.heights.size)
+        return pressed(self, plane, start)
+
+    monkeypatch.setattr(HalfSpaceModel, "_pressed", counted)
+    return made
+
+
+@pytest.mark.parametrize("kind", ["analytic", "isolated", "consistent", "concurrent"])
+def test_a_plan_solves_nothing_of_the_scene(monkeypatch, presses, kind):
+    monkeypatch.setattr("multiscale.blocks.embedding", never)
+    monkeypatch.setattr("multiscale.blocks.smooth_correction", never)
+    monkeypatch.setattr("multiscale.assemble.make_table", never)
+    given = data(kind, grid=128)
+    stage = make_stage(Scene.from_dict(given))
+    made = forecast(stage)
+    assert made.total > 0.0
+    assert made.error > 0.0
+    # of the estimates on at most 96² cells there is one
+    assert presses == ([] if kind == "analytic" else [96**2])
+
+
+def test_patches_out_of_reach_build_no_law(monkeypatch):
+    given = data("isolated", patches={"grid": [4, 4]}, load={"approach": 0.003, "steps": 1})
+    run = Run(Scene.from_dict(given))
+    reached = run.stage.reached_patches
+    assert 0 < reached < 16
+    solved = set()
+    pressed = HalfSpaceModel._pressed
+
+    def counted(self, plane, start):
+        solved.add(tuple(self.within.borders_x) + tuple(self.within.borders_y))
+        return pressed(self, plane, start)
+
+    monkeypatch.setattr(HalfSpaceModel, "_pressed", counted)
+    laws = run.make_laws().laws
+    assert len(solved) == reached
+    assert sum(law.pressure.size > 0 for law in laws) == reached
+
+
+def summits(below: int) -> Asperities:
+    """Return three summits within reach, and others far below."""
+    random = np.random.default_rng(3)
+    x, y = random.uniform(0.1, 0.9, (2, 3 + below))
+    z = np.concatenate(([0.0, -0.001, -0.002], np.full(below, -0.5)))
+    radius = np.full(3 + below, 0.2)
+    return Asperities(
+        x=x, y=y, z=z, radius_major=radius, radius_minor=radius, angle=0.0 * radius,
+        lengths=(1.0, 1.0), highest=0.0, mean_height=-0.1,
+    )  # fmt: skip
+
+
+def evaluations(monkeypatch, below: int) -> int:
+    """Return how many pairs of summits a load takes."""
+    counted = [0]
+    field = micro.interaction.circular_field
+
+    def watched(*given, **options):
+        counted[0] += int(np.prod(np.broadcast_shapes(*(np.shape(part) for part in given))))
+        return field(*given, **options)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(micro.interaction, "circular_field", watched)
+        model = asperity_model("circular", summits(below), contact_modulus=1.0)
+        whole = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
+        model.respond([0.002, 0.004], patches=whole, mean_heights=[-0.1])
+    return counted[0]
+
+
+def test_summits_out_of_reach_cost_nothing(monkeypatch):
+    alone = evaluations(monkeypatch, 0)
+    assert alone > 0
+    assert evaluations(monkeypatch, 40) == alone
+
+
+def test_a_scene_without_open_keys_weighs_no_alternatives(monkeypatch):
+    monkeypatch.setattr("multiscale.choices.predicted_cost", never)
+    monkeypatch.setattr("multiscale.choices.expected_errors", never)
+    stage = make_stage(Scene.from_dict(data("consistent")))
+    assert stage.decision is None
+
+
+def test_rates_are_measured_only_where_they_are_needed():
+    from multiscale.machine import Machine
+    from multiscale.work import Work
+
+    machine = Machine()
+    assert Work(call=10.0, passes=5.0).seconds(machine) > 0.0
+    assert set(vars(machine)) == {"call", "passes"}
+    assert replace(Work(call=1.0), call=0.0).seconds(Machine()) == 0.0
