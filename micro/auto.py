@@ -56,6 +56,7 @@ def choose(
     patches: PatchGrid | None = None,
     periodic: bool = False,
     cost: Cost | None = None,
+    label: str | None = None,
 ) -> Choice:
     """Choose a micro model of a surface.
 
@@ -75,10 +76,11 @@ def choose(
         periodic: Whether surface and pressures continue periodically; else the border is free.
         cost: Predicted time of all solutions, of a kind of model (its name, or ``scaled``) on so
             many cells [s]; by default what one core took when it was measured.
+        label: Label of the only candidate that may be taken, such as an earlier choice.
 
     Raises:
         InputError: When approach, tolerance or number of solutions is out of range, or a surface
-            that is not periodic shall be.
+            that is not periodic shall be, or no candidate has the label.
     """
     _refuse(surface, approach, tolerance, solutions, periodic)
     check = Check(
@@ -88,15 +90,22 @@ def choose(
         tolerance=tolerance,
         periodic=periodic,
     )
-    found = options(
-        surface,
-        [check.measures, contact_measures(surface, approach, periodic=periodic)],
-        contact_modulus=contact_modulus,
-        solutions=solutions,
-        patches=patches,
-        periodic=periodic,
-        cost=cost,
+    found = list(
+        options(
+            surface,
+            [check.measures, contact_measures(surface, approach, periodic=periodic)],
+            contact_modulus=contact_modulus,
+            solutions=solutions,
+            patches=patches,
+            periodic=periodic,
+            cost=cost,
+        )
     )
+    if label is not None:
+        labels = [option.candidate.label for option in found]
+        found = [option for option in found if option.candidate.label == label]
+        if not found:
+            raise InputError("is no micro model here", value=label, allowed=", ".join(labels))
     return _Search(sorted(found, key=lambda o: o.candidate.cost), tolerance, check).choice()
 
 

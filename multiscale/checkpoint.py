@@ -29,7 +29,8 @@ class Checkpoint:
 
     Attributes:
         run: Random name of the run, which its journal bears too.
-        scene: The scene as nested dictionaries.
+        scene: The scene as it was given, as nested dictionaries.
+        settled: What its open keys became.
         heights: SHA-256 of the surface's heights.
         laws: The law file's bytes; empty without laws.
         steps: The accepted load steps.
@@ -39,6 +40,7 @@ class Checkpoint:
 
     run: str
     scene: dict[str, Any]
+    settled: dict[str, Any]
     heights: str
     laws: bytes
     steps: tuple[LoadStep, ...] = ()
@@ -119,7 +121,7 @@ def _refused(path: Path, problem: str, value: str | None = None, allowed: str = 
 
 
 def _arrays(checkpoint: Checkpoint) -> Arrays:
-    facts = {"run": checkpoint.run, "scene": checkpoint.scene, "heights": checkpoint.heights}
+    facts = {name: getattr(checkpoint, name) for name in ("run", "scene", "settled", "heights")}
     return {
         "facts": text_array(json.dumps(facts)),
         "laws": np.frombuffer(checkpoint.laws, np.uint8),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import product
 from typing import TYPE_CHECKING, Any
@@ -119,6 +119,49 @@ def cheapest(stage: Stage, given: Scene, free: frozenset[str]) -> Stage:
     decision = decided(found, accuracy_of(given))
     taken = stages[next(k for k, a in enumerate(found) if a is decision.taken)]
     return replace(taken, decision=decision)
+
+
+def settled_keys(stage: Stage, given: Scene) -> dict[str, Any]:
+    """Return what the open keys of a scene became, so that a run goes on as it began.
+
+    Rates of the machine decide near ties, and another session may run on another machine.
+
+    Args:
+        stage: The ingredients.
+        given: The scene as it was given.
+
+    Returns:
+        Values that JSON can hold, by key; of the micro model the candidate's label.
+    """
+    found: dict[str, Any] = {}
+    for key in sorted(open_keys(given)):
+        section, _, name = key.partition(".")
+        if key == "coupling.kind":
+            found[key] = stage.scene.coupling.model_dump(mode="json", exclude_unset=True)
+        elif key == "micro.model":
+            found[key] = stage.choice.taken.label if stage.choice else None
+        else:
+            found[key] = getattr(getattr(stage.scene, section), name)
+    return found
+
+
+def with_settled(scene: Scene, settled: Mapping[str, Any]) -> Scene:
+    """Return a scene whose open keys, but for the micro model, are what they became before.
+
+    Args:
+        scene: The scene as it was given.
+        settled: What `settled_keys` returned.
+    """
+    changes: dict[str, Any] = {}
+    for key in open_keys(scene) & set(settled) - {"micro.model"}:
+        section, _, name = key.partition(".")
+        if key == "coupling.kind":
+            changes[section] = CouplingSection.model_validate(settled[key])
+            continue
+        value = settled[key]
+        value = tuple(value) if isinstance(value, list) else value
+        changes[section] = getattr(scene, section).model_copy(update={name: value})
+    return _changed(scene, changes)
 
 
 def _alternative(stage: Stage) -> Alternative:

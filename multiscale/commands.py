@@ -20,7 +20,7 @@ from multiscale.law_files import write_laws
 from multiscale.outputs import write_whole
 from multiscale.quantities import parse_duration
 from multiscale.results import write_fields, write_figure, write_results
-from multiscale.resuming import Keeper, is_finished
+from multiscale.resuming import Keeper, is_finished, kept_choices
 from multiscale.run import Run
 from multiscale.scene import Scene
 from multiscale.stage import Stage, make_stage
@@ -36,7 +36,8 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
     """
     with Interruption(comm, _limit(choice.max_time)) as interruption:
         scene, folder = scene_and_folder(choice, comm)
-        run = Run(scene, comm)
+        kept = on_root(comm, lambda: kept_choices(folder)) if choice.resume else None
+        run = Run(scene, comm, kept)
         with locked(folder, comm) as lock:
             keeper = Keeper(folder, run, lock)
             if not _begun(choice.resume, folder, run, keeper):

@@ -39,7 +39,9 @@ def stated_model(scene: Scene, surface: Surface) -> MicroModel:
     )
 
 
-def chosen_model(scene: Scene, surface: Surface, patches: PatchGrid, tolerance: float) -> Choice:
+def chosen_model(
+    scene: Scene, surface: Surface, patches: PatchGrid, tolerance: float, label: str | None = None
+) -> Choice:
     """Choose the micro model at the load that brings the plane nearest anywhere.
 
     Where the force or the moment is prescribed, a half-space of few cells tells how near that is.
@@ -49,6 +51,7 @@ def chosen_model(scene: Scene, surface: Surface, patches: PatchGrid, tolerance: 
         surface: Its surface.
         patches: Its patches.
         tolerance: Relative error of the force.
+        label: The candidate to take, if it is known.
     """
     kind, plane = scene.coupling.kind, estimated_plane(scene, surface)
     at = reach(surface, plane, summits=_FEW_SUMMITS)
@@ -68,6 +71,7 @@ def chosen_model(scene: Scene, surface: Surface, patches: PatchGrid, tolerance: 
         patches=patches if scene.coupling.kind != "analytic" else None,
         solutions=solutions,
         cost=cost,
+        label=label,
     )
 
 

@@ -35,6 +35,7 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "written": datetime.now(UTC).isoformat(timespec="seconds"),
         "scene_file": run.scene.file,
         "scene": run.scene.model_dump(by_alias=True, mode="json"),
+        "scene_given": run.given.model_dump(by_alias=True, mode="json"),
         "units": "mm, N, MPa",
         "surface": {
             "source": run.stage.surface.source,

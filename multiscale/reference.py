@@ -14,6 +14,7 @@ from geometry.patches import PatchGrid
 from multiscale.blocks import block_material
 from multiscale.coupling import embedded_step
 from multiscale.history import LoadStep, PatchState
+from multiscale.records import Arrays, packed, unpacked
 from multiscale.reference_record import ReferenceRecord, reference_record
 from multiscale.stage import Stage
 
@@ -51,7 +52,7 @@ class ReferenceCoupling:
             raise ValueError("a reference needs a mesh")
         self._blocks, self._patches = tuple(blocks), patches
         self.qualities = tuple(qualities)
-        self._last: ObstacleState | None = None
+        self._last: tuple[ObstacleState, ...] = ()
 
     @property
     def finest(self) -> ObstacleBlock:
@@ -70,15 +71,26 @@ class ReferenceCoupling:
         Raises:
             ValueError: Before the first load step.
         """
-        if self._last is None:
+        if not self._last:
             raise ValueError("no load step has been accepted yet")
-        return self._last
+        return self._last[-1]
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step on every mesh; see `Coupling.press`."""
-        states = [block.press(control) for block in self._blocks]
-        self._last = states[-1]
-        return self._step(states)
+        self._last = tuple(block.press(control) for block in self._blocks)
+        return self._step(self._last)
+
+    def state(self) -> Arrays:
+        """Return the plane on every mesh; see `Restorable`."""
+        return packed(tuple((state.approach, *state.tilt) for state in self._last))
+
+    def restore(self, state: Arrays) -> None:
+        """Press every mesh by its plane again; see `Restorable`."""
+        planes = unpacked(state, ()) if state else ()
+        self._last = tuple(
+            block.press(Control(approach=approach, tilt=(tx, ty)))
+            for block, (approach, tx, ty) in zip(self._blocks, planes, strict=False)
+        )
 
     def _step(self, states: Sequence[ObstacleState]) -> LoadStep:
         finest, nominal = states[-1], self._patches.area * self._patches.count

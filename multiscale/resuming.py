@@ -166,6 +166,19 @@ def refuse_changes(then: Checkpoint, now: Checkpoint, path: Path) -> None:
         )
 
 
+def kept_choices(folder: Path) -> dict[str, Any] | None:
+    """Return what the open keys of an interrupted run's scene became; None without a checkpoint.
+
+    Args:
+        folder: Folder of its results.
+
+    Raises:
+        InputError: When the checkpoint is damaged.
+    """
+    path = folder / CHECKPOINT
+    return read_checkpoint(path).settled if path.exists() else None
+
+
 def is_finished(folder: Path, run: Run) -> bool:
     """Tell whether the results in a folder are those of a finished run of the same scene.
 
@@ -176,7 +189,7 @@ def is_finished(folder: Path, run: Run) -> bool:
     now = run.checkpoint("", {})
     try:
         facts = json.loads((folder / "provenance.json").read_text(encoding="utf-8"))
-        then = replace(now, scene=facts["scene"], heights=facts["surface"]["heights_sha256"])
+        then = replace(now, scene=facts["scene_given"], heights=facts["surface"]["heights_sha256"])
         refuse_changes(then, now, folder / CHECKPOINT)
         return bool(facts["finished"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError):  # InputError among them

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cached_property
 from io import BytesIO
@@ -16,6 +16,7 @@ from geometry.collective import on_root
 from multiscale.assemble import assemble, make_table
 from multiscale.blocks import final_field, load_together
 from multiscale.checkpoint import Checkpoint, digest
+from multiscale.choices import settled_keys
 from multiscale.coupling import EmbeddedCoupling
 from multiscale.forecast import Forecast, forecast
 from multiscale.history import History, LoadStep
@@ -39,8 +40,10 @@ class Run:
     Args:
         scene: What to run.
         comm: MPI communicator (mpi4py); None runs on this process alone.
+        settled: What the scene's open keys became when the run began; see `settled_keys`.
 
     Attributes:
+        given: The scene as it was given.
         stage: The scene's ingredients, made at once: surface, summits, patches, micro model.
         scene: The scene, what it left open settled.
         seconds: Wall time of each phase so far [s].
@@ -51,8 +54,10 @@ class Run:
         position: Where the load programme has come to with them.
     """
 
-    def __init__(self, scene: Scene, comm: Any = None) -> None:
-        self.comm = comm
+    def __init__(
+        self, scene: Scene, comm: Any = None, settled: Mapping[str, Any] | None = None
+    ) -> None:
+        self.given, self.comm = scene, comm
         self.steps: list[LoadStep] = []
         self.position = Position()
         self._resumed: Checkpoint | None = None
@@ -61,7 +66,7 @@ class Run:
         self.interface: Interface | None = None
         self.coupling: Coupling | None = None
         load_together(scene, comm)
-        self.stage: Stage = on_root(comm, lambda: make_stage(scene))
+        self.stage: Stage = on_root(comm, lambda: make_stage(scene, settled))
         self.scene = self.stage.scene
         self.seconds = dict(self.stage.seconds)
 
@@ -111,7 +116,8 @@ class Run:
         """
         return Checkpoint(
             run=name,
-            scene=self.scene.model_dump(by_alias=True, mode="json"),
+            scene=self.given.model_dump(by_alias=True, mode="json"),
+            settled=settled_keys(self.stage, self.given),
             heights=self.heights,
             laws=self._law_bytes,
             steps=tuple(self.steps),

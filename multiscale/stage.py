@@ -6,6 +6,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from geometry.meshes import BlockShape
 from geometry.patches import PatchGrid, patch_means
 from geometry.surface import Surface
 from micro import MODELS, AsperityModel, Choice, MicroModel, ScaledModel
-from multiscale.choices import SETTLED_LATE, cheapest, open_keys, provisional
+from multiscale.choices import SETTLED_LATE, cheapest, open_keys, provisional, with_settled
 from multiscale.contact_estimate import Contacts, contacts
 from multiscale.coupling import tilted_approaches
 from multiscale.decision import Decision
@@ -213,15 +214,20 @@ class Stage:
         return np.asarray(approach + from_centre @ np.asarray(tilt) - (self.surface.highest - z))
 
 
-def make_stage(scene: Scene) -> Stage:
+def make_stage(scene: Scene, settled: Mapping[str, Any] | None = None) -> Stage:
     """Make or read the surface, find its summits, settle what is open, check that all fits.
+
+    Args:
+        scene: The scene.
+        settled: What open keys became when the run began; see `settled_keys`.
 
     Raises:
         InputError: When something cannot be made or does not fit; names file, key and value.
     """
     began = time.perf_counter()
-    free = open_keys(scene)
-    start = provisional(scene, free)
+    known = settled or {}
+    free = open_keys(scene) - set(known)
+    start = provisional(with_settled(scene, known), free)
     check_size(start)
     if "surface.grid" in free:
         start, surface = chosen_surface(scene, start)
@@ -236,9 +242,11 @@ def make_stage(scene: Scene) -> Stage:
     shape = make_shape(start, surface)
     made = time.perf_counter()
     seconds = {"surface": made - began}
-    choice = None
+    choice, label = None, known.get("micro.model")
     if start.micro.model == "auto":
-        choice = chosen_model(start, surface, patches, micro_tolerance(scene, start, surface))
+        choice = chosen_model(
+            start, surface, patches, micro_tolerance(scene, start, surface), label
+        )
         seconds["micro choice"] = time.perf_counter() - made
     model = choice.model if choice else stated_model(start, surface)
     mean_heights = patch_means(surface, patches)
