@@ -70,9 +70,10 @@ class Interruption:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Give the signals back."""
+        """Give the signals back; a notice of the time limit that comes now must not kill."""
         for number, handler in self._former.items():
-            signal.signal(number, handler)
+            late_notice = number == signal.SIGUSR1 and handler == signal.SIG_DFL
+            signal.signal(number, signal.SIG_IGN if late_notice else handler)
         self._former.clear()
 
     def check(self, where: str, took: float = 0.0) -> None:
