@@ -42,7 +42,7 @@ def test_two_spheres_feel_each_other(balls):
     means = patch_means(balls, HALVES)
     coupling = ConcurrentCoupling(model, HALVES, means, block_rest(16))
     expected = coupling.press(Control(approach=APPROACH)).force_N
-    block, state = pressed(balls, APPROACH, fine=SIZE / 3.0, patches=HALVES)
+    _, state = pressed(balls, APPROACH, fine=SIZE / 3.0, patches=HALVES)
     alone = 8.0 / 3.0 * MODULUS * np.sqrt(RADIUS) * APPROACH**1.5
     assert expected / alone < 0.9  # measured 0.83: each sinks in the other's pit
     assert state.force == pytest.approx(expected, rel=5e-3)
