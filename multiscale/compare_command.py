@@ -97,4 +97,3 @@ def budget_seconds(text: str) -> float:
         raise InputError(
             problem, key="--budget", value=text, allowed=allowed.rstrip(")") or None
         ) from None
-
