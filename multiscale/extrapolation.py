@@ -50,8 +50,8 @@ def extrapolated(values: ArrayLike, sizes: ArrayLike, order: float | None = None
     one and a quarter, but at least half the order, with two meshes, where the order is taken on
     trust; with three, half less than the rate they show, or than the order if they seem to
     converge faster. Where three meshes do not converge monotonically at a rate between 0.5 and 8,
-    the finest value stands, with what a third of the known order leaves open between the first and the
-    last, a rate of 0.25 without one, or their spread if that is more. Meshes may also agree by
+    the finest value stands, with what a third of the known order leaves open between the first and
+    the last, a rate of 0.25 without one, or their spread if that is more. Meshes may also agree by
     accident: no relative bar is less than half the median of all load steps.
 
     Args:
