@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 _OPTIONS = {
     "General.Verbosity": 0,
     "General.Terminal": 0,
+    "Mesh.Algorithm": 6,
     "Mesh.ElementOrder": 1,
     "Mesh.RecombineAll": 0,
     "Mesh.SubdivisionAlgorithm": 0,

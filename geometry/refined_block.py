@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from geometry.checks import positive_lengths
 from geometry.errors import InputError
@@ -17,6 +18,8 @@ from geometry.lattice import gmsh_session
 from geometry.surface import Surface
 
 Array = NDArray[np.float64]
+
+_DELAUNAY = 5  # gmsh's number of the algorithm
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -94,7 +97,7 @@ class RefinedShape:
             gmsh.model.occ.synchronize()
             _name_faces(gmsh, box, self.height)
             _set_sizes(gmsh, self)
-            gmsh.model.mesh.generate(3)
+            _generate(gmsh, self)
             gmsh.model.mesh.setOrder(self.degree)
             yield gmsh.model
 
@@ -160,6 +163,22 @@ def _name_faces(gmsh: Any, box: int, height: float) -> None:
     for tag, (name, members) in enumerate(groups.items(), start=1):
         gmsh.model.addPhysicalGroup(2, members, tag)
         gmsh.model.setPhysicalName(2, tag, name)
+
+
+def _generate(gmsh: Any, shape: RefinedShape) -> None:
+    """Mesh; again if the frontal algorithm, whose triangles are better, has missed a place.
+
+    It looks at sizes where it puts nodes alone, and can step over small ones between large ones.
+    """
+    gmsh.model.mesh.generate(2)
+    _, nodes, _ = gmsh.model.mesh.getNodes(2, -1, includeBoundary=True)
+    nodes = np.reshape(nodes, (-1, 3))
+    top = nodes[np.abs(nodes[:, 2]) < 1e-9 * shape.height, :2]
+    if np.any(cKDTree(top).query(shape.places)[0] > shape.fine):
+        gmsh.model.mesh.clear()
+        gmsh.option.setNumber("Mesh.Algorithm", _DELAUNAY)
+        gmsh.model.mesh.generate(2)
+    gmsh.model.mesh.generate(3)
 
 
 def _set_sizes(gmsh: Any, shape: RefinedShape) -> None:

@@ -52,6 +52,22 @@ def test_geometry_has_the_order_of_the_element(element, kind):
     assert list(kinds) == [kind]  # gmsh's numbers of tetrahedra with 4 and 10 nodes
 
 
+def test_no_place_is_stepped_over():
+    """Large triangles all around: gmsh's frontal algorithm puts no node near the small ones."""
+    ticks = np.linspace(0.0, 1.0, 24)
+    lattice = np.stack(np.meshgrid(ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 2)
+    near = lattice[np.linalg.norm(lattice - 0.5, axis=1) < 0.14]
+    places = np.vstack([near, [[0.5, 0.5]]])
+    small = shape(
+        interface=(1.0, 1.0), height=1.0, places=places, fine=0.05, coarse=0.29, growth=0.7
+    )
+    with small.meshed() as model:
+        _, nodes, _ = model.mesh.getNodes(2, -1, includeBoundary=True)
+    distance = np.linalg.norm(nodes.reshape(-1, 3) - [0.5, 0.5, 0.0], axis=1)
+    # triangles of this edge have 2/√3 nodes per square of it: 14.5 in the disc; 1 was missed
+    assert 10 <= np.count_nonzero(distance < 0.1) <= 20
+
+
 def test_meshes_are_the_same_on_every_run():
     found = []
     for _ in range(2):
