@@ -5,7 +5,6 @@ from __future__ import annotations
 from enum import Enum
 from typing import Any
 
-
 _LONGEST = 200  # characters of a value in a message
 
 

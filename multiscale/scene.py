@@ -8,7 +8,6 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
-from geometry.errors import InputError
 from geometry.spectrum import Spectrum
 from multiscale.left_open import Open, OrAuto
 from multiscale.quantities import Length, Pressure, Slope, SpectralAmplitude
@@ -24,9 +23,11 @@ from multiscale.sections import (
 
 Flag = Annotated[bool, Field(strict=True)]
 PositiveLength = Annotated[Length, Field(gt=0)]
-Count = Annotated[int, Field(ge=1, strict=True)]
+Count = Annotated[int, Field(ge=1, le=1_000_000_000, strict=True)]
 Pair = Annotated[tuple[Count, Count], Field(description="x, y")]
-Heights = Annotated[int, Field(ge=4, strict=True)]  # fewer have no cubic interpolant
+Heights = Annotated[
+    int, Field(ge=4, le=1_000_000_000, strict=True)
+]  # fewer have no cubic interpolant
 Band = Annotated[tuple[Number, Number], Field(description="lower, upper number of waves per side")]
 
 

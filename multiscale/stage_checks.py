@@ -83,6 +83,11 @@ def _sizes(scene: Scene) -> Iterator[tuple[str, object, str, float]]:
     if meshed and scene.block.cells != "auto":
         cells = block_cells(scene)
         yield "block.cells", cells, "", math.prod(cells) * BYTES_PER_CELL
+    if meshed and scene.block.margin:
+        more = 2 * scene.block.margin_cells
+        nx, ny, nz = block_cells(scene)
+        needed = (nx + more) * (ny + more) * nz * BYTES_PER_CELL
+        yield "block.margin_cells", scene.block.margin_cells, "", needed
     if not isinstance(patches, tuple):
         return
     count, steps = math.prod(patches), scene.loading.steps * len(scene.loading.programme.points)
