@@ -23,7 +23,7 @@ def positive_lengths(value: Any, what: str) -> tuple[float, float]:
         what: What the lengths belong to, such as ``"the surface"``.
 
     Raises:
-        InputError: When there are not two of them, or one is not positive and of some sensible scale.
+        InputError: When there are not two of them, or one is not positive, or of no sensible scale.
     """
     problem, allowed = f"the lengths of {what} do not fit", "two positive numbers (Lx, Ly) in mm"
     pair = finite_pair(value, problem, allowed=allowed)

@@ -200,7 +200,8 @@ def _checked_heights(heights: ArrayLike) -> Array:
     if len(bad):
         first = tuple(int(index) for index in bad[0])
         raise InputError(
-            f"{len(bad)} of {array.size} heights are not finite or of no scale, the first at index {first}",
+            f"{len(bad)} of {array.size} heights are not finite or of no scale, the first at index "
+            f"{first}",
             value=float(array[first]),
             allowed=f"finite heights in mm, within ±{LARGEST:g}",
         )

@@ -122,3 +122,23 @@ def check_patches(scene: Scene, surface: Surface) -> None:
                 allowed=f"at most {list(limit)}",
                 file=scene.file,
             )
+
+
+def check_load(scene: Scene, surface: Surface) -> None:
+    """Refuse loads that would press a linear elastic block to nothing."""
+    if scene.coupling.kind == "analytic":
+        return
+    block, loading = scene.block, scene.loading
+    most = block.height if loading.force is None else block.young_modulus * surface.area
+    named, unit = ("the block's height", "mm") if loading.force is None else ("E times area", "N")
+    key, points = "load.force", loading.force
+    if points is None:
+        key, points = "load.approach", loading.approach or ()
+    if max(points) > most:
+        raise InputError(
+            "presses the block to nothing",
+            key=key,
+            value=list(points),
+            allowed=f"at most {named}, {most:.6g} {unit}",
+            file=scene.file,
+        )
