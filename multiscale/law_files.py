@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -114,7 +115,7 @@ def read_laws(path: Path | BinaryIO) -> LawTable:
                 lengths=_pair(file.attrs["lengths_mm"], float),
                 origin=_pair(file.attrs["origin_mm"], float),
             )
-            if patches.count > len(file):
+            if math.prod(patches.grid) > len(file):
                 raise InputError("lacks laws", value=patches.grid, allowed=f"{len(file)} groups")
             groups = [file[_group_name(patches, index)] for index in range(patches.count)]
             made_by = {
