@@ -192,7 +192,7 @@ def test_budget(text, seconds):
     [
         (
             "5",
-            r"--budget = '5': has no unit \(allowed: a quantity in units of s, such as \"55 min\"",
+            r"--budget = '5': has no unit \(allowed: a quantity in units of s, such as \"5 min\"",
         ),
         ("5 mm", "has the wrong unit"),
         ("soon", "cannot be read as a quantity"),
