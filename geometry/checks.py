@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 
 from geometry.errors import InputError
 
+SMALLEST, LARGEST = 1e-15, 1e15
+"""Lengths that double precision leaves sense to when they are squared and multiplied [mm]."""
+
 
 def positive_lengths(value: Any, what: str) -> tuple[float, float]:
     """Return two positive, finite side lengths as floats.
@@ -20,11 +23,11 @@ def positive_lengths(value: Any, what: str) -> tuple[float, float]:
         what: What the lengths belong to, such as ``"the surface"``.
 
     Raises:
-        InputError: When there are not two of them, or one is not positive and finite.
+        InputError: When there are not two of them, or one is not positive, or of no sensible scale.
     """
     problem, allowed = f"the lengths of {what} do not fit", "two positive numbers (Lx, Ly) in mm"
     pair = finite_pair(value, problem, allowed=allowed)
-    if min(pair) <= 0.0:
+    if not SMALLEST <= min(pair) <= max(pair) <= LARGEST:
         raise InputError(problem, value=pair, allowed=allowed)
     return pair
 
@@ -53,7 +56,8 @@ def cell_counts(value: Any, what: str, *, dimension: int = 2, smallest: int = 1)
 
 def frozen_array(value: Any) -> NDArray[np.float64]:
     """Return a contiguous, read-only float64 copy."""
-    array = np.array(value, dtype=np.float64, order="C")
+    with np.errstate(over="ignore", invalid="ignore"):  # long doubles may become infinite
+        array = np.array(value, dtype=np.float64, order="C")
     array.setflags(write=False)
     return array
 

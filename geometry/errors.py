@@ -5,6 +5,8 @@ from __future__ import annotations
 from enum import Enum
 from typing import Any
 
+_LONGEST = 200  # characters of a value in a message
+
 
 class _Value(Enum):
     """Stands for a value that is not told; an enum stays itself when it is sent between ranks."""
@@ -57,8 +59,9 @@ class InputError(PatchlawError, ValueError):
         )
 
     def __str__(self) -> str:
-        shown = None if self.value is _Value.UNTOLD else f"{self.value!r}"
-        subject = " = ".join(part for part in (self.key, shown) if part)
+        shown = None if self.value is _Value.UNTOLD else _shortened(self.value)
+        key = self.key and (self.key if len(self.key) <= _LONGEST else f"{self.key[:_LONGEST]}…")
+        subject = " = ".join(part for part in (key, shown) if part)
         text = ": ".join(part for part in (self.file, subject, self.problem) if part)
         return f"{text} (allowed: {self.allowed})" if self.allowed else text
 
@@ -93,6 +96,15 @@ class NotWritten(PatchlawError, RuntimeError):
     """
 
     exit_code = 5
+
+
+def _shortened(value: Any) -> str:
+    """Return what stands for a value in a message: a line, however long the value is."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # of thousands of digits, or levels
+        return f"<{type(value).__name__}>"
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
 
 
 def _not_converged(what: str, reason: str, iterations: int, remedy: str) -> NotConverged:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import io
+import math
 import os
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.checks import cell_counts, positive_lengths
+from geometry.checks import LARGEST, cell_counts, positive_lengths
 from geometry.errors import InputError
 from geometry.instruments import read_instrument
 from geometry.surface import Surface
@@ -19,6 +21,8 @@ from geometry.surface import Surface
 Array = NDArray[np.float64]
 Content = tuple[Array, tuple[float, float] | None]
 
+_BYTES_PER_HEIGHT = 100  # that surface and spline take, roughly
+_BYTES_PER_CHARACTER = 60  # likewise of a text, with heights of two characters and more
 _PLACE_TOLERANCE = 0.01  # of a cell: a point further from its place is not on a regular grid
 
 
@@ -52,7 +56,7 @@ def read_surface(
     """
     file = Path(path)
     try:
-        if not file.is_file():
+        if not _is_file(file):  # nor a pipe or a device, which may never end
             raise InputError("there is no such file")
         heights, found = _READERS.get(file.suffix.lower(), read_instrument)(file)
         sides = lengths if lengths is not None else found
@@ -72,16 +76,59 @@ def read_surface(
                 value=surface.grid,
                 allowed=f"{tuple(grid)}",
             )
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", file=str(file)) from None
     except InputError as error:
         raise error.located(file=str(file)) from None
     return surface
 
 
-def _read_array(file: Path) -> Content:
+def _is_file(file: Path) -> bool:
     try:
-        return np.load(file, allow_pickle=False), None
-    except (OSError, ValueError, EOFError) as error:
+        return file.is_file()
+    except OSError:  # a name longer than any, a folder that may not be entered
+        return False
+
+
+def _read_array(file: Path) -> Content:
+    """Return the array of a ``.npy`` file, whose header is believed in nothing unchecked."""
+    with file.open("rb") as stream:
+        shape, transposed, dtype = _array_header(stream)
+        count = math.prod(shape)
+        if dtype.kind not in "biuf":  # pickled objects among them
+            raise InputError("the heights are not an array of real numbers", value=str(dtype))
+        if len(shape) != 2 or min(shape) < 0:
+            raise InputError("not a two-dimensional array", value=shape, allowed="(nx, ny)")
+        held = os.fstat(stream.fileno()).st_size - stream.tell()
+        if held < count * dtype.itemsize:
+            raise InputError(
+                f"not a whole numpy array: it has {held} bytes of the {count * dtype.itemsize} "
+                "that its header promises"
+            )
+        _check_memory(count * _BYTES_PER_HEIGHT)
+        flat = np.fromfile(stream, dtype=dtype, count=count)
+    return flat.reshape(shape, order="F" if transposed else "C"), None
+
+
+def _array_header(stream: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """Return shape, whether it is in Fortran's order, and type of a ``.npy`` file."""
+    form = np.lib.format
+    readers = {(1, 0): form.read_array_header_1_0, (2, 0): form.read_array_header_2_0}
+    try:
+        return readers[form.read_magic(stream)](stream)
+    except KeyError:
+        raise InputError("not a numpy array of a known version", allowed="1.0, 2.0") from None
+    except Exception as error:  # whatever the parser of the header meets
         raise InputError(f"not a readable numpy array: {_first_line(error)}") from None
+
+
+def _check_memory(needed: float) -> None:
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if needed > memory:
+        raise InputError(
+            f"the heights need about {needed / 1e9:.3g} GB of memory",
+            allowed=f"what fits into {memory / 1e9:.3g} GB",
+        )
 
 
 def _read_matrix(file: Path) -> Content:
@@ -96,17 +143,18 @@ def _read_points(file: Path) -> Content:
             value=points.shape[1],
             allowed="3 columns",
         )
-    if not np.isfinite(points[:, :2]).all():
-        raise InputError("some coordinates x, y are not finite")
+    if not np.all(np.abs(points[:, :2]) <= LARGEST):
+        raise InputError(f"some coordinates x, y are not finite, or beyond {LARGEST:g} mm")
     (ix, dx), (iy, dy) = _places(points[:, 0], "x"), _places(points[:, 1], "y")
-    heights = np.full((ix.max() + 1, iy.max() + 1), np.nan)
-    times = np.bincount(np.ravel_multi_index((ix, iy), heights.shape), minlength=heights.size)
-    if np.any(times != 1):
+    nx, ny = int(ix.max()) + 1, int(iy.max()) + 1
+    taken, times = np.unique(ix * ny + iy, return_counts=True)
+    if taken.size != nx * ny or np.any(times != 1):
         raise InputError(
-            f"the points do not fill a regular grid of {heights.shape[0]} × {heights.shape[1]}: "
-            f"{np.count_nonzero(times == 0)} places are empty, "
+            f"the points do not fill a regular grid of {nx} × {ny}: "
+            f"{nx * ny - taken.size} places are empty, "
             f"{np.count_nonzero(times > 1)} taken more than once"
         )
+    heights = np.empty((nx, ny))
     heights[ix, iy] = points[:, 2]
     return heights, (heights.shape[0] * dx, heights.shape[1] * dy)
 
@@ -122,6 +170,7 @@ _READERS: dict[str, Callable[[Path], Content]] = {
 
 def _load_text(file: Path) -> Array:
     """Return a matrix of numbers, whichever of the usual separators the text has."""
+    _check_memory(file.stat().st_size * _BYTES_PER_CHARACTER)
     try:
         text = file.read_text(encoding="utf-8-sig")
         rows = (line.partition("#")[0].strip() for line in text.splitlines())

@@ -155,14 +155,10 @@ def synthesise(
     """
     nx, ny = cell_counts(grid, "the grid of the surface", smallest=4)
     lengths = positive_lengths(lengths, "the surface")
+    _check_resolved((nx, ny), _reach(spectrum, lengths), per_wave=1)  # before waves are listed
     waves = random_waves(spectrum, lengths)
-    needed = tuple(max(4, 2 * int(np.abs(k).max()) + 1) for k in (waves.kx, waves.ky))
-    if nx < needed[0] or ny < needed[1]:
-        raise InputError(
-            "the grid is too coarse for the shortest waves of the spectrum",
-            value=(nx, ny),
-            allowed=f"at least {needed[0]} × {needed[1]} heights",
-        )
+    largest = int(np.abs(waves.kx).max()), int(np.abs(waves.ky).max())
+    _check_resolved((nx, ny), largest, per_wave=2)
     shift = np.pi * (waves.kx / nx + waves.ky / ny)  # samples lie at cell centres
     coefficient = waves.amplitude * np.exp(1j * (waves.phase + shift))
     half = np.zeros((nx, ny // 2 + 1), dtype=np.complex128)
@@ -182,13 +178,29 @@ def _checked_band(band: tuple[float, float], name: str) -> tuple[float, float]:
     return lo, hi
 
 
+def _check_resolved(grid: tuple[int, int], largest: tuple[int, int], *, per_wave: int) -> None:
+    """Refuse a grid that has no more than so many cells per wave along x or y."""
+    if any(cells <= per_wave * waves for cells, waves in zip(grid, largest, strict=True)):
+        needed = " × ".join(f"{max(4, 2 * waves + 1)}" for waves in largest)
+        raise InputError(
+            "the grid is too coarse for the shortest waves of the spectrum",
+            value=grid,
+            allowed=f"at least {needed} heights",
+        )
+
+
 def _reach(spectrum: Spectrum, lengths: tuple[float, float]) -> tuple[int, int]:
     """Return the largest |kx| and |ky| that the band can hold."""
     if spectrum.waves is not None:
         hi = spectrum.waves[1] * _ROUNDING
-        return int(hi), int(hi * lengths[1] / lengths[0])
+        return _whole(hi), _whole(hi * lengths[1] / lengths[0])
     assert spectrum.waves_x is not None and spectrum.waves_y is not None
-    return int(spectrum.waves_x[1]), int(spectrum.waves_y[1])
+    return _whole(spectrum.waves_x[1]), _whole(spectrum.waves_y[1])
+
+
+def _whole(waves: float) -> int:
+    """Return a number of waves rounded down; infinite products count as more than any grid has."""
+    return int(min(waves, 1e18))
 
 
 def _half_plane(reach: tuple[int, int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry.checks import frozen_array, positive_lengths
+from geometry.checks import LARGEST, frozen_array, positive_lengths
 from geometry.errors import InputError
 from geometry.interpolant import Interpolant
 
@@ -196,13 +196,14 @@ def _checked_heights(heights: ArrayLike) -> Array:
             value=array.shape,
             allowed="shape (nx, ny) with nx, ny ≥ 4",
         )
-    bad = np.argwhere(~np.isfinite(array))
+    bad = np.argwhere(~(np.abs(array) <= LARGEST))
     if len(bad):
         first = tuple(int(index) for index in bad[0])
         raise InputError(
-            f"{len(bad)} of {array.size} heights are not finite, the first at index {first}",
+            f"{len(bad)} of {array.size} heights are not finite or of no scale, the first at index "
+            f"{first}",
             value=float(array[first]),
-            allowed="finite heights in mm",
+            allowed=f"finite heights in mm, within ±{LARGEST:g}",
         )
     return array
 

@@ -17,7 +17,16 @@ from geometry.errors import InputError
 from multiscale.history import LoadStep, PatchState
 from multiscale.loading import Position
 from multiscale.outputs import write_bytes
-from multiscale.records import Arrays, as_text, packed, part, prefixed, text_array, unpacked
+from multiscale.records import (
+    Arrays,
+    as_text,
+    packed,
+    part,
+    prefixed,
+    stored_numbers,
+    text_array,
+    unpacked,
+)
 
 FORMAT = "patchlaw checkpoint 1"
 _PATCH = "patches."
@@ -77,6 +86,8 @@ def read_checkpoint(path: Path) -> Checkpoint:
     Raises:
         InputError: When it is none, is of another format or damaged.
     """
+    if not path.is_file():  # a pipe would be waited for
+        raise _refused(path, "is no file")
     try:
         with h5py.File(path, "r") as file:
             form = str(file.attrs.get("format", ""))
@@ -86,14 +97,14 @@ def read_checkpoint(path: Path) -> Checkpoint:
 
             def read(name: str, item: Any) -> None:
                 if isinstance(item, h5py.Dataset):
-                    arrays[name] = np.asarray(item[()])
+                    arrays[name] = stored_numbers(item)
 
             file.visititems(read)
             if str(file.attrs.get("sha256", "")) != digest(arrays):
                 raise _refused(path, "is damaged: its checksum does not fit its content")
         return _checkpoint(arrays)
-    except InputError:
-        raise
+    except InputError as error:
+        raise error.located(file=str(path)) from None
     except OSError as error:
         raise _refused(path, f"is damaged or cannot be read: {error}") from None
     except Exception as error:  # a sound checksum over what this version cannot understand

@@ -217,7 +217,11 @@ def scene_and_folder(
 
 def _check_folder(folder: Path) -> None:
     """Refuse a folder that could not be written to, before anything is computed."""
-    nearest = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    try:
+        nearest = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    except OSError as error:  # a name longer than any
+        problem = f"cannot be used: {error.strerror}"
+        raise InputError(problem, key="--out", value=str(folder)) from None
     if not nearest.is_dir():
         raise InputError(f"{nearest} is not a folder", key="--out", value=str(folder))
     if not os.access(nearest, os.W_OK | os.X_OK):

@@ -88,7 +88,7 @@ def journalled(path: Path, run: str) -> Iterator[tuple[LoadStep, Position, Array
         path: The file; it may be missing.
         run: Name of the run.
     """
-    data = memoryview(path.read_bytes()) if path.exists() else memoryview(b"")
+    data = memoryview(path.read_bytes()) if path.is_file() else memoryview(b"")
     while len(data) > _CHECK + _LENGTH:
         length = int.from_bytes(data[_CHECK : _CHECK + _LENGTH], "little")
         content = data[_CHECK + _LENGTH : _CHECK + _LENGTH + length]

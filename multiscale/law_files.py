@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import h5py
-import numpy as np
 
 from geometry.errors import InputError
 from geometry.partition import UnevenPartition
 from geometry.patches import PatchGrid
 from multiscale.laws import PatchLaw
+from multiscale.records import stored_numbers
 from multiscale.spread import ContactSpread
 
 _COLUMNS = {
@@ -103,6 +104,8 @@ def read_laws(path: Path | BinaryIO) -> LawTable:
     Raises:
         InputError: When the file cannot be read, is no law file or lacks anything.
     """
+    if isinstance(path, Path) and not path.is_file():  # a pipe would be waited for
+        raise InputError("is not a readable law file: there is no such file", file=str(path))
     try:
         with h5py.File(path, "r") as file:
             if file.attrs.get("format") != "patchlaw laws 1":
@@ -112,6 +115,8 @@ def read_laws(path: Path | BinaryIO) -> LawTable:
                 lengths=_pair(file.attrs["lengths_mm"], float),
                 origin=_pair(file.attrs["origin_mm"], float),
             )
+            if math.prod(patches.grid) > len(file):
+                raise InputError("lacks laws", value=patches.grid, allowed=f"{len(file)} groups")
             groups = [file[_group_name(patches, index)] for index in range(patches.count)]
             made_by = {
                 name.removeprefix("made_by_"): str(text)
@@ -125,21 +130,21 @@ def read_laws(path: Path | BinaryIO) -> LawTable:
                 force_error=float(file.attrs.get("force_error", _UNKNOWN)),
                 spread=_spread(file["spread"], patches) if "spread" in file else None,
             )
-    except (OSError, KeyError) as error:
-        raise InputError(f"is not a readable law file: {error}", file=str(path)) from None
     except InputError as error:
         raise error.located(file=str(path)) from None
+    except Exception as error:  # h5py raises errors of many families over damaged files
+        raise InputError(f"is not a readable law file: {error}", file=str(path)) from None
 
 
 def _spread(group: Any, patches: PatchGrid) -> ContactSpread:
     ticks = {f"ticks_{axis}": tuple(group.attrs[f"load_borders_{axis}_mm"]) for axis in "xy"}
     loads = UnevenPartition(**ticks)
-    columns = {name: np.asarray(group[name][()]) for name in _SPREAD}
+    columns = {name: stored_numbers(group[name]) for name in _SPREAD}
     return ContactSpread(patches=patches, loads=loads, **columns)
 
 
 def _law(group: Any) -> PatchLaw:
-    content: dict[str, Any] = {name: np.asarray(group[name][()]) for name in _COLUMNS}
+    content: dict[str, Any] = {name: stored_numbers(group[name]) for name in _COLUMNS}
     scalars = _OLDER | dict(group.attrs)
     content.update({name: float(scalars[name]) for name in _SCALARS})
     return PatchLaw(**content)

@@ -19,6 +19,20 @@ _EXAMPLES = {
     "s": '"55 min"',
 }
 
+_NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?"
+_UNIT = r"\(?(?:[^\W\d]+|%)(?:\s*(?:\^|\*\*)\s*[+-]?[0-9]{1,2}(?![0-9])|[²³⁴])?\)?"
+_QUANTITY = re.compile(rf"\s*{_NUMBER}\s*(?:\*?\s*{_UNIT}(?:\s*[*/·]\s*{_UNIT}|\s+{_UNIT})*)?\s*")
+_LONGEST = 100  # characters
+
+_SIZES = {
+    "mm": (1e-15, 1e15),
+    "MPa": (1e-15, 1e15),
+    "mm**4": (1e-60, 1e60),
+    "": (1e-15, 1e6),
+    "N": (1e-30, 1e30),
+    "s": (1e-3, 1e12),
+}
+
 
 @cache
 def _registry() -> Any:
@@ -39,19 +53,31 @@ def parse_quantity(value: Any, unit: str) -> float:
         The magnitude in ``unit``.
 
     Raises:
-        ValueError: When the value is no quantity, has another dimension or is not finite.
+        ValueError: When the value is no quantity, has another dimension, is not finite or of no
+            scale that computing in double precision leaves sense to.
     """
     if isinstance(value, bool) or not isinstance(value, str | int | float):
         raise ValueError(f"is not a quantity (allowed: a number in {_named(unit)} or a string)")
-    number = _with_unit(value, unit) if isinstance(value, str) else float(value)
+    try:
+        number = _with_unit(value, unit) if isinstance(value, str) else float(value)
+    except OverflowError:  # a whole number beyond floating point
+        number = math.inf
     if not math.isfinite(number):
         raise ValueError("is not finite (allowed: a finite quantity)")
+    least, most = _SIZES[unit]
+    if number != 0.0 and not least <= abs(number) <= most:
+        raise ValueError(
+            f"is out of any scale (allowed: {least:g} to {most:g} {unit or 'as a ratio'}, or 0)"
+        )
     return number
 
 
 def _with_unit(text: str, unit: str) -> float:
     """Convert a string with a unit by pint."""
     allowed = f"(allowed: a quantity in units of {_named(unit)}, such as {_EXAMPLES[unit]})"
+    # pint would also do sums, and 9**9**9 for as long as it takes
+    if len(text) > _LONGEST or not _QUANTITY.fullmatch(text):
+        raise ValueError(f"cannot be read as a quantity {allowed}")
     try:
         quantity = _registry().Quantity(text)
     except Exception as error:  # pint raises whatever its tokenizer meets

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.errors import InputError
+
 Arrays = dict[str, NDArray[Any]]
 """Arrays by name: what a file can hold and a checksum be taken of."""
 
@@ -32,6 +34,24 @@ def text_array(text: str) -> NDArray[np.uint8]:
         text: Any text.
     """
     return np.frombuffer(text.encode(), np.uint8)
+
+
+def stored_numbers(item: Any) -> NDArray[Any]:
+    """Return the numbers of an HDF5 dataset, if the file itself holds as many as it promises.
+
+    Args:
+        item: What h5py found under a name.
+
+    Raises:
+        InputError: When it is no dataset of numbers, or they are elsewhere or nowhere.
+    """
+    kind = getattr(getattr(item, "dtype", None), "kind", "")
+    if not kind or kind not in "biuf":
+        raise InputError(f"{item.name} is not a column of numbers")
+    # ours are neither packed nor spread over files: a small file promises no large array
+    if item.nbytes > item.id.get_storage_size() or item.external:
+        raise InputError(f"{item.name} is not whole", value=item.shape)
+    return np.asarray(item[()])
 
 
 def part(arrays: Arrays, prefix: str) -> Arrays:

@@ -40,7 +40,7 @@ def _unknown_key(path: list[str], model: type[BaseModel]) -> InputError:
     known = _known_keys(model, path[:-1])
     close = difflib.get_close_matches(path[-1], known, n=1, cutoff=0.5)
     hint = f"; did you mean '{close[0]}'?" if close else ""
-    return InputError(f"unknown key{hint}", key=".".join(path), allowed=", ".join(known))
+    return InputError(f"unknown key{hint}", key=".".join(path) or '""', allowed=", ".join(known))
 
 
 def _known_keys(model: Any, sections: list[str]) -> list[str]:

@@ -192,7 +192,8 @@ def is_finished(folder: Path, run: Run) -> bool:
         then = replace(now, scene=facts["scene_given"], heights=facts["surface"]["heights_sha256"])
         refuse_changes(then, now, folder / CHECKPOINT)
         return bool(facts["finished"])
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):  # InputError among them
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        # InputError is a ValueError
         return False
 
 

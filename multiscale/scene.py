@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
-from geometry.errors import InputError
 from geometry.spectrum import Spectrum
 from multiscale.left_open import Open, OrAuto
 from multiscale.quantities import Length, Pressure, Slope, SpectralAmplitude
 from multiscale.refusals import first_refusal
+from multiscale.scene_files import override, read_scene_file
 from multiscale.sections import (
     CouplingSection,
     LoadSection,
@@ -24,9 +23,11 @@ from multiscale.sections import (
 
 Flag = Annotated[bool, Field(strict=True)]
 PositiveLength = Annotated[Length, Field(gt=0)]
-Count = Annotated[int, Field(ge=1, strict=True)]
+Count = Annotated[int, Field(ge=1, le=1_000_000_000, strict=True)]
 Pair = Annotated[tuple[Count, Count], Field(description="x, y")]
-Heights = Annotated[int, Field(ge=4, strict=True)]  # fewer have no cubic interpolant
+Heights = Annotated[
+    int, Field(ge=4, le=1_000_000_000, strict=True)
+]  # fewer have no cubic interpolant
 Band = Annotated[tuple[Number, Number], Field(description="lower, upper number of waves per side")]
 
 
@@ -188,9 +189,9 @@ class Scene(Section):
             InputError: When the file cannot be read or anything in it is wrong.
         """
         path = Path(path)
-        data = _read_toml(path)
+        data = read_scene_file(path)
         for text in overrides:
-            _override(data, text)
+            override(data, text)
         return cls.from_dict(data, source=path)
 
     @classmethod
@@ -228,30 +229,3 @@ class Scene(Section):
             return None
         folder = self._source.parent if self._source else Path()
         return folder / self.surface.file
-
-
-def _read_toml(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_bytes().decode())
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", file=str(path)) from None
-    except UnicodeDecodeError as error:
-        raise InputError(f"is not UTF-8 text: {error}", file=str(path)) from None
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"is not valid TOML: {error}", file=str(path)) from None
-
-
-def _override(data: dict[str, Any], text: str) -> None:
-    """Set one dotted key in nested dictionaries."""
-    key, equals, value = (part.strip() for part in text.partition("="))
-    if not equals or not key:
-        raise InputError("is not an override", value=text, allowed="--set key=value")
-    *sections, name = key.split(".")
-    for section in sections:
-        data = data.setdefault(section, {})
-        if not isinstance(data, dict):
-            raise InputError(f"'{section}' is not a section", value=text, key=key)
-    try:
-        data[name] = tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
-        data[name] = value

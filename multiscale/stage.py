@@ -32,7 +32,7 @@ from multiscale.micro_choice import (
 from multiscale.reference_meshes import ReferenceMeshes, reference_meshes
 from multiscale.refinement import MOST_ROWS
 from multiscale.scene import Scene
-from multiscale.stage_checks import check_patches, check_size, patch_grid
+from multiscale.stage_checks import check_load, check_patches, check_size, patch_grid
 from multiscale.surface_choice import chosen_surface, micro_tolerance
 
 Array = NDArray[np.float64]
@@ -234,6 +234,7 @@ def make_stage(scene: Scene, settled: Mapping[str, Any] | None = None) -> Stage:
     else:
         surface = make_surface(start)
     check_patches(start, surface)
+    check_load(start, surface)
     patches = PatchGrid(grid=patch_grid(start), lengths=surface.lengths)
     asperities = find_asperities(surface, periodic=False)  # the block's sides are free
     if start.coupling.kind == "reference":

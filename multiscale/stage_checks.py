@@ -83,6 +83,11 @@ def _sizes(scene: Scene) -> Iterator[tuple[str, object, str, float]]:
     if meshed and scene.block.cells != "auto":
         cells = block_cells(scene)
         yield "block.cells", cells, "", math.prod(cells) * BYTES_PER_CELL
+    if meshed and scene.block.margin:
+        more = 2 * scene.block.margin_cells
+        nx, ny, nz = block_cells(scene)
+        needed = (nx + more) * (ny + more) * nz * BYTES_PER_CELL
+        yield "block.margin_cells", scene.block.margin_cells, "", needed
     if not isinstance(patches, tuple):
         return
     count, steps = math.prod(patches), scene.loading.steps * len(scene.loading.programme.points)
@@ -117,3 +122,23 @@ def check_patches(scene: Scene, surface: Surface) -> None:
                 allowed=f"at most {list(limit)}",
                 file=scene.file,
             )
+
+
+def check_load(scene: Scene, surface: Surface) -> None:
+    """Refuse loads that would press a linear elastic block to nothing."""
+    if scene.coupling.kind == "analytic":
+        return
+    block, loading = scene.block, scene.loading
+    most = block.height if loading.force is None else block.young_modulus * surface.area
+    named, unit = ("the block's height", "mm") if loading.force is None else ("E times area", "N")
+    key, points = "load.force", loading.force
+    if points is None:
+        key, points = "load.approach", loading.approach or ()
+    if max(points) > most:
+        raise InputError(
+            "presses the block to nothing",
+            key=key,
+            value=list(points),
+            allowed=f"at most {named}, {most:.6g} {unit}",
+            file=scene.file,
+        )

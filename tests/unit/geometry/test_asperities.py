@@ -171,9 +171,9 @@ def test_subsets_keep_what_belongs_to_the_surface():
         ({"x": [0.1]}, "arrays differ in shape"),
         ({"border_x": [0.1]}, "arrays differ in shape"),
         ({"angle": [[0.0], [1.0]]}, "arrays differ in shape"),
-        ({"radius_minor": [1.0, 4.0]}, "not R' ≥ R'' > 0"),
-        ({"radius_minor": [0.0, 1.0]}, "not R' ≥ R'' > 0"),
-        ({"radius_major": [np.nan, 4.0]}, "not R' ≥ R'' > 0"),
+        ({"radius_minor": [1.0, 4.0]}, "principal radii are not R' ≥ R'' > 0"),
+        ({"radius_minor": [0.0, 1.0]}, "principal radii are not R' ≥ R'' > 0"),
+        ({"radius_major": [np.nan, 4.0]}, "principal radii are not R' ≥ R'' > 0"),
         ({"lengths": (0.0, 1.0)}, "lengths of the asperities do not fit"),
     ],
 )

@@ -1,5 +1,9 @@
+import os
+import pickle
+
 import numpy as np
 import pytest
+from height_files import Bomb, header
 
 from geometry import InputError, read_surface
 
@@ -92,7 +96,7 @@ def test_missing_files_and_folders(tmp_path):
 def test_pickled_objects_are_never_loaded(tmp_path):
     file = tmp_path / "scan.npy"
     np.save(file, np.array([{"a": 1}], dtype=object), allow_pickle=True)
-    with pytest.raises(InputError, match=r"not a readable numpy array: .*allow_pickle"):
+    with pytest.raises(InputError, match=r"'object': the heights are not an array of re"):
         read_surface(file, lengths=SIDES)
 
 
@@ -100,7 +104,7 @@ def test_pickled_objects_are_never_loaded(tmp_path):
 def test_arrays_of_other_kinds_are_refused(tmp_path, array):
     file = tmp_path / "scan.npy"
     np.save(file, array)
-    with pytest.raises(InputError, match=r"scan\.npy: the heights are not an array of real"):
+    with pytest.raises(InputError, match=r"scan\.npy: .*: the heights are not an array of r"):
         read_surface(file, lengths=SIDES)
 
 
@@ -116,3 +120,50 @@ def test_the_grid_must_match_when_given(tmp_path):
     np.save(tmp_path / "scan.npy", HEIGHTS)
     with pytest.raises(InputError, match=r"\(5, 4\): the file's number of heights.*\(4, 5\)"):
         read_surface(tmp_path / "scan.npy", lengths=SIDES, grid=(4, 5))
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (header((10**5, 10**5)) + bytes(800), "not a whole numpy array: it has 800 bytes of the 8"),
+        (header((4, 4), "<c16") + bytes(256), "'complex128': the heights are not an array of real"),
+        (header((4, 4), "|O") + pickle.dumps(Bomb()), "'object': the heights are not an array of"),
+        (pickle.dumps(Bomb()), "not a readable numpy array"),
+        (header((16,)) + bytes(128), r"\(16,\): not a two-dimensional array \(allowed: \(nx, ny"),
+        (header((-4, -4)) + bytes(128), r"\(-4, -4\): not a two-dimensional array"),
+        (b"\x93NUMPY\3\0" + header((4, 4))[8:], "not a numpy array of a known version"),
+        (np.lib.format.MAGIC_PREFIX + b"\1\0v\0{'descr'", "not a readable numpy array: EOF"),
+    ],
+)
+def test_headers_are_not_believed(tmp_path, content, message):
+    (tmp_path / "a.npy").write_bytes(content)
+    with pytest.raises(InputError, match=rf"a\.npy: .*{message}"):
+        read_surface(tmp_path / "a.npy", lengths=(1.0, 1.0))
+
+
+@pytest.mark.parametrize(("name", "size"), [("a.npy", 9 * 10**12), ("a.txt", 10**13)])
+def test_files_larger_than_memory_are_refused_unread(tmp_path, name, size):
+    with (tmp_path / name).open("wb") as file:  # nearly all of it a hole, which takes no disk
+        file.write(header((10**5, 10**7)))
+        file.truncate(size)
+    with pytest.raises(InputError, match=rf"{name}: the heights need about .* GB of memory \(allo"):
+        read_surface(tmp_path / name, lengths=(1.0, 1.0))
+
+
+def test_what_is_no_regular_file_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe.txt")
+    for path in (tmp_path / "pipe.txt", "/dev/zero", tmp_path / ("x" * 300), "a\0.npy"):
+        with pytest.raises(InputError, match="there is no such file"):
+            read_surface(path, lengths=(1.0, 1.0))
+
+
+def test_sizes_of_no_scale_are_refused(tmp_path):
+    np.savetxt(tmp_path / "a.txt", 1e200 * HEIGHTS)
+    with pytest.raises(InputError, match=r"20 of 20 heights are not finite or of no scale"):
+        read_surface(tmp_path / "a.txt", lengths=(1.0, 1.0))
+    np.savetxt(tmp_path / "b.txt", HEIGHTS)
+    with pytest.raises(InputError, match="the lengths of the surface do not fit"):
+        read_surface(tmp_path / "b.txt", lengths=(1e-300, 1.0))
+    np.savetxt(tmp_path / "c.xyz", points() * (1e300, 1.0, 1.0))
+    with pytest.raises(InputError, match=r"coordinates x, y are not finite, or beyond 1e\+15 mm"):
+        read_surface(tmp_path / "c.xyz")

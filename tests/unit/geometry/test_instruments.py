@@ -59,7 +59,8 @@ def test_files_that_are_not_enough_are_refused(monkeypatch, file, content, messa
 
 
 @pytest.mark.parametrize(
-    ("text", "message"), [("truncated", "cannot read it: truncated"), ("a\nb", "read it: OSError")]
+    ("text", "message"),
+    [("truncated", "SurfaceTopography cannot read it: trunc"), ("a\nb", "read it: OSError")],
 )
 def test_errors_of_the_library_are_passed_on_in_one_line(monkeypatch, file, text, message):
     def fail(path):

@@ -32,5 +32,5 @@ def test_means_weighted_by_area_are_the_mean():
 
 @pytest.mark.parametrize("ticks", [(0.0,), (0.0, 0.0), (1.0, 0.5), (0.0, np.nan)])
 def test_lines_that_do_not_ascend_are_refused(ticks):
-    with pytest.raises(InputError, match=r"ticks_y .* must ascend"):
+    with pytest.raises(InputError, match=r"ticks_y .* the grid lines of a partition must ascend"):
         UnevenPartition(ticks_x=(0.0, 1.0), ticks_y=ticks)

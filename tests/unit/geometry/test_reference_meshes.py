@@ -106,9 +106,9 @@ def test_hexahedra_are_halved_in_all_directions():
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"count": 0}, "at least one mesh"),
-        ({"count": 2.0}, "at least one mesh"),
-        ({"count": True}, "at least one mesh"),
+        ({"count": 0}, "a family has at least one mesh"),
+        ({"count": 2.0}, "a family has at least one mesh"),
+        ({"count": True}, "a family has at least one mesh"),
         ({"mesh": "prisms"}, "these cells are unknown"),
         ({"mesh": "hexahedra"}, "hexahedra need their number"),
         ({"mesh": "hexahedra", "cells": (4, 4, 4), "element": "P2"}, "not an element of hexahedra"),

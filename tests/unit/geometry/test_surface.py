@@ -118,7 +118,10 @@ def test_crop_keeps_whole_cells():
 
 @pytest.mark.parametrize("interval", [(1.0, 1.0), (1.5, 1.0), (-1.0, 1.0), (0.0, 2.5)])
 def test_crop_must_lie_within(interval):
-    with pytest.raises(InputError, match=r"crop along x.*0 ≤ lo < hi ≤ 2\.0 mm"):
+    with pytest.raises(
+        InputError,
+        match=r"crop along x does not lie within the surface or keeps no.*0 ≤ lo < hi ≤ 2\.0 mm",
+    ):
         plane().cropped(x=interval)
 
 

@@ -18,7 +18,9 @@ def make(sides="free", **changes):
 
 
 def test_unknown_sides_are_refused():
-    with pytest.raises(InputError, match=r"'glued': unknown .* \(allowed: free, roller\)"):
+    with pytest.raises(
+        InputError, match=r"'glued': unknown support of the sides \(allowed: free, roller\)"
+    ):
         make("glued")
 
 

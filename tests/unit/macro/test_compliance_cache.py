@@ -113,3 +113,17 @@ def test_nobody_at_home_keeps_nothing(monkeypatch):
     for variable in ("PATCHLAW_CACHE", "XDG_CACHE_HOME"):
         monkeypatch.delenv(variable, raising=False)
     assert cache_directory() is None
+
+
+def test_any_damaged_byte_costs_no_more_than_computing_anew(counted):
+    calls, compute = counted
+    wanted = compute()["c"]
+    cached("kind", (), compute, MPI.COMM_SELF)
+    (path,) = cache_directory().iterdir()
+    whole = path.read_bytes()
+    for at in range(0, len(whole), 3):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 0x41]) + whole[at + 1 :])
+        np.testing.assert_array_equal(
+            cached("kind", (), compute, MPI.COMM_SELF)["c"], wanted, err_msg=f"byte {at}"
+        )
+    assert len(calls) > 2 + len(whole) // 12  # much of the damage is seen

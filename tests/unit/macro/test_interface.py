@@ -82,5 +82,7 @@ def test_patches_beyond_the_top_are_refused():
 
 
 def test_unknown_mode_is_refused():
-    with pytest.raises(InputError, match=r"'cellwise': .* \(allowed: patchwise, pointwise\)"):
+    with pytest.raises(
+        InputError, match=r"'cellwise': unknown interface \(allowed: patchwise, pointwise\)"
+    ):
         make().sampling("cellwise")

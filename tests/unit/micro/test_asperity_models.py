@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from geometry import InputError, PatchGrid
-from micro import MODELS, AsperityModel, HertzContact, asperity_model
+from geometry import InputError, PatchGrid, Surface
+from micro import MODELS, AsperityModel, HertzContact, asperity_model, micro_model
 from micro.attribution import shares
 
 E_STAR = 4000.0
@@ -196,3 +196,9 @@ def test_refuses(cluster):
     corner = PatchGrid(grid=(1, 1), lengths=(0.5, 0.5))
     with pytest.raises(InputError, match="points lie outside the patches"):
         model.respond([1e-3], patches=corner, mean_heights=[0.0])
+
+
+def test_unknown_model_by_name():
+    surface = Surface(heights=np.eye(8), lengths=(1.0, 1.0))
+    with pytest.raises(InputError, match=r"'flat': unknown micro model \(allowed: .*half-space"):
+        micro_model("flat", surface, contact_modulus=1.0)

@@ -54,5 +54,5 @@ def test_nothing_touches():
 
 
 def test_periodic_surfaces_are_refused():
-    with pytest.raises(InputError, match="on a free border"):
+    with pytest.raises(InputError, match="finite slopes are estimated on a free border"):
         finite_slope_effect(model_of(SURFACE, periodic=True), 8e-3, poisson_ratio=NU)

@@ -162,7 +162,7 @@ def test_travels_without_its_work_arrays():
 def test_refusals(surface):
     with pytest.raises(InputError, match=r"0\.0: the contact modulus must be positive"):
         HalfSpaceModel(surface=surface, contact_modulus=0.0)
-    with pytest.raises(InputError, match=r"-1: the tolerance must be positive"):
+    with pytest.raises(InputError, match=r"-1: the tolerance must be positive and finite"):
         HalfSpaceModel(surface=surface, contact_modulus=1.0, tolerance=-1)
     with pytest.raises(InputError, match="needs a periodic surface"):
         HalfSpaceModel(surface=surface.cropped(), contact_modulus=1.0, periodic=True)

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry import InputError, PatchGrid, Spectrum, Surface, patch_means, synthesise
-from micro import IslandModel
+from geometry import InputError, NotConverged, PatchGrid, Spectrum, Surface, patch_means, synthesise
+from micro import IslandModel, island_passes
 
 PATCHES = PatchGrid(grid=(2, 3), lengths=(1.0, 1.0))
 
@@ -139,3 +139,13 @@ def test_refuses(surface, model):
     corner = PatchGrid(grid=(1, 1), lengths=(0.1, 0.1))
     with pytest.raises(InputError, match="points lie outside the patches"):
         model.respond([1e-2], patches=corner, mean_heights=[0.0])
+
+
+def test_passes_that_never_settle_are_an_error(model, monkeypatch):
+    monkeypatch.setattr(island_passes, "_MOST_PASSES", 0)
+    message = (
+        "^the passes between islands and their displacements at height .* mm did not converge: "
+        r'MAX_ITERATIONS after 0 iterations; .*micro\.model = "half-space"'
+    )
+    with pytest.raises(NotConverged, match=message):
+        model.solve(1e-3)

@@ -5,11 +5,13 @@ import pytest
 
 from geometry import NotConverged
 from micro import active_set as active_set_module
+from micro import newton_krylov as krylov_module
 from micro import truncated_newton as truncated_module
 from micro.active_set import active_set
 from micro.contact_problem import TOLERANCE, ContactProblem
 from micro.ellipse import shape_factors
 from micro.interaction import Interaction
+from micro.line_search import damped_step
 from micro.truncated_newton import truncated_newton
 
 
@@ -64,15 +66,31 @@ def test_newton_is_fast(cluster):
 
 
 @pytest.mark.parametrize(
-    ("module", "limit", "reason"),
+    ("module", "limit", "what", "reason"),
     [
-        (active_set_module, "_MOST_ITERATIONS", "MAX_ITERATIONS"),
-        (truncated_module, "_MOST_ITERATIONS", "MAX_ITERATIONS"),
-        (truncated_module, "_MOST_SETS", "CONTACTING_SET"),
+        (active_set_module, "_MOST_ITERATIONS", "Newton's method on the active set", "MAX_ITERAT"),
+        (truncated_module, "_MOST_ITERATIONS", "the truncated Newton minimisation", "MAX_ITERAT"),
+        (truncated_module, "_MOST_SETS", "the truncated Newton minimisation", "CONTACTING_SET"),
     ],
 )
-def test_running_out_is_an_error(cluster, monkeypatch, module, limit, reason):
+def test_running_out_is_an_error(cluster, monkeypatch, module, limit, what, reason):
     monkeypatch.setattr(module, limit, 1)
     method = active_set if module is active_set_module else truncated_newton
-    with pytest.raises(NotConverged, match=f"did not converge: {reason} after"):
+    with pytest.raises(NotConverged, match=f"^{what} did not converge: {reason}.* after"):
         method(problem(cluster, 5e-3), np.zeros(7))
+
+
+def test_inexact_newton_gives_up(cluster, monkeypatch):
+    monkeypatch.setattr(krylov_module, "_MOST_ITERATIONS", 0)
+    message = "^Newton's method with iterated linear systems did not converge: MAX_ITERATIONS"
+    with pytest.raises(NotConverged, match=message):
+        krylov_module.newton_krylov(problem(cluster, 5e-3), np.zeros(7))
+
+
+def test_step_that_never_gains_is_an_error():
+    def worse(point):
+        return None, 1.0 + np.abs(point)
+
+    message = "^a damped Newton step did not converge: LINE_SEARCH after 1 iterations; lower load"
+    with pytest.raises(NotConverged, match=message):
+        damped_step(worse, np.zeros(2), np.ones(2), 0.5)

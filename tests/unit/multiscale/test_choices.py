@@ -9,7 +9,7 @@ import pytest
 
 from geometry.errors import InputError
 from multiscale import Scene, make_stage
-from multiscale.choices import open_keys
+from multiscale.choices import cheapest, open_keys
 from multiscale.decision import Alternative, decided
 from multiscale.forecast import forecast
 from multiscale.plan import statements, warnings
@@ -170,7 +170,10 @@ def test_what_cannot_be_promised_is_said():
     ("wrong", "problem"),
     [
         ({"accuracy": 0.5}, r"accuracy = 0.5: must be less than 0.5"),
-        ({"accuracy": "2 %"}, r"accuracy = '2 %': is not a number"),
+        (
+            {"accuracy": "2 %"},
+            r"accuracy = '2 %': is not a number \(allowed: a number without quotes",
+        ),
         ({"patches": {"grid": "many"}}, r"patches.grid = 'many': must be a valid tuple"),
         ({"coupling": {"kind": "auto", "love": "centre"}}, r"love = 'centre' does not go with"),
         ({"source": {"spectrum": None, "file": "a.npy", "grid": "auto"}}, r"needs a 'spectrum'"),
@@ -227,3 +230,9 @@ def test_open_keys_survive_a_dump_and_are_in_the_schema():
 def test_the_plan_says_how_fine_the_heights_are():
     said = dict(statements(make_stage(scene())))["surface"]
     assert "8 heights along the shortest wavelength" in said  # 48 heights, 6 waves
+
+
+def test_nothing_to_choose(monkeypatch):
+    monkeypatch.setattr("multiscale.choices._scenes", lambda *given: [])
+    with pytest.raises(InputError, match=r"coupling\.kind: leaves nothing to choose"):
+        cheapest(None, None, frozenset())

@@ -1,6 +1,7 @@
 """Comparisons end to end: records, report, command line; levels run in this process."""
 
 import csv
+from argparse import Namespace
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from multiscale import compare
 from multiscale.cli import main
-from multiscale.compare_command import budget_seconds
+from multiscale.compare_command import budget_seconds, compare_scene
 from multiscale.level_process import level_result
 from multiscale.level_results import LevelResult
 from multiscale.measures import Curves
@@ -274,3 +275,9 @@ def test_history_gives_records():
     assert set(patches[0]) == {
         "step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area_fraction",
     }  # fmt: skip
+
+
+def test_levels_take_no_petsc_options():
+    choice = Namespace(ranks=1, budget=None, against=None)
+    with pytest.raises(InputError, match="-- = '-ksp_monitor': levels take no PETSc options"):
+        compare_scene(choice, ["-ksp_monitor"], None)

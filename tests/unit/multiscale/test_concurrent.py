@@ -161,7 +161,9 @@ def test_a_failure_leaves_the_coupling_as_it_was(monkeypatch):
     for one in (pressed, other):
         one.press(Control(approach=0.01))
     monkeypatch.setattr(concurrent, "_MOST", 1)
-    with pytest.raises(NotConverged, match=r"yielding at .*DIVERGED_MAX_IT after 1 iterations"):
+    with pytest.raises(
+        NotConverged, match=r"the block's yielding at .*DIVERGED_MAX_IT after 1 iterations"
+    ):
         pressed.press(Control(approach=0.02))
     monkeypatch.undo()
     after, expected = (one.press(Control(approach=0.015)) for one in (pressed, other))

@@ -109,11 +109,18 @@ def test_area_and_separation():
             {"approach": np.r_[np.full(2, 1e-3), np.linspace(2e-3, 9e-3, 10)]},
             "increasing approach",
         ),
-        ({"pressure": np.r_[0.0, np.full(11, np.nan)]}, "finite pressure"),
-        ({"pressure": np.r_[0.0, -1.0, np.ones(10)]}, "without tension"),
+        ({"pressure": np.r_[0.0, np.full(11, np.nan)]}, "a patch law needs a finite pressure"),
+        ({"pressure": np.r_[0.0, -1.0, np.ones(10)]}, "needs a pressure without tension"),
         ({"pressure": np.linspace(1, 2, 12)}, "starts at zero pressure"),
     ],
 )
 def test_impossible_tables_are_refused(changes, text):
     with pytest.raises(InputError, match=text):
         law_of(hertz, **changes)
+
+
+def test_a_single_row_is_no_law():
+    one = {name: np.zeros(1) for name in ("closure", "pressure", "approach", "relief")}
+    one |= {"contact_area_fraction": np.zeros(1), "contacts": np.ones(1, int)}
+    with pytest.raises(InputError, match=r"a patch law needs no row .open patch. or at least two"):
+        law_of(hertz, **one)

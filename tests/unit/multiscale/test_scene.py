@@ -18,7 +18,7 @@ REFUSED = {
     "impossible unit": ("block.young_modulus='4 kg'", "'4 kg': has the wrong unit (allowed: a"),
     "unknown unit": ("load.approach='8 foo'", "'8 foo': cannot be read as a quantity"),
     "no unit": ("load.approach='8'", "load.approach = '8': has no unit"),
-    "not finite": ("load.approach=nan", "load.approach = nan: is not finite"),
+    "not finite": ("load.approach=nan", "load.approach = nan: is not finite (allowed: a finite qu"),
     "bool for a number": ("load.approach=true", "load.approach = True: is not a quantity"),
     "negative approach": ("load.approach=-1", "load.approach = -1: must be greater than 0"),
     "poisson ratio 0.5": (
@@ -149,7 +149,7 @@ def test_override_of_a_value_as_section():
     ("content", "text"),
     [
         (b"[load\n", "is not valid TOML"),
-        (b"\xff\xfe\x00", "is not UTF-8 text"),
+        (b"\xff\xfe\x00", "is not UTF-8 text: 'utf-8' codec"),
         (b"[surface]\n", "surface: needs exactly one source"),
         (b"", "surface: is required and missing"),
     ],
@@ -198,3 +198,10 @@ def test_schema_knows_every_section():
     schema = Scene.model_json_schema(by_alias=True)
     assert {"surface", "block", "patches", "micro", "coupling", "load"} <= set(schema["properties"])
     assert schema["additionalProperties"] is False
+
+
+def test_spectrum_needs_an_extent():
+    data = Scene.load(PAPER).model_dump(by_alias=True)
+    data["surface"]["lengths"] = None
+    with pytest.raises(InputError, match="surface: a 'spectrum' needs 'grid' and 'lengths' beside"):
+        Scene.from_dict(data)

@@ -6,7 +6,7 @@ import pytest
 from geometry import PatchGrid
 from geometry.errors import InputError
 from multiscale.laws import LawPoint
-from multiscale.spread import ContactSpread
+from multiscale.spread import ContactSpread, check_division
 from multiscale.yielding import SpreadLoads, UniformLoads
 
 PATCHES = PatchGrid(grid=(2, 1), lengths=(2.0, 1.0))
@@ -135,3 +135,9 @@ def test_what_does_not_fit_is_refused(changes, text):
     }
     with pytest.raises(InputError, match=text):
         ContactSpread(**(content | changes))
+
+
+def test_loads_must_divide_the_patches():
+    odd = PatchGrid(grid=(3, 3), lengths=PATCHES.lengths)
+    with pytest.raises(InputError, match="the rectangles of the loads must divide the patches"):
+        check_division(PATCHES, odd)

@@ -1,0 +1,158 @@
+"""Tries thousands of generated inputs in every door of the program; see ``--help``."""
+
+import argparse
+import os
+import resource
+import signal
+import sys
+import tempfile
+import time
+import traceback
+import warnings
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+from hypothesis import HealthCheck, Phase, given, seed, settings
+from hypothesis import strategies as st
+
+ROOT = Path(__file__).parents[2]
+sys.path[:0] = [str(ROOT / "tests" / "unit" / name) for name in ("geometry", "multiscale")]
+
+import height_files  # noqa: E402
+import scene_inputs  # noqa: E402
+import stored_inputs  # noqa: E402
+
+LONGEST = 10  # seconds for one input
+MOST_MEMORY = 6 << 30  # bytes of address space
+
+
+class Hang(Exception):
+    """An input took longer than `LONGEST`."""
+
+
+def doors(folder):
+    """Yield the name of each kind of input, its strategy, what tries one, and its share."""
+    scene, set_ = folder / "scene.toml", scene_inputs.toml(scene_inputs.BASE).encode()
+    laws, checkpoint = stored_inputs.originals(scene_inputs.BASE, folder)
+
+    def write(path, content):
+        path.write_bytes(content)
+        return path
+
+    def text(data):
+        return scene_inputs.toml(data).encode("utf-8", "surrogatepass")
+
+    words = st.builds(
+        "{}={}".format, st.sampled_from(sorted(scene_inputs.KEYS)), scene_inputs.odd_text
+    )
+    yield (
+        "scenes, planned",
+        scene_inputs.scenes(),
+        lambda data: scene_inputs.planned(write(scene, text(data))),
+        0.4,
+    )
+    yield (
+        "scenes, run",
+        scene_inputs.scenes(),
+        lambda data: scene_inputs.ran(write(scene, text(data))),
+        0.05,
+    )
+    yield (
+        "scene files damaged",
+        scene_inputs.damaged(),
+        lambda content: scene_inputs.planned(write(scene, content)),
+        0.15,
+    )
+    yield (
+        "words of --set",
+        st.one_of(words, scene_inputs.odd_text),
+        lambda word: scene_inputs.planned(write(scene, set_), [word]),
+        0.1,
+    )
+    yield (
+        "files of heights",
+        st.tuples(height_files.anything, height_files.sides),
+        lambda drawn: height_files.read(write(folder / f"h{drawn[0][0]}", drawn[0][1]), drawn[1]),
+        0.2,
+    )
+    for name, whole, reader in zip(
+        ("law files", "checkpoints"), (laws, checkpoint), stored_inputs.READERS, strict=True
+    ):
+        yield (
+            name,
+            st.one_of(stored_inputs.flipped(whole), stored_inputs.rewritten(whole)),
+            lambda content, reader=reader: stored_inputs.read(
+                write(folder / "stored.h5", content), reader
+            ),
+            0.05,
+        )
+
+
+def campaign(strategy, attempt, count, number):
+    """Try inputs; return outcomes, times [s] and a trace of each different defect."""
+    outcomes, times, defects = Counter(), [], {}
+
+    def tried(drawn):
+        began = time.perf_counter()
+        signal.setitimer(signal.ITIMER_REAL, LONGEST)
+        try:
+            outcomes[attempt(drawn)] += 1
+        except (Exception, Hang) as error:
+            outcomes["DEFECT"] += 1
+            where = traceback.extract_tb(error.__traceback__)[-1]
+            told = "".join(traceback.format_exception(error))[-1500:]
+            defects.setdefault((type(error), where.filename, where.lineno), (drawn, told))
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0)
+        times.append(time.perf_counter() - began)
+
+    run = given(strategy)(tried)
+    run = settings(
+        max_examples=count,
+        database=None,
+        deadline=None,
+        phases=[Phase.generate],
+        suppress_health_check=list(HealthCheck),
+    )(seed(number)(run))
+    run()
+    return outcomes, times, defects
+
+
+def main():
+    """Run the campaign and print a line for every kind of input."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--inputs", type=int, default=6000)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--only", help="one kind of input, by the begin of its name")
+    choice = parser.parse_args()
+    os.environ["PATCHLAW_CACHE"] = "off"
+    resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
+    warnings.simplefilter("error", RuntimeWarning)
+
+    def late(*_):
+        raise Hang
+
+    signal.signal(signal.SIGALRM, late)
+    found = False
+    with tempfile.TemporaryDirectory() as folder:
+        for name, strategy, attempt, share in doors(Path(folder)):
+            if choice.only and not name.startswith(choice.only):
+                continue
+            count = round(choice.inputs * share)
+            outcomes, times, defects = campaign(strategy, attempt, count, choice.seed)
+            told = ", ".join(f"{number} {outcome}" for outcome, number in outcomes.most_common())
+            memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+            print(
+                f"{name}: {len(times)} inputs: {told}; {1e3 * np.mean(times):.1f} ms each, "
+                f"the slowest {max(times):.2f} s; {memory:.0f} MB",
+                flush=True,
+            )
+            for drawn, trace in defects.values():
+                found = True
+                print(f"{str(drawn)[:2000]}\n{trace}\n")
+    sys.exit(1 if found else 0)
+
+
+if __name__ == "__main__":
+    main()

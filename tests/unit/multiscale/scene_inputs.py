@@ -1,0 +1,269 @@
+"""Strategies for scenes as users could write them, right, extreme and wrong, and their outcomes."""
+
+import copy
+import json
+import math
+import re
+
+import numpy as np
+from hypothesis import strategies as st
+
+from geometry.errors import InputError, NotConverged
+from multiscale.plan import statements, warnings
+from multiscale.run import run
+from multiscale.scene import Scene
+from multiscale.stage import make_stage
+
+BASE = {
+    "surface": {
+        "spectrum": {"hurst": 0.8, "waves": [2, 5], "rms_slope": 0.2, "seed": 1},
+        "grid": [16, 16],
+        "lengths": ["1 mm", "1 mm"],
+    },
+    "block": {"height": "1 mm", "young_modulus": "4 GPa", "poisson_ratio": 0.3},
+    "patches": {"grid": [2, 2]},
+    "micro": {"model": "half-space"},
+    "coupling": {"kind": "analytic"},
+    "load": {"approach": "5 um", "steps": 2},
+}
+UNITS = (
+    "um",
+    "mm",
+    "m",
+    "km",
+    "nm",
+    "GPa",
+    "Pa",
+    "N",
+    "kg",
+    "um/mm",
+    "%",
+    "mm^4",
+    "",
+    "degC",
+    "dB",
+)
+
+WHOLE = (0, -1, 1, 2, 3, 4, 5, 7, 8, 10**3, 10**6, 10**9, 10**18, 2**63, 2**64, 10**43, 10**400)
+BROKEN = (
+    *(0.0, -0.0, 5e-324, 1e-308, 1e-200, 1e-30, 1e-9, 1e-3, 0.5, 0.4999999, 1.5, 1e9, 1e30, 1e155),
+    *(1e200, 1.7e308, math.inf, -math.inf, math.nan, -1e-3, -0.999999),
+)
+extreme = st.sampled_from([*WHOLE, *BROKEN])
+quantity = st.builds(
+    "{}{}{}".format,
+    st.one_of(extreme, st.floats(), st.sampled_from(["nan", "inf", "1e99999", "1_0", "٣", "8,5"])),
+    st.sampled_from([" ", "", "*", "**", "  "]),
+    st.sampled_from(UNITS),
+)
+ODD = (
+    *("", " ", "\0", "nan", "8 µm", "−8 um", "a/../b.npy", "/dev/zero", ".", "8 um 9", "9**9**9"),
+    *("x" * 5000, "(" * 300, "1" + "0" * 5000 + " um", "__import__('os')", "10**10**10 um"),
+)
+odd_text = st.one_of(st.text(max_size=20), st.sampled_from(ODD))
+scalar = st.one_of(extreme, st.integers(), st.floats(), st.booleans(), quantity, odd_text)
+value = st.one_of(
+    scalar,
+    st.lists(scalar, max_size=4),
+    st.lists(extreme, min_size=2, max_size=3),
+    st.lists(st.integers(1, 40), min_size=2, max_size=3),
+    st.lists(quantity, min_size=2, max_size=2),
+    st.dictionaries(st.sampled_from(["seed", "hurst", "x", "grid"]), scalar, max_size=3),
+    st.lists(st.lists(scalar, max_size=2), max_size=2),
+)
+lengths = st.one_of(
+    st.sampled_from(["1 mm", "5 um", 2.0, "1 nm", "1 km", 1e-300, 1e300, 5e-324, 1e155, 0, -1]),
+    st.floats(-12, 12).map(lambda power: 10.0**power),
+)
+ratios = st.one_of(st.floats(0, 1), extreme)
+counts = st.one_of(st.integers(1, 40), extreme)
+pairs = st.tuples(counts, counts).map(list)
+small = st.tuples(st.integers(1, 24), st.integers(1, 24)).map(list)
+bands = st.one_of(
+    st.tuples(st.integers(0, 4), st.integers(3, 9)).map(list), st.tuples(extreme, extreme).map(list)
+)
+loads = st.one_of(lengths, st.lists(lengths, max_size=4))
+slopes = st.one_of(st.floats(-0.1, 0.1), extreme)
+tilts = st.one_of(st.just("free"), st.tuples(slopes, slopes).map(list))
+
+
+def _words(text):
+    return st.sampled_from(text.split())
+
+
+KEYS = {
+    "accuracy": ratios,
+    "surface.spectrum.hurst": ratios,
+    "surface.spectrum.waves": bands,
+    "surface.spectrum.waves_x": bands,
+    "surface.spectrum.rms_slope": st.one_of(extreme, st.floats(1e-9, 1e3)),
+    "surface.spectrum.rms_height": lengths,
+    "surface.spectrum.s0": extreme,
+    "surface.spectrum.seed": counts,
+    "surface.file": st.sampled_from(["nowhere.npy", ".", "/dev/zero", "", "x.opd"]),
+    "surface.grid": st.one_of(small, pairs, st.just("auto")),
+    "surface.lengths": st.tuples(lengths, lengths).map(list),
+    "surface.detrend": _words("none mean plane quadratic"),
+    "block.height": lengths,
+    "block.young_modulus": st.one_of(extreme, lengths, st.just("1 TPa")),
+    "block.poisson_ratio": st.one_of(st.floats(-1, 0.5), extreme),
+    "block.sides": _words("free roller"),
+    "block.cells": st.one_of(
+        st.tuples(counts, counts, counts).map(list),
+        st.lists(st.integers(1, 9), min_size=3, max_size=3),
+        st.just("auto"),
+    ),
+    "block.element": _words("Q1 Q2 P1 P2"),
+    "block.grading": st.one_of(st.floats(1, 9), extreme),
+    "block.margin": lengths,
+    "block.margin_cells": counts,
+    "block.margin_grading": st.one_of(st.floats(1, 9), extreme),
+    "patches.grid": st.one_of(small, pairs, st.just("auto")),
+    "micro.model": _words("elliptic circular elliptic-independent islands half-space auto"),
+    "micro.tolerance": ratios,
+    "micro.solver": _words("active-set truncated-newton"),
+    "micro.curvature": _words("summit contact"),
+    "micro.border": _words("ignore include"),
+    "coupling.compliance": _words("auto finite-element decomposed"),
+    "coupling.newton": _words("auto condensed full"),
+    "coupling.love": _words("mean centre"),
+    "coupling.interface": _words("patchwise pointwise"),
+    "coupling.table_tolerance": st.one_of(st.floats(1e-9, 0.1), extreme),
+    "reference.method": _words("active-set augmented-lagrangian"),
+    "reference.mesh": _words("auto hexahedra tetrahedra"),
+    "reference.meshes": counts,
+    "reference.fine": lengths,
+    "load.approach": loads,
+    "load.force": loads,
+    "load.steps": st.one_of(st.integers(1, 9), extreme),
+    "load.tilt": tilts,
+    "load.force_change": ratios,
+    "output.figures": st.booleans(),
+    "output.fields": st.booleans(),
+}
+strange = st.sampled_from([*KEYS, "surface", "surface.spectrum", "block", "x", "bloc.y.z", ""])
+
+
+def put(data, dotted, new):
+    """Return nested dictionaries with one more key; what is in its way makes place."""
+    data = copy.deepcopy(data)
+    *sections, name = dotted.split(".")
+    inner = data
+    for section in sections:
+        if not isinstance(inner.get(section), dict):
+            inner[section] = {}
+        inner = inner[section]
+    inner[name] = new
+    return data
+
+
+@st.composite
+def scenes(draw):
+    """Draw a small scene of any kind with some keys set, mostly to something of their type."""
+    data = BASE
+    kinds = ("analytic", "isolated", "consistent", "concurrent", "reference", "auto")
+    data = put(data, "coupling.kind", draw(st.sampled_from(kinds)))
+    data = put(data, "micro.model", draw(st.sampled_from(["half-space", "elliptic", "islands"])))
+    if draw(st.booleans()):
+        data = put(data, "block.cells", [4, 4, 4])
+    for _ in range(draw(st.integers(1, 3))):
+        name = draw(st.sampled_from(sorted(KEYS)))
+        data = put(data, name, draw(KEYS[name]))
+        if name == "load.force":
+            data["load"].pop("approach", None)
+        if name.startswith("surface.spectrum.rms_height"):
+            data["surface"]["spectrum"].pop("rms_slope", None)
+    if draw(st.integers(0, 3)) == 0:
+        data = put(data, draw(strange), draw(value))
+    if draw(st.integers(0, 19)) == 0:
+        del data[draw(st.sampled_from(sorted(data)))]
+    return data
+
+
+def toml(data):
+    """Return nested dictionaries as TOML; texts as JSON writes them, which TOML can read."""
+    return "".join(f"{_key(name)} = {_value(part)}\n" for name, part in data.items())
+
+
+def _key(name):
+    return json.dumps(name)
+
+
+def _value(part):
+    if isinstance(part, dict):
+        return "{" + ", ".join(f"{_key(n)} = {_value(p)}" for n, p in part.items()) + "}"
+    if isinstance(part, list | tuple):
+        return "[" + ", ".join(map(_value, part)) + "]"
+    if isinstance(part, bool):
+        return str(part).lower()
+    if isinstance(part, float) and not math.isfinite(part):
+        return str(part)
+    return json.dumps(part)
+
+
+@st.composite
+def damaged(draw):
+    """Draw the bytes of a scene of which some are overwritten, cut or put in."""
+    data = bytearray(toml(draw(scenes()) if draw(st.booleans()) else BASE).encode())
+    for _ in range(draw(st.integers(1, 4))):
+        at = draw(st.integers(0, len(data)))
+        piece = draw(st.one_of(st.binary(max_size=6), st.sampled_from([b"[" * 2000, b"a." * 3000])))
+        data[at : at + draw(st.integers(0, 6))] = piece
+    return bytes(data)
+
+
+def _takes_long(scene):
+    """Whether a scene is large, but may fit into the memory of some machine."""
+    sizes = [scene.surface.grid, scene.patches.grid]
+    return any(isinstance(size, tuple) and 1e5 < math.prod(size) < 1e12 for size in sizes)
+
+
+def planned(path, overrides=()):
+    """Plan a scene as ``patchlaw plan`` does, without its times; return how that ended.
+
+    What is wrong must be told with the file, and with the key where it is not the file as a whole.
+    """
+    try:
+        scene = Scene.load(path, overrides)
+        if _takes_long(scene):
+            return "not tried"
+        stage = make_stage(scene)
+        list(statements(stage))
+        list(warnings(stage))
+    except InputError as error:
+        told = str(error)
+        assert str(path) in told or (overrides and error.key is None), told
+        assert error.key or re.search("is not (valid TOML|UTF-8)|cannot be read|override", told)
+        assert len(told) < 2000, told[:300]
+        return "refused"
+    except NotConverged:
+        return "not converged"
+    return "planned"
+
+
+def ran(path):
+    """Run a small scene without files; return how that ended, "not tried" if it is not small."""
+    try:
+        scene = Scene.load(path)
+        if _takes_long(scene):
+            return "not tried"
+        stage = make_stage(scene)
+        meshes = [] if stage.meshes is None else stage.meshes.unknowns
+        large = (
+            stage.surface.heights.size > 600
+            or stage.patches.count > 16
+            or scene.loading.steps > 9
+            or sum(meshes) > 5000
+            or math.prod(stage.shape.cells) > 800
+        )
+        if large or (scene.block.margin and scene.block.margin_cells > 4):
+            return "not tried"
+        history = run(scene)
+    except InputError as error:
+        assert str(path) in str(error)
+        return "refused"
+    except NotConverged:
+        return "not converged"
+    for name in ("force_N", "contact_area_fraction", "mean_separation_mm"):
+        assert np.isfinite(getattr(history, name)).all(), name
+    return "ran"

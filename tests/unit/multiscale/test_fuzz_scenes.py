@@ -1,0 +1,165 @@
+"""Scenes of any content are planned, or refused in one line that names file, key and value."""
+
+import os
+import re
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from scene_inputs import BASE, KEYS, damaged, odd_text, planned, put, ran, scenes, toml
+
+from geometry.errors import InputError
+from multiscale.scene import Scene
+from multiscale.scene_files import MOST_BYTES
+from multiscale.stage import make_stage
+
+few = settings(
+    derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)
+)
+
+
+@settings(few, max_examples=120)
+@given(scenes())
+def test_scenes_of_any_values(tmp_path_factory, data):
+    path = tmp_path_factory.getbasetemp() / "scene.toml"
+    path.write_text(toml(data), encoding="utf-8", errors="surrogatepass")
+    planned(path)
+
+
+@settings(few, max_examples=150)
+@given(damaged())
+def test_scenes_of_any_bytes(tmp_path_factory, content):
+    path = tmp_path_factory.getbasetemp() / "damaged.toml"
+    path.write_bytes(content)
+    planned(path)
+
+
+@settings(few, max_examples=80)
+@given(st.one_of(odd_text, st.builds("{}={}".format, st.sampled_from(sorted(KEYS)), odd_text)))
+def test_overrides_of_any_text(tmp_path_factory, word):
+    path = tmp_path_factory.getbasetemp() / "base.toml"
+    path.write_text(toml(BASE), encoding="utf-8")
+    planned(path, [word])
+
+
+@settings(few, max_examples=40)
+@given(scenes())
+def test_small_scenes_run(tmp_path_factory, data):
+    path = tmp_path_factory.getbasetemp() / "run.toml"
+    data = put(put(data, "coupling.kind", "analytic"), "block.cells", [4, 4, 4])
+    path.write_text(toml(data), encoding="utf-8", errors="surrogatepass")
+    ran(path)
+
+
+def refused(tmp_path, key, value, *, kind="consistent"):
+    """Return why a scene with one more key is refused."""
+    path = tmp_path / "scene.toml"
+    path.write_text(toml(put(put(BASE, "coupling.kind", kind), key, value)), encoding="utf-8")
+    with pytest.raises(InputError) as refusal:
+        make_stage(Scene.load(path))
+    return str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "text"),
+    [
+        ("surface.grid", [10**6, 10**6], "surface.grid = [1000000, 1000000]: needs about 1e+05 GB"),
+        ("surface.grid", [10**43, 4], "surface.grid.0 = 1" + "0" * 43 + ": must be less than or"),
+        ("surface.spectrum.waves", [2, 1e9], "(16, 16): the grid is too coarse for the shortest"),
+        ("surface.spectrum.waves", [2, 1e308], "(16, 16): the grid is too coarse for the shortest"),
+        ("patches.grid", [10**5, 10**5], "patches.grid = [100000, 100000]: needs about 1e+03 GB"),
+        ("load.steps", 10**9, "load.steps = 1000000000: must be less than or equal to 1000000"),
+        (
+            "block.cells",
+            [10**4, 10**4, 43],
+            "block.cells = [10000, 10000, 43]: needs about 2.15e+",
+        ),
+        ("block.cells", [10**43, 1, 1], "block.cells.0 = 1" + "0" * 43 + ": must be less than or"),
+        ("block.cells", [10**400, 1, 1], "block.cells.0 = 1" + "0" * 198 + "…: must be less than"),
+    ],
+)
+def test_sizes_are_refused_before_anything_is_allocated(tmp_path, key, value, text):
+    assert text in refused(tmp_path, key, value)
+
+
+def test_more_bombs(tmp_path):
+    fine = refused(tmp_path, "reference.fine", "1 nm", kind="reference")
+    assert "reference.fine = 1.0000000000000002e-06: the reference needs about" in fine
+    path = tmp_path / "margin.toml"
+    data = put(put(BASE, "coupling.kind", "consistent"), "block.margin", "1 mm")
+    path.write_text(toml(put(data, "block.margin_cells", 10**9)), encoding="utf-8")
+    with pytest.raises(InputError, match=r"block.margin_cells = 1000000000: needs about 2"):
+        make_stage(Scene.load(path))
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "text"),
+    [
+        ("load.approach", "1.1 mm", "[1.1]: presses the block to nothing (allowed: at most the"),
+        ("load.approach", "1e-300 mm", "'1e-300 mm': is out of any scale (allowed: 1e-15 to 1e+15"),
+        ("load.approach", 10**400, "…: is not finite"),
+        ("load.approach", "9**9**9**9 um", "'9**9**9**9 um': cannot be read as a quantity"),
+        ("load.approach", "1 m^9^9^9", "'1 m^9^9^9': cannot be read as a quantity"),
+        ("block.young_modulus", "(" * 90, "((': cannot be read as a quantity (allowed: a quantity"),
+        ("", 3, '"": unknown key (allowed: accuracy, surface'),
+        ("x" * 999, 3, "xxx…: unknown key (allowed: accuracy, surface"),
+    ],
+)
+def test_values_of_no_sense(tmp_path, key, value, text):
+    assert text in refused(tmp_path, key, value)
+
+
+def test_force_beyond_the_block(tmp_path):
+    data = put(put(BASE, "coupling.kind", "concurrent"), "load", {"force": [1.0, "5 kN"]})
+    path = tmp_path / "scene.toml"
+    path.write_text(toml(data), encoding="utf-8")
+    message = r"load.force = \[1.0, 5000.0\]: presses the block to nothing \(allowed: at most E t"
+    with pytest.raises(InputError, match=message):
+        make_stage(Scene.load(path))
+
+
+@pytest.mark.parametrize(
+    ("content", "text"),
+    [
+        (b"#" * 10**8, f"cannot be read: it is larger than any scene .allowed: {MOST_BYTES} bytes"),
+        (b"x = " + b"[" * 10**4, "is not valid TOML: it is nested too deeply"),
+        (b"x = " + b"{a=" * 10**4, "is not valid TOML: it is nested too deeply"),
+        (b"a." * 10**4 + b"a = 1", "is not valid TOML: a line with more dots than any scene"),
+        (b"x = " + b"1" * 10**4, "is not valid TOML: Exceeds the limit"),
+        (b"x = 0x" + b"f" * 10**4, "x: unknown key"),
+        (b"accuracy = 0x" + b"f" * 10**4, "accuracy = <int>: must be a valid number"),
+        ("grid = 1".encode("utf-16"), "is not UTF-8 text"),
+        ("# höhe".encode("latin-1"), "is not UTF-8 text"),
+        (bytes(range(1, 128)), "is not valid TOML"),
+    ],
+    ids=range(10),
+)
+def test_files_that_are_no_scenes(tmp_path, content, text):
+    path = tmp_path / "scene.toml"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=f"^{re.escape(str(path))}: .*{text}"):
+        Scene.load(path)
+
+
+def test_what_is_no_regular_file_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path, tmp_path / "pipe", "/dev/zero"):
+        with pytest.raises(InputError, match="cannot be read: it is not a regular file"):
+            Scene.load(path)
+    for path, reason in (("x" * 300, "File name too long"), ("a\0b", "embedded null byte")):
+        with pytest.raises(InputError, match=f"cannot be read: {reason}"):
+            Scene.load(path)
+
+
+def test_override_with_a_second_line_is_a_text(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(toml(BASE), encoding="utf-8")
+    with pytest.raises(InputError, match=r"load.steps = '2\\nx = 3': must be a valid integer"):
+        Scene.load(path, ["load.steps=2\nx = 3"])
+
+
+def test_override_of_endless_sections(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(toml(BASE), encoding="utf-8")
+    with pytest.raises(InputError, match="is not an override"):
+        Scene.load(path, ["a." * 5000 + "b=1"])
