@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from reference_cases import COMM, ellipsoid
 
-from geometry import Control, Spectrum, reference_shapes, suggested_fine, synthesise
+from geometry import Control, Spectrum, reference_shapes, synthesise
 from macro import Block, Material, ObstacleBlock, rough_block_mesh
 
 SET_1 = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1)
@@ -16,12 +16,13 @@ MEASURED = Spectrum(hurst=0.8, waves=(2, 40), rms_slope=0.215, seed=3)
 
 @dataclass(frozen=True)
 class Case:
-    """A scene: its surface, largest approach [mm], tilt and Poisson's ratio."""
+    """A scene: surface, largest approach [mm], tilt, Poisson's ratio, edge of tetrahedra [mm]."""
 
     spectrum: Spectrum
     approach: float = 8e-3
     tilt: tuple[float, float] = (0.0, 0.0)
     poisson_ratio: float = 0.15
+    fine: float = 0.035
 
     @property
     def surface(self):
@@ -33,7 +34,7 @@ CASES = {
     "wide spectrum": Case(MEASURED),
     "tilted": Case(SET_1, tilt=(5e-3, -2e-3)),
     "nu 0.49": Case(SET_1, poisson_ratio=0.49),
-    "merged": Case(SET_1, approach=25e-3),
+    "merged": Case(SET_1, approach=25e-3, fine=0.06),
 }
 MESHES = {
     "hexahedra": {"mesh": "hexahedra", "cells": (20, 20, 6)},
@@ -44,9 +45,7 @@ MESHES = {
 def curve(case, options, method="active-set"):
     """Return the block and its contact at half the approach and all of it."""
     surface = case.surface
-    if not options:
-        fine = suggested_fine(surface, case.approach, tilt=case.tilt, edges=1.0)
-        options = {"fine": max(fine, 0.035)}
+    options = options or {"fine": case.fine}
     (shape,) = reference_shapes(surface, case.approach, 1.0, count=1, tilt=case.tilt, **options)
     mesh, _ = rough_block_mesh(shape, surface, COMM)
     material = Material(young_modulus=4000.0, poisson_ratio=case.poisson_ratio)
