@@ -9,6 +9,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from geometry.errors import InputError, NotConverged
+from multiscale.forecast import forecast
 from multiscale.plan import statements, warnings
 from multiscale.run import run
 from multiscale.scene import Scene
@@ -219,7 +220,7 @@ def _takes_long(scene):
 
 
 def planned(path, overrides=()):
-    """Plan a scene as ``patchlaw plan`` does, without its times; return how that ended.
+    """Plan a scene as ``patchlaw plan`` does; return how that ended.
 
     What is wrong must be told with the file, and with the key where it is not the file as a whole.
     """
@@ -228,8 +229,9 @@ def planned(path, overrides=()):
         if _takes_long(scene):
             return "not tried"
         stage = make_stage(scene)
-        list(statements(stage))
-        list(warnings(stage))
+        made = forecast(stage)
+        told = [*(text for _, text in statements(stage, made)), *warnings(stage, made)]
+        assert all(np.isfinite(part) for part in (made.total, made.memory, made.error)), told
     except InputError as error:
         told = str(error)
         assert str(path) in told or (overrides and error.key is None), told

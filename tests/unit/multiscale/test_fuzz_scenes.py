@@ -18,7 +18,7 @@ few = settings(
 )
 
 
-@settings(few, max_examples=120)
+@settings(few, max_examples=80)
 @given(scenes())
 def test_scenes_of_any_values(tmp_path_factory, data):
     path = tmp_path_factory.getbasetemp() / "scene.toml"
