@@ -92,6 +92,11 @@ def test_more_bombs(tmp_path):
         make_stage(Scene.load(path))
 
 
+def test_block_of_a_kilometre_needs_no_layers_to_be_counted(tmp_path):
+    text = refused(tmp_path, "block.height", "1e9 km", kind="reference")
+    assert "reference.fine = None: the reference needs about" in text
+
+
 @pytest.mark.parametrize(
     ("key", "value", "text"),
     [
