@@ -106,6 +106,7 @@ def test_block_of_a_kilometre_needs_no_layers_to_be_counted(tmp_path):
         ("load.approach", "9**9**9**9 um", "'9**9**9**9 um': cannot be read as a quantity"),
         ("load.approach", "1 m^9^9^9", "'1 m^9^9^9': cannot be read as a quantity"),
         ("block.young_modulus", "(" * 90, "((': cannot be read as a quantity (allowed: a quantity"),
+        ("block.grading", 1e30, "block.grading = 1e+30: must be less than or equal to 1000000"),
         ("", 3, '"": unknown key (allowed: accuracy, surface'),
         ("x" * 999, 3, "xxx…: unknown key (allowed: accuracy, surface"),
     ],
