@@ -21,8 +21,10 @@ from geometry.surface import Surface
 Array = NDArray[np.float64]
 Content = tuple[Array, tuple[float, float] | None]
 
-_BYTES_PER_HEIGHT = 100  # that surface and spline take, roughly
-_BYTES_PER_CHARACTER = 60  # likewise of a text, with heights of two characters and more
+BYTES_PER_HEIGHT = 100
+"""Memory that surface, spline and spectrum take per height, roughly [B]."""
+
+_BYTES_PER_CHARACTER = 8  # likewise of a text while it is read
 _PLACE_TOLERANCE = 0.01  # of a cell: a point further from its place is not on a regular grid
 
 
@@ -105,7 +107,7 @@ def _read_array(file: Path) -> Content:
                 f"not a whole numpy array: it has {held} bytes of the {count * dtype.itemsize} "
                 "that its header promises"
             )
-        _check_memory(count * _BYTES_PER_HEIGHT)
+        _check_memory(count * BYTES_PER_HEIGHT)
         flat = np.fromfile(stream, dtype=dtype, count=count)
     return flat.reshape(shape, order="F" if transposed else "C"), None
 
@@ -184,6 +186,7 @@ def _load_text(file: Path) -> Array:
         raise InputError(f"not a matrix of numbers: {_first_line(error)}") from None
     if matrix.size == 0:
         raise InputError("the file is empty")
+    _check_memory(matrix.size * BYTES_PER_HEIGHT)
     return matrix
 
 

@@ -215,11 +215,12 @@ def _cubes(shape: RefinedShape) -> float:
     beside = np.asarray(distance_transform_edt(away, sampling=spacing))
     # layers as thick as the elements under the places
     depths, total = [0.0], 0.0
-    while depths[-1] < shape.height:
+    while depths[-1] < shape.height and _edge(shape, depths[-1]) < shape.coarse:
         depths.append(min(depths[-1] + 0.5 * _edge(shape, depths[-1]), shape.height))
     for above, below in pairwise(depths):
         distance = np.hypot(beside, 0.5 * (above + below))
         total += (below - above) * float(np.sum(_edge(shape, distance) ** -3.0))
+    total += (shape.height - depths[-1]) * beside.size * shape.coarse**-3.0  # all alike below
     return total * float(np.prod(spacing))
 
 

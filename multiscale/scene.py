@@ -98,10 +98,10 @@ class BlockSection(Section):
         | None
     ) = None
     element: Literal["Q1", "Q2", "P1", "P2"] = "Q1"
-    grading: Annotated[Number, Field(ge=1, description="bottom to top layer height")] = 1.0
+    grading: Annotated[Number, Field(ge=1, le=1e6, description="bottom to top layer height")] = 1.0
     margin: Annotated[Length, Field(ge=0, description="block beyond the interface")] = 0.0
     margin_cells: Count = 8
-    margin_grading: Annotated[Number, Field(ge=1)] = 8.0
+    margin_grading: Annotated[Number, Field(ge=1, le=1e6)] = 8.0
 
 
 class PatchesSection(Section):

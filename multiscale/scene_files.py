@@ -23,14 +23,7 @@ def read_scene_file(path: Path) -> dict[str, Any]:
     Raises:
         InputError: When it is no regular file, cannot be read, is too large or no TOML.
     """
-    try:
-        if path.exists() and not path.is_file():  # a folder, a pipe, a device: may never end
-            raise InputError("cannot be read: it is not a regular file", file=str(path))
-        with path.open("rb") as file:
-            content = file.read(MOST_BYTES + 1)
-    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"cannot be read: {reason}", file=str(path)) from None
+    content = _content(path)
     if len(content) > MOST_BYTES:
         raise InputError(
             f"cannot be read: it is larger than any scene (allowed: {MOST_BYTES} bytes)",
@@ -42,6 +35,19 @@ def read_scene_file(path: Path) -> dict[str, Any]:
         raise InputError(f"is not UTF-8 text: {error}", file=str(path)) from None
     except ValueError as error:
         raise InputError(f"is not valid TOML: {error}", file=str(path)) from None
+
+
+def _content(path: Path) -> bytes:
+    """Return the bytes of a file, if it has an end; no more than a scene and one."""
+    try:
+        regular = path.is_file() or not path.exists()  # what does not exist has a better error
+        if regular:
+            with path.open("rb") as file:
+                return file.read(MOST_BYTES + 1)
+    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"cannot be read: {reason}", file=str(path)) from None
+    raise InputError("cannot be read: it is not a regular file", file=str(path))
 
 
 def override(data: dict[str, Any], text: str) -> None:

@@ -7,11 +7,9 @@ import os
 from collections.abc import Iterator, Sequence
 
 from geometry.errors import InputError
+from geometry.files import BYTES_PER_HEIGHT
 from geometry.surface import Surface
 from multiscale.scene import Scene
-
-BYTES_PER_HEIGHT = 100
-"""Memory that surface, spline and spectrum take per height, roughly [B]."""
 
 BYTES_PER_CELL = 5000
 """Memory that mesh, stiffness and multigrid take per cell, roughly [B]."""

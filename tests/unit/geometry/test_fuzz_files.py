@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, given, settings
 
 
 @settings(
-    max_examples=300,
+    max_examples=200,
     derandomize=True,
     database=None,
     deadline=None,

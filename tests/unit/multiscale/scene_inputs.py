@@ -9,6 +9,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from geometry.errors import InputError, NotConverged
+from multiscale.forecast import forecast
 from multiscale.plan import statements, warnings
 from multiscale.run import run
 from multiscale.scene import Scene
@@ -169,10 +170,12 @@ def scenes(draw):
     for _ in range(draw(st.integers(1, 3))):
         name = draw(st.sampled_from(sorted(KEYS)))
         data = put(data, name, draw(KEYS[name]))
+        if name == "surface.file":
+            data["surface"].pop("spectrum", None)
         if name == "load.force":
             data["load"].pop("approach", None)
         if name.startswith("surface.spectrum.rms_height"):
-            data["surface"]["spectrum"].pop("rms_slope", None)
+            data["surface"].get("spectrum", {}).pop("rms_slope", None)
     if draw(st.integers(0, 3)) == 0:
         data = put(data, draw(strange), draw(value))
     if draw(st.integers(0, 19)) == 0:
@@ -219,7 +222,7 @@ def _takes_long(scene):
 
 
 def planned(path, overrides=()):
-    """Plan a scene as ``patchlaw plan`` does, without its times; return how that ended.
+    """Plan a scene as ``patchlaw plan`` does; return how that ended.
 
     What is wrong must be told with the file, and with the key where it is not the file as a whole.
     """
@@ -228,11 +231,13 @@ def planned(path, overrides=()):
         if _takes_long(scene):
             return "not tried"
         stage = make_stage(scene)
-        list(statements(stage))
-        list(warnings(stage))
+        made = forecast(stage)
+        told = [*(text for _, text in statements(stage, made)), *warnings(stage, made)]
+        assert all(np.isfinite(part) for part in (made.total, made.memory, made.error)), told
     except InputError as error:
         told = str(error)
-        assert str(path) in told or (overrides and error.key is None), told
+        of_heights = error.key == "surface.file"  # which names the file of heights
+        assert str(path) in told or of_heights or (overrides and error.key is None), told
         assert error.key or re.search("is not (valid TOML|UTF-8)|cannot be read|override", told)
         assert len(told) < 2000, told[:300]
         return "refused"
@@ -260,7 +265,7 @@ def ran(path):
             return "not tried"
         history = run(scene)
     except InputError as error:
-        assert str(path) in str(error)
+        assert str(path) in str(error) or error.key == "surface.file"
         return "refused"
     except NotConverged:
         return "not converged"

@@ -18,7 +18,7 @@ few = settings(
 )
 
 
-@settings(few, max_examples=120)
+@settings(few, max_examples=80)
 @given(scenes())
 def test_scenes_of_any_values(tmp_path_factory, data):
     path = tmp_path_factory.getbasetemp() / "scene.toml"
@@ -92,6 +92,11 @@ def test_more_bombs(tmp_path):
         make_stage(Scene.load(path))
 
 
+def test_block_of_a_kilometre_needs_no_layers_to_be_counted(tmp_path):
+    text = refused(tmp_path, "block.height", "1e9 km", kind="reference")
+    assert "reference.fine = None: the reference needs about" in text
+
+
 @pytest.mark.parametrize(
     ("key", "value", "text"),
     [
@@ -101,6 +106,7 @@ def test_more_bombs(tmp_path):
         ("load.approach", "9**9**9**9 um", "'9**9**9**9 um': cannot be read as a quantity"),
         ("load.approach", "1 m^9^9^9", "'1 m^9^9^9': cannot be read as a quantity"),
         ("block.young_modulus", "(" * 90, "((': cannot be read as a quantity (allowed: a quantity"),
+        ("block.grading", 1e30, "block.grading = 1e+30: must be less than or equal to 1000000"),
         ("", 3, '"": unknown key (allowed: accuracy, surface'),
         ("x" * 999, 3, "xxx…: unknown key (allowed: accuracy, surface"),
     ],
@@ -144,7 +150,8 @@ def test_files_that_are_no_scenes(tmp_path, content, text):
 def test_what_is_no_regular_file_is_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     for path in (tmp_path, tmp_path / "pipe", "/dev/zero"):
-        with pytest.raises(InputError, match="cannot be read: it is not a regular file"):
+        message = f"^{re.escape(str(path))}: cannot be read: it is not a regular file$"
+        with pytest.raises(InputError, match=message):
             Scene.load(path)
     for path, reason in (("x" * 300, "File name too long"), ("a\0b", "embedded null byte")):
         with pytest.raises(InputError, match=f"cannot be read: {reason}"):
