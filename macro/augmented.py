@@ -39,8 +39,8 @@ TOLERANCE = 1e-10
 
 PENETRATION = {1: 1e-8, 2: 1e-5}
 """Depth of quadrature points beyond the plane, and gap of those under pressure, relative to the
-largest displacement, by the element's degree: on quadratic facets points nearly repeat each other's conditions, and multipliers
-that share one load settle slowly."""
+largest displacement, by the element's degree: on quadratic facets points nearly repeat each
+other's conditions, and multipliers that share one load settle slowly."""
 
 _SOFT, _HARD = 30.0, 1000.0  # stiffness at first and at last: E* over the facet
 _LOOSEST, _SPARE = 0.03, 0.3  # relative residual of linear solves, and at the end
