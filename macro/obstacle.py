@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from geometry.control import Control
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
+from macro import compat
 from macro.active_nodes import ActiveNodes
 from macro.augmented import AugmentedFacets
 from macro.block import Block
@@ -88,7 +89,9 @@ class ObstacleBlock:
             NotConverged: When an iteration fails, or nothing can hold the plane; the earlier
                 solutions stay what they were, so that a smaller step can be tried.
         """
-        return measured(self.block, self.top, self._plane, self._method.press(control))
+        state = measured(self.block, self.top, self._plane, self._method.press(control))
+        compat.free_dropped(self.block.stiffness.comm)
+        return state
 
 
 def _check_top(block: Block, patches: PatchGrid) -> None:
