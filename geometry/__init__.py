@@ -11,11 +11,12 @@ from geometry.files import read_surface
 from geometry.meshes import Alignment, BlockShape, alignment, flat_block
 from geometry.partition import Partition, UnevenPartition
 from geometry.patches import PatchGrid, patch_means
-from geometry.reference_meshes import characteristic_size, reference_shapes, suggested_fine
+from geometry.reference_meshes import characteristic_size, reference_shapes
 from geometry.refined_block import RefinedShape, places_in_reach
 from geometry.spectrum import Spectrum, synthesise
 from geometry.statistics import PowerSpectrum, Roughness, power_spectrum, roughness
 from geometry.surface import Surface
+from geometry.typical_contact import suggested_fine
 
 __all__ = [
     "Alignment",

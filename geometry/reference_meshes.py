@@ -1,14 +1,14 @@
 """Families of meshes of a rough block, coarse to fine, whose results can be extrapolated.
 
 All sizes of a family fall together. Where contact can occur the finest tetrahedra have a stated
-number of edges along the radius of a typical contact, estimated from the surface alone: of a cap
-in reach of the plane Hertz' contact takes half the area, whatever its curvature.
+number of edges along the radius of a typical contact, see `typical_contact`.
 
 The force converges from above. Curved quadratic tetrahedra with n edges along a contact's radius
-err like 1/n³: on two surfaces of Set 1 under 8 µm, heights × 0.1, by 1.4 and 2.0 % with n = 1.5
-and 0.2 and 0.3 % with n = 3; both extrapolated with the order 3, by less than 0.05 %. Single meshes
-scatter by where their nodes happen to lie, so that an order observed on three of them does too.
-Linear tetrahedra err by 3.4 % with n = 6, at the cost of quadratic ones with n = 2.
+err like 1/n³: by 1.4 and 2.0 % with n = 1.5 and by 0.2 and 0.3 % with n = 3, on two surfaces of
+Set 1 (Waddad et al. 2016, table 1) at an approach of 8 µm, heights × 0.1, against concurrent
+coupling corrected for the 0.28 % of finite slopes that remain there. Single meshes scatter by
+where their nodes happen to lie, so that an order observed on three of them does too. Linear
+tetrahedra err by 3.4 % with n = 6, at the cost of quadratic ones with n = 2.
 """
 
 from __future__ import annotations
@@ -17,29 +17,21 @@ import math
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
 
 from geometry.errors import InputError
 from geometry.meshes import BlockShape
-from geometry.refined_block import RefinedShape, depth_below_plane, places_in_reach
+from geometry.refined_block import RefinedShape, places_in_reach
 from geometry.surface import Surface
+from geometry.typical_contact import EDGES, contact_radius
 
-Array = NDArray[np.float64]
 Shape: TypeAlias = BlockShape | RefinedShape
 Cells: TypeAlias = Literal["tetrahedra", "hexahedra"]
-
-EDGES = 3.0
-"""Edges along the radius of a typical contact, of the finest tetrahedra unless stated."""
 
 _SPAN = 2.0
 """Ratio of the coarsest size of a family to the finest."""
 
 _GROWTH = 1.2
 """Increase of the edge length per distance, with one edge along a contact's radius."""
-
-_MERGING = 0.05
-"""Share of the surface in reach above which contacts merge instead of growing wider."""
 
 
 def reference_shapes(
@@ -74,14 +66,15 @@ def reference_shapes(
         element: ``P1`` or ``P2`` (default) tetrahedra; ``Q1`` (default) or ``Q2`` hexahedra.
 
     Raises:
-        InputError: When a value is out of its range, or hexahedra come without their number.
+        InputError: When a value is out of its range, hexahedra come without their number, or they
+            are too few for a family.
     """
     if isinstance(count, bool) or not isinstance(count, int) or count < 1:
         raise InputError("a family has at least one mesh", value=count, allowed="1, 2, 3 …")
     factors = [_SPAN ** (k / max(count - 1, 1)) for k in reversed(range(count))]
     if mesh == "hexahedra":
         finest = _hexahedra(surface, height, cells, grading, element or "Q1")
-        return tuple(_coarsened(finest, factor) for factor in factors)
+        return _all_finer(tuple(_coarsened(finest, factor) for factor in factors))
     if mesh != "tetrahedra":
         raise InputError(
             "these cells are unknown", value=mesh, allowed=", ".join(map(repr, get_args(Cells)))
@@ -109,71 +102,6 @@ def characteristic_size(shape: Shape) -> float:
         return shape.fine
     x, y, z = shape.ticks
     return float(np.cbrt(np.diff(x).min() * np.diff(y).min() * np.diff(z).min()))
-
-
-def suggested_fine(
-    surface: Surface,
-    approach: float,
-    *,
-    tilt: tuple[float, float] = (0.0, 0.0),
-    edges: float = EDGES,
-) -> float:
-    """Return an edge length that resolves typical contacts [mm].
-
-    Args:
-        surface: The rough surface.
-        approach: Largest approach [mm].
-        tilt: Slopes of the approach along x and y.
-        edges: Edges along the radius of a typical contact.
-
-    Raises:
-        InputError: When the number of edges is not positive.
-    """
-    if not 0.0 < edges < math.inf:
-        raise InputError("edges along a contact's radius", value=edges, allowed="> 0")
-    return contact_radius(surface, approach, tilt=tilt) / edges
-
-
-def contact_radius(
-    surface: Surface, approach: float, *, tilt: tuple[float, float] = (0.0, 0.0)
-) -> float:
-    """Estimate the radius of a typical contact from the surface alone [mm].
-
-    In a disc of radius r the mean distance from the edge is r / 3, which also serves patches of
-    other forms; the contact of a cap has 1/√2 of its radius (Hertz). Where more than a twentieth
-    of the surface is in reach, contacts merge and neighbours hold the plane off: the highest
-    twentieth counts.
-
-    Args:
-        surface: The rough surface.
-        approach: Approach at the middle of the surface [mm].
-        tilt: Slopes of the approach along x and y.
-
-    Returns:
-        The radius, at least the distance of the surface's samples.
-
-    Raises:
-        InputError: When a value is not finite.
-    """
-    if not np.isfinite([approach, *tilt]).all():
-        raise InputError("approach and tilt must be finite", value=(approach, *tilt))
-    x, y = (
-        np.linspace(0.0, length, min(max(256, 2 * n), 1024) + 1)
-        for length, n in zip(surface.lengths, surface.grid, strict=True)
-    )
-    points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
-    depth = depth_below_plane(surface, points, approach, tilt)
-    level = float(np.quantile(depth, 1.0 - _MERGING))
-    inside = depth >= level if level > 0.0 else depth > 0.0
-    least = max(surface.spacing)
-    if not inside.any():
-        return least
-    if inside.all():
-        return 0.5 * min(surface.lengths)
-    step = (x[1], y[1])
-    # a point lies on average half a step further inside than its distance from those outside
-    distance = distance_transform_edt(inside, sampling=step)[inside] - 0.5 * min(step)
-    return max(3.0 * float(distance.mean()) / math.sqrt(2.0), least)
 
 
 def _tetrahedra(
@@ -226,3 +154,15 @@ def _coarsened(finest: BlockShape, factor: float) -> BlockShape:
         grading=finest.grading,
         element=finest.element,
     )
+
+
+def _all_finer(family: tuple[BlockShape, ...]) -> tuple[BlockShape, ...]:
+    """Refuse a family whose cells do not become smaller along all axes."""
+    cells, sizes = np.array([shape.cells for shape in family]), map(characteristic_size, family)
+    if len(family) > 1 and (np.any(cells[0] == cells[-1]) or np.any(np.diff([*sizes]) >= 0.0)):
+        raise InputError(
+            f"too few hexahedra for {len(family)} meshes that differ along x, y and z",
+            value=family[-1].cells,
+            allowed="more cells, or fewer meshes",
+        )
+    return family

@@ -81,13 +81,16 @@ class ActiveNodes:
             if held is None:
                 plane, active = self._resettled(task, plane, displacement, active)
                 continue
-            spent += self._solve(task, plane, displacement, active, held, tolerance)
+            more, missed = self._solve(task, plane, displacement, active, held, tolerance)
+            spent += more
             forces, depth = self._forces(displacement), self._depth(plane, displacement)
             large = self._largest(forces[active])
             pulled = active & (forces < -TOLERANCE * large)
             pressed = ~active & (depth > TOLERANCE * self._largest(displacement.array_r))
             changed, total = self._count(pulled | pressed), self._count(active)
-            if not changed and tolerance <= TOLERANCE:
+            # the forces that a solve starts from may be far larger than those it finds
+            exact = missed <= TOLERANCE * max(self._norm(forces[active]), self._nothing)
+            if not changed and exact:
                 return self._found(control, plane, displacement, active, sets, spent)
             fewest, waited = (changed, 0) if changed < fewest else (fewest, waited + 1)
             # a settled or nearly settled set is worth solving for well
@@ -135,24 +138,29 @@ class ActiveNodes:
         active: Flags,
         held: Array,
         tolerance: float,
-    ) -> int:
-        """Solve with the active nodes on the plane, and move it; return the linear iterations."""
+    ) -> tuple[int, float]:
+        """Solve with the active nodes on the plane, and move it.
+
+        Returns:
+            Linear iterations, and the norm of the residual that was allowed [N].
+        """
         if not self._count(active):
             displacement.set(0.0)
-            return 0
+            return 0, 0.0
         dofs, levers = self._top.dofs[active], self._plane.levers(task.free)[active]
         motions = levers @ held
         displacement.array[dofs] -= self._depth(plane, displacement)[active]
         before = displacement.array_r[dofs].copy()
         residual = self._residual(displacement)
-        scale = np.sqrt(float(self._sum(np.array(np.sum(residual.array_r[dofs] ** 2)))))
+        scale = self._norm(residual.array_r[dofs])
         residual.array[dofs] -= motions @ (held.T @ task.wanted)
         scale = max(scale, float(np.linalg.norm(held.T @ task.wanted)), self._nothing)
         self._solver.hold(dofs, motions)
-        spent = self._solver.improve(displacement, residual, 0.5 * tolerance * scale)
+        allowed = 0.5 * tolerance * scale
+        spent = self._solver.improve(displacement, residual, allowed)
         shares = self._sum(motions.T @ (before - displacement.array_r[dofs]))
         plane[task.free] += self._plane.unit[task.free] * (held @ shares)
-        return spent
+        return spent, allowed
 
     def _found(
         self,
@@ -211,6 +219,9 @@ class ActiveNodes:
     def _largest(self, values: Array) -> float:
         comm = self._block.mesh.comm
         return float(comm.allreduce(float(np.abs(values).max(initial=0.0)), op=MPI.MAX))
+
+    def _norm(self, values: Array) -> float:
+        return float(np.sqrt(self._block.mesh.comm.allreduce(float(values @ values))))
 
     def _count(self, which: Flags) -> int:
         return int(self._block.mesh.comm.allreduce(int(np.count_nonzero(which))))

@@ -38,9 +38,9 @@ TOLERANCE = 1e-10
 """Residual of the equilibrium that a solution may have, relative to its contact forces."""
 
 PENETRATION = {1: 1e-8, 2: 1e-5}
-"""Depth of quadrature points beyond the plane, relative to the largest displacement, by the
-element's degree: on quadratic facets points nearly repeat each other's conditions, and multipliers
-that share one load settle slowly."""
+"""Depth of quadrature points beyond the plane, and gap of those under pressure, relative to the
+largest displacement, by the element's degree: on quadratic facets points nearly repeat each
+other's conditions, and multipliers that share one load settle slowly."""
 
 _SOFT, _HARD = 30.0, 1000.0  # stiffness at first and at last: E* over the facet
 _LOOSEST, _SPARE = 0.03, 0.3  # relative residual of linear solves, and at the end
@@ -113,7 +113,8 @@ class AugmentedFacets:
             more, cycles = self._equilibrate(displacement, tolerance, control)
             steps, spent = steps + more, spent + cycles
             closure = self._equilibrium.closure(displacement)
-            depth = self._largest(np.maximum(closure - law.rest, 0.0))
+            # depth under no pressure, depth or gap under pressure
+            depth = self._largest((law.pressure(closure) - law.multiplier) / law.slope)
             excess = depth / max(self._penetration * self._largest(displacement.array_r), _TINY)
             hard = bool(np.all(law.slope >= self._stiff))
             hard = bool(self._block.mesh.comm.allreduce(hard, op=MPI.LAND))
@@ -191,7 +192,7 @@ class AugmentedFacets:
         pressing = -load.array_r[self._top.dofs]
         gap = -self._plane.closure(plane, -displacement.array_r[self._top.dofs])
         touching = pressing > _NO_FORCE * self._largest(pressing)
-        if self._exact:
+        if self._exact and self._largest(pressing):
             touching |= gap < self._penetration * self._largest(displacement.array_r)
         values = displacement.array_r.copy()
         self._history.add(Start(plane, values, pressure), float(self._plane.loads(pressing)[0]))

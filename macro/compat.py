@@ -203,6 +203,22 @@ def assemble_vector(form: Any) -> PETSc.Vec:
     return vector
 
 
+def free_dropped(comm: PETSc.Comm) -> None:
+    """Free the matrices and vectors that Python has dropped on all ranks.
+
+    PETSc from 3.18 on keeps them until it is asked, because ranks drop them at different times;
+    3.18 itself does so on a single rank too.
+
+    Args:
+        comm: Communicator of one of them.
+
+    Note:
+        Collective.
+    """
+    if hasattr(PETSc, "garbage_cleanup"):
+        PETSc.garbage_cleanup(comm)
+
+
 def write_vtx(path: str, function: Any) -> None:
     """Write a Lagrange function of any degree as VTX; only where `HAS_VTX`.
 

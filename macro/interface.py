@@ -121,7 +121,7 @@ class Interface:
     degree: int | None = None
 
     def __post_init__(self) -> None:
-        if not np.allclose(self.areas, self.patches.area, rtol=1e-6):
+        if not np.allclose(self.areas, self.patches.area, rtol=1e-6, atol=0.0):
             raise InputError(
                 "the patches reach beyond the top of the block",
                 value=(self.patches.origin, self.patches.lengths),

@@ -13,7 +13,7 @@ from petsc4py import PETSc
 from geometry.errors import NotConverged
 from macro.solvers import KRYLOV_DEFAULTS, PREFIX, default_options, reason_name
 
-NONKRYLOV_DEFAULTS: Mapping[str, object] = {
+NONLINEAR_DEFAULTS: Mapping[str, object] = {
     "snes_type": "newtonls",
     "snes_linesearch_type": "bt",
     "snes_rtol": 1e-10,
@@ -85,7 +85,7 @@ class NewtonSolver:
         self.snes.setJacobian(self._tangent, problem.tangent, base)
         self.snes.setConvergenceTest(self._converged)
         self.snes.ksp.setPC(preconditioner.pc)
-        with default_options(PREFIX, {**KRYLOV_DEFAULTS, **NONKRYLOV_DEFAULTS}):
+        with default_options(PREFIX, {**KRYLOV_DEFAULTS, **NONLINEAR_DEFAULTS}):
             self.snes.setFromOptions()
 
     def solve(self, solution: PETSc.Vec, *, what: str, remedy: str) -> NewtonReport:

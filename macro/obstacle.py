@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from geometry.control import Control
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
+from macro import compat
 from macro.active_nodes import ActiveNodes
 from macro.augmented import AugmentedFacets
 from macro.block import Block
@@ -37,7 +38,8 @@ class ObstacleBlock:
         top: Nodes of the top, of this rank.
 
     Raises:
-        InputError: When there is no such method, or the penalty is not positive.
+        InputError: When there is no such method, the penalty is not positive, the block's top has
+            a margin, or a patch reaches beyond the top.
 
     Note:
         Everything here is collective.
@@ -62,6 +64,7 @@ class ObstacleBlock:
             raise InputError("the penalty must be positive", value=penalty, allowed="> 0 MPa/mm")
         lengths = block.mesh.shape.interface
         patches = patches or PatchGrid(grid=(1, 1), lengths=lengths)
+        _check_top(block, patches)
         self.block, self.top = block, TopNodes(block, patches)
         self._plane = RigidPlane(
             self.top.x, self.top.y, highest - self.top.height, lengths, block.mesh.comm
@@ -86,4 +89,26 @@ class ObstacleBlock:
             NotConverged: When an iteration fails, or nothing can hold the plane; the earlier
                 solutions stay what they were, so that a smaller step can be tried.
         """
-        return measured(self.block, self.top, self._plane, self._method.press(control))
+        state = measured(self.block, self.top, self._plane, self._method.press(control))
+        compat.free_dropped(self.block.stiffness.comm)
+        return state
+
+
+def _check_top(block: Block, patches: PatchGrid) -> None:
+    """Refuse what the plane would press on outside the interface, and patches out there."""
+    shape = block.mesh.shape
+    if shape.margin:
+        raise InputError(
+            "the plane presses on the whole top, which has no margin",
+            value=shape.margin,
+            allowed="0 mm",
+        )
+    sides = np.array(shape.interface)
+    low, high = np.array(patches.origin), np.array(patches.origin) + patches.lengths
+    slack = 1e-9 * sides
+    if np.any(low < -slack) or np.any(high > sides + slack):
+        raise InputError(
+            "the patches reach beyond the top of the block",
+            value=(patches.origin, patches.lengths),
+            allowed=f"inside the interface {shape.interface} mm",
+        )

@@ -14,6 +14,7 @@ from petsc4py import PETSc
 from geometry.collective import together
 from geometry.control import Control
 from geometry.errors import InputError
+from macro import compat
 from macro.block import Block
 from macro.contact import Contact
 from macro.equilibrium import Equilibrium
@@ -127,7 +128,9 @@ class PressedBlock:
         self._basis.add(solution)
         comm = equilibrium.block.mesh.comm
         seconds = comm.allreduce(time.perf_counter() - began, op=MPI.MAX)
-        return self._state(solution, report, seconds)
+        state = self._state(solution, report, seconds)
+        compat.free_dropped(solution.comm)
+        return state
 
     def start_from(self, pressure: Array) -> None:
         """Let the next load step start from the displacements by mean pressures of the patches.

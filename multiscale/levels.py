@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Any
 
 from geometry.errors import InputError
-from geometry.reference_meshes import suggested_fine
+from geometry.typical_contact import suggested_fine
 from micro import MODEL_NAMES
 from multiscale.ingredients import make_surface
 from multiscale.level import OWN, Content, Level, content_of, flattened

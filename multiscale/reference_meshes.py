@@ -13,9 +13,10 @@ from scipy.ndimage import distance_transform_edt
 
 from geometry.errors import InputError
 from geometry.meshes import BlockShape
-from geometry.reference_meshes import characteristic_size, contact_radius, reference_shapes
+from geometry.reference_meshes import characteristic_size, reference_shapes
 from geometry.refined_block import RefinedShape
 from geometry.surface import Surface
+from geometry.typical_contact import contact_radius
 from multiscale.scene import Scene
 
 Array = NDArray[np.float64]

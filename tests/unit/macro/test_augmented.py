@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from geometry import BlockShape, Control, Surface
+from geometry import BlockShape, Control, Spectrum, Surface, synthesise
 from macro import Block, Material, ObstacleBlock, rough_block_mesh
 from macro.augmented import PENETRATION
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.3)
 X = (np.arange(65) + 0.5) / 65 - 0.5
 SPHERE = Surface(heights=-((X[:, None] - 0.02) ** 2 + X**2) / 4.0, lengths=(1.0, 1.0))
+ROUGH = synthesise(
+    Spectrum(hurst=0.9, waves=(2, 4), rms_slope=0.15, seed=2), grid=(64, 64), lengths=(1.0, 1.0)
+)
 FLAT = Surface(heights=np.zeros((8, 8)), lengths=(1.0, 1.0))
 SHAPE = BlockShape(interface=(1.0, 1.0), height=0.5, cells=(8, 8, 3), grading=2.0)
 
@@ -21,6 +24,14 @@ def obstacle(shape, method, surface=SPHERE, sides="free", **options):
     mesh, _ = rough_block_mesh(shape, surface, MPI.COMM_SELF)
     block = Block(mesh, MATERIAL, sides)
     return ObstacleBlock(block, surface.highest - surface.mean_height, method=method, **options)
+
+
+def at_points(found, state):
+    """Return depths and pressures of the quadrature points."""
+    method, displacement = found._method, found.block.stiffness.createVecRight()
+    displacement.array[:] = state.displacement
+    closure = method._equilibrium.closure(displacement)
+    return closure - method._law.rest, method._law.pressure(closure)
 
 
 def forces(shape, control):
@@ -43,17 +54,31 @@ LIMIT = {"Q1": 1e-5, "P1": 1e-7, "Q2": 2e-3, "P2": 1e-2}
 def test_no_point_penetrates_and_none_is_pulled(element):
     found = obstacle(replace(SHAPE, cells=(5, 5, 2), element=element), "augmented-lagrangian")
     state = found.press(Control(force=30.0, tilt=None))
-    method = found._method
-    displacement = found.block.stiffness.createVecRight()
-    displacement.array[:] = state.displacement
-    closure = method._equilibrium.closure(displacement)
-    depth = closure - method._law.rest
-    pressure = method._law.pressure(closure)
+    depth, pressure = at_points(found, state)
     assert depth.max() <= PENETRATION[int(element[1])] * np.abs(state.displacement).max()
     assert pressure.min() == 0.0 < pressure.max()
     assert state.force == pytest.approx(30.0, rel=1e-9)
     assert state.reaction == pytest.approx(30.0, rel=1e-9)
     np.testing.assert_allclose(state.moment, 0.0, atol=1e-8)
+
+
+@pytest.mark.parametrize("element", ["Q1", "P1"])
+def test_no_point_presses_across_a_gap(element):
+    shape = replace(SHAPE, height=1.0, cells=(8, 8, 4), grading=1.0, element=element)
+    found = obstacle(shape, "augmented-lagrangian", ROUGH)
+    state = found.press(Control(approach=0.012))
+    depth, pressure = at_points(found, state)
+    widest = -depth[pressure > 0.0].min()
+    assert widest <= PENETRATION[1] * np.abs(state.displacement).max()
+
+
+@pytest.mark.parametrize("element", ["Q1", "P1"])
+def test_without_force_nothing_touches(element):
+    shape = replace(SHAPE, height=1.0, cells=(8, 8, 4), grading=1.0, element=element)
+    # beyond the highest node, short of the points of the facets around it
+    state = obstacle(shape, "augmented-lagrangian", ROUGH).press(Control(approach=6e-3))
+    assert (state.force, state.reason) == (0.0, "CONVERGED_NO_CONTACT")
+    assert (state.nodes, state.contacts, state.contact_area) == (0, 0, 0.0)
 
 
 def test_error_of_the_penalty_is_its_inverse():

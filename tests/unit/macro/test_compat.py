@@ -1,9 +1,12 @@
 """What the rest of macro expects from every dolfinx release."""
 
 import logging
+import weakref
 
 import numpy as np
 import pytest
+from mpi4py import MPI
+from petsc4py import PETSc
 
 from macro import compat
 
@@ -47,3 +50,22 @@ def test_compiling_leaves_logging_as_it_was():
         root.setLevel(logging.DEBUG)
         assert not logging.getLogger("any").isEnabledFor(logging.INFO)
     assert (root.level, root.manager.disable, list(root.handlers)) == before
+
+
+class Doubling:
+    """A linear map for PETSc."""
+
+    def mult(self, _matrix, x, y):
+        x.copy(y)
+        y.scale(2.0)
+
+
+def test_what_python_has_dropped_is_freed():
+    vector = PETSc.Vec().createMPI(3, comm=MPI.COMM_SELF)
+    context = Doubling()
+    matrix = PETSc.Mat().createPython((3, 3), context, comm=MPI.COMM_SELF)
+    matrix.setUp()
+    alive = weakref.ref(context)
+    del matrix, context
+    compat.free_dropped(vector.comm)
+    assert alive() is None  # PETSc held the only reference

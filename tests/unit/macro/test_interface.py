@@ -81,6 +81,14 @@ def test_patches_beyond_the_top_are_refused():
         make(lengths=(2.5, 1.0))
 
 
+def test_patches_beyond_a_small_top_are_refused():
+    # areas of 1e-8 mm²
+    small = {"interface": (1e-3, 1e-3), "height": 1e-3, "cells": (2, 2, 1)}
+    assert make((10, 10), (1e-3, 1e-3), **small).areas.sum() == pytest.approx(1e-6, rel=NODES)
+    with pytest.raises(InputError, match="patches reach beyond"):
+        make((10, 10), (1.2e-3, 1e-3), **small)
+
+
 def test_unknown_mode_is_refused():
     with pytest.raises(
         InputError, match=r"'cellwise': unknown interface \(allowed: patchwise, pointwise\)"

@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from geometry import Control, InputError, NotConverged, PatchGrid, Spectrum, Surface, synthesise
 from geometry.meshes import BlockShape
-from macro import Block, Material, active_nodes
+from macro import Block, Material, active_nodes, block_mesh
 from macro.obstacle import ObstacleBlock
 from macro.rough_mesh import rough_block_mesh
 
@@ -96,6 +96,15 @@ def test_force_and_approach_are_two_ways_to_the_same_contact():
     assert iterations[1] < 1.5 * iterations[0]  # measured 1.1: no search around the solves
 
 
+def test_a_small_force_after_a_large_one_is_met():
+    found = obstacle()
+    for force in (20.0, 1e-6):
+        state = found.press(Control(force=force))
+        # solves are converged to 1e-10 of the contact forces found, not of those before
+        assert state.force == pytest.approx(force, rel=2e-10)
+        assert state.reaction == pytest.approx(force, rel=2e-10)
+
+
 def test_free_plane_turns_until_there_is_no_moment():
     found = obstacle()
     for force in (1e-6, 0.5, 4.0):
@@ -177,6 +186,11 @@ def test_wrong_input_is_refused():
         obstacle(method="barrier")
     with pytest.raises(InputError, match="the penalty must be positive"):
         obstacle(method="penalty", penalty=0.0)
+    with pytest.raises(InputError, match=r"patches reach beyond the top.*inside .*1\.0, 1\.0"):
+        obstacle(patches=PatchGrid(grid=(2, 2), lengths=(1.0, 1.1)))
+    wide = block_mesh(replace(SHAPE, cells=(2, 2, 1), margin=0.5, margin_cells=1), MPI.COMM_SELF)
+    with pytest.raises(InputError, match=r"the whole top, which has no margin.*0\.5"):
+        ObstacleBlock(Block(wide, MATERIAL), 0.0)
 
 
 def test_a_patch_without_a_node_is_closed_like_the_nearest():
