@@ -10,6 +10,9 @@ from multiscale.expected_errors import expected_errors, slope_effect
 from multiscale.machine import this_machine
 from multiscale.stage import Stage
 
+_ALL = 0.995
+"""Relative error beyond which a bound says nothing."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Forecast:
@@ -46,9 +49,10 @@ class Forecast:
         if self.accuracy is None or self.error <= self.accuracy:
             return None
         largest = max(self.errors, key=lambda cause: self.errors[cause])
+        off = "as much as it is" if self.error >= _ALL else f"{100 * self.error:.2g} %"
         return (
             f"an accuracy of {100 * self.accuracy:.3g} % cannot be promised: the force may be off "
-            f"by {100 * self.error:.2g} %, most of it by the {largest}"
+            f"by {off}, most of it by the {largest}"
         )
 
 
@@ -82,15 +86,18 @@ def forecast_statements(made: Forecast) -> Iterator[tuple[str, str]]:
         "cost",
         f"about {made.total:.2g} s on one core ({phases}) and {made.memory / 1e6:.0f} MB",
     )
-    causes = ", ".join(f"{cause} {100 * error:.2g} %" for cause, error in made.errors.items())
+    causes = ", ".join(f"{cause} {_share(error)}" for cause, error in made.errors.items())
+    limit = " of the small-slope limit" if made.slopes else ""
+    text = f"the force, at a given approach, within {100 * made.error:.2g} %{limit} ({causes})"
+    if made.error >= _ALL:
+        text = f"the force may be off by as much as it is: no accuracy is promised ({causes})"
     if made.slopes:
-        yield (
-            "error",
-            f"the force within {100 * made.error:.2g} % of the small-slope limit ({causes}); "
-            f"finite slopes, which stay outside, take about {100 * made.slopes:.2g} %",
-        )
-    else:
-        yield "error", f"the force within {100 * made.error:.2g} % ({causes})"
+        text += f"; finite slopes, which stay outside, take about {100 * made.slopes:.2g} %"
+    yield "error", text
+
+
+def _share(error: float) -> str:
+    return "the whole" if error >= _ALL else f"{100 * error:.2g} %"
 
 
 def comparison(made: Forecast, seconds: Mapping[str, float]) -> list[tuple[str, str, str]]:
