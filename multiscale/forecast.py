@@ -6,12 +6,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from multiscale.costs import peak_memory, predicted_cost
+from multiscale.decision import ALL, bound_text
 from multiscale.expected_errors import expected_errors, slope_effect
 from multiscale.machine import this_machine
 from multiscale.stage import Stage
-
-_ALL = 0.995
-"""Relative error beyond which a bound says nothing."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +47,7 @@ class Forecast:
         if self.accuracy is None or self.error <= self.accuracy:
             return None
         largest = max(self.errors, key=lambda cause: self.errors[cause])
-        off = "as much as it is" if self.error >= _ALL else f"{100 * self.error:.2g} %"
+        off = "as much as it is" if self.error >= ALL else bound_text(self.error)
         return (
             f"an accuracy of {100 * self.accuracy:.3g} % cannot be promised: the force may be off "
             f"by {off}, most of it by the {largest}"
@@ -86,18 +84,14 @@ def forecast_statements(made: Forecast) -> Iterator[tuple[str, str]]:
         "cost",
         f"about {made.total:.2g} s on one core ({phases}) and {made.memory / 1e6:.0f} MB",
     )
-    causes = ", ".join(f"{cause} {_share(error)}" for cause, error in made.errors.items())
+    causes = ", ".join(f"{cause} {bound_text(error)}" for cause, error in made.errors.items())
     limit = " of the small-slope limit" if made.slopes else ""
-    text = f"the force, at a given approach, within {100 * made.error:.2g} %{limit} ({causes})"
-    if made.error >= _ALL:
-        text = f"the force may be off by as much as it is: no accuracy is promised ({causes})"
+    text = f"the force, at a given approach, within {bound_text(made.error)}{limit} ({causes})"
+    if made.error >= ALL:
+        text = f"no accuracy can be told: the force may be off by as much as it is ({causes})"
     if made.slopes:
         text += f"; finite slopes, which stay outside, take about {100 * made.slopes:.2g} %"
     yield "error", text
-
-
-def _share(error: float) -> str:
-    return "the whole" if error >= _ALL else f"{100 * error:.2g} %"
 
 
 def comparison(made: Forecast, seconds: Mapping[str, float]) -> list[tuple[str, str, str]]:

@@ -247,8 +247,9 @@ class _Family:
     def _cells(self) -> tuple[int, int, int]:
         """Elements of a block that carries laws itself; a decomposed one's are for less."""
         stated = self._scene.block.cells
-        its_own = isinstance(stated, tuple) and not self._scene.coupling.decomposed
-        return stated if its_own else EMBEDDED_CELLS
+        if self._scene.coupling.decomposed or not isinstance(stated, tuple):
+            return EMBEDDED_CELLS
+        return stated
 
     @property
     def _patches(self) -> Grid:

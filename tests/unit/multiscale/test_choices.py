@@ -11,7 +11,7 @@ from geometry.errors import InputError
 from multiscale import Scene, make_stage
 from multiscale.choices import open_keys
 from multiscale.decision import Alternative, decided
-from multiscale.forecast import forecast
+from multiscale.forecast import Forecast, forecast, forecast_statements
 from multiscale.plan import statements, warnings
 
 
@@ -227,3 +227,19 @@ def test_open_keys_survive_a_dump_and_are_in_the_schema():
 def test_the_plan_says_how_fine_the_heights_are():
     said = dict(statements(make_stage(scene())))["surface"]
     assert "8 heights along the shortest wavelength" in said  # 48 heights, 6 waves
+
+
+def test_a_bound_beyond_the_force_itself_is_no_number():
+    made = Forecast(
+        seconds={}, memory=1e9, errors={"mesh": 1.0, "block": 0.004}, slopes=0.0, accuracy=0.02
+    )
+    told = dict(forecast_statements(made))["error"]
+    assert told == (
+        "no accuracy can be told: the force may be off by as much as it is "
+        "(mesh an unknown error, block 0.4 %)"
+    )
+    assert "off by as much as it is, most of it by the mesh" in made.broken_promise
+    small = dataclasses.replace(made, errors={"mesh": 0.0123}, slopes=0.026)
+    assert dict(forecast_statements(small))["error"].startswith(
+        "the force, at a given approach, within 1.2 % of the small-slope limit (mesh 1.2 %); finite"
+    )
