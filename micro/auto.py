@@ -140,7 +140,7 @@ class _Search:
             error = self._candidates[k].checked_error
             if error is None or error <= self._tolerance:
                 return self._chosen(k, model, against, "the cheapest that promises")
-            said = "has no solution" if np.isinf(error) else f"differs by {error:.2%}"
+            said = "has no solution" if np.isinf(error) else f"differs by {100 * error:.2g} %"
             self._failed.append(f"{candidate.label} {said} when checked")
             del left[k]
         best = min(left or dict(enumerate(self._candidates)), key=self._expected)
@@ -162,11 +162,13 @@ class _Search:
         taken = self._candidates[k]
         checked = "not checked, for a finer grid would be too large, at half the largest approach"
         if taken.checked_error is not None:
-            checked = f"{taken.checked_error:.2%} from {against} at half the largest approach"
+            checked = (
+                f"{100 * taken.checked_error:.2g} % from {against} at half the largest approach"
+            )
         at = self._check.measures
         sentence = (
             f"{taken.label}: {why} the tolerance of {100 * self._tolerance:.3g} %; expected error "
-            f"of the force {taken.expected_error:.1%}, {checked}, where contacts cover about "
+            f"of the force {100 * taken.expected_error:.2g} %, {checked}, where contacts cover about "
             f"{at.contact_fraction:.2g} of the surface in {at.regions or 'no'} "
             f"region{'s' * (at.regions != 1)} above the plane, with {at.cells_per_radius:.2g} of "
             f"its cells per radius; predicted {taken.cost:.2g} s for all solutions"

@@ -36,7 +36,7 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
     """
     with Interruption(comm, _limit(choice.max_time)) as interruption:
         scene, folder = scene_and_folder(choice, comm)
-        kept = on_root(comm, lambda: kept_choices(folder)) if choice.resume else None
+        kept = on_root(comm, lambda: kept_choices(folder, scene)) if choice.resume else None
         run = Run(scene, comm, kept)
         with locked(folder, comm) as lock:
             keeper = Keeper(folder, run, lock)

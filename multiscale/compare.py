@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from geometry.errors import InputError
+from multiscale.choices import open_keys, provisional, settled_keys, with_settled
 from multiscale.compare_rows import compared
 from multiscale.comparison import Comparison
 from multiscale.level import Level
@@ -15,7 +17,12 @@ from multiscale.level_results import LevelResult
 from multiscale.level_runs import Launch, check_launchable, run_levels
 from multiscale.levels import levels
 from multiscale.outcomes import AGAINST, Against, Outcome
+from multiscale.outputs import write_json
 from multiscale.scene import Scene
+from multiscale.stage import make_stage
+
+SETTLED = "settled.json"
+"""File beside finished levels, of what the plan took for the keys that the scene leaves open."""
 
 
 def compare(
@@ -31,6 +38,8 @@ def compare(
     observe: Callable[[Level, LevelResult, bool], None] | None = None,
 ) -> Comparison:
     """Run a scene at every sensible level, cheapest first, each in a clean process of its own.
+
+    What the scene leaves open is what the plan takes for it, the same for all levels.
 
     Args:
         scene: The scene.
@@ -69,9 +78,11 @@ def compare(
         check_launchable(ranks)
     outcomes = []
     with tempfile.TemporaryDirectory(prefix="patchlaw-compare-") as aside:
+        place = Path(aside) if folder is None else folder
+        scene = settled_scene(scene, place)
         for level, result, kept in run_levels(
             levels(scene, ranks),
-            folder=Path(aside) if folder is None else folder,
+            folder=place,
             budget_s=budget_s,
             launch=launch,
             begin=begin,
@@ -80,3 +91,27 @@ def compare(
                 observe(level, result, kept)
             outcomes.append(Outcome(level, result))
     return compared(scene, outcomes, against)
+
+
+def settled_scene(scene: Scene, folder: Path) -> Scene:
+    """Return a scene whose open keys, but for the micro model, are what the plan takes for them.
+
+    They are kept: another call may find the machine in another mood, and levels of other patches.
+
+    Args:
+        scene: The scene.
+        folder: Where finished levels are kept.
+    """
+    free = open_keys(scene)
+    if free <= {"micro.model"}:
+        return scene
+    path, given = folder / SETTLED, scene.model_dump(by_alias=True, mode="json")
+    try:
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        known = kept["settled"] if kept["scene"] == given else None
+    except (OSError, ValueError, KeyError, TypeError):
+        known = None
+    if known is None:
+        known = settled_keys(make_stage(scene), scene)
+        write_json(path, {"scene": given, "settled": known})
+    return provisional(with_settled(scene, known), free & {"micro.model"})

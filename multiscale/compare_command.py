@@ -54,16 +54,22 @@ def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         raise InputError("levels take no PETSc options", key="--", value=" ".join(options))
     scene, folder = scene_and_folder(choice, comm, ending="-compare")
     with terminal.following(comm) as (begun, ended):
-        found = compare(
-            scene,
-            comm,
-            against=choice.against,
-            budget_s=budget,
-            folder=folder / KEPT,
-            ranks=choice.ranks,
-            begin=lambda level: begun(level.name),
-            observe=lambda level, result, kept: ended(_line(level, result, kept)),
-        )
+        try:
+            found = compare(
+                scene,
+                comm,
+                against=choice.against,
+                budget_s=budget,
+                folder=folder / KEPT,
+                ranks=choice.ranks,
+                begin=lambda level: begun(level.name),
+                observe=lambda level, result, kept: ended(_line(level, result, kept)),
+            )
+        except KeyboardInterrupt:
+            ended(
+                f"interrupted: finished levels are kept in {folder / KEPT}; go on by the same call"
+            )
+            raise
     for text in (*headline(found), *bargains(found), *found.warnings):
         terminal.say(comm, text)
     terminal.show_files(comm, write_comparison(folder, found))

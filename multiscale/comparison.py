@@ -144,6 +144,8 @@ class Comparison:
     def error(self, row: Row, error: str | None = None) -> float:
         """Return the size of a row's error, but no less than the measure's uncertainty.
 
+        An error that is not known stays so (NaN).
+
         Args:
             row: The row.
             error: A field of `Measures`; by default the largest of the response over the curve.
@@ -155,7 +157,8 @@ class Comparison:
         if name not in Measures.__slots__:
             allowed = ", ".join(Measures.__slots__)
             raise InputError("is no error measure", value=name, allowed=allowed)
-        return float(np.fmax(abs(getattr(row.errors, name)), getattr(self.uncertainty, name)))
+        size, bar = abs(getattr(row.errors, name)), getattr(self.uncertainty, name)
+        return float(max(size, bar)) if np.isfinite((size, bar)).all() else float(size)
 
     def frontier(self, error: str | None = None) -> tuple[Row, ...]:
         """Return the levels that no other beats in both time and error, fastest first.

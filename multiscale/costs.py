@@ -81,8 +81,10 @@ def run_work(stage: Stage) -> dict[str, Work]:
     if stage.by_laws:
         works["laws"] = law_work(stage)
     if stage.meshes is not None:
-        steps = step_count(stage.scene.loading.programme)
-        works["block"], works["load steps"] = reference_work(stage.meshes, steps)
+        programme = stage.scene.loading.programme
+        works["block"], works["load steps"] = reference_work(
+            stage.meshes, step_count(programme), turning=programme.tilt is None
+        )
     else:
         works["block"], works["load steps"] = _block(stage), _load_steps(stage)
     if stage.embedded and stage.scene.coupling.kind == "consistent" and _bends(stage):

@@ -6,6 +6,18 @@ from dataclasses import dataclass
 
 _TOLD = 3  # alternatives that the sentence names
 
+ALL = 0.995
+"""Relative error of the force from which on a bound says nothing."""
+
+
+def bound_text(error: float) -> str:
+    """Return the bound of a relative error in words.
+
+    Args:
+        error: The bound.
+    """
+    return "an unknown error" if error >= ALL else f"{100 * error:.2g} %"
+
 
 @dataclass(frozen=True, kw_only=True)
 class Alternative:
@@ -34,7 +46,7 @@ class Alternative:
     @property
     def price(self) -> str:
         """Expected error and predicted time in words."""
-        return f"{100 * self.error:.2g} % in {self.seconds:.2g} s"
+        return f"{bound_text(self.error)} in {self.seconds:.2g} s"
 
 
 @dataclass(frozen=True, kw_only=True)

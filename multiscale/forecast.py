@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from multiscale.costs import peak_memory, predicted_cost
+from multiscale.decision import ALL, bound_text
 from multiscale.expected_errors import expected_errors, slope_effect
 from multiscale.machine import this_machine
 from multiscale.stage import Stage
@@ -46,9 +47,10 @@ class Forecast:
         if self.accuracy is None or self.error <= self.accuracy:
             return None
         largest = max(self.errors, key=lambda cause: self.errors[cause])
+        off = "as much as it is" if self.error >= ALL else bound_text(self.error)
         return (
             f"an accuracy of {100 * self.accuracy:.3g} % cannot be promised: the force may be off "
-            f"by {100 * self.error:.2g} %, most of it by the {largest}"
+            f"by {off}, most of it by the {largest}"
         )
 
 
@@ -82,15 +84,14 @@ def forecast_statements(made: Forecast) -> Iterator[tuple[str, str]]:
         "cost",
         f"about {made.total:.2g} s on one core ({phases}) and {made.memory / 1e6:.0f} MB",
     )
-    causes = ", ".join(f"{cause} {100 * error:.2g} %" for cause, error in made.errors.items())
+    causes = ", ".join(f"{cause} {bound_text(error)}" for cause, error in made.errors.items())
+    limit = " of the small-slope limit" if made.slopes else ""
+    text = f"the force, at a given approach, within {bound_text(made.error)}{limit} ({causes})"
+    if made.error >= ALL:
+        text = f"no accuracy can be told: the force may be off by as much as it is ({causes})"
     if made.slopes:
-        yield (
-            "error",
-            f"the force within {100 * made.error:.2g} % of the small-slope limit ({causes}); "
-            f"finite slopes, which stay outside, take about {100 * made.slopes:.2g} %",
-        )
-    else:
-        yield "error", f"the force within {100 * made.error:.2g} % ({causes})"
+        text += f"; finite slopes, which stay outside, take about {100 * made.slopes:.2g} %"
+    yield "error", text
 
 
 def comparison(made: Forecast, seconds: Mapping[str, float]) -> list[tuple[str, str, str]]:

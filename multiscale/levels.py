@@ -48,7 +48,7 @@ def levels(scene: Scene, ranks: int = 1) -> tuple[Level, ...]:
     """Return the levels of a scene, cheapest first by predicted cost.
 
     Args:
-        scene: The scene.
+        scene: The scene; of its keys only ``micro.model`` may be open.
         ranks: Processes for levels that can use more than one.
 
     Raises:
@@ -71,6 +71,8 @@ class _Family:
         self._heights: Grid = stated if isinstance(stated, tuple) else make_surface(scene).grid
         self._grids = coarser_grids(self._heights, scene.surface.spectrum)
         self._base["patches"] = {"grid": list(pressure_grid(scene))}
+        # levels say what they are; beside an accuracy what they leave out would be chosen
+        self._accuracy = {"accuracy": self._base.pop("accuracy", None)}
 
     def all(self) -> Iterator[Level]:
         for level in (
@@ -85,8 +87,9 @@ class _Family:
                 yield level
 
     def _own(self) -> Level | None:
-        content = {key: self._base[key] for key in self._base if key != "patches"}
-        whole = content | {"patches": {"grid": list(self._scene.patches.grid)}}
+        whole = self._base | {"patches": {"grid": list(self._patches)}}
+        if self._accuracy["accuracy"] is not None:
+            whole |= self._accuracy
         kind, model = self._scene.coupling.kind, self._scene.micro.model
         parts: list[str] = [kind]
         if kind not in ("analytic", "reference"):
@@ -242,9 +245,11 @@ class _Family:
 
     @property
     def _cells(self) -> tuple[int, int, int]:
-        """Elements of a block that carries laws itself."""
+        """Elements of a block that carries laws itself; a decomposed one's are for less."""
         stated = self._scene.block.cells
-        return stated if isinstance(stated, tuple) else EMBEDDED_CELLS
+        if self._scene.coupling.decomposed or not isinstance(stated, tuple):
+            return EMBEDDED_CELLS
+        return stated
 
     @property
     def _patches(self) -> Grid:

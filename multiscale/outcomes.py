@@ -71,8 +71,10 @@ def ranked(outcomes: Sequence[Outcome], against: Against) -> list[Outcome]:
 def _fineness(one: Outcome) -> tuple[float, ...]:
     """Return what makes a level better than another of its kind.
 
-    These are the number of meshes, the edges of the finest in a contact, rectangles of load,
-    elements and heights.
+    These are the number of meshes, the edges of the finest in a contact, heights, rectangles of
+    load and elements, in the order of what too few of them cost: on Set 1 of Waddad et al. 2016
+    5 % of the force with 32 × 32 heights, 1 % with 64 × 64, and less than that with a block of
+    8 × 8 × 6 elements.
     """
     content = one.level.content
     cells, reference = content["block"].get("cells", (1,)), content["reference"]
@@ -80,9 +82,9 @@ def _fineness(one: Outcome) -> tuple[float, ...]:
     return (
         reference["meshes"] if own else 0,
         -reference.get("fine", 0.0) if own else 0.0,
+        math.prod(one.level.heights),
         math.prod(content["patches"]["grid"]) if one.level.kind == "concurrent" else 0,
         math.prod(cells),
-        math.prod(one.level.heights),
     )
 
 

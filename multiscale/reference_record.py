@@ -53,9 +53,9 @@ class ReferenceRecord:
 
     @property
     def by_force(self) -> bool:
-        """Whether the force is prescribed: all meshes carry the same, and differ in approach."""
-        spread = np.ptp(self.force_N, axis=0)
-        return bool(np.all(spread <= 1e-6 * np.abs(self.force_N).max(axis=0)))
+        """Whether the force is prescribed: meshes then differ in approach, which else is given."""
+        spread = np.ptp(self.approach_mm, axis=0)
+        return bool(np.any(spread > 1e-12 * np.abs(self.approach_mm).max(axis=0)))
 
     @property
     def _unknown(self) -> tuple[Estimate, float, str]:
@@ -109,9 +109,9 @@ class ReferenceRecord:
     def cells(self) -> tuple[str, list[str]]:
         """Heading and cells of a table's column that holds the values at mesh size zero."""
         found, scale, unit = self._unknown
-        heading = f"at size zero [{unit}]"
         if len(self.sizes) == 1:
-            return heading, ["no error bar"] * found.value.size
+            return "at size zero", ["no error bar"] * found.value.size
+        heading = f"at size zero [{unit}]"
         pairs = zip(scale * found.value, scale * found.error, strict=True)
         return heading, [f"{value:.5g} ± {error:.2g}" for value, error in pairs]
 

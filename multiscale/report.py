@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
+from multiscale.decision import bound_text
 from multiscale.forecast import Forecast, comparison
 from multiscale.history import History
 
@@ -105,9 +106,10 @@ def curve_cells(history: History) -> tuple[tuple[str, ...], list[tuple[str, ...]
 
 
 def _errors(made: Forecast) -> Iterable[tuple[str, str]]:
-    yield from ((cause, f"{error:.2%}") for cause, error in made.errors.items())
-    yield "altogether", f"{made.error:.2%}"
-    yield "finite slopes, outside of it, about", f"{made.slopes:.1%}"
+    yield from ((cause, bound_text(error)) for cause, error in made.errors.items())
+    yield "altogether", bound_text(made.error)
+    if made.slopes:
+        yield "finite slopes, outside of it, about", bound_text(made.slopes)
 
 
 def _headline(history: History) -> str:

@@ -20,6 +20,7 @@ from multiscale.loading import Position
 from multiscale.outputs import remove_partial
 from multiscale.records import Arrays
 from multiscale.run import Run
+from multiscale.scene import Scene
 
 CHECKPOINT, JOURNAL = "checkpoint.h5", "checkpoint.journal"
 _SOONEST = 1.0  # between two checkpoints [s]; the journal holds the load steps in between
@@ -147,7 +148,28 @@ def refuse_changes(then: Checkpoint, now: Checkpoint, path: Path) -> None:
     Raises:
         InputError: When a key has changed that can matter; names it, and what it was.
     """
-    old, new = dict(_flat(then.scene)), dict(_flat(now.scene))
+    refuse_changed_keys(then.scene, now.scene, path)
+    if then.heights != now.heights:
+        raise InputError(
+            f"the heights are not those that the run in {path.parent} began with; restore them, or "
+            "run without --resume to begin anew",
+            key="surface.file",
+            value=now.scene["surface"].get("file"),
+        )
+
+
+def refuse_changed_keys(then: dict[str, Any], now: dict[str, Any], path: Path) -> None:
+    """Refuse to go on with a scene that says something else.
+
+    Args:
+        then: The scene as the run began with it, as nested dictionaries.
+        now: The present one.
+        path: File of the checkpoint.
+
+    Raises:
+        InputError: When a key has changed that can matter; names it, and what it was.
+    """
+    old, new = dict(_flat(then)), dict(_flat(now))
     for key in dict.fromkeys((*new, *old)):
         if not key.startswith("output.") and old.get(key) != new.get(key):
             raise InputError(
@@ -157,26 +179,24 @@ def refuse_changes(then: Checkpoint, now: Checkpoint, path: Path) -> None:
                 value=new.get(key),
                 allowed=repr(old.get(key)),
             )
-    if then.heights != now.heights:
-        raise InputError(
-            f"the heights are not those that the run in {path.parent} began with; restore them, or "
-            "run without --resume to begin anew",
-            key="surface.file",
-            value=new.get("surface.file"),
-        )
 
 
-def kept_choices(folder: Path) -> dict[str, Any] | None:
+def kept_choices(folder: Path, scene: Scene) -> dict[str, Any] | None:
     """Return what the open keys of an interrupted run's scene became; None without a checkpoint.
 
     Args:
         folder: Folder of its results.
+        scene: The present scene: choices for another would not fit it.
 
     Raises:
-        InputError: When the checkpoint is damaged.
+        InputError: When the checkpoint is damaged, or of another scene.
     """
     path = folder / CHECKPOINT
-    return read_checkpoint(path).settled if path.exists() else None
+    if not path.exists():
+        return None
+    kept = read_checkpoint(path)
+    refuse_changed_keys(kept.scene, scene.model_dump(by_alias=True, mode="json"), path)
+    return kept.settled
 
 
 def is_finished(folder: Path, run: Run) -> bool:

@@ -31,6 +31,8 @@ def warm(elements: Sequence[str], comm: Any = None) -> tuple[Path, int]:
     Note:
         Collective.
     """
+    if comm is not None:  # PETSc starts on all ranks together; one rank alone must not
+        import macro  # noqa: F401
     return on_root(comm, lambda: _compile_all(elements))
 
 

@@ -1,4 +1,4 @@
-"""The doctor under mpirun: it speaks once, for all ranks."""
+"""The doctor and the warming under mpirun: they speak once, for all ranks."""
 
 import json
 
@@ -25,3 +25,10 @@ def test_a_check_that_fails_on_one_rank_fails_for_all(mpirun):
     assert done.returncode == 2
     assert done.stdout.count("OSError: only here") == 1
     assert done.stderr.count("not fit to run: BLAS") == 1
+
+
+def test_forms_are_compiled_ahead_by_a_job_too(mpirun):
+    # PETSc starts on all ranks together: rank 0 alone would bring the others down
+    done = mpirun(2, "-m", "multiscale", "warm", "--element", "Q1", timeout=100)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("compiled forms in") == 1

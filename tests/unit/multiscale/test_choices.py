@@ -11,7 +11,7 @@ from geometry.errors import InputError
 from multiscale import Scene, make_stage
 from multiscale.choices import cheapest, open_keys
 from multiscale.decision import Alternative, decided
-from multiscale.forecast import forecast
+from multiscale.forecast import Forecast, forecast, forecast_statements
 from multiscale.plan import statements, warnings
 
 
@@ -236,3 +236,19 @@ def test_nothing_to_choose(monkeypatch):
     monkeypatch.setattr("multiscale.choices._scenes", lambda *given: [])
     with pytest.raises(InputError, match=r"coupling\.kind: leaves nothing to choose"):
         cheapest(None, None, frozenset())
+
+
+def test_a_bound_beyond_the_force_itself_is_no_number():
+    made = Forecast(
+        seconds={}, memory=1e9, errors={"mesh": 1.0, "block": 0.004}, slopes=0.0, accuracy=0.02
+    )
+    told = dict(forecast_statements(made))["error"]
+    assert told == (
+        "no accuracy can be told: the force may be off by as much as it is "
+        "(mesh an unknown error, block 0.4 %)"
+    )
+    assert "off by as much as it is, most of it by the mesh" in made.broken_promise
+    small = dataclasses.replace(made, errors={"mesh": 0.0123}, slopes=0.026)
+    assert dict(forecast_statements(small))["error"].startswith(
+        "the force, at a given approach, within 1.2 % of the small-slope limit (mesh 1.2 %); finite"
+    )

@@ -57,6 +57,13 @@ def test_frontier_leaves_out_what_did_not_end_or_is_unknown():
     assert [one.name for one in comparison(rows).frontier()] == ["slow"]
 
 
+def test_an_error_that_is_unknown_is_not_the_uncertainty():
+    # such as the distribution of the pressures of a level that carries nothing
+    found = comparison([row("unmeasured", 1.0, float("nan")), row("slow", 3.0, 0.1)], bar=0.02)
+    assert np.isnan(found.error(found["unmeasured"]))
+    assert [one.name for one in found.frontier()] == ["slow"]
+
+
 def test_response_is_what_the_load_does_not_prescribe():
     rows = [row("one", 1.0, 0.1)]
     assert comparison(rows).error(rows[0]) == 0.1

@@ -121,7 +121,16 @@ def test_work_grows_with_what_is_asked():
     assert total(grid=128) > total()
     assert total(output={"figures": True}) > total()
     assert total(kind="analytic") < total()
-    assert reference_work(2e5, 8).seconds(Unit()) > 2.0 * reference_work(1e5, 3).seconds(Unit())
+    coarse, fine = (
+        make_stage(scene("reference", cells=(n, n, n // 2))).meshes for n in (16, 32)
+    )  # fmt: skip
+    assert total(kind="reference", cells=(32, 32, 16)) > total(kind="reference", cells=(16, 16, 8))
+    made, pressed = reference_work(fine, 8)
+    assert made.seconds(Unit()) > reference_work(coarse, 8)[0].seconds(Unit())
+    assert pressed.seconds(Unit()) == pytest.approx(
+        2.0 * reference_work(fine, 4)[1].seconds(Unit())
+    )
+    assert reference_work(fine, 8, turning=True)[1].product > pressed.product
     shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(16, 16, 12))
     assert smooth_bytes(shape, (32, 32)) > smooth_bytes(shape, (16, 16)) > 1e8
 

@@ -5,10 +5,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from geometry.patches import PatchGrid
+from multiscale.choices import open_keys
+from multiscale.compare import settled_scene
 from multiscale.level_grids import pressure_grid
+from multiscale.level_results import LevelResult
 from multiscale.levels import levels
+from multiscale.measures import Curves
+from multiscale.outcomes import Outcome, ranked
 from multiscale.scene import Scene
+from multiscale.stage_checks import EMBEDDED_CELLS
 
+COLUMNS = (
+    "approach", "force", "area", "separation", "approach_error", "force_error", "area_error",
+)  # fmt: skip
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 
 
@@ -115,3 +125,44 @@ def test_small_slopes_scale_heights_and_load_together():
     assert small.scene.loading.approach == pytest.approx((0.8e-3,), rel=1e-12)
     assert small.scene.loading.tilt == pytest.approx((1e-3, 0.0), rel=1e-12)
     assert small.scene.reference == steep.scene.reference
+
+
+def test_scene_that_leaves_all_open_has_levels_that_stand(tmp_path):
+    text = (
+        "accuracy = 0.05\n[surface]\nspectrum = { hurst = 0.95, waves = [2, 4], rms_slope = 0.2 }\n"
+        "grid = 'auto'\nlengths = [1, 1]\n[block]\nyoung_modulus = '4 GPa'\npoisson_ratio = 0.3\n"
+        "cells = 'auto'\n[patches]\ngrid = 'auto'\n[micro]\nmodel = 'auto'\n[coupling]\n"
+        "kind = 'auto'\n[load]\napproach = '8 um'\nsteps = 2\n"
+    )
+    (tmp_path / "open.toml").write_text(text, encoding="utf-8")
+    scene = Scene.load(tmp_path / "open.toml")
+    settled = settled_scene(scene, tmp_path)
+    assert settled_scene(scene, tmp_path) == settled  # what was kept
+    found = levels(settled)
+    (own,) = [level for level in found if level.is_own]
+    assert own.scene.coupling.kind in ("consistent", "concurrent")
+    assert (own.scene.accuracy, own.scene.micro.model) == (0.05, "auto")
+    for level in found:
+        assert open_keys(level.scene) <= {"micro.model"}
+        assert not open_keys(level.scene) or level.is_own or level.kind == "reference"
+    meshed = [level.scene.block.cells for level in found if "elements" in level.name]
+    assert EMBEDDED_CELLS in meshed  # laws on a mesh are not left with what a smooth rest needs
+
+
+def test_heights_count_before_elements():
+    # with 5 % of the force at stake, against a tenth of that
+    names = ["32 × 32, 16 × 16 × 12 elements", "128 × 128, 8 × 8 × 6 elements"]
+    picked = [level for level in made() if level.name.endswith(tuple(names))]
+    ones = np.ones(2)
+    curves = Curves(
+        patches=PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)),
+        patch_pressure=ones[:, None],
+        **{key: ones for key in COLUMNS},
+    )
+    ended = [
+        Outcome(level, LevelResult(key=level.key, status="done", curves=curves))
+        for level in picked
+        if level.kind == "concurrent"
+    ]
+    assert len(ended) == 2
+    assert ranked(ended, "concurrent")[0].level.heights == (128, 128)

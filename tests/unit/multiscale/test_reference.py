@@ -87,7 +87,9 @@ def test_one_mesh_has_no_error_bar():
     history = run(scene("reference.meshes=1", "load.steps=1"))
     assert history.reference.label == "no error bar"
     assert np.isnan(history.reference.force.error).all()
-    assert curve_cells(history)[1][0][-1] == "no error bar"
+    header, rows = curve_cells(history)
+    assert (header[-1], rows[0][-1]) == ("at size zero", "no error bar")
+    assert not history.reference.by_force
     assert any("no error bar" in note for note in history.notes)
 
 

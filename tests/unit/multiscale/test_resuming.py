@@ -17,7 +17,7 @@ from multiscale.checkpoint import read_checkpoint, write_checkpoint
 from multiscale.cli import main
 from multiscale.folder_lock import FolderLock
 from multiscale.journal import Journal, journalled
-from multiscale.resuming import Keeper, with_journal
+from multiscale.resuming import Keeper, kept_choices, with_journal
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 ALONE = {"coupling": {"kind": "analytic"}, "micro": {"model": "half-space"}}
@@ -214,6 +214,16 @@ def test_changed_scene_is_refused_with_the_key(tmp_path, ended, changes, text):
     interrupted(tmp_path / "out", ended)
     with pytest.raises(InputError, match=text):
         resumed(tmp_path / "out", scene(ALONE | changes))
+
+
+def test_choices_for_another_scene_are_not_taken(tmp_path, ended):
+    # they may not fit it: a micro model on a grid that the new surface does not have
+    interrupted(tmp_path / "out", ended)
+    assert kept_choices(tmp_path / "out", ended.scene) == {}
+    other = scene(ALONE | {"surface": {"grid": [32, 32]}})
+    with pytest.raises(InputError, match=r"surface.grid = \[32, 32\].*allowed: \[48, 48\]"):
+        kept_choices(tmp_path / "out", other)
+    assert kept_choices(tmp_path / "elsewhere", other) is None
 
 
 def test_other_outputs_may_be_asked_for(tmp_path, ended):
