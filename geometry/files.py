@@ -7,6 +7,7 @@ import os
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from geometry.checks import cell_counts, positive_lengths
 from geometry.errors import InputError
 from geometry.instruments import read_instrument
+from geometry.missing import filled
 from geometry.surface import Surface
 
 Array = NDArray[np.float64]
@@ -28,6 +30,7 @@ def read_surface(
     lengths: tuple[float, float] | None = None,
     grid: tuple[int, int] | None = None,
     periodic: bool = False,
+    missing: Literal["refuse", "fill"] = "refuse",
 ) -> Surface:
     """Read heights at cell centres from a file, told by its suffix.
 
@@ -43,6 +46,8 @@ def read_surface(
             or an instrument's file says.
         grid: Numbers of heights (nx, ny) that the file must have; any when not given.
         periodic: Whether the heights continue periodically.
+        missing: What to do with heights that are not a number: refuse the file, or fill them, see
+            `geometry.missing.filled`; the surface's source then says how many they were.
 
     Returns:
         The surface, with heights in mm.
@@ -60,12 +65,19 @@ def read_surface(
             raise InputError(
                 "the file has no lengths, they must be given", allowed="lengths (Lx, Ly) in mm"
             )
-        surface = Surface(
-            heights=heights,
-            lengths=positive_lengths(sides, "the surface"),
-            periodic=periodic,
-            source=str(file),
-        )
+        sides, source = positive_lengths(sides, "the surface"), str(file)
+        gaps = _gaps(heights)
+        if gaps and missing == "fill":
+            nx, ny = heights.shape
+            heights, share = filled(heights, (sides[0] / nx, sides[1] / ny))
+            source += f", {share:.3g} of the heights missing and filled by a membrane"
+        elif gaps:
+            raise InputError(
+                f"{gaps} of {heights.size} heights are not finite, for they are missing",
+                value=float("nan"),
+                allowed="finite heights in mm, or missing = 'fill'",
+            )
+        surface = Surface(heights=heights, lengths=sides, periodic=periodic, source=source)
         if grid is not None and surface.grid != cell_counts(grid, "the grid of the surface"):
             raise InputError(
                 "the file's number of heights differs from the grid that was asked for",
@@ -75,6 +87,12 @@ def read_surface(
     except InputError as error:
         raise error.located(file=str(file)) from None
     return surface
+
+
+def _gaps(heights: Array) -> int:
+    """Return the number of missing heights of what may be a surface."""
+    real = heights.ndim == 2 and heights.dtype.kind == "f"  # anything else is refused as a surface
+    return int(np.count_nonzero(np.isnan(heights))) if real else 0
 
 
 def _read_array(file: Path) -> Content:

@@ -27,7 +27,7 @@ _MOST = 40
 _KEPT = 6  # secants, over load steps too
 _LESS = 0.2  # of the force tried before
 _GUESSED = 1e-4  # tolerance of what another iteration starts from
-_CLEAR = 1e-12  # of contact, where no force is wanted [mm]
+_CLEAR = 1e-12  # of half the diagonal: clear of contact, where no force is wanted
 
 
 class _Found(NamedTuple):
@@ -217,7 +217,7 @@ class ConcurrentCoupling:
             if control.force:
                 plane[0] += control.force / (self._model.contact_modulus * self._half)
             else:
-                plane[0] -= self._half * float(np.hypot(*plane[1:])) + _CLEAR
+                plane[0] -= self._half * (float(np.hypot(*plane[1:])) + _CLEAR)
         return self._contact.press(plane, np.zeros(len(self._contact.shape)), start)
 
     def _settled(
