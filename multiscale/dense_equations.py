@@ -25,7 +25,7 @@ moment relative to the largest force and that force times half the interface's d
 touch, where closures are not known that well, it is relative to what they are known to."""
 
 _FARTHEST = 1e3  # halves of the diagonal up to which a first contact is looked for
-_ROUNDING = 8.0 * np.finfo(float).eps  # of the closures that the laws start at
+_ROUNDING = 8.0 * float(np.finfo(float).eps)  # of the closures that the laws start at
 _BISECTIONS = 30  # for a start: a few digits will do
 
 
