@@ -67,15 +67,16 @@ def read_surface(
             )
         sides, source = positive_lengths(sides, "the surface"), str(file)
         gaps = _gaps(heights)
-        if gaps and missing == "fill":
+        if len(gaps) and missing == "fill":
             nx, ny = heights.shape
             heights, share = filled(heights, (sides[0] / nx, sides[1] / ny))
             source += f", {share:.3g} of the heights missing and filled by a membrane"
-        elif gaps:
+        elif len(gaps):
+            first = tuple(int(index) for index in gaps[0])
             raise InputError(
-                f"{gaps} of {heights.size} heights are not finite, for they are missing",
+                f"{len(gaps)} of {heights.size} heights are not finite, the first at index {first}",
                 value=float("nan"),
-                allowed="finite heights in mm, or missing = 'fill'",
+                allowed="finite heights in mm; missing = 'fill' closes gaps by a membrane",
             )
         surface = Surface(heights=heights, lengths=sides, periodic=periodic, source=source)
         if grid is not None and surface.grid != cell_counts(grid, "the grid of the surface"):
@@ -89,10 +90,11 @@ def read_surface(
     return surface
 
 
-def _gaps(heights: Array) -> int:
-    """Return the number of missing heights of what may be a surface."""
-    real = heights.ndim == 2 and heights.dtype.kind == "f"  # anything else is refused as a surface
-    return int(np.count_nonzero(np.isnan(heights))) if real else 0
+def _gaps(heights: Array) -> NDArray[np.intp]:
+    """Return the indices of missing heights of what may be a surface, shape (n, 2)."""
+    if heights.ndim != 2 or heights.dtype.kind != "f":  # refused as a surface, if it is none
+        return np.empty((0, 2), dtype=np.intp)
+    return np.argwhere(np.isnan(heights))
 
 
 def _read_array(file: Path) -> Content:

@@ -27,6 +27,7 @@ _MOST = 40
 _KEPT = 6  # secants, over load steps too
 _LESS = 0.2  # of the force tried before
 _GUESSED = 1e-4  # tolerance of what another iteration starts from
+_ROUNDING = float(np.finfo(float).eps)  # of half the diagonal: what gaps are known to
 _CLEAR = 1e-12  # of half the diagonal: clear of contact, where no force is wanted
 
 
@@ -237,7 +238,8 @@ class ConcurrentCoupling:
         scale = force * np.array([1.0, self._half, self._half])
         excess = np.abs(trial.excess(control)) / scale
         change = float(np.abs(step[1]).sum()) / force
-        return change <= tolerance and bool(np.all(excess[moves] <= tolerance))
+        known = _ROUNDING * self._half / self._newton.depth(trial)  # near first touch less
+        return change <= max(tolerance, known) and bool(np.all(excess[moves] <= tolerance))
 
 
 def _unsettled(control: Control) -> NotConverged:

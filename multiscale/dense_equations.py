@@ -25,7 +25,7 @@ moment relative to the largest force and that force times half the interface's d
 touch, where closures are not known that well, it is relative to what they are known to."""
 
 _FARTHEST = 1e3  # halves of the diagonal up to which a first contact is looked for
-_ROUNDING = 8.0 * float(np.finfo(float).eps)  # of the closures that the laws start at
+_ROUNDING = 8.0 * float(np.finfo(float).eps)  # of approaches, and of the closures laws start at
 _BISECTIONS = 30  # for a start: a few digits will do
 
 
@@ -72,7 +72,7 @@ class DenseEquations:
         lever: What the plane's approach and slopes move the patches by, shape (N, 3).
         area: Area of a patch [mm²].
         half: Half the interface's diagonal [mm].
-        rounding: What closures are known to, however near the plane [mm].
+        reach: Size of the closures that the laws start at [mm].
 
     Raises:
         InputError: When the compliance is not a finite matrix of the size of the partition.
@@ -86,7 +86,7 @@ class DenseEquations:
         self.area = patches.area
         self.half = 0.5 * float(np.hypot(*patches.lengths))
         touch = laws.touch[np.isfinite(laws.touch)]
-        self.rounding = _ROUNDING * float(np.abs(touch).max(initial=0.0))
+        self.reach = float(np.abs(touch).max(initial=0.0))
 
     def at(self, local: Array, plane: Array) -> Iterate:
         """Evaluate a trial state."""
@@ -142,11 +142,17 @@ class LoadCase:
 
     def largest(self, iterate: Iterate) -> float:
         """Return the largest of what is missing, where relative to less than rounding to that."""
+        closure, load, approach = iterate.missing, self.lack(iterate), self._approach(iterate)
+        plain = np.append(np.abs(closure) / approach, np.abs(load) / self.force)
+        if plain.max() <= TOLERANCE:
+            return float(plain.max())
         equations = self._equations
-        known = max(self._approach(iterate), equations.rounding / TOLERANCE)
-        blur = equations.area * equations.rounding * float(iterate.point.dpressure.sum())
-        parts = iterate.missing / known, self.lack(iterate) / max(self.force, blur / TOLERANCE)
-        return float(np.abs(np.concatenate(parts)).max())
+        rounding = _ROUNDING * max(equations.reach, approach)  # of approaches: what it makes of
+        steepest = float(np.abs(equations.tangent(iterate)).sum(axis=1).max())  # closures, and of
+        blur = equations.area * float(iterate.point.dpressure.sum())  # the force
+        known = max(approach, steepest * rounding / TOLERANCE)
+        measure = max(self.force, blur * rounding / TOLERANCE)
+        return float(np.append(np.abs(closure) / known, np.abs(load) / measure).max())
 
     def _approach(self, iterate: Iterate) -> float:
         """Return the largest approach of the plane to a patch [mm]."""
@@ -167,7 +173,8 @@ class LoadCase:
         found = self.prescribed(plane)
         lean = self._equations.lever[:, 1:] @ found[1:]
         approach = float(np.min(self._equations.laws.touch - lean))
-        approach -= 2.0 * self._equations.rounding  # of the iteration, and of its end
+        largest = max(self._equations.reach, float(np.abs(approach + lean).max()))
+        approach -= 2.0 * TOLERANCE * largest  # so that what the solution misses is not contact
         if not np.isfinite(approach):
             raise self.failure("NO_CONTACT", 0)
         return Control(approach=approach, tilt=(float(found[1]), float(found[2])))
