@@ -13,7 +13,7 @@ BASE = {
         "grid": [32, 32],
         "lengths": ["1 mm", "1 mm"],
     },
-    "block": {"young_modulus": "4 GPa", "poisson_ratio": 0.15, "cells": [8, 8, 6]},
+    "block": {"young_modulus": "4 GPa", "poisson_ratio": 0.15, "cells": [6, 6, 4]},
     "patches": {"grid": [4, 4]},
     "micro": {"model": "half-space"},
     "load": {"approach": "8 um", "steps": 1},

@@ -33,7 +33,7 @@ def test_first_touch_of_one_asperity(kind, tmp_path):
     hertz = 4 / 3 * modulus * np.sqrt(0.5) * np.array(approach) ** 1.5
     # the block yields by 1e-3 of 1e-6 mm; closures of 0.5 mm are known to 4e-7 of 1e-10 mm
     np.testing.assert_allclose(found.force_N[:3], hertz, rtol=5e-3)
-    assert found.force_N[3] == 0.0  # the step that lands exactly on first touch
+    assert found.force_N[3] <= 1e-18  # lands exactly on first touch; gaps are known to 1e-17 mm
     assert found.newton_iterations.max() <= 8
 
 
@@ -60,7 +60,7 @@ def test_a_step_a_hundred_times_too_large_and_back(kind):
         assert there.force_N[1] == pytest.approx(near.force_N[0], rel=1e-7)  # their 1e-8 each
     assert there.force_N[0] > 500.0 * near.force_N[0]
     assert there.force_N[2] == 0.0 and not there.patch_pressure_MPa[2].any()
-    slow = history(load__approach=["800 um"], load__steps=5, **load)
+    slow = history(load__approach=["800 um"], load__steps=3, **load)
     assert there.force_N[0] == pytest.approx(slow.force_N[-1], rel=1e-5)
 
 
