@@ -51,7 +51,7 @@ CASES = {
     "1 first touch, from 1e-10 mm": [LAWS, "load.approach=[1e-10, 1e-6, 8e-3, 0.0]"],
     "2 full contact and beyond": [LAWS, "load.approach=['2 mm']"],
     "3 one patch": [LAWS, "patches.grid=[1, 1]"],
-    "3 as many patches as heights": [WHOLE, f"patches.grid=[{SIZE}, {SIZE}]"],
+    "3 256 patches": [WHOLE, "patches.grid=[16, 16]"],
     "6 ν = 0.4999, Q1 on the mesh: locks": [*MESH, "block.poisson_ratio=0.4999"],
     "6 ν = 0.4999, Q2 on the mesh": [*MESH, "block.poisson_ratio=0.4999", "block.element=Q2"],
     "6 ν = 0.4999, decomposed": [LAWS, "block.poisson_ratio=0.4999"],
