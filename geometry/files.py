@@ -8,7 +8,7 @@ import os
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from geometry.checks import LARGEST, cell_counts, positive_lengths
 from geometry.errors import InputError
 from geometry.instruments import read_instrument
+from geometry.missing import filled
 from geometry.surface import Surface
 
 Array = NDArray[np.float64]
@@ -34,6 +35,7 @@ def read_surface(
     lengths: tuple[float, float] | None = None,
     grid: tuple[int, int] | None = None,
     periodic: bool = False,
+    missing: Literal["refuse", "fill"] = "refuse",
 ) -> Surface:
     """Read heights at cell centres from a file, told by its suffix.
 
@@ -49,6 +51,8 @@ def read_surface(
             or an instrument's file says.
         grid: Numbers of heights (nx, ny) that the file must have; any when not given.
         periodic: Whether the heights continue periodically.
+        missing: What to do with heights that are not a number: refuse the file, or fill them, see
+            `geometry.missing.filled`; the surface's source then says how many they were.
 
     Returns:
         The surface, with heights in mm.
@@ -66,12 +70,20 @@ def read_surface(
             raise InputError(
                 "the file has no lengths, they must be given", allowed="lengths (Lx, Ly) in mm"
             )
-        surface = Surface(
-            heights=heights,
-            lengths=positive_lengths(sides, "the surface"),
-            periodic=periodic,
-            source=str(file),
-        )
+        sides, source = positive_lengths(sides, "the surface"), str(file)
+        gaps = _gaps(heights)
+        if len(gaps) and missing == "fill":
+            nx, ny = heights.shape
+            heights, share = filled(heights, (sides[0] / nx, sides[1] / ny))
+            source += f", {share:.3g} of the heights missing and filled by a membrane"
+        elif len(gaps):
+            first = tuple(int(index) for index in gaps[0])
+            raise InputError(
+                f"{len(gaps)} of {heights.size} heights are not finite, the first at index {first}",
+                value=float("nan"),
+                allowed="finite heights in mm; missing = 'fill' closes gaps by a membrane",
+            )
+        surface = Surface(heights=heights, lengths=sides, periodic=periodic, source=source)
         if grid is not None and surface.grid != cell_counts(grid, "the grid of the surface"):
             raise InputError(
                 "the file's number of heights differs from the grid that was asked for",
@@ -83,6 +95,13 @@ def read_surface(
     except InputError as error:
         raise error.located(file=str(file)) from None
     return surface
+
+
+def _gaps(heights: Array) -> NDArray[np.intp]:
+    """Return the indices of missing heights of what may be a surface, shape (n, 2)."""
+    if heights.ndim != 2 or heights.dtype.kind != "f":  # refused as a surface, if it is none
+        return np.empty((0, 2), dtype=np.intp)
+    return np.argwhere(np.isnan(heights))
 
 
 def _is_file(file: Path) -> bool:

@@ -186,8 +186,10 @@ def _zero(
     """Close a bracket by secant steps that stay well inside it (Illinois method)."""
     side = 0
     for _ in range(_MOST_EVALUATIONS):
-        if high[1] == 0.0 or abs(high[0] - low[0]) <= 1e-15 * abs(high[0]):
+        if high[1] == 0.0:
             return high[0]
+        if abs(high[0] - low[0]) <= 1e-15 * abs(high[0]):
+            return high[0] if control.force else low[0]  # no force at all: not touched
         middle = (low[0] * high[1] - high[0] * low[1]) / (high[1] - low[1])
         value = root(middle)
         if value == 0.0:

@@ -12,6 +12,11 @@ from multiscale.machine import this_machine
 from multiscale.stage import Stage
 from multiscale.stage_checks import DECOMPOSED_CELLS
 
+STIFF_FROM = 0.45
+"""Poisson's ratio above which linear elements lock. Two by two patches on 8 × 8 × 6 trilinear
+cells are 1.6 % too stiff there, 6 % at 0.49 and 57 % at 0.4999; as many nodes of quadratic ones
+0.5, 1.1 and 1.5 %."""
+
 _LONG = 5.0  # seconds that a user should know of
 
 
@@ -69,9 +74,25 @@ def _element_warnings(stage: Stage) -> Iterator[str]:
             f"{cells:.3g} cells along a patch: fewer than four linear (two quadratic) ones make "
             "the block stiffer by several per cent under a patch's pressure; refine block.cells"
         )
+    yield from locking(stage.shape.degree, stage.scene.block.poisson_ratio)
     fit = alignment(stage.shape, stage.patches)
     if not fit:
         yield fit.sentence
+
+
+def locking(degree: int, poisson_ratio: float) -> Iterator[str]:
+    """Yield a warning where elements are much too stiff for a nearly incompressible block.
+
+    Args:
+        degree: Polynomial degree of the elements.
+        poisson_ratio: Of the block.
+    """
+    if degree == 1 and poisson_ratio > STIFF_FROM:
+        yield (
+            f"linear elements lock as Poisson's ratio comes near 0.5 (here {poisson_ratio:g}): the "
+            "block is too stiff by several per cent or more; take block.element = 'Q2' or 'P2', or "
+            "coupling.compliance = 'decomposed', whose elements are quadratic"
+        )
 
 
 def _smooth_cost(stage: Stage) -> tuple[int, float, float]:

@@ -27,7 +27,8 @@ _MOST = 40
 _KEPT = 6  # secants, over load steps too
 _LESS = 0.2  # of the force tried before
 _GUESSED = 1e-4  # tolerance of what another iteration starts from
-_CLEAR = 1e-12  # of contact, where no force is wanted [mm]
+_ROUNDING = float(np.finfo(float).eps)  # of half the diagonal: what gaps are known to
+_CLEAR = 1e-12  # of half the diagonal: clear of contact, where no force is wanted
 
 
 class _Found(NamedTuple):
@@ -217,7 +218,7 @@ class ConcurrentCoupling:
             if control.force:
                 plane[0] += control.force / (self._model.contact_modulus * self._half)
             else:
-                plane[0] -= self._half * float(np.hypot(*plane[1:])) + _CLEAR
+                plane[0] -= self._half * (float(np.hypot(*plane[1:])) + _CLEAR)
         return self._contact.press(plane, np.zeros(len(self._contact.shape)), start)
 
     def _settled(
@@ -237,7 +238,8 @@ class ConcurrentCoupling:
         scale = force * np.array([1.0, self._half, self._half])
         excess = np.abs(trial.excess(control)) / scale
         change = float(np.abs(step[1]).sum()) / force
-        return change <= tolerance and bool(np.all(excess[moves] <= tolerance))
+        known = _ROUNDING * self._half / self._newton.depth(trial)  # near first touch less
+        return change <= max(tolerance, known) and bool(np.all(excess[moves] <= tolerance))
 
 
 def _unsettled(control: Control) -> NotConverged:

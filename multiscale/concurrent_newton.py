@@ -121,7 +121,7 @@ class ConcurrentNewton:
         found, assumed = trial.found, trial.assumed
         if float(np.abs(found - assumed).sum()) <= _FORESEEN * float(found.sum()):
             return max(farthest, 2.0 * went)
-        return min(farthest, max(0.5 * went, _NEAREST * self._depth(trial)))
+        return min(farthest, max(0.5 * went, _NEAREST * self.depth(trial)))
 
     def next(
         self,
@@ -155,7 +155,7 @@ class ConcurrentNewton:
         change = np.abs(self._contact.shape @ turn - self._contact.yielding @ lag)
         if control.tilt is None:  # elsewhere the turn is bounded
             change = change[trial.found > 0.0]
-        part = 1.0 / max(1.0, float(change.max()) / (_FARTHEST * self._depth(trial)))
+        part = 1.0 / max(1.0, float(change.max()) / (_FARTHEST * self.depth(trial)))
         plane = trial.plane + part * turn
         plane = np.where(free(control), plane, prescribed(control))
         return self._contact.press(plane, trial.assumed + part * lag, trial)
@@ -172,10 +172,10 @@ class ConcurrentNewton:
 
     def _farthest(self, trial: Trial) -> float:
         """Return how far the plane may turn at once where nothing touches [mm]."""
-        return max(self._depth(trial), _TURNED * (trial.plane[0] - self._contact.first_touch))
+        return max(self.depth(trial), _TURNED * (trial.plane[0] - self._contact.first_touch))
 
-    def _depth(self, trial: Trial) -> float:
-        """Return the depth of all contacts taken as one [mm]."""
+    def depth(self, trial: Trial) -> float:
+        """Return the depth of all contacts of a press, taken as one [mm]."""
         stiffness = self._stiffness.estimate(trial.response).sum()
         return _POWER * float(trial.found.sum() / stiffness)
 
@@ -190,7 +190,7 @@ class ConcurrentNewton:
 
     def _level(self, control: Control, trial: Trial) -> Trial | None:
         """Press by the law P ~ h^(3/2) of all contacts as one; None where it says nothing."""
-        found, depth = trial.found, self._depth(trial)
+        found, depth = trial.found, self.depth(trial)
         total = float(found.sum())
         mean = float(found @ self._contact.yielding @ found) / total
         known = float(found @ self._contact.yielding @ trial.assumed) / total

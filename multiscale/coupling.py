@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.control import Control
-from geometry.errors import InputError
+from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
 from micro import MicroModel, Response, RigidPlane
 from multiscale.balance import Balance
@@ -101,7 +101,14 @@ class EmbeddedCoupling:
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `Coupling.press`."""
-        state = self._pressed.press(control)
+        try:
+            state = self._pressed.press(control)
+        except NotConverged as error:
+            if not any(law.is_punch for law in self._table.laws):
+                raise
+            problem = "a flat patch, whose pressure is a function of closure nowhere"
+            made_for = self._table.made_by.get("coupling")
+            raise beyond_law(control, problem, made_for) from error
         step = self._step(control, state)
         self._last = state
         return step
@@ -243,8 +250,8 @@ def beyond_law(control: Control, problem: str, coupling: str | None) -> BeyondLa
     """
     alone = (
         "near full contact a patch taken alone has no pressure as a function of closure: take "
-        "coupling.kind = 'consistent' or 'concurrent', larger patches (patches.grid) or a smaller "
-        "load"
+        "coupling.newton = 'condensed', which goes on, coupling.kind = 'consistent' or "
+        "'concurrent', larger patches (patches.grid) or a smaller load"
     )
     whole = (
         "the block lets the plane come or turn further than the half-space that the laws were "

@@ -19,7 +19,13 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+TOLERANCE = 1e-12
+"""Residual of a solution: of the closures relative to the largest approach, of the force and the
+moment relative to the largest force and that force times half the interface's diagonal. Near first
+touch, where closures are not known that well, it is relative to what they are known to."""
+
 _FARTHEST = 1e3  # halves of the diagonal up to which a first contact is looked for
+_ROUNDING = 8.0 * float(np.finfo(float).eps)  # of approaches, and of the closures laws start at
 _BISECTIONS = 30  # for a start: a few digits will do
 
 
@@ -66,6 +72,7 @@ class DenseEquations:
         lever: What the plane's approach and slopes move the patches by, shape (N, 3).
         area: Area of a patch [mm²].
         half: Half the interface's diagonal [mm].
+        reach: Size of the closures that the laws start at [mm].
 
     Raises:
         InputError: When the compliance is not a finite matrix of the size of the partition.
@@ -78,6 +85,8 @@ class DenseEquations:
         self.lever: Array = np.column_stack((np.ones(count), patches.centres - middle))
         self.area = patches.area
         self.half = 0.5 * float(np.hypot(*patches.lengths))
+        touch = laws.touch[np.isfinite(laws.touch)]
+        self.reach = float(np.abs(touch).max(initial=0.0))
 
     def at(self, local: Array, plane: Array) -> Iterate:
         """Evaluate a trial state."""
@@ -126,12 +135,29 @@ class LoadCase:
         """Return force and moments that are missing, over the plane's free motions [N]."""
         return ((self._wanted - iterate.load) * self.unit)[self.free]
 
-    def residual(self, iterate: Iterate, order: float) -> float:
+    def residual(self, iterate: Iterate) -> float:
         """Return the norm of what is missing, relative to the largest approach and force."""
-        lever, half = self._equations.lever, self._equations.half
-        approach = max(float(np.abs(lever @ iterate.plane).max()), 1e-9 * half)
-        parts = (iterate.missing / approach, self.lack(iterate) / self.force)
-        return float(np.linalg.norm(np.concatenate(parts), order))
+        parts = iterate.missing / self._approach(iterate), self.lack(iterate) / self.force
+        return float(np.linalg.norm(np.concatenate(parts)))
+
+    def largest(self, iterate: Iterate) -> float:
+        """Return the largest of what is missing, where relative to less than rounding to that."""
+        closure, load, approach = iterate.missing, self.lack(iterate), self._approach(iterate)
+        plain = np.append(np.abs(closure) / approach, np.abs(load) / self.force)
+        if plain.max() <= TOLERANCE:
+            return float(plain.max())
+        equations = self._equations
+        rounding = _ROUNDING * max(equations.reach, approach)  # of approaches: what it makes of
+        steepest = float(np.abs(equations.tangent(iterate)).sum(axis=1).max())  # closures, and of
+        blur = equations.area * float(iterate.point.dpressure.sum())  # the force
+        known = max(approach, steepest * rounding / TOLERANCE)
+        measure = max(self.force, blur * rounding / TOLERANCE)
+        return float(np.append(np.abs(closure) / known, np.abs(load) / measure).max())
+
+    def _approach(self, iterate: Iterate) -> float:
+        """Return the largest approach of the plane to a patch [mm]."""
+        equations = self._equations
+        return max(float(np.abs(equations.lever @ iterate.plane).max()), 1e-9 * equations.half)
 
     def prescribed(self, plane: Array | None) -> Array:
         """Return a plane's approach and slopes with those that are prescribed put in."""
@@ -147,6 +173,8 @@ class LoadCase:
         found = self.prescribed(plane)
         lean = self._equations.lever[:, 1:] @ found[1:]
         approach = float(np.min(self._equations.laws.touch - lean))
+        largest = max(self._equations.reach, float(np.abs(approach + lean).max()))
+        approach -= 2.0 * TOLERANCE * largest  # so that what the solution misses is not contact
         if not np.isfinite(approach):
             raise self.failure("NO_CONTACT", 0)
         return Control(approach=approach, tilt=(float(found[1]), float(found[2])))

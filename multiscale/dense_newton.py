@@ -11,14 +11,10 @@ from numpy.typing import NDArray
 from geometry.control import Control
 from geometry.errors import NotConverged
 from geometry.patches import PatchGrid
-from multiscale.dense_equations import DenseEquations, Iterate, Laws, LoadCase
+from multiscale.dense_equations import TOLERANCE, DenseEquations, Iterate, Laws, LoadCase
 from multiscale.yielding import Yielding
 
 Array = NDArray[np.float64]
-
-TOLERANCE = 1e-12
-"""Residual of a solution: of the closures relative to the largest approach, of the force and the
-moment relative to the largest force and that force times half the interface's diagonal."""
 
 _MOST_STEPS = 100
 _MOST_HALVINGS = 40
@@ -104,12 +100,12 @@ class DenseNewton:
         recent: deque[float] = deque(maxlen=_MEMORY)
         for _ in range(_MOST_STEPS):
             case.see(now)
-            residuals.append(case.residual(now, np.inf))
+            residuals.append(case.largest(now))
             if residuals[-1] <= TOLERANCE:
                 return _state(now, residuals)
             ds, dq, supported = self._direction(case, now)
             if supported:
-                recent.append(case.residual(now, 2))
+                recent.append(case.residual(now))
                 now = self._searched(case, now, ds, dq, max(recent), len(residuals))
             else:
                 recent.clear()
@@ -164,7 +160,7 @@ class DenseNewton:
         """Halve a Newton step until the residual is below those of the last steps."""
         for share in 0.5 ** np.arange(_MOST_HALVINGS):
             trial = self._equations.at(now.local + share * ds, now.plane + share * dq)
-            if case.residual(trial, 2) <= (1.0 - _DECREASE * share) * reference:
+            if case.residual(trial) <= (1.0 - _DECREASE * share) * reference:
                 return trial
         raise case.failure("DIVERGED_LINE_SEARCH", spent)
 

@@ -31,6 +31,7 @@ def make_surface(scene: Scene) -> Surface:
         surface = _located(scene, "surface.spectrum", lambda: synthesise(spectrum, **extent))
     else:
         path = scene.surface_path or Path()
+        extent["missing"] = section.missing
         surface = _located(scene, "surface.file", lambda: read_surface(path, **extent))
     if section.detrend == "none":
         return surface

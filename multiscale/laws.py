@@ -111,6 +111,14 @@ class PatchLaw:
         return self._rising == len(self.closure)
 
     @property
+    def is_punch(self) -> bool:
+        """Whether closure falls from first touch on, as it does over a flat patch taken alone.
+
+        Then the pressure is a function of closure nowhere.
+        """
+        return not self.is_open and self._rising == 1
+
+    @property
     def range(self) -> tuple[float, float]:
         """Closures at first touch and at the end of the pressure's being a function of it [mm]."""
         return self.touch, self.touch if self.is_open else float(self.closure[self._rising - 1])

@@ -176,14 +176,26 @@ def recorded(
     )
 
 
-def reference_notes(record: ReferenceRecord, coupling: ReferenceCoupling) -> Iterator[str]:
+def reference_notes(
+    record: ReferenceRecord, coupling: ReferenceCoupling, steps: Sequence[LoadStep], stage: Stage
+) -> Iterator[str]:
     """Yield what a report says of a reference's own errors.
 
     Args:
         record: What its meshes say together.
         coupling: What made the load steps.
+        steps: The load steps.
+        stage: The scene's ingredients.
     """
     yield record.sentence
+    missed = [step.step for step in steps if not step.contacts and _below_highest(step, stage)]
+    if missed:
+        yield (
+            f"no node of the finest mesh touches in {len(missed)} of {len(steps)} load steps, "
+            f"first in step {missed[0]}, though the plane lies below the surface's highest point: "
+            f"the mesh is too coarse for contact there, and the force zero; refine "
+            f"{stage.meshes.key if stage.meshes else 'it'}"
+        )
     if coupling.qualities:
         thinnest = min(quality.thinnest for quality in coupling.qualities)
         steepest = max(quality.steepest for quality in coupling.qualities)
@@ -191,3 +203,9 @@ def reference_notes(record: ReferenceRecord, coupling: ReferenceCoupling) -> Ite
             f"the roughness leaves the cells at least {thinnest:.2g} of their volume; the steepest "
             f"edge of the top has a slope of {steepest:.2g}"
         )
+
+
+def _below_highest(step: LoadStep, stage: Stage) -> bool:
+    """Whether the plane of a load step lies below the highest point of the undeformed surface."""
+    arm = np.asarray(stage.surface.highest_point) - 0.5 * np.asarray(stage.surface.lengths)
+    return step.approach_mm + float(arm @ np.asarray(step.tilt)) > 0.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from geometry.meshes import BlockShape
+from multiscale.block_plan import locking
 from multiscale.reference_meshes import ReferenceMeshes
 from multiscale.scene import Scene
 from multiscale.stage_checks import patch_grid
@@ -67,6 +68,7 @@ def reference_warnings(scene: Scene, meshes: ReferenceMeshes) -> Iterator[str]:
             f"{meshes.across:.2g} edges across a typical contact at the largest load: the force is "
             f"wrong by several per cent; refine {meshes.key}"
         )
+    yield from locking(meshes.degree, scene.block.poisson_ratio)
     finest = meshes.shapes[-1]
     if isinstance(finest, BlockShape):
         top = float(finest.ticks[2][-1] - finest.ticks[2][-2])

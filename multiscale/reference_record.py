@@ -70,7 +70,7 @@ class ReferenceRecord:
     @property
     def relative_error(self) -> float:
         """Error bar at the largest force, relative: of the force, or of the approach by force."""
-        if not self.force_N.size:
+        if not self.force_N.any():
             return float("nan")
         found, last = self._unknown[0], self._most
         value, error = abs(float(found.value[last])), float(found.error[last])
@@ -90,6 +90,8 @@ class ReferenceRecord:
             return "one mesh: no error bar; reference.meshes = 2 gives one"
         if not self.force_N.size:
             return "no load step, no error bar"
+        if not self.force_N.any():
+            return "no contact on any mesh, no error bar"
         what = "approach" if self.by_force else "force"
         (found, scale, unit), last = self._unknown, self._most
         rate = float(found.rate[last])

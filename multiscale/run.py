@@ -182,7 +182,7 @@ class Run:
         record = None
         if isinstance(self.coupling, ReferenceCoupling):
             record = recorded(self.stage, self.coupling, self.steps)
-            notes += reference_notes(record, self.coupling)
+            notes += reference_notes(record, self.coupling, self.steps, self.stage)
         return History(
             steps=tuple(self.steps),
             patches=self.stage.patches,

@@ -54,7 +54,11 @@ class SpectrumSection(Section):
 
 
 class SurfaceSection(Section):
-    """Exactly one source of heights, and the rectangle it covers."""
+    """Exactly one source of heights, and the rectangle it covers.
+
+    ``missing``: heights of a file that are not a number are refused, or filled by the smoothest
+    membrane between the others, see `geometry.missing.filled`.
+    """
 
     spectrum: SpectrumSection | None = None
     file: str | None = None
@@ -68,6 +72,7 @@ class SurfaceSection(Section):
     ) = None
     lengths: tuple[PositiveLength, PositiveLength] | None = None
     detrend: Literal["none", "mean", "plane", "quadratic"] = "none"
+    missing: Literal["refuse", "fill"] = "refuse"
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
@@ -75,6 +80,8 @@ class SurfaceSection(Section):
             raise ValueError("needs exactly one source (allowed: either 'spectrum' or 'file')")
         if self.spectrum is not None and (self.grid is None or self.lengths is None):
             raise ValueError("a 'spectrum' needs 'grid' and 'lengths' beside it")
+        if self.file is None and self.missing == "fill":
+            raise ValueError("missing = 'fill' needs a 'file' (allowed: leave it out)")
         if self.file is not None and self.grid == "auto":
             raise ValueError(
                 "grid = 'auto' needs a 'spectrum' (allowed: the grid of the file, or leave it out)"

@@ -1,0 +1,146 @@
+"""Hard blocks: nearly incompressible, auxetic, in any unit, flat, slender, with a bad cell."""
+
+import numpy as np
+import pytest
+from block_cases import block_of
+from hard_cases import history, scene
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from macro import Block, Material, block_mesh
+from multiscale import make_stage
+from multiscale.plan import warnings
+
+BLOCKED = ("isolated", "consistent", "concurrent")
+
+
+def stiffness(element, cells, nu):
+    return history(
+        coupling__kind="isolated", coupling__newton="full", patches__grid=[2, 2],
+        surface__grid=[16, 16], block__poisson_ratio=nu, block__element=element,
+        block__cells=cells,
+    ).force_N[-1]  # fmt: skip
+
+
+def test_quadratic_elements_do_not_lock():
+    # hard: at ν = 0.4999 trilinear cells are half as stiff again; the remedy is the element
+    linear = [stiffness("Q1", [n, n, n], 0.4999) for n in (4, 8)]
+    quadratic = [stiffness("Q2", [n, n, n], 0.4999) for n in (2, 4, 8)]
+    exact = history(
+        coupling__kind="isolated", coupling__compliance="decomposed", patches__grid=[2, 2],
+        surface__grid=[16, 16], block__poisson_ratio=0.4999,
+        block__cells=[12, 12, 9],
+    ).force_N[-1]  # fmt: skip
+    assert min(linear) > 1.25 * exact  # locked
+    steps = np.abs(np.diff(quadratic)) / exact
+    assert quadratic[-1] == pytest.approx(exact, rel=0.03)  # both meshes leave about 1 %
+    assert steps[1] < 0.65 * steps[0]  # the jump of pressure at a patch's border leaves rate 1
+
+
+@pytest.mark.parametrize("nu", [0.0, -0.5])
+def test_blocks_that_do_not_bulge(nu):
+    # hard: cells couple differently; the witness is the half-space in closed form and its rest
+    laws = {"coupling__kind": "isolated", "block__poisson_ratio": nu, "patches__grid": [2, 2]}
+    mesh = history(coupling__newton="full", block__element="Q2", **laws).force_N[-1]
+    split = history(coupling__compliance="decomposed", **laws).force_N[-1]
+    assert mesh == pytest.approx(split, rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("element", "nu", "told"), [("Q1", 0.49, 1), ("P1", 0.46, 1), ("Q2", 0.49, 0), ("Q1", 0.4, 0)]
+)
+def test_the_plan_says_that_linear_elements_lock(element, nu, told):
+    cells = {} if element.startswith("Q") else {"block__cells": None}
+    material = {"block__element": element, "block__poisson_ratio": nu}
+    plain = scene(coupling__kind="isolated", **material)
+    meshed = scene(coupling__kind="reference", **material, **cells)
+    for one in (plain, meshed):
+        assert sum("linear elements lock" in text for text in warnings(make_stage(one))) == told
+    split = make_stage(scene(block__poisson_ratio=0.4999))
+    assert not any("lock" in one for one in warnings(split))  # the decomposed block is quadratic
+
+
+@pytest.mark.parametrize("kind", BLOCKED)
+def test_no_tolerance_knows_a_unit(kind):
+    # hard: E over nine decades, lengths over six; powers of two scale without any rounding
+    def measured(length, modulus):
+        force = history(
+            coupling__kind=kind, surface__lengths=[length, length], block__height=length,
+            load__approach=[8e-3 * length], block__young_modulus=modulus,
+        ).force_N[-1]  # fmt: skip
+        return force / (modulus * length**2)
+
+    here = measured(1.0, 4096.0)
+    for length, modulus in ((1.0, 2.0**-10), (1024.0, 2.0**20), (2.0**-10, 4096.0)):
+        assert measured(length, modulus) == pytest.approx(here, rel=1e-10)
+
+
+@pytest.mark.parametrize("kind", ["consistent", "concurrent"])
+@pytest.mark.parametrize("unit", ["m", "um"])
+def test_metres_and_micrometres(kind, unit):
+    size = {"m": 1e3, "um": 1e-3}[unit]
+    there = history(
+        coupling__kind=kind, surface__lengths=[f"1 {unit}"] * 2, block__height=f"1 {unit}",
+        load__approach=f"{8 * size} um", block__young_modulus="4e9 Pa",
+    )  # fmt: skip
+    here = history(coupling__kind=kind)
+    assert there.force_N[-1] / size**2 == pytest.approx(here.force_N[-1], rel=1e-10)
+
+
+def test_a_slender_column_adds_its_own_length():
+    # hard: 50 : 1; with the whole surface the column's yielding is in series, F h (1/EA + e²/EI)
+    column = history(coupling__kind="concurrent", block__height="50 mm")
+    force = column.force_N[-1]
+    alone = history(coupling__kind="analytic", load__approach=None, load__force=[force])
+    last = column.steps[-1]
+    arm = np.hypot(*last.moment_N_mm) / force  # the plane stays level: the column bends by F arm
+    length = 50.0 * force / 4000.0 * (1.0 + 12.0 * arm**2)
+    # end zones of about half a width, and contacts that know no sides: 2.6 % was measured
+    assert column.approach_mm[-1] - alone.approach_mm[-1] == pytest.approx(length, rel=0.04)
+    assert column.newton_iterations.max() <= 15
+
+
+@pytest.mark.parametrize(("height", "bound"), [("0.02 mm", 8), ("50 mm", 8)])
+def test_flat_and_slender_blocks_on_the_mesh(height, bound):
+    # hard: cells of 50 : 1; geometric multigrid coarsens where planes are close
+    found = history(coupling__kind="isolated", coupling__newton="full", block__height=height)
+    assert found.linear_iterations.sum() <= bound * max(found.newton_iterations.sum(), 1)
+    assert abs(found.steps[-1].imbalance) < 1e-9  # the residual is 1e-10 of the load
+
+
+def test_love_on_a_patch_as_large_as_the_block():
+    # hard: the half-space inside the law is none; warned, and the error is this
+    large = {"patches__grid": [1, 1], "block__height": "0.2 mm"}
+    told = list(warnings(make_stage(scene(coupling__kind="isolated", **large))))
+    assert any("not small against the block" in one for one in told)
+    right = history(coupling__kind="concurrent", **large).force_N[-1]
+    wrong = history(coupling__kind="isolated", **large).force_N[-1]
+    assert 0.02 < abs(wrong / right - 1.0) < 0.5
+
+
+@pytest.mark.parametrize("element", ["Q1", "P1"])
+def test_one_very_bad_cell(element):
+    # hard: a node moved until the cells beside it keep a fiftieth of their height
+    block = block_of(element=element, cells=(6, 6, 4))
+    good = _iterations(block)
+    mesh = block_mesh(block.mesh.shape, MPI.COMM_SELF)
+    x = mesh.mesh.geometry.x
+    node = int(np.argmin(np.abs(x - np.array([0.5, 0.5, -0.5])).sum(axis=1)))
+    x[node, 2] += 0.98 * 0.25
+    bad = Block(mesh, Material(young_modulus=4000.0, poisson_ratio=0.15))
+    assert _iterations(bad) <= 3 * good + 10
+
+
+def _iterations(block):
+    """Return the iterations to 1e-8 under a load of all frequencies; the true residual is small."""
+    load = block.stiffness.createVecRight()
+    load.array[:] = np.random.default_rng(5).standard_normal(block.owned_dofs)
+    load.pointwiseMult(load, block.free)
+    found, residual = load.duplicate(), load.duplicate()
+    block.solver.setTolerances(rtol=1e-8)
+    block.solver.solve(load, found)
+    assert block.solver.reason > 0
+    block.stiffness.mult(found, residual)
+    residual.axpy(-1.0, load)
+    assert residual.norm(PETSc.NormType.NORM_2) < 1.1e-8 * load.norm()
+    return block.solver.its

@@ -1,0 +1,188 @@
+"""Hard loads: first touch, steps too large, nearly vertical laws, ten thousand steps and back."""
+
+import tracemalloc
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hard_cases import KINDS, centred, from_file, history, scene
+from scipy.optimize import brentq
+
+from geometry.control import Control
+from geometry.errors import NotConverged
+from geometry.patches import PatchGrid
+from micro import contact_modulus
+from multiscale.dense_newton import DenseNewton
+from multiscale.laws import PatchLaw
+from multiscale.patch_laws import PatchLaws
+from multiscale.run import Run
+
+every_kind = pytest.mark.parametrize("kind", KINDS)
+
+
+@every_kind
+def test_first_touch_of_one_asperity(kind, tmp_path):
+    # hard: p ~ c^1.5 has no stiffness at first touch, where closures of 0.1 mm differ by 1e-10 mm
+    x, y = centred(33)
+    sphere = from_file(tmp_path, -(x**2 + y**2) / (2 * 0.5))  # radius 0.5 mm
+    approach = [1e-10, 1e-8, 1e-6]
+    found = history(
+        coupling__kind=kind, micro__model="circular", load__approach=[*approach, 0.0], **sphere
+    )
+    modulus = contact_modulus(4000.0, 0.15)
+    hertz = 4 / 3 * modulus * np.sqrt(0.5) * np.array(approach) ** 1.5
+    # the block yields by 1e-3 of 1e-6 mm; closures of 0.5 mm are known to 4e-7 of 1e-10 mm
+    np.testing.assert_allclose(found.force_N[:3], hertz, rtol=5e-3)
+    assert found.force_N[3] <= 1e-18  # lands exactly on first touch; gaps are known to 1e-17 mm
+    assert found.newton_iterations.max() <= 8
+
+
+@every_kind
+def test_smallest_forces_first(kind):
+    # hard: the plane has to be placed to far below the rounding of what closures start at
+    forces = [1e-9, 1e-6, 1e-3, 1.0, 0.0]
+    found = history(coupling__kind=kind, load__approach=None, load__force=forces)
+    # 1e-9 N moves the plane by 1e-11 mm, known to 1e-17 mm: force to 2e-6 of itself
+    np.testing.assert_allclose(found.force_N[:4], forces[:4], rtol=1e-5)
+    assert found.force_N[4] == 0.0
+    assert np.all(np.diff(found.approach_mm[:4]) > 0.0)
+
+
+@every_kind
+def test_a_step_a_hundred_times_too_large_and_back(kind):
+    # hard: from first touch to full contact at once; isolated laws end where they are functions
+    load = {"coupling__kind": kind, "surface__grid": [16, 16], "block__cells": [6, 6, 4]}
+    if kind == "isolated":
+        load["coupling__newton"] = "condensed"
+    near = history(load__approach="8 um", **load)
+    there = history(load__approach=["800 um", "8 um", "0 um"], **load)
+    if kind in ("analytic", "concurrent"):  # laws that reach further have other rows
+        assert there.force_N[1] == pytest.approx(near.force_N[0], rel=1e-7)  # their 1e-8 each
+    assert there.force_N[0] > 500.0 * near.force_N[0]
+    assert there.force_N[2] == 0.0 and not there.patch_pressure_MPa[2].any()
+    slow = history(load__approach=["800 um"], load__steps=3, **load)
+    assert there.force_N[0] == pytest.approx(slow.force_N[-1], rel=1e-5)
+
+
+def test_a_patch_alone_at_full_contact_on_the_mesh_is_told():
+    # hard: the pressure stops being a function of closure, and no smaller step helps
+    with pytest.raises(
+        NotConverged, match=r"stops being a function.*coupling.newton = 'condensed'"
+    ):
+        history(
+            coupling__kind="isolated",
+            coupling__newton="full",
+            load__approach="800 um",
+            surface__grid=[16, 16],
+        )
+
+
+@every_kind
+def test_tilt_that_leaves_half_the_patches_open(kind):
+    # hard: contact at one side only, where the approach at the middle says little
+    found = history(coupling__kind=kind, load__tilt=["40 um/mm", "0 um/mm"], load__steps=4)
+    pressed = found.patch_pressure_MPa[-1] > 0.0
+    assert 4 <= np.count_nonzero(pressed) <= 8
+    assert found.moment_x_N_mm[-1] > 0.1 * found.force_N[-1]  # the force acts on the lower side
+    assert found.newton_iterations.max() <= (30 if kind == "analytic" else 8)  # conjugate gradients
+
+
+@every_kind
+def test_a_gap_shifted_by_a_ten_thousandth(kind):
+    # hard: a table of laws must not turn a small change of the gap into noise
+    small = {"coupling__kind": kind, "surface__grid": [16, 16], "block__cells": [6, 6, 4]}
+    below, at, above = history(
+        load__approach=[0.008 * (1 + shift) for shift in (-1e-4, 0.0, 1e-4)],
+        **small,
+    ).force_N
+    wide = history(load__approach=[0.0079, 0.0081], **small).force_N
+    slope = (wide[1] - wide[0]) / 0.0002
+    assert (above - below) / 1.6e-6 == pytest.approx(
+        slope, rel=0.02
+    )  # curvature, kinks of contacts
+    assert above - at == pytest.approx(at - below, rel=0.01)
+
+
+def law(closure, pressure):
+    closure, pressure = np.array(closure), np.array(pressure)
+    zero = np.zeros(len(closure))
+    return PatchLaw(
+        closure=closure, pressure=pressure, approach=closure, contact_area_fraction=zero,
+        contacts=zero.astype(int), relief=zero, touch=float(closure[0]), reach=0.02,
+    )  # fmt: skip
+
+
+STEEP = np.array([0.0, 1e-3, 1e-3 + 1e-9, 9e-3])
+TABLES = {
+    "kink": ([0.0, 4e-3, 4.01e-3, 9e-3], [0.0, 1.0, 60.0, 400.0]),
+    "plateau": ([0.0, 2e-3, 6e-3, 9e-3], [0.0, 20.0, 20.0, 90.0]),
+    "nearly vertical": (STEEP, [0.0, 1.0, 100.0, 120.0]),
+    "noisy": (np.linspace(0.0, 9e-3, 19), 4e5 * np.linspace(0.0, 9e-3, 19) ** 1.5),
+}
+
+
+@pytest.mark.parametrize("name", TABLES)
+@pytest.mark.parametrize("force", [None, 50.0], ids=["approach", "force"])
+def test_laws_with_a_kink_a_plateau_a_wall_or_noise(name, force):
+    # hard: the tangent jumps, vanishes or is a wall; with noise the pressure falls here and there
+    closure, pressure = TABLES[name]
+    if name == "noisy":
+        noise = np.random.default_rng(4).normal(0.0, 0.05, len(pressure))
+        pressure = np.abs(pressure * (1.0 + noise))
+    one, yields = law(closure, pressure), 1e-4
+    patch = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
+    newton = DenseNewton(PatchLaws([one]), np.array([[yields]]), patch)
+    control = Control(approach=0.012, tilt=(0.0, 0.0))
+    if force is not None:
+        control = Control(force=force, tilt=(0.0, 0.0))
+    state = newton.solve(control)
+    assert state.iterations <= 40
+
+    def missing(local):
+        return float(local + yields * one.along(local).pressure) - state.plane[0]
+
+    root = brentq(missing, 0.0, 0.02, xtol=1e-18, rtol=1e-15)
+    assert float(state.local[0]) == pytest.approx(root, rel=1e-9)  # 1e-12 over the slope
+    if force is not None:
+        assert state.load[0] == pytest.approx(force, rel=1e-9)
+
+
+@every_kind
+def test_hundreds_of_load_steps_do_not_drift_nor_grow(kind):
+    # hard: what is carried from step to step must neither wander nor pile up
+    laps, small = 6, {"block__cells": [6, 6, 4], "surface__grid": [16, 16], "patches__grid": [2, 2]}
+    work = Run(
+        scene(coupling__kind=kind, load__approach=["8 um", "2 um"] * laps, load__steps=5, **small)
+    )
+    tracemalloc.start()
+    try:
+        force, memory = [], []
+        for step in work.load_steps():
+            force.append(step.force_N)
+            memory.append(tracemalloc.get_traced_memory()[0])
+    finally:
+        tracemalloc.stop()
+    tops = np.array(force[4::10])
+    # 1e-8 is the tolerance of the couplings that have no table
+    np.testing.assert_allclose(tops, tops[0], rtol=2e-8)
+    half = len(memory) // 2
+    assert (memory[-1] - memory[half]) / half < 4000.0  # bytes a step: the history itself, 1 kB
+
+
+def test_a_plane_on_nothing_but_its_own_law_counts_from_rounding():
+    # hard: two patches of which one starts 10^8 times further away than the load goes
+    patches = PatchGrid(grid=(2, 1), lengths=(2.0, 1.0))
+    touch = np.array([0.0, 100.0])
+
+    def along(local):
+        depth = np.maximum(local - touch, 0.0)
+        return SimpleNamespace(
+            closure=touch + (local - touch), pressure=1e5 * depth**1.5,
+            dclosure=np.ones(2), dpressure=1.5e5 * np.sqrt(depth),
+        )  # fmt: skip
+
+    newton = DenseNewton(SimpleNamespace(touch=touch, along=along), np.diag([1e-6, 1e-6]), patches)
+    state = newton.solve(Control(approach=1e-6, tilt=(0.0, 0.0)))
+    depth = brentq(lambda s: s + 1e-6 * 1e5 * s**1.5 - 1e-6, 0.0, 1e-6, xtol=1e-20, rtol=1e-14)
+    assert state.pressure[0] == pytest.approx(1e5 * depth**1.5, rel=1e-6)
+    assert state.pressure[1] == 0.0
