@@ -20,12 +20,11 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.control import Control
-from geometry.errors import NotConverged
 from macro.block import Block
 from macro.free_solver import FreeSolver
 from macro.history_start import Start, StepHistory
 from macro.obstacle_state import Found
-from macro.rigid_plane import RigidPlane, Task, described
+from macro.rigid_plane import RigidPlane, Task, not_found
 from macro.top_nodes import TopNodes
 
 Array = NDArray[np.float64]
@@ -98,12 +97,7 @@ class ActiveNodes:
             tolerance = TOLERANCE if near else _LOOSE
             moved = pulled | pressed
             active = active ^ (self._first(moved) if waited > _PATIENCE else moved)
-        raise NotConverged(
-            f"the contact of the rough block under {described(control)}",
-            reason="ACTIVE_SET_CYCLES",
-            iterations=_MOST_SETS,
-            remedy="take smaller load steps (load.steps)",
-        )
+        raise not_found(control, "ACTIVE_SET_CYCLES", _MOST_SETS)
 
     def _started(self, task: Task, start: Start, displacement: PETSc.Vec) -> tuple[Array, Flags]:
         """Return the first plane and active set: those of before and nodes that penetrate."""

@@ -18,24 +18,19 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.control import Control
-from geometry.errors import NotConverged
 from geometry.patches import PatchGrid
 from macro.augmented_law import AugmentedLaw, facet_sizes
+from macro.augmented_newton import LOOSEST, SPARE, TOLERANCE, FacetNewton
 from macro.block import Block
 from macro.contact import Contact
 from macro.equilibrium import Equilibrium
 from macro.history_start import Start, StepHistory
 from macro.interface import Interface
 from macro.obstacle_state import Found
-from macro.rigid_plane import RigidPlane, described
-from macro.solvers import reason_name
-from macro.stiff_preconditioner import StiffPreconditioner
+from macro.rigid_plane import RigidPlane, not_found
 from macro.top_nodes import TopNodes
 
 Array = NDArray[np.float64]
-
-TOLERANCE = 1e-10
-"""Residual of the equilibrium that a solution may have, relative to its contact forces."""
 
 PENETRATION = {1: 1e-8, 2: 1e-5}
 """Depth of quadrature points beyond the plane, and gap of those under pressure, relative to the
@@ -43,14 +38,11 @@ largest displacement, by the element's degree: on quadratic facets points nearly
 other's conditions, and multipliers that share one load settle slowly."""
 
 _SOFT, _HARD = 30.0, 1000.0  # stiffness at first and at last: E* over the facet
-_LOOSEST, _SPARE = 0.03, 0.3  # relative residual of linear solves, and at the end
 _HARDER, _HARDEST = 10.0, 10.0  # growth of the stiffness between updates, and all in all
 _FALL = 0.1  # of the penetration by an update; else springs are too soft
-_MOST_STEPS, _MOST_UPDATES, _HALVINGS = 60, 40, 30
-_ON = 1e-12  # of a basis function: its node is not on the facet
+_MOST_UPDATES = 40
 _NO_FORCE = 1e-6  # of the largest nodal force: none
 _TINY = 1e-300
-_ENOUGH = 0.9  # share of the energy's slope that a step may leave
 
 
 class AugmentedFacets:
@@ -83,14 +75,7 @@ class AugmentedFacets:
         self._law = AugmentedLaw(np.sum(points.values * rest[points.nodes], axis=1))
         self._contact = Contact(interface, sampling, [self._law])
         self._equilibrium = Equilibrium(block, sampling, self._contact)
-        self._preconditioner = StiffPreconditioner(
-            block.stiffness, block.solver.pc, interface.points_by_dofs
-        )
-        self._ksp = PETSc.KSP().create(block.stiffness.comm)
-        self._ksp.setPC(self._preconditioner.pc)
-        self._ksp.setOperators(self._equilibrium.tangent, block.stiffness)
-        self._ksp.setType("cg")
-        self._ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
+        self._newton = FacetNewton(self._equilibrium, self._law, interface, top, plane)
         self._history = StepHistory(block.owned_dofs, len(points.x))
 
     def press(self, control: Control) -> Found:
@@ -107,10 +92,10 @@ class AugmentedFacets:
         law.multiplier = np.maximum(start.contact, 0.0) if self._exact else 0.0 * start.contact
         displacement = self._block.stiffness.createVecRight()
         displacement.array[:] = start.displacement
-        steps, spent, tolerance, before = 0, 0, _LOOSEST, np.inf
+        steps, spent, tolerance, before = 0, 0, LOOSEST, np.inf
         law.slope, hardest = self._soft, self._stiff
         for _ in range(_MOST_UPDATES):
-            more, cycles = self._equilibrate(displacement, tolerance, control)
+            more, cycles = self._newton.solve(displacement, tolerance, control)
             steps, spent = steps + more, spent + cycles
             closure = self._equilibrium.closure(displacement)
             # depth under no pressure, depth or gap under pressure
@@ -126,62 +111,9 @@ class AugmentedFacets:
                 hardest = np.minimum(_HARDER * hardest, _HARDEST * self._stiff)
             before = excess
             law.slope = np.minimum(_HARDER * law.slope, hardest)
-            near = min(0.1 * tolerance, _SPARE * self._penetration * excess) if self._exact else 0.0
+            near = min(0.1 * tolerance, SPARE * self._penetration * excess) if self._exact else 0.0
             tolerance = max(TOLERANCE, near) if hard or not self._exact else tolerance
-        raise self._failure(control, "MULTIPLIERS", _MOST_UPDATES)
-
-    def _equilibrate(
-        self, displacement: PETSc.Vec, tolerance: float, control: Control
-    ) -> tuple[int, int]:
-        """Solve under fixed multipliers; return Newton's steps and the linear iterations."""
-        equilibrium, spent = self._equilibrium, 0
-        residual, step = displacement.duplicate(), displacement.duplicate()
-        for steps in range(_MOST_STEPS):
-            equilibrium.residual(displacement, residual)
-            norm, scale = residual.norm(), equilibrium.scale
-            if norm <= tolerance * scale:
-                return steps, spent
-            if not scale:  # nothing presses
-                displacement.set(0.0)
-                continue
-            self._linearise(displacement)
-            rtol = max(min(_LOOSEST, norm / scale), _SPARE * tolerance * scale / norm)
-            self._ksp.setTolerances(rtol=rtol, max_it=1000)
-            self._ksp.solve(residual, step)
-            spent += int(self._ksp.its)
-            if self._ksp.reason < 0:
-                name = reason_name(PETSc.KSP.ConvergedReason, self._ksp.reason)
-                raise self._failure(control, name, spent)
-            self._advance(displacement, residual, step, control)
-        raise self._failure(control, "NEWTON", _MOST_STEPS)
-
-    def _linearise(self, displacement: PETSc.Vec) -> None:
-        """Move the tangent and its preconditioner to a displacement."""
-        self._equilibrium.update_tangent(displacement)
-        slope = self._law.stiffness(self._equilibrium.closure(displacement))
-        points = self._interface.quadrature
-        rows, columns = np.nonzero((np.abs(points.values) > _ON) & (slope > 0.0)[:, None])
-        marks = self._top.collect(points.nodes[rows, columns], np.ones(len(rows)))
-        sprung = marks > 0.0
-        free = self._contact.free
-        motions = self._plane.levers(free)[sprung] @ self._plane.held(free, sprung)
-        self._preconditioner.update(slope / self._sampling.weight, self._top.dofs[sprung], motions)
-
-    def _advance(
-        self, displacement: PETSc.Vec, residual: PETSc.Vec, step: PETSc.Vec, control: Control
-    ) -> None:
-        """Go back along a step until the slope of the energy along it has fallen."""
-        slope, low, high, share = residual.dot(step), 0.0, np.inf, 1.0
-        start = displacement.copy()
-        for _ in range(_HALVINGS):
-            displacement.waxpy(-share, step, start)
-            self._equilibrium.residual(displacement, residual)
-            left = residual.dot(step)
-            if abs(left) <= _ENOUGH * abs(slope):
-                return
-            low, high = (share, high) if left > 0.0 else (low, share)
-            share = 3.0 * share if high == np.inf else 0.5 * (low + high)
-        raise self._failure(control, "LINE_SEARCH", _HALVINGS)
+        raise not_found(control, "MULTIPLIERS", _MOST_UPDATES)
 
     def _found(self, control: Control, displacement: PETSc.Vec, steps: int, spent: int) -> Found:
         closure, plane = self._equilibrium.closure(displacement), self._contact.plane.copy()
@@ -205,14 +137,6 @@ class AugmentedFacets:
             active_sets=steps,
             linear_iterations=spent,
             reason=reason if self._largest(pressing) else "CONVERGED_NO_CONTACT",
-        )
-
-    def _failure(self, control: Control, reason: str, iterations: int) -> NotConverged:
-        return NotConverged(
-            f"the contact of the rough block under {described(control)}",
-            reason=reason,
-            iterations=iterations,
-            remedy="take smaller load steps (load.steps)",
         )
 
     def _largest(self, values: Array) -> float:

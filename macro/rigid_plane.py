@@ -9,6 +9,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from geometry.control import Control
+from geometry.errors import NotConverged
 from macro.settle import LOOSE, Excess, settle
 
 Array = NDArray[np.float64]
@@ -166,7 +167,23 @@ class _Springs:
         return float(np.abs(fixed).sum() + np.abs(motion).sum())
 
 
-def described(control: Control) -> str:
+def not_found(control: Control, reason: str, iterations: int) -> NotConverged:
+    """Return the error of a load step whose contact was not found.
+
+    Args:
+        control: What the load step prescribes.
+        reason: Name of the reason.
+        iterations: Iterations that were made.
+    """
+    return NotConverged(
+        f"the contact of the rough block under {_described(control)}",
+        reason=reason,
+        iterations=iterations,
+        remedy="take smaller load steps (load.steps)",
+    )
+
+
+def _described(control: Control) -> str:
     """Say under what a load step presses, for an error."""
     if control.force is not None:
         return f"a force of {control.force:.6g} N"

@@ -23,6 +23,8 @@ from macro.subfacets import FacetLattice, covered, facet_lattice
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
+_NO_AREA = 1e-9  # of a patch
+
 
 class TopNodes:
     """Nodes of a block's top and what is measured with them.
@@ -150,7 +152,8 @@ class TopNodes:
     @cached_property
     def _empty(self) -> tuple[NDArray[np.bool_], Array]:
         """Which patches hold no node, shape (N,), and marks on the nodes nearest to them."""
-        empty = self._patch_areas <= 0.0
+        # areas of the vertices of quadratic triangles are rounding, of either sign
+        empty = self._patch_areas <= _NO_AREA * self.patches.area
         centres = self.patches.centres[empty]
         apart = np.hypot(*(np.stack([self.x, self.y])[:, :, None] - centres.T[:, None]))
         least = np.min(self._block.mesh.comm.allgather(apart.min(axis=0, initial=np.inf)), axis=0)
