@@ -49,7 +49,7 @@ LAPS = 10 if choice.quick else 500
 FORCES = "load.force=['1e-9 N', '1e-3 N', '1 N', '0 N']"
 CASES = {
     "1 first touch, from 1e-10 mm": [LAWS, "load.approach=[1e-10, 1e-6, 8e-3, 0.0]"],
-    "2 full contact and beyond": [LAWS, "load.approach=['2 mm']"],
+    "2 full contact and beyond": [LAWS, "load.approach=['2 mm']", "block.height=3 mm"],
     "3 one patch": [LAWS, "patches.grid=[1, 1]"],
     "3 256 patches": [WHOLE, "patches.grid=[16, 16]"],
     "6 ν = 0.4999, Q1 on the mesh: locks": [*MESH, "block.poisson_ratio=0.4999"],

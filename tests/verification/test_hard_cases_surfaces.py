@@ -55,9 +55,14 @@ def test_full_contact_is_as_stiff_as_a_flat_surface(tmp_path):
     flat = from_file(tmp_path, np.zeros((32, 32)))
     for kind in ("consistent", "concurrent"):
         rough = history(
-            coupling__kind=kind, load__approach=["2 mm", "2.2 mm"], micro__model="half-space"
+            coupling__kind=kind,
+            block__height="3 mm",
+            load__approach=["2 mm", "2.2 mm"],
+            micro__model="half-space",
         )
-        even = history(coupling__kind=kind, load__approach=["2 mm", "2.2 mm"], **flat)
+        even = history(
+            coupling__kind=kind, block__height="3 mm", load__approach=["2 mm", "2.2 mm"], **flat
+        )
         stiffness = [float(np.diff(one.force_N)[0]) for one in (rough, even)]
         assert rough.contact_area_fraction[-1] > 0.95
         assert stiffness[0] == pytest.approx(stiffness[1], rel=5e-3)
