@@ -168,8 +168,8 @@ class _Search:
         at = self._check.measures
         sentence = (
             f"{taken.label}: {why} the tolerance of {100 * self._tolerance:.3g} %; expected error "
-            f"of the force {100 * taken.expected_error:.2g} %, {checked}, where contacts cover about "
-            f"{at.contact_fraction:.2g} of the surface in {at.regions or 'no'} "
+            f"of the force {100 * taken.expected_error:.2g} %, {checked}, where contacts cover "
+            f"about {at.contact_fraction:.2g} of the surface in {at.regions or 'no'} "
             f"region{'s' * (at.regions != 1)} above the plane, with {at.cells_per_radius:.2g} of "
             f"its cells per radius; predicted {taken.cost:.2g} s for all solutions"
         )
