@@ -67,7 +67,7 @@ def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> 
             )
         except KeyboardInterrupt:
             ended(
-                f"interrupted: finished levels are kept in {folder / KEPT}; go on by the same call"
+                f"interrupted: finished levels are kept in {folder / KEPT}; the same call goes on"
             )
             raise
     for text in (*headline(found), *bargains(found), *found.warnings):

@@ -86,7 +86,9 @@ def test_the_check_is_the_difference_from_the_surfaces_own_grid():
     own = HalfSpaceModel(surface=surface, contact_modulus=1.0)
     expected = abs(force(choice.model, [0.01])[0] / force(own, [0.01])[0] - 1.0)
     assert choice.checked_error == pytest.approx(expected, abs=1e-12)
-    assert f"{expected:.2%} from the half-space solution on 96 × 96 cells" in choice.sentence
+    assert (
+        f"{100 * expected:.2g} % from the half-space solution on 96 × 96 cells" in choice.sentence
+    )
 
 
 def test_the_surfaces_own_grid_is_checked_against_a_finer_one(monkeypatch):
