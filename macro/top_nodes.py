@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from geometry.patches import PatchGrid
 from macro import compat
@@ -150,14 +151,21 @@ class TopNodes:
         return int(connected_components(graph, directed=False)[0]) if len(names) else 0
 
     @cached_property
-    def _empty(self) -> tuple[NDArray[np.bool_], Array]:
+    def _empty(self) -> tuple[NDArray[np.bool_], csr_array]:
         """Which patches hold no node, shape (N,), and marks on the nodes nearest to them."""
         # areas of the vertices of quadratic triangles are rounding, of either sign
         empty = self._patch_areas <= _NO_AREA * self.patches.area
         centres = self.patches.centres[empty]
-        apart = np.hypot(*(np.stack([self.x, self.y])[:, :, None] - centres.T[:, None]))
-        least = np.min(self._block.mesh.comm.allgather(apart.min(axis=0, initial=np.inf)), axis=0)
-        return empty, (apart <= (1.0 + 1e-9) * least).astype(float)  # all of several as near
+        tree = cKDTree(np.stack([self.x, self.y], axis=1))
+        apart = tree.query(centres)[0] if tree.n else np.full(len(centres), np.inf)
+        least = np.min(self._block.mesh.comm.allgather(apart), axis=0)
+        # all of several as near
+        near = tree.query_ball_point(centres, (1.0 + 1e-9) * least) if tree.n else []
+        rows = np.concatenate([np.empty(0, dtype=np.intp), *map(np.asarray, near)]).astype(np.intp)
+        counts = np.array([len(found) for found in near], dtype=np.intp)
+        columns = np.repeat(np.arange(len(near)), counts)
+        shape = (len(self.x), len(centres))
+        return empty, coo_array((np.ones(len(rows)), (rows, columns)), shape=shape).tocsr()
 
     @cached_property
     def _shares(self) -> csr_array:
