@@ -126,6 +126,9 @@ class ConcurrentCoupling:
 
     def _solved(self, control: Control, last: _Found | None) -> _Found:
         """Iterate; where a plane free to turn hardly touches, from a force that holds it there."""
+        apart = self._apart(control, last)
+        if apart is not None:
+            return _Found(apart, last.secants if last else (), 1, None)
         try:
             return self._found(control, last)
         except NotConverged as error:
@@ -137,6 +140,17 @@ class ConcurrentCoupling:
             except NotConverged:
                 raise error from None  # it names what was asked for
             return found._replace(presses=found.presses + near.presses)
+
+    def _apart(self, control: Control, last: _Found | None) -> Trial | None:
+        """Return a prescribed plane that touches nothing; None where it may touch, or does."""
+        if control.approach is None or control.tilt is None:
+            return None
+        nearest = control.approach + self._half * float(np.hypot(*control.tilt))
+        if nearest > self._model.first_touch:
+            return None
+        nothing = np.zeros(len(self._contact.shape))
+        trial = self._contact.press(prescribed(control), nothing, last.trial if last else None)
+        return None if trial.found.any() else trial
 
     def _held(self, approach: float, last: _Found | None) -> _Found:
         """Return a balanced plane near an approach, or one turned the same way without contact."""
