@@ -54,7 +54,7 @@ for axes in (over_ratio, over_e):
 found = f"at R'/R'' = 10: F1 = {f[ten]:.3f}, A1 = {a[ten]:.3f}; the approximate eccentricity of "
 found += f"eq. 2 changes them by {f2[ten] / f[ten] - 1:+.2%} and {a2[ten] / a[ten] - 1:+.2%}."
 claim = "circles overestimate the area and underestimate the force where e is high."
-page.add(3, "factors of an elliptic contact", figure, claim, found)
+page.add("Figure 3", "factors of an elliptic contact", figure, claim, found)
 thin = 1e-6
 log = np.log(4.0 / thin)
 slender = np.pi / np.sqrt(2.0 * thin) * (log - 1.0) ** 0.25 * log**-1.5
@@ -93,7 +93,7 @@ apart = (along - across) / across
 found = f"displacement on the major axis against that on the minor one: {apart[80]:+.0%} at r = a, "
 found += f"{apart[160]:+.1%} at 2a, {apart[-1]:+.2%} at 5a (R'/R'' = 4)."
 claim = "the difference is largest along the major axis and fades far from the contact."
-page.add(5, "displacement by an elliptic contact", figure, claim, found)
+page.add("Figure 5", "displacement by an elliptic contact", figure, claim, found)
 inside = r < b
 parabola = depth - r[inside] ** 2 / (2 * minor)
 assert np.allclose(across[inside], parabola, rtol=0, atol=1e-12)  # the plane touches there
@@ -122,5 +122,5 @@ spectral.legend(frameon=False)
 found = f"slope {slope:.2f}, rms height {1e3 * density.variance**0.5:.1f} µm, "
 found += f"{len(summits)} summits."
 claim = "S ∝ |k|^(−2(H + 1)) = |k|^(−3.9) between 2 and 10 waves per side."
-page.add(6, "spectrum and surface", figure, claim, found)
+page.add("Figure 6", "spectrum and surface", figure, claim, found)
 assert abs(slope + 3.9) < 0.1

@@ -78,7 +78,7 @@ for number, band in SETS.items():
     found += f". Area of circles against ellipses at 1.2 % of contact area: {wider:+.1%}. κ here "
     found += "at 2 %: " + ", ".join(f"{n} {at(0.02, x)[0]:.2f}" for n, x in group.items()) + "."
     figure = models_figure(group, rms_slope=SLOPE)
-    page.add(number, TITLES[number], figure, CLAIMS[number], found)
+    page.add(f"Figure {number}", TITLES[number], figure, CLAIMS[number], found)
     assert abs(deepest - 1) < 0.03
     assert max(shares[:2]) < 0.0 < min(shares[2:])  # interaction, then none
     assert max(abs(shares[:2])) < min(shares[2:])
@@ -115,6 +115,6 @@ for axes in (curve, spread):
 found = f"κ at 5 % over {len(crowd)} surfaces (mean ± standard deviation): "
 found += ", ".join(f"{name} {k:.2f} ± {s:.2f}" for name, (k, s) in mean.items()) + "."
 claim = "κ tends to values between 2 and 2.34 above 5 % of contact area (20 surfaces)."
-page.add(8, "many surfaces of Set 1", figure, claim, found)
+page.add("Figure 8", "many surfaces of Set 1", figure, claim, found)
 assert all(1.7 < k < 2.6 for k, _ in mean.values())
 assert mean["elliptic-independent"][0] < mean["half-space"][0]  # asperities merge into more area

@@ -24,17 +24,17 @@ class Page:
         self.folder, self.store = folder, folder / "claims.json"
         folder.mkdir(parents=True, exist_ok=True)
 
-    def add(self, number: int, title: str, figure: Figure, claim: str, found: str) -> None:
+    def add(self, name: str, title: str, figure: Figure, claim: str, found: str) -> None:
         """Save a figure as PNG, print the finding, and write the page anew."""
         known = json.loads(self.store.read_text("utf-8")) if self.store.exists() else {}
-        picture = f"figure_{number:02d}.png"
+        picture = name.lower().replace(" ", "_") + ".png"
         figure.savefig(self.folder / picture, dpi=110)
-        print(f"Figure {number}, {title}: {found}")
-        known[picture] = [number, title, claim, found]
+        print(f"{name}, {title}: {found}")
+        known[name] = [picture, title, claim, found]
         self.store.write_text(json.dumps(known, ensure_ascii=False), "utf-8")
         parts = [HEAD]
-        for name, entry in sorted(known.items()):
-            n, subject, said, seen = map(escape, map(str, entry))
-            parts.append(f"<h2>Figure {n}: {subject}</h2><p><b>The paper:</b> {said}")
-            parts.append(f"<p><b>This run:</b> {seen}<p><img src={name} alt='{subject}'>")
+        for heading in sorted(known, key=lambda text: (len(text), text)):  # 9 before 14
+            file, subject, said, seen = map(escape, known[heading])
+            parts.append(f"<h2>{heading}: {subject}</h2><p><b>The paper:</b> {said}")
+            parts.append(f'<p><b>This run:</b> {seen}<p><img src="{file}" alt="{subject}">')
         (self.folder / "index.html").write_text("\n".join(parts), "utf-8")
