@@ -1,0 +1,126 @@
+# %% [markdown]
+# # The paper's figures, 1: one asperity and one surface (Figures 3, 5 and 6)
+#
+# What one learns: what the shape of a contact does to its force, area and surroundings, how good
+# the approximate eccentricity is, and what a surface of Set 1 looks like. Waddad et al. 2016
+# (doi 10.1016/j.triboint.2015.12.023); `index.html` puts their claims beside what this run finds.
+# `paper_figures_models.py` (7, 8, 9) and `paper_figures_block.py` (14, 15, times) add theirs.
+#
+# Run time: three seconds. `--quick` for a coarser surface, `--out DIR` for the folder.
+
+# %%
+import argparse
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from paper.page import Page
+
+from geometry import PatchGrid, Spectrum, find_asperities, power_spectrum, synthesise
+from micro import HertzContact, contact_modulus
+from micro.ellipse import area_factor, eccentricity, eccentricity_approximate, force_factor
+from multiscale.figures import draw_surface
+
+parser = argparse.ArgumentParser()
+parser.add_argument("--quick", action="store_true")
+parser.add_argument("--out", type=Path, default=Path("results/paper_figures"))
+choice = parser.parse_args()
+page = Page(choice.out)
+GRID, MODULUS = 64 if choice.quick else 256, contact_modulus(4000.0, 0.15)
+BLUE, RED, GREEN = "#0b3c5d", "#d1495b", "#1b998b"
+
+# %% [markdown]
+# Figure 3. The limits are Johnson's: 1 for spheres, and with K → Λ = ln(4a/b), E → 1 for slender
+# contacts F1 → (π/√2) sqrt(a/b) (Λ − 1)^(1/4) Λ^(−3/2).
+
+# %%
+ratio = np.geomspace(1.0, 100.0, 200)
+shapes = {"exact": eccentricity(ratio, 1.0), "paper's eq. 2": eccentricity_approximate(ratio, 1.0)}
+figure = Figure(figsize=(9.6, 4.0), layout="constrained")
+over_ratio, over_e = figure.subplots(1, 2)
+for (name, e), style in zip(shapes.items(), ("-", "--"), strict=True):
+    for label, factor, colour in (("F1", force_factor, BLUE), ("A1", area_factor, RED)):
+        over_ratio.semilogx(ratio, factor(e), style, color=colour, label=f"{label}, {name}")
+e = np.linspace(0.0, 0.999, 500)
+over_e.plot(e, force_factor(e), color=BLUE, label="F1")
+over_e.plot(e, area_factor(e), color=RED, label="A1")
+over_ratio.set(xlabel="radius ratio R'/R'' [-]", ylabel="F1, A1 [-]")
+over_e.set(xlabel="eccentricity e [-]", ylabel="F1, A1 [-]")
+(f, a), (f2, a2) = ((force_factor(e), area_factor(e)) for e in shapes.values())
+ten = np.searchsorted(ratio, 10.0)
+for axes in (over_ratio, over_e):
+    axes.grid(alpha=0.3)
+    axes.legend(frameon=False)
+found = f"at R'/R'' = 10: F1 = {f[ten]:.3f}, A1 = {a[ten]:.3f}; the approximate eccentricity of "
+found += f"eq. 2 changes them by {f2[ten] / f[ten] - 1:+.2%} and {a2[ten] / a[ten] - 1:+.2%}."
+claim = "circles overestimate the area and underestimate the force where e is high."
+page.add("Figure 3", "factors of an elliptic contact", figure, claim, found)
+thin = 1e-6
+log = np.log(4.0 / thin)
+slender = np.pi / np.sqrt(2.0 * thin) * (log - 1.0) ** 0.25 * log**-1.5
+assert abs(force_factor(np.sqrt(1 - thin**2)) / slender - 1) < 1e-3
+assert abs(f[0] - 1) + abs(a[0] - 1) < 1e-12 and f[ten] > 1.0 > a[ten]
+
+# %% [markdown]
+# Figure 5. One contact of R'/R'' = 4, and a circular one of equal R and indentation.
+
+# %%
+depth, major, minor = 1e-3, 0.2, 0.05  # mm
+ellipse, circle = (
+    HertzContact(contact_modulus=MODULUS, radius_major=R1, radius_minor=R2, indentation=depth)
+    for R1, R2 in ((major, minor), (0.1, 0.1))
+)
+a, b = float(ellipse.semi_major), float(ellipse.semi_minor)
+r = np.linspace(0.0, 5.0 * a, 401)
+along, across = ellipse.displacement(r, 0), ellipse.displacement(0, r)
+figure = Figure(figsize=(10.4, 4.0), layout="constrained")
+field, cut = figure.subplots(1, 2)
+figure.get_layout_engine().set(wspace=0.08)
+span = np.linspace(-3 * a, 3 * a, 201)
+levels = np.linspace(0.0, 1e3 * depth, 11)
+field_map = 1e3 * ellipse.displacement(span[None, :], span[:, None])
+image = field.contourf(1e3 * span, 1e3 * span, field_map, levels, cmap="cividis")
+field.contour(1e3 * span, 1e3 * span, np.hypot(span / a, span[:, None] / b), [1.0], colors="w")
+field.set(xlabel="x [µm]", ylabel="y [µm]", aspect="equal", title="white: border of the contact")
+figure.colorbar(image, ax=field, label="normal displacement [µm]")
+curves = {"major axis": along, "minor axis": across, "circular": circle.displacement(r, 0)}
+for (name, u), look in zip(curves.items(), ("-", "--", ":"), strict=True):
+    cut.plot(1e3 * r, 1e3 * u, look, color={"-": BLUE, "--": RED, ":": GREEN}[look], label=name)
+cut.set(xlabel="distance from the centre [µm]", ylabel="normal displacement [µm]")
+cut.grid(alpha=0.3)
+cut.legend(frameon=False)
+apart = (along - across) / across
+found = f"displacement on the major axis against that on the minor one: {apart[80]:+.0%} at r = a, "
+found += f"{apart[160]:+.1%} at 2a, {apart[-1]:+.2%} at 5a (R'/R'' = 4)."
+claim = "the difference is largest along the major axis and fades far from the contact."
+page.add("Figure 5", "displacement by an elliptic contact", figure, claim, found)
+inside = r < b
+parabola = depth - r[inside] ** 2 / (2 * minor)
+assert np.allclose(across[inside], parabola, rtol=0, atol=1e-12)  # the plane touches there
+assert abs(along[-1] / (ellipse.force / (np.pi * MODULUS * r[-1])) - 1) < 0.03  # a point force
+
+# %% [markdown]
+# Figure 6. Set 1: two to ten waves per side, Hurst exponent 0.95. The paper gives the amplitude in
+# a figure only; a rms gradient of 0.215 reproduces its pressures.
+
+# %%
+spectrum = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1)
+surface = synthesise(spectrum, grid=(GRID, GRID), lengths=(1.0, 1.0))
+density = power_spectrum(surface)
+band = (density.wavenumber > 5 * np.pi) & (density.wavenumber < 19 * np.pi)  # whole rings
+q, S = density.wavenumber[band], density.density[band]
+slope, start = np.polyfit(np.log(q), np.log(S), 1)
+figure = Figure(figsize=(10.6, 4.6), layout="constrained")
+spectral, heights = figure.subplots(1, 2)
+spectral.loglog(q, S, "o", color=BLUE, label="this surface, by rings")
+spectral.loglog(q, np.exp(start) * q**slope, "--", color=RED, label=f"slope {slope:.2f}")
+spectral.set(xlabel="angular wavenumber [rad/mm]", ylabel="spectral density [mm⁴]")
+summits = find_asperities(surface, periodic=False)
+draw_surface(figure, heights, surface, summits, PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)))
+spectral.grid(alpha=0.3)
+spectral.legend(frameon=False)
+found = f"slope {slope:.2f}, rms height {1e3 * density.variance**0.5:.1f} µm, "
+found += f"{len(summits)} summits."
+claim = "S ∝ |k|^(−2(H + 1)) = |k|^(−3.9) between 2 and 10 waves per side."
+page.add("Figure 6", "spectrum and surface", figure, claim, found)
+assert abs(slope + 3.9) < 0.1
