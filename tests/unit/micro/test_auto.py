@@ -149,3 +149,13 @@ def test_coarse_grids_must_resolve_the_patches():
 def test_refuses(options, problem):
     with pytest.raises(InputError, match=problem):
         choose(rough(5), contact_modulus=1.0, **{"approach": 0.01} | options)
+
+
+def test_an_earlier_choice_is_taken_again():
+    surface = rough(1)
+    first = choose(surface, contact_modulus=1.0, approach=0.01)
+    other = next(c.label for c in first.candidates if c.label != first.taken.label)
+    again = choose(surface, contact_modulus=1.0, approach=0.01, label=other)
+    assert again.taken.label == other
+    with pytest.raises(InputError, match="'a better one': is no micro model here"):
+        choose(surface, contact_modulus=1.0, approach=0.01, label="a better one")
