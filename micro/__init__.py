@@ -7,11 +7,11 @@ of pressure move the half-space.
 """
 
 from micro.asperity_models import MODELS, SOLVERS, AsperityModel, ModelKind, asperity_model
-from micro.asperity_state import AsperityState
-from micro.auto import Choice, choose
-from micro.auto_candidates import Candidate, resampled
+from micro.auto.candidates import Candidate, resampled
+from micro.auto.choice import Choice, choose
 from micro.boussinesq import HalfSpace
-from micro.contacts import Contacts, find_contacts
+from micro.cells.contacts import Contacts, find_contacts
+from micro.cells.half_space_state import HalfSpaceState
 from micro.ellipse import (
     area_factor,
     axis_factor,
@@ -22,17 +22,17 @@ from micro.ellipse import (
 )
 from micro.finite_slope import finite_slope_effect
 from micro.half_space import HalfSpaceModel
-from micro.half_space_state import HalfSpaceState
 from micro.hertz import HertzContact, contact_modulus
 from micro.influence import influence_matrix, mutual_influence
-from micro.island_state import IslandState
-from micro.islands import IslandModel
 from micro.love import love_centre, love_integral, love_mean, love_mutual
-from micro.many_summits import PAIR_SUMS
 from micro.models import MODEL_NAMES, MicroModel, micro_model
 from micro.plane import Field, RigidPlane
+from micro.regions.island_state import IslandState
+from micro.regions.islands import IslandModel
 from micro.response import Pressed, Response
-from micro.scaled_model import BORDERS, CURVATURES, ScaledModel
+from micro.summits.asperity_state import AsperityState
+from micro.summits.many_summits import PAIR_SUMS
+from micro.summits.scaled_model import BORDERS, CURVATURES, ScaledModel
 
 __all__ = [
     "BORDERS",

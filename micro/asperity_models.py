@@ -2,7 +2,7 @@
 
 A rigid plane that has approached by δ asks every summit for the displacement
 d_k = <δ(x_k) − (z_M − z_k)>. Without interaction each contact makes it alone, w_k = d_k; with
-interaction the displacements by all contacts add up to w_k (`micro.contact_problem`).
+interaction the displacements by all contacts add up to w_k (`micro.summits.contact_problem`).
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from geometry import Asperities, Partition, PatchGrid
 from geometry.errors import InputError
-from micro.active_set import active_set
-from micro.asperity_state import AsperityState, HertzCoefficients
-from micro.contact_problem import ContactProblem, Method, Solution, solve
 from micro.curve import PatchSums
 from micro.hertz import HertzContact
-from micro.interaction import Interaction
-from micro.many_summits import PAIR_SUMS, ManySummits, pair_sum
+from micro.pairs.interaction import Interaction
 from micro.plane import RigidPlane
 from micro.response import Pressed, Response
-from micro.truncated_newton import truncated_newton
+from micro.summits.active_set import active_set
+from micro.summits.asperity_state import AsperityState, HertzCoefficients
+from micro.summits.contact_problem import ContactProblem, Method, Solution, solve
+from micro.summits.many_summits import PAIR_SUMS, ManySummits, pair_sum
+from micro.summits.truncated_newton import truncated_newton
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -68,8 +68,8 @@ class AsperityModel:
     """One of the four discrete models on given asperities.
 
     How the interaction is summed over pairs follows from the number of summits in reach
-    (`micro.many_summits`): exactly up to 2000, through a mesh above. The truncated Newton method
-    sums every pair directly; its time and memory grow with the square of their number.
+    (`micro.summits.many_summits`): exactly up to 2000, through a mesh above. The truncated Newton
+    method sums every pair directly; its time and memory grow with the square of their number.
 
     Args:
         asperities: The n summits, with the highest point z_M that the approach counts from.

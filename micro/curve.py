@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from geometry import Asperities, Partition, PatchGrid, Surface
 from geometry.errors import InputError
-from micro.asperity_state import HertzCoefficients
-from micro.attribution import shares
-from micro.contact_problem import Solution
 from micro.patch_displacement import patch_displacements
 from micro.plane import RigidPlane
 from micro.response import Response
+from micro.summits.asperity_state import HertzCoefficients
+from micro.summits.attribution import shares
+from micro.summits.contact_problem import Solution
 
 Array = NDArray[np.float64]
 
@@ -30,8 +30,8 @@ class PatchSums:
     """Sums and means over patches of what the asperities do.
 
     A contact that straddles borders is shared by the integral of its pressure over the patches
-    (`micro.attribution`); as a contact it counts for the patch that holds its summit. The paper
-    assigns it whole.
+    (`micro.summits.attribution`); as a contact it counts for the patch that holds its summit. The
+    paper assigns it whole.
 
     Args:
         asperities: The n asperities.

@@ -21,8 +21,8 @@ from scipy import fft
 from geometry import PatchGrid
 from geometry.errors import InputError
 from micro.boussinesq import HalfSpace
+from micro.cells.half_space_state import HalfSpaceState
 from micro.half_space import HalfSpaceModel
-from micro.half_space_state import HalfSpaceState
 
 Array = NDArray[np.float64]
 

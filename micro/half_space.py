@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from geometry import Partition, PatchGrid, Surface
 from geometry.errors import InputError
-from micro.contact_pressure import Pressures
-from micro.elastic_grid import ElasticGrids
-from micro.half_space_curve import CellSums
-from micro.half_space_state import HalfSpaceState
+from micro.cells.contact_pressure import Pressures
+from micro.cells.elastic_grid import ElasticGrids
+from micro.cells.half_space_curve import CellSums
+from micro.cells.half_space_state import HalfSpaceState
+from micro.cells.pressing import Pressing
 from micro.plane import RigidPlane
-from micro.pressing import Pressing
 from micro.response import Pressed, Response
 
 Array = NDArray[np.float64]

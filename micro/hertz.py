@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from geometry.errors import InputError
 from micro.ellipse import ShapeFactors, shape_factors
-from micro.hertz_field import elliptic_field
+from micro.pairs.hertz_field import elliptic_field
 
 Array = NDArray[np.float64]
 

@@ -10,10 +10,10 @@ from geometry import Partition, PatchGrid, Surface, find_asperities
 from geometry.errors import InputError
 from micro.asperity_models import MODELS, asperity_model
 from micro.half_space import HalfSpaceModel
-from micro.islands import IslandModel
 from micro.plane import RigidPlane
+from micro.regions.islands import IslandModel
 from micro.response import Pressed, Response
-from micro.scaled_model import ScaledModel
+from micro.summits.scaled_model import ScaledModel
 
 MODEL_NAMES = (*MODELS, "islands", "half-space")
 """Names of all micro models, the cheapest kinds first."""

@@ -5,27 +5,27 @@ patch its law, the laws go onto the flat interface of an elastic block, and load
 `History`. A reference meshes the rough surface itself instead, and tells its own error.
 """
 
-from multiscale.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
 from multiscale.compare import compare
-from multiscale.comparison import Comparison, Row
-from multiscale.concurrent import ConcurrentCoupling
-from multiscale.condensed import CondensedCoupling
-from multiscale.consistent import consistent_laws
+from multiscale.comparing.comparison import Comparison, Row
 from multiscale.coupling import AnalyticCoupling, EmbeddedCoupling
-from multiscale.extrapolation import Estimate, extrapolated
+from multiscale.couplings.concurrent import ConcurrentCoupling
+from multiscale.couplings.condensed import CondensedCoupling
+from multiscale.couplings.yielding import SpreadLoads, UniformLoads
 from multiscale.history import History, LoadStep, PatchState
-from multiscale.law_files import LawTable, read_laws, write_laws
+from multiscale.law_tables.consistent import consistent_laws
+from multiscale.law_tables.isolated import isolated_laws
+from multiscale.law_tables.law_files import LawTable, read_laws, write_laws
+from multiscale.law_tables.patch_laws import PatchLaws
+from multiscale.law_tables.spread import ContactSpread
 from multiscale.laws import PatchLaw
 from multiscale.loading import Programme, load_steps
-from multiscale.patch_laws import PatchLaws
-from multiscale.reference import ReferenceCoupling
-from multiscale.reference_record import ReferenceRecord
+from multiscale.reference.coupling import ReferenceCoupling
+from multiscale.reference.extrapolation import Estimate, extrapolated
+from multiscale.reference.record import ReferenceRecord
+from multiscale.restart.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
 from multiscale.run import Run, run
 from multiscale.scene import Scene
-from multiscale.spread import ContactSpread
 from multiscale.stage import Stage, make_stage
-from multiscale.tabulate import isolated_laws
-from multiscale.yielding import SpreadLoads, UniformLoads
 
 __all__ = [
     "AnalyticCoupling",

@@ -8,24 +8,24 @@ from typing import TYPE_CHECKING, Any
 from geometry.collective import on_root
 from geometry.errors import InputError
 from micro import HalfSpaceModel, MicroModel, resampled
-from multiscale.blocks import (
+from multiscale.coupling import AnalyticCoupling, EmbeddedCoupling
+from multiscale.couplings.blocks import (
     bending_block,
     embedding,
     fine_loads,
     smooth_correction,
     yielding,
 )
-from multiscale.concurrent import TOLERANCE, ConcurrentCoupling
-from multiscale.condensed import CondensedCoupling
-from multiscale.consistent import consistent_laws
-from multiscale.coupling import AnalyticCoupling, EmbeddedCoupling
-from multiscale.law_files import LawTable
+from multiscale.couplings.concurrent import TOLERANCE, ConcurrentCoupling
+from multiscale.couplings.condensed import CondensedCoupling
+from multiscale.law_tables.consistent import consistent_laws
+from multiscale.law_tables.isolated import isolated_laws
+from multiscale.law_tables.law_files import LawTable
 from multiscale.laws import ExtendedLaw
 from multiscale.loading import Coupling
-from multiscale.newton_choice import newton_choice
-from multiscale.reference import make_reference
+from multiscale.planning.newton_choice import newton_choice
+from multiscale.reference.coupling import make_reference
 from multiscale.stage import Stage
-from multiscale.tabulate import isolated_laws
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import Interface

@@ -11,7 +11,10 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from geometry.errors import InputError, PatchlawError
-from multiscale import commands, compare_command, doctor_command, terminal
+from multiscale import commands
+from multiscale.comparing import command as compare_command
+from multiscale.doctor import command as doctor_command
+from multiscale.reporting import terminal
 
 _MOST_PATIENT = 5.0  # with other ranks, at the end [s]
 _SOLVER_OPTIONS = ("-snes_", "-ksp_", "-pc_", "-mg_")

@@ -11,18 +11,19 @@ from typing import Any
 from geometry.collective import on_root
 from geometry.errors import InputError, NotConverged, PatchlawError
 from geometry.statistics import roughness
-from multiscale import plan, terminal
-from multiscale.blocks import load_together
-from multiscale.folder_lock import locked
-from multiscale.forecast import Forecast, forecast
-from multiscale.interruption import Interruption, Stopped
-from multiscale.law_files import write_laws
-from multiscale.outputs import write_whole
-from multiscale.quantities import parse_duration
-from multiscale.results import write_fields, write_figure, write_results
-from multiscale.resuming import Keeper, is_finished, kept_choices
+from multiscale import plan
+from multiscale.couplings.blocks import load_together
+from multiscale.law_tables.law_files import write_laws
+from multiscale.planning.forecast import Forecast, forecast
+from multiscale.reporting import terminal
+from multiscale.reporting.outputs import write_whole
+from multiscale.reporting.results import write_fields, write_figure, write_results
+from multiscale.restart.folder_lock import locked
+from multiscale.restart.interruption import Interruption, Stopped
+from multiscale.restart.resuming import Keeper, is_finished, kept_choices
 from multiscale.run import Run
 from multiscale.scene import Scene
+from multiscale.scenes.quantities import parse_duration
 from multiscale.stage import Stage, make_stage
 
 

@@ -9,15 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from geometry.errors import InputError
-from multiscale.choices import open_keys, provisional, settled_keys, with_settled
-from multiscale.compare_rows import compared
-from multiscale.comparison import Comparison
-from multiscale.level import Level
-from multiscale.level_results import LevelResult
-from multiscale.level_runs import Launch, check_launchable, run_levels
-from multiscale.levels import levels
-from multiscale.outcomes import AGAINST, Against, Outcome
-from multiscale.outputs import write_json
+from multiscale.comparing.comparison import Comparison
+from multiscale.comparing.level import Level
+from multiscale.comparing.level_results import LevelResult
+from multiscale.comparing.level_runs import Launch, check_launchable, run_levels
+from multiscale.comparing.levels import levels
+from multiscale.comparing.outcomes import AGAINST, Against, Outcome
+from multiscale.comparing.rows import compared
+from multiscale.planning.choices import open_keys, provisional, settled_keys, with_settled
+from multiscale.reporting.outputs import write_json
 from multiscale.scene import Scene
 from multiscale.stage import make_stage
 

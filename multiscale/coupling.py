@@ -12,9 +12,9 @@ from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
 from micro import MicroModel, Response, RigidPlane
-from multiscale.balance import Balance
+from multiscale.couplings.balance import Balance
 from multiscale.history import LoadStep, PatchState
-from multiscale.law_files import LawTable
+from multiscale.law_tables.law_files import LawTable
 from multiscale.loading import BeyondLaws, described
 from multiscale.records import Arrays, packed, unpacked
 

@@ -14,7 +14,7 @@ from geometry.patches import PatchGrid
 from geometry.surface import Surface
 from micro.response import Response
 from multiscale.history import History
-from multiscale.law_files import LawTable
+from multiscale.law_tables.law_files import LawTable
 
 _STYLES = ("-", "--", "-.", ":", (0, (3, 1, 1, 1, 1, 1)))
 _COLOURS = ("#0b3c5d", "#d1495b", "#1b998b", "#edae49", "#6a4c93")

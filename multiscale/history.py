@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from geometry.patches import PatchGrid
 
 if TYPE_CHECKING:  # which itself is made of load steps
-    from multiscale.reference_record import ReferenceRecord
+    from multiscale.reference.record import ReferenceRecord
 
 Array = NDArray[np.float64]
 

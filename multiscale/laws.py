@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geometry.errors import InputError
-from multiscale.law_curves import FLATTEST, Curves
+from multiscale.law_tables.law_curves import FLATTEST, Curves
 
 Array = NDArray[np.float64]
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from geometry.statistics import roughness
-from multiscale.block_plan import block_statement, block_warnings
-from multiscale.forecast import Forecast, forecast_statements
-from multiscale.newton_choice import newton_choice
-from multiscale.reference_plan import (
+from multiscale.planning.block_plan import block_statement, block_warnings
+from multiscale.planning.forecast import Forecast, forecast_statements
+from multiscale.planning.newton_choice import newton_choice
+from multiscale.planning.reference_plan import (
     NO_MICRO_MODEL,
     reference_coupling,
     reference_statement,
     reference_warnings,
 )
+from multiscale.planning.surface_choice import heights_per_wave
 from multiscale.stage import Stage
-from multiscale.surface_choice import heights_per_wave
 
 
 def statements(stage: Stage, made: Forecast | None = None) -> Iterator[tuple[str, str]]:

@@ -14,19 +14,19 @@ from numpy.typing import NDArray
 
 from geometry.collective import on_root
 from multiscale.assemble import assemble, make_table
-from multiscale.blocks import final_field, load_together
-from multiscale.checkpoint import Checkpoint, digest
-from multiscale.choices import settled_keys
 from multiscale.coupling import EmbeddedCoupling
-from multiscale.forecast import Forecast, forecast
+from multiscale.couplings.blocks import final_field, load_together
 from multiscale.history import History, LoadStep
-from multiscale.law_files import LawTable, read_laws, write_laws
+from multiscale.law_tables.law_files import LawTable, read_laws, write_laws
 from multiscale.loading import Coupling, Drive, Position, Restorable
+from multiscale.planning.choices import settled_keys
+from multiscale.planning.forecast import Forecast, forecast
 from multiscale.records import Arrays
-from multiscale.reference import ReferenceCoupling, recorded, reference_notes
+from multiscale.reference.coupling import ReferenceCoupling, recorded, reference_notes
+from multiscale.reporting.validity import range_notes
+from multiscale.restart.checkpoint import Checkpoint, digest
 from multiscale.scene import Scene
 from multiscale.stage import Stage, make_stage
-from multiscale.validity import range_notes
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import Interface

@@ -9,11 +9,11 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 
 from geometry.spectrum import Spectrum
-from multiscale.left_open import Open, OrAuto
-from multiscale.quantities import Length, Pressure, Slope, SpectralAmplitude
-from multiscale.refusals import first_refusal
-from multiscale.scene_files import override, read_scene_file
-from multiscale.sections import (
+from multiscale.scenes.left_open import Open, OrAuto
+from multiscale.scenes.quantities import Length, Pressure, Slope, SpectralAmplitude
+from multiscale.scenes.refusals import first_refusal
+from multiscale.scenes.scene_files import override, read_scene_file
+from multiscale.scenes.sections import (
     CouplingSection,
     LoadSection,
     Number,

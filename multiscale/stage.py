@@ -17,23 +17,23 @@ from geometry.meshes import BlockShape
 from geometry.patches import PatchGrid, patch_means
 from geometry.surface import Surface
 from micro import MODELS, AsperityModel, Choice, MicroModel, ScaledModel
-from multiscale.choices import SETTLED_LATE, cheapest, open_keys, provisional, with_settled
-from multiscale.contact_estimate import Contacts, contacts
 from multiscale.coupling import tilted_approaches
-from multiscale.decision import Decision
 from multiscale.ingredients import make_shape, make_surface
-from multiscale.micro_choice import (
+from multiscale.law_tables.refinement import MOST_ROWS
+from multiscale.planning.choices import SETTLED_LATE, cheapest, open_keys, provisional, with_settled
+from multiscale.planning.contact_estimate import Contacts, contacts
+from multiscale.planning.decision import Decision
+from multiscale.planning.micro_choice import (
     chosen_model,
     estimated_plane,
     furthest_plane,
     nearest,
     stated_model,
 )
-from multiscale.reference_meshes import ReferenceMeshes, reference_meshes
-from multiscale.refinement import MOST_ROWS
+from multiscale.planning.surface_choice import chosen_surface, micro_tolerance
+from multiscale.reference.meshes import ReferenceMeshes, reference_meshes
 from multiscale.scene import Scene
 from multiscale.stage_checks import check_load, check_patches, check_size, patch_grid
-from multiscale.surface_choice import chosen_surface, micro_tolerance
 
 Array = NDArray[np.float64]
 

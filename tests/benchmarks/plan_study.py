@@ -27,7 +27,7 @@ import numpy as np
 from geometry.patches import PatchGrid
 from micro import HalfSpaceModel
 from multiscale import Run, Scene, assemble, blocks
-from multiscale.results import write_results
+from multiscale.reporting.results import write_results
 
 FACTOR = 2.0
 KINDS = ("auto", "auto", "auto", "concurrent", "consistent", "isolated", "analytic", "mesh")

@@ -35,8 +35,8 @@ from geometry import (
 )
 from macro import Block, Material, ObstacleBlock, make_correction, rough_block_mesh
 from micro import HalfSpace, HalfSpaceModel
-from multiscale.concurrent import ConcurrentCoupling
-from multiscale.extrapolation import extrapolated
+from multiscale.couplings.concurrent import ConcurrentCoupling
+from multiscale.reference.extrapolation import extrapolated
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 SIDE, APPROACH, ORDER = 1.0, 8e-3, 3.0

@@ -15,6 +15,14 @@ BELOW = {
     "multiscale": {"geometry", "micro", "macro"},
 }
 FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
+# sub-packages from the ground up: each may import those before it
+ORDER = {
+    "micro": ["pairs", "regions", "summits", "cells", "auto"],
+    "multiscale": [
+        "scenes", "law_tables", "couplings", "reference", "planning", "reporting", "restart",
+        "doctor", "comparing",
+    ],
+}  # fmt: skip
 HEAVY = {
     "geometry": FINITE_ELEMENTS | {"h5py", "matplotlib", "pydantic"},
     "micro": FINITE_ELEMENTS | {"gmsh", "h5py", "matplotlib", "pydantic"},
@@ -37,13 +45,27 @@ def imports(path):
 @pytest.mark.parametrize("package", BELOW)
 def test_imports_go_down_only(package):
     forbidden = (set(BELOW) - BELOW[package] - {package}) | HEAVY[package]
-    for path in (ROOT / package).glob("*.py"):
+    for path in (ROOT / package).rglob("*.py"):
         crossing = forbidden & set(imports(path))
         assert not crossing, f"{path.name} imports {crossing}"
 
 
+@pytest.mark.parametrize("package", ORDER)
+def test_sub_packages_go_down_only(package):
+    order = ORDER[package]
+    assert sorted(order) == sorted(
+        path.parent.name for path in (ROOT / package).glob("*/__init__.py")
+    )
+    for path in (ROOT / package).glob("*/*.py"):
+        later = {f"{package}.{name}" for name in order[order.index(path.parent.name) + 1 :]}
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom):
+                crossing = ".".join((node.module or "").split(".")[:2])
+                assert crossing not in later, f"{path.name} imports {crossing}"
+
+
 def test_only_one_module_knows_dolfinx_releases():
-    for path in (ROOT / "macro").glob("*.py"):
+    for path in (ROOT / "macro").rglob("*.py"):
         if path.name != "compat.py":
             assert "__version__" not in path.read_text(encoding="utf-8")
 

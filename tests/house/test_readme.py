@@ -7,6 +7,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from setuptools import find_packages
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -36,16 +37,25 @@ def test_linked_files_exist(path):
 
 
 def test_every_name_in_the_floor_plan_is_a_module():
-    plan = re.findall(r"^(geometry|micro|macro|multiscale)/ +(.*)$", TEXT, re.MULTILINE)
-    assert len(plan) == 4
-    for package, names in plan:
-        for name in names.split(" · "):
-            assert (ROOT / package / f"{name.strip()}.py").is_file(), name
+    block = TEXT[TEXT.index("\nmultiscale/ ") :].partition("```")[0]
+    lines = [
+        re.match(r"(\w+/)? {2,}(?:(\w+)/ +)?(.*)", line) for line in block.strip().splitlines()
+    ]
+    package, packages = "", []
+    for line in lines:
+        assert line is not None
+        if line[1]:
+            package = line[1]
+            packages.append(package)
+        for name in line[3].split(" · "):
+            assert (ROOT / package / (line[2] or "") / f"{name.strip()}.py").is_file(), name
+    assert packages == ["multiscale/", "micro/", "macro/", "geometry/"]
 
 
-def test_packages_are_listed():
+def test_packages_are_found():
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    listed = settings["tool"]["setuptools"]["packages"]
-    assert listed == sorted(listed, key=["geometry", "micro", "macro", "multiscale"].index)
-    for package in listed:
-        assert (ROOT / package / "__init__.py").is_file()
+    wanted = settings["tool"]["setuptools"]["packages"]["find"]["include"]
+    found = find_packages(str(ROOT), include=wanted)
+    made = {path.parent for name in ("geometry", "micro", "macro", "multiscale")
+            for path in (ROOT / name).rglob("__init__.py")}  # fmt: skip
+    assert {ROOT / name.replace(".", "/") for name in found} == made

@@ -83,7 +83,7 @@ def test_every_refusal_is_pinned(package, pinned):
     known = pieces(pinned, LENGTH)
     missing = [
         f"{path.name}:{line}: {' … '.join(parts)}"
-        for path in sorted((ROOT / package).glob("*.py"))
+        for path in sorted((ROOT / package).rglob("*.py"))
         for line, parts in messages(path)
         if not any(pieces(part, LENGTH) & known or part in pinned for part in parts)
     ]

@@ -70,7 +70,9 @@ class Runs:
     def __init__(self, root, environment):
         self.root, self.environment = root, os.environ | environment
         self.forks = multiprocessing.get_context("forkserver")
-        self.forks.set_forkserver_preload(["multiscale.cli", "multiscale.report", "scipy.fft"])
+        self.forks.set_forkserver_preload(
+            ["multiscale.cli", "multiscale.reporting.report", "scipy.fft"]
+        )
 
     def forked(self, words, log, over):
         """Run in a forked process until `over` tells; return the exit code, None when killed."""

@@ -4,7 +4,7 @@ import numpy as np
 
 from geometry import PatchGrid, Spectrum, patch_means, synthesise
 from micro import micro_model
-from multiscale.concurrent import ConcurrentCoupling
+from multiscale.couplings.concurrent import ConcurrentCoupling
 
 MODULUS = 4000.0
 CELLS = 16

@@ -10,9 +10,9 @@ from macro import Material, make_correction
 from micro import HalfSpaceModel, contact_modulus, influence_matrix
 from micro.boussinesq import HalfSpace
 from multiscale import Scene, run
-from multiscale.concurrent import ConcurrentCoupling
-from multiscale.condensed import CondensedCoupling
-from multiscale.consistent import consistent_laws
+from multiscale.couplings.concurrent import ConcurrentCoupling
+from multiscale.couplings.condensed import CondensedCoupling
+from multiscale.law_tables.consistent import consistent_laws
 from multiscale.loading import Programme, load_steps
 
 mpi = pytest.importorskip("mpi4py.MPI")

@@ -12,9 +12,9 @@ from geometry.control import Control
 from geometry.errors import NotConverged
 from geometry.patches import PatchGrid
 from micro import contact_modulus
-from multiscale.dense_newton import DenseNewton
+from multiscale.couplings.dense_newton import DenseNewton
+from multiscale.law_tables.patch_laws import PatchLaws
 from multiscale.laws import PatchLaw
-from multiscale.patch_laws import PatchLaws
 from multiscale.run import Run
 
 every_kind = pytest.mark.parametrize("kind", KINDS)

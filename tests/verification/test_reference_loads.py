@@ -7,7 +7,7 @@ from reference_cases import COMM, MATERIAL, MODULUS, block_rest, body, give, pre
 from geometry import BlockShape, Control, PatchGrid, RefinedShape, Surface, patch_means
 from macro import Block, ObstacleBlock, rough_block_mesh
 from micro import HalfSpaceModel, HertzContact
-from multiscale.concurrent import ConcurrentCoupling
+from multiscale.couplings.concurrent import ConcurrentCoupling
 
 RADIUS, SIZE, APART = 100.0, 0.06, 0.16
 APPROACH = SIZE**2 / RADIUS

@@ -24,8 +24,8 @@ from geometry import (
 )
 from macro import Block, ObstacleBlock, make_correction, rough_block_mesh
 from micro import HalfSpace, HalfSpaceModel
-from multiscale.concurrent import ConcurrentCoupling
-from multiscale.extrapolation import extrapolated
+from multiscale.couplings.concurrent import ConcurrentCoupling
+from multiscale.reference.extrapolation import extrapolated
 
 APPROACH, FLAT = 8e-3, 0.01
 

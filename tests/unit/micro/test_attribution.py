@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 from geometry import PatchGrid
-from micro.attribution import shares
+from micro.summits.attribution import shares
 
 GRID = PatchGrid(grid=(4, 5), lengths=(1.0, 1.2))
 

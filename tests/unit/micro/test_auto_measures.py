@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from geometry import Surface
-from micro.auto_measures import contact_measures
+from micro.auto.measures import contact_measures
 
 
 def paraboloid(centre=(0.5, 0.5), ratio=1.0, cells=160):

@@ -5,10 +5,10 @@ import pytest
 from scipy.optimize import nnls
 
 from geometry import NotConverged
-from micro import contact_pressure
-from micro.coarse_start import coarsened, nested_pressure, refined
-from micro.elastic_grid import ElasticGrid, ElasticGrids
-from micro.pressing import Pressing
+from micro.cells import contact_pressure
+from micro.cells.coarse_start import coarsened, nested_pressure, refined
+from micro.cells.elastic_grid import ElasticGrid, ElasticGrids
+from micro.cells.pressing import Pressing
 
 CASES = {
     "square": ((8, 8), (1.0, 1.0)),

@@ -5,9 +5,9 @@ import pytest
 from scipy import fft
 
 from micro import love_integral
-from micro.convolution import Convolution
-from micro.elastic_grid import Cells, ElasticGrid, ElasticGrids
-from micro.kernels import love_kernel, padded_spectrum, periodic_spectrum
+from micro.cells.convolution import Convolution
+from micro.cells.elastic_grid import Cells, ElasticGrid, ElasticGrids
+from micro.cells.kernels import love_kernel, padded_spectrum, periodic_spectrum
 
 GRIDS = [(16, 16), (15, 22), (7, 1), (1, 30), (1, 1)]
 SPACING = (0.1, 0.13)

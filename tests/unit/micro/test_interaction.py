@@ -6,7 +6,7 @@ from scipy.special import elliprf
 
 from micro.ellipse import shape_factors
 from micro.hertz import HertzContact
-from micro.interaction import MERGING_SLOPE, Interaction, merging_parameter
+from micro.pairs.interaction import MERGING_SLOPE, Interaction, merging_parameter
 
 
 def interaction(asperities, circular):

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from geometry import InputError, NotConverged, PatchGrid, Spectrum, Surface, patch_means, synthesise
-from micro import IslandModel, island_passes
+from micro import IslandModel
+from micro.regions import island_passes
 
 PATCHES = PatchGrid(grid=(2, 3), lengths=(1.0, 1.0))
 

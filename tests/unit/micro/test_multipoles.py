@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from micro.ellipse import shape_factors
-from micro.hertz_field import elliptic_field
-from micro.multipoles import angular_polynomials, moments, pair_terms, series_coefficients
+from micro.pairs.hertz_field import elliptic_field
+from micro.pairs.multipoles import angular_polynomials, moments, pair_terms, series_coefficients
 
 
 def test_coefficients_are_those_of_the_transform():

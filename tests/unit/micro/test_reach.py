@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from micro.reach import Box
+from micro.cells.reach import Box
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,8 @@ import pytest
 from scipy.ndimage import label
 
 from geometry import Spectrum, Surface, synthesise
-from micro.catchments import catchments, passes_between, sampled
-from micro.relief import Relief
+from micro.regions.catchments import catchments, passes_between, sampled
+from micro.regions.relief import Relief
 
 EIGHT = np.ones((3, 3))
 

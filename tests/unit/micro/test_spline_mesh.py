@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from micro.spline_mesh import SplineMesh, smooth_kernel
+from micro.pairs.spline_mesh import SplineMesh, smooth_kernel
 
 
 @pytest.fixture(scope="module", params=[(1.0, 1.0), (2.0, 0.3)])

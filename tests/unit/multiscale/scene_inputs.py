@@ -9,8 +9,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from geometry.errors import InputError, NotConverged
-from multiscale.forecast import forecast
 from multiscale.plan import statements, warnings
+from multiscale.planning.forecast import forecast
 from multiscale.run import run
 from multiscale.scene import Scene
 from multiscale.stage import make_stage

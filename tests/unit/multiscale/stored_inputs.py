@@ -7,8 +7,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from geometry.errors import InputError
-from multiscale.checkpoint import read_checkpoint, write_checkpoint
-from multiscale.law_files import read_laws, write_laws
+from multiscale.law_tables.law_files import read_laws, write_laws
+from multiscale.restart.checkpoint import read_checkpoint, write_checkpoint
 from multiscale.run import Run
 from multiscale.scene import Scene
 

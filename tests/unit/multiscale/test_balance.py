@@ -6,7 +6,7 @@ from scipy.optimize import brentq
 
 from geometry.control import Control
 from geometry.errors import NotConverged
-from multiscale.balance import Balance
+from multiscale.couplings.balance import Balance
 
 X = np.array([-0.4, 0.3, 0.1, -0.2, 0.45])
 Y = np.array([-0.3, -0.4, 0.35, 0.4, 0.05])

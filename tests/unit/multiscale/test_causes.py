@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from multiscale.causes import Best, causes
+from multiscale.comparing.causes import Best, causes
 
 ROUNDING = 1e-12  # sums of five doubles of order one
 BEST = Best(half_space=3.4, block=3.1, rough=3.0, slopes=-0.025)

@@ -9,10 +9,10 @@ import pytest
 
 from geometry.errors import InputError
 from multiscale import Scene, make_stage
-from multiscale.choices import cheapest, open_keys
-from multiscale.decision import Alternative, decided
-from multiscale.forecast import Forecast, forecast, forecast_statements
 from multiscale.plan import statements, warnings
+from multiscale.planning.choices import cheapest, open_keys
+from multiscale.planning.decision import Alternative, decided
+from multiscale.planning.forecast import Forecast, forecast, forecast_statements
 
 
 def scene(source=None, **sections):
@@ -233,7 +233,7 @@ def test_the_plan_says_how_fine_the_heights_are():
 
 
 def test_nothing_to_choose(monkeypatch):
-    monkeypatch.setattr("multiscale.choices._scenes", lambda *given: [])
+    monkeypatch.setattr("multiscale.planning.choices._scenes", lambda *given: [])
     with pytest.raises(InputError, match=r"coupling\.kind: leaves nothing to choose"):
         cheapest(None, None, frozenset())
 

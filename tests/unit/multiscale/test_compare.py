@@ -12,10 +12,10 @@ from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from multiscale import compare
 from multiscale.cli import main
-from multiscale.compare_command import budget_seconds, compare_scene
-from multiscale.level_process import level_result
-from multiscale.level_results import LevelResult
-from multiscale.measures import Curves
+from multiscale.comparing.command import budget_seconds, compare_scene
+from multiscale.comparing.level_process import level_result
+from multiscale.comparing.level_results import LevelResult
+from multiscale.comparing.measures import Curves
 from multiscale.run import run
 from multiscale.scene import Scene
 
@@ -46,13 +46,15 @@ def launched(level, seconds):
 @pytest.fixture(autouse=True)
 def few_elements(monkeypatch):
     """Blocks of few elements: the numbers are not what is tested here."""
-    monkeypatch.setattr("multiscale.levels.SMOOTH_CELLS", ((4, 4, 4), (6, 6, 4), (8, 8, 6)))
+    monkeypatch.setattr(
+        "multiscale.comparing.levels.SMOOTH_CELLS", ((4, 4, 4), (6, 6, 4), (8, 8, 6))
+    )
 
 
 @pytest.fixture(scope="module")
 def found():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("multiscale.levels.SMOOTH_CELLS", ((4, 4, 4), (6, 6, 4), (8, 8, 6)))
+        patch.setattr("multiscale.comparing.levels.SMOOTH_CELLS", ((4, 4, 4), (6, 6, 4), (8, 8, 6)))
         return compare(Scene.load(PAPER, TINY), launch=launched)
 
 
@@ -212,7 +214,7 @@ def call(capsys, *words):
 
 
 def test_command_writes_table_figures_and_report(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr("multiscale.level_runs.launch_process", launched)
+    monkeypatch.setattr("multiscale.comparing.level_runs.launch_process", launched)
     code, shown, err = call(capsys, "--out", str(tmp_path))
     assert (code, err) == (0, "")
     assert "They are compared with “concurrent, half-space 64 × 64" in shown
@@ -234,14 +236,14 @@ def test_command_writes_table_figures_and_report(capsys, tmp_path, monkeypatch):
         assert not level.is_own and not level.name.startswith(PICKED)
         return launched(level, seconds)
 
-    monkeypatch.setattr("multiscale.level_runs.launch_process", none_again)
+    monkeypatch.setattr("multiscale.comparing.level_runs.launch_process", none_again)
     code, shown, _ = call(capsys, "--out", str(tmp_path))
     assert code == 0
     assert f"{OWN_NAME}: done, kept" in shown
 
 
 def test_command_tells_when_the_measure_was_not_reached(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr("multiscale.level_runs.launch_process", launched)
+    monkeypatch.setattr("multiscale.comparing.level_runs.launch_process", launched)
     code, shown, err = call(capsys, "--out", str(tmp_path), "--against", "reference")
     assert code == 3
     assert "the comparison against reference did not converge: LEVEL_NOT_REACHED" in err

@@ -8,9 +8,9 @@ import pytest
 
 from geometry.errors import InputError, NotConverged
 from multiscale import Run, Scene, run
-from multiscale.blocks import patch_compliance
-from multiscale.newton_choice import newton_choice
+from multiscale.couplings.blocks import patch_compliance
 from multiscale.plan import statements, warnings
+from multiscale.planning.newton_choice import newton_choice
 from multiscale.stage import make_stage
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"

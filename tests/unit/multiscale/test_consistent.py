@@ -6,8 +6,8 @@ import pytest
 from geometry import PatchGrid, Spectrum, patch_means, synthesise
 from geometry.control import Control
 from micro import influence_matrix, micro_model
-from multiscale.condensed import CondensedCoupling
-from multiscale.consistent import consistent_laws
+from multiscale.couplings.condensed import CondensedCoupling
+from multiscale.law_tables.consistent import consistent_laws
 
 MODULUS = 4000.0
 END = 9e-3

@@ -13,13 +13,13 @@ from geometry.smooth_shape import smooth_shape
 from macro.side_loads import sides
 from micro import HalfSpaceModel
 from multiscale import Run, Scene, make_stage
-from multiscale.block_work import _side_points, mesh_unknowns, reference_work, smooth_bytes
-from multiscale.costs import predicted_cost, run_work
 from multiscale.loading import Programme
-from multiscale.machine import Machine, this_machine
-from multiscale.press_work import presses, step_count
-from multiscale.results import write_results
-from multiscale.work import Work
+from multiscale.planning.block_work import _side_points, mesh_unknowns, reference_work, smooth_bytes
+from multiscale.planning.costs import predicted_cost, run_work
+from multiscale.planning.machine import Machine, this_machine
+from multiscale.planning.press_work import presses, step_count
+from multiscale.planning.work import Work
+from multiscale.reporting.results import write_results
 
 
 class Unit(Machine):

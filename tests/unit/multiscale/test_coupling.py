@@ -8,7 +8,7 @@ import pytest
 from geometry.control import Control
 from geometry.patches import PatchGrid
 from multiscale.coupling import EmbeddedCoupling, tilted_approaches
-from multiscale.law_files import LawTable
+from multiscale.law_tables.law_files import LawTable
 from multiscale.laws import PatchLaw
 from multiscale.loading import BeyondLaws
 

@@ -9,7 +9,7 @@ from scipy.optimize import brentq, root
 from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
-from multiscale.dense_newton import DenseNewton
+from multiscale.couplings.dense_newton import DenseNewton
 
 
 class HertzLaws:

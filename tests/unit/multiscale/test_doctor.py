@@ -7,9 +7,11 @@ from types import SimpleNamespace
 import pytest
 
 from geometry.errors import InputError
-from multiscale import doctor_forms, doctor_machine, doctor_packages
 from multiscale.cli import main
-from multiscale.doctor import Finding, examine, verdict
+from multiscale.doctor import forms as doctor_forms
+from multiscale.doctor import machine as doctor_machine
+from multiscale.doctor import packages as doctor_packages
+from multiscale.doctor.examination import Finding, examine, verdict
 
 OPEN_MPI = "Open MPI v4.1.4"
 

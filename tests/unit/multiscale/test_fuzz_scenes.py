@@ -10,7 +10,7 @@ from scene_inputs import BASE, KEYS, damaged, odd_text, planned, put, ran, scene
 
 from geometry.errors import InputError
 from multiscale.scene import Scene
-from multiscale.scene_files import MOST_BYTES
+from multiscale.scenes.scene_files import MOST_BYTES
 from multiscale.stage import make_stage
 
 few = settings(

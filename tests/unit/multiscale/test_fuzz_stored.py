@@ -11,8 +11,8 @@ from scene_inputs import BASE
 from stored_inputs import READERS, flipped, originals, read, rewritten
 
 from geometry.errors import InputError
-from multiscale.checkpoint import read_checkpoint
-from multiscale.law_files import read_laws
+from multiscale.law_tables.law_files import read_laws
+from multiscale.restart.checkpoint import read_checkpoint
 
 few = settings(
     derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)

@@ -12,8 +12,8 @@ import pytest
 from geometry.errors import InputError
 from multiscale import Run
 from multiscale.cli import main
-from multiscale.interruption import Interruption, Stopped
-from multiscale.quantities import parse_duration
+from multiscale.restart.interruption import Interruption, Stopped
+from multiscale.scenes.quantities import parse_duration
 
 PAPER = str(Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml")
 SMALL = [
@@ -138,7 +138,7 @@ def test_what_is_no_duration(capsys, text, problem):
 def test_a_notice_after_the_end_does_not_kill():
     """A batch system tells the end of the time whenever it likes."""
     code = (
-        "import os, signal; from multiscale.interruption import Interruption\n"
+        "import os, signal; from multiscale.restart.interruption import Interruption\n"
         "with Interruption(None): pass\n"
         "os.kill(os.getpid(), signal.SIGUSR1)"
     )

@@ -9,9 +9,9 @@ import pytest
 from geometry.errors import InputError
 from geometry.partition import UnevenPartition
 from geometry.patches import PatchGrid
-from multiscale.law_files import LawTable, read_laws, write_laws
+from multiscale.law_tables.law_files import LawTable, read_laws, write_laws
+from multiscale.law_tables.spread import ContactSpread
 from multiscale.laws import PatchLaw
-from multiscale.spread import ContactSpread
 
 COLUMNS = ("closure", "pressure", "approach", "contact_area_fraction", "contacts", "relief")
 

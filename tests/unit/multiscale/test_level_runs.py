@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from geometry.errors import InputError, NotConverged
-from multiscale import level_process, level_runs
-from multiscale.level_results import LevelResult, read_result, write_result
-from multiscale.level_runs import check_launchable, launch_process, run_levels
-from multiscale.levels import levels
+from multiscale.comparing import level_process, level_runs
+from multiscale.comparing.level_results import LevelResult, read_result, write_result
+from multiscale.comparing.level_runs import check_launchable, launch_process, run_levels
+from multiscale.comparing.levels import levels
 from multiscale.run import Run, run
 from multiscale.scene import Scene
 

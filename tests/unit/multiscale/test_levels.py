@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from geometry.patches import PatchGrid
-from multiscale.choices import open_keys
 from multiscale.compare import settled_scene
-from multiscale.level_grids import pressure_grid
-from multiscale.level_results import LevelResult
-from multiscale.levels import levels
-from multiscale.measures import Curves
-from multiscale.outcomes import Outcome, ranked
+from multiscale.comparing.level_grids import pressure_grid
+from multiscale.comparing.level_results import LevelResult
+from multiscale.comparing.levels import levels
+from multiscale.comparing.measures import Curves
+from multiscale.comparing.outcomes import Outcome, ranked
+from multiscale.planning.choices import open_keys
 from multiscale.scene import Scene
 from multiscale.stage_checks import EMBEDDED_CELLS
 

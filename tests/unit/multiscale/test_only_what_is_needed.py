@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import micro.interaction
-import multiscale.results
+import micro.pairs.interaction
+import multiscale.reporting.results
 from geometry import Asperities, PatchGrid
 from micro import HalfSpaceModel, asperity_model
 from multiscale import Run, Scene, make_stage
-from multiscale.forecast import forecast
-from multiscale.results import write_results
+from multiscale.planning.forecast import forecast
+from multiscale.reporting.results import write_results
 
 FINITE_ELEMENTS = ("dolfinx", "petsc4py", "macro", "gmsh")
 PICTURES = ("matplotlib",)
@@ -75,8 +75,8 @@ def never(*given, **options):
 
 
 def test_only_the_force_curve(monkeypatch, tmp_path):
-    monkeypatch.setattr(multiscale.results, "_figures", never)
-    monkeypatch.setattr(multiscale.results, "report_html", never)
+    monkeypatch.setattr(multiscale.reporting.results, "_figures", never)
+    monkeypatch.setattr(multiscale.reporting.results, "report_html", never)
     monkeypatch.setattr(sys.modules["multiscale.run"], "final_field", never)
     run = Run(Scene.from_dict(data("concurrent", block=data()["block"] | {"cells": [4, 4, 4]})))
     assert len(list(run.load_steps())) == 2
@@ -100,8 +100,8 @@ def presses(monkeypatch):
 
 @pytest.mark.parametrize("kind", ["analytic", "isolated", "consistent", "concurrent"])
 def test_a_plan_solves_nothing_of_the_scene(monkeypatch, presses, kind):
-    monkeypatch.setattr("multiscale.blocks.embedding", never)
-    monkeypatch.setattr("multiscale.blocks.smooth_correction", never)
+    monkeypatch.setattr("multiscale.couplings.blocks.embedding", never)
+    monkeypatch.setattr("multiscale.couplings.blocks.smooth_correction", never)
     monkeypatch.setattr("multiscale.assemble.make_table", never)
     given = data(kind, grid=128)
     stage = make_stage(Scene.from_dict(given))
@@ -145,14 +145,14 @@ def summits(below: int) -> Asperities:
 def evaluations(monkeypatch, below: int) -> int:
     """Return how many pairs of summits a load takes."""
     counted = [0]
-    field = micro.interaction.circular_field
+    field = micro.pairs.interaction.circular_field
 
     def watched(*given, **options):
         counted[0] += int(np.prod(np.broadcast_shapes(*(np.shape(part) for part in given))))
         return field(*given, **options)
 
     with monkeypatch.context() as patch:
-        patch.setattr(micro.interaction, "circular_field", watched)
+        patch.setattr(micro.pairs.interaction, "circular_field", watched)
         model = asperity_model("circular", summits(below), contact_modulus=1.0)
         whole = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
         model.respond([0.002, 0.004], patches=whole, mean_heights=[-0.1])
@@ -166,15 +166,15 @@ def test_summits_out_of_reach_cost_nothing(monkeypatch):
 
 
 def test_a_scene_without_open_keys_weighs_no_alternatives(monkeypatch):
-    monkeypatch.setattr("multiscale.choices.predicted_cost", never)
-    monkeypatch.setattr("multiscale.choices.expected_errors", never)
+    monkeypatch.setattr("multiscale.planning.choices.predicted_cost", never)
+    monkeypatch.setattr("multiscale.planning.choices.expected_errors", never)
     stage = make_stage(Scene.from_dict(data("consistent")))
     assert stage.decision is None
 
 
 def test_rates_are_measured_only_where_they_are_needed():
-    from multiscale.machine import Machine
-    from multiscale.work import Work
+    from multiscale.planning.machine import Machine
+    from multiscale.planning.work import Work
 
     machine = Machine()
     assert Work(call=10.0, passes=5.0).seconds(machine) > 0.0

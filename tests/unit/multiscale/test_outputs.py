@@ -8,7 +8,7 @@ import pytest
 from geometry.errors import NotWritten
 from geometry.patches import PatchGrid
 from multiscale.history import COLUMNS, PATCH_COLUMNS, History, LoadStep, PatchState
-from multiscale.outputs import write_tables, write_text, write_whole
+from multiscale.reporting.outputs import write_tables, write_text, write_whole
 
 
 @pytest.fixture

@@ -14,8 +14,8 @@ from geometry.errors import InputError
 from multiscale import Scene, make_stage, plan, run
 from multiscale.cli import main
 from multiscale.figures import history_figure, pressure_figure
-from multiscale.reference_record import reference_record
-from multiscale.report import curve_cells
+from multiscale.reference.record import reference_record
+from multiscale.reporting.report import curve_cells
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 COARSE = [

@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 
 from geometry.errors import InputError, NotWritten
-from multiscale import Run, Scene, choices
-from multiscale.checkpoint import read_checkpoint, write_checkpoint
+from multiscale import Run, Scene
 from multiscale.cli import main
-from multiscale.folder_lock import FolderLock
-from multiscale.journal import Journal, journalled
-from multiscale.resuming import Keeper, kept_choices, with_journal
+from multiscale.planning import choices
+from multiscale.restart.checkpoint import read_checkpoint, write_checkpoint
+from multiscale.restart.folder_lock import FolderLock
+from multiscale.restart.journal import Journal, journalled
+from multiscale.restart.resuming import Keeper, kept_choices, with_journal
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 ALONE = {"coupling": {"kind": "analytic"}, "micro": {"model": "half-space"}}

@@ -9,7 +9,7 @@ from geometry import PatchGrid, Spectrum, find_asperities, patch_means, synthesi
 from geometry.errors import InputError
 from micro import asperity_model, micro_model
 from micro.love import love_centre, love_mean
-from multiscale.tabulate import IsolatedPatch, isolated_laws
+from multiscale.law_tables.isolated import IsolatedPatch, isolated_laws
 
 MODULUS = 4000.0
 TOLERANCE = 1e-4

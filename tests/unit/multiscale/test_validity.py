@@ -8,11 +8,11 @@ import pytest
 from geometry import PatchGrid, Spectrum, patch_means, synthesise
 from geometry.control import Control
 from micro import micro_model
-from multiscale.concurrent import ConcurrentCoupling
-from multiscale.consistent import consistent_laws
 from multiscale.coupling import AnalyticCoupling
-from multiscale.tabulate import isolated_laws
-from multiscale.validity import range_notes
+from multiscale.couplings.concurrent import ConcurrentCoupling
+from multiscale.law_tables.consistent import consistent_laws
+from multiscale.law_tables.isolated import isolated_laws
+from multiscale.reporting.validity import range_notes
 
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
 END = 40e-3

@@ -5,9 +5,9 @@ import pytest
 
 from geometry import PatchGrid
 from geometry.errors import InputError
+from multiscale.couplings.yielding import SpreadLoads, UniformLoads
+from multiscale.law_tables.spread import ContactSpread, check_division
 from multiscale.laws import LawPoint
-from multiscale.spread import ContactSpread, check_division
-from multiscale.yielding import SpreadLoads, UniformLoads
 
 PATCHES = PatchGrid(grid=(2, 1), lengths=(2.0, 1.0))
 LOADS = PatchGrid(grid=(4, 2), lengths=(2.0, 1.0))

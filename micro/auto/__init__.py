@@ -1,0 +1,1 @@
+"""Choice of a micro model by its expected error and cost."""

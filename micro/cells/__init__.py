@@ -1,0 +1,1 @@
+"""Contact on the half-space cell by cell: kernels, transforms, pressures."""

@@ -1,0 +1,83 @@
+"""Contact of a rough surface with a rigid plane at one approach, cell by cell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from micro.cells.contacts import Contacts, find_contacts
+from micro.cells.elastic_grid import ElasticGrids
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HalfSpaceState:
+    """Contact of all cells at one approach; maps are evaluated when first asked for.
+
+    Args:
+        approach: Rigid approach δ at the centre, counted from first touch [mm].
+        required: Displacement that the plane asks of each cell, δ(x, y) − (z_M − z), negative
+            where they are apart, shape (nx, ny) [mm].
+        pressure: Contact pressure, shape (nx, ny) [MPa].
+        contact_modulus: E* [MPa].
+        spacing: Sides (dx, dy) of a cell [mm].
+        periodic: Whether surface and pressures continue periodically.
+        residual: Largest violation of gap ≥ 0 and of gap = 0 under pressure, relative to the
+            largest displacement asked for. It bounds the error of the force: this is exact for
+            a surface whose heights differ by ``residual`` δ at most.
+        iterations: Products of the compliance with pressures.
+        grids: Elastic half-space of the model.
+    """
+
+    approach: float
+    required: Array
+    pressure: Array
+    contact_modulus: float
+    spacing: tuple[float, float]
+    periodic: bool
+    residual: float
+    iterations: int
+    grids: ElasticGrids = field(repr=False)
+
+    @property
+    def force(self) -> float:
+        """Normal force [N]."""
+        return float(self.pressure.sum()) * self.spacing[0] * self.spacing[1]
+
+    @property
+    def in_contact(self) -> NDArray[np.bool_]:
+        """Which cells carry a pressure, shape (nx, ny)."""
+        return self.pressure > 0.0
+
+    @property
+    def counted_area(self) -> float:
+        """Area of all cells under pressure [mm²]; too large by a part of the perimeter."""
+        return float(self.contacts.counted_area.sum())
+
+    @property
+    def contact_area(self) -> float:
+        """Real contact area, corrected by the perimeter [mm²]."""
+        return float(self.contacts.area.sum())
+
+    @cached_property
+    def contacts(self) -> Contacts:
+        """The connected contacts."""
+        return find_contacts(self.pressure, self.spacing, periodic=self.periodic)
+
+    @cached_property
+    def displacement(self) -> Array:
+        """Normal displacement of the surface at the cell centres, shape (nx, ny) [mm].
+
+        On a periodic surface it counts from its own mean.
+        """
+        grid = self.grids.at(self.pressure.shape, self.spacing)
+        return grid.displacement(np.divide(self.pressure, self.contact_modulus))
+
+    @property
+    def gap(self) -> Array:
+        """Distance of the displaced surface from the plane, shape (nx, ny) [mm]."""
+        return self.displacement - self.required

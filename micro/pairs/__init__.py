@@ -1,0 +1,1 @@
+"""Displacements that asperities cause each other, pair by pair or many at once."""

@@ -1,0 +1,1 @@
+"""Contact problems of interacting asperities, and what they leave."""

@@ -1,0 +1,1 @@
+"""A scene computed at many levels: error against time."""

@@ -1,0 +1,1 @@
+"""Ways to put rough contacts and an elastic block into one equilibrium."""

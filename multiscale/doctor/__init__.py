@@ -1,0 +1,1 @@
+"""Is this machine fit for runs, and made ready for them?"""

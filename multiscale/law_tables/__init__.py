@@ -1,0 +1,1 @@
+"""Patch laws: made of a rough surface, refined, packed, kept on disk."""

@@ -1,0 +1,160 @@
+"""Stores patch laws in HDF5 and reads them back bit for bit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import h5py
+
+from geometry.errors import InputError
+from geometry.partition import UnevenPartition
+from geometry.patches import PatchGrid
+from multiscale.law_tables.spread import ContactSpread
+from multiscale.laws import PatchLaw
+from multiscale.records import stored_numbers
+
+_COLUMNS = {
+    "approach": "mm",
+    "closure": "mm",
+    "pressure": "MPa",
+    "contact_area_fraction": "1",
+    "contacts": "1",
+    "relief": "mm",
+}
+_SCALARS = {
+    "touch": "mm",
+    "reach": "mm",
+    "interpolation_error": "1",
+    "stiffness_error": "1",
+    "warned_from": "MPa",
+}
+_SPREAD = {"approach": "mm", "forces": "N", "correction": "mm/N"}
+_UNKNOWN = float("nan")
+_OLDER = {"stiffness_error": _UNKNOWN, "warned_from": float("inf")}  # files that lack these
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LawTable:
+    """The laws of all patches of an interface.
+
+    Attributes:
+        patches: The partition.
+        laws: One law per patch, in the order of the flat patch index.
+        made_by: How they were made: coupling, micro model, Love's displacement, tolerance, and the
+            slopes of the plane that pressed the whole surface.
+        force_error: Estimated error of the force between the rows, see `refinement.Errors`: of
+            all patches together, or of the worst where each was tabulated alone.
+        spread: Where the contacts are within the patches, and what the block that the laws were
+            made for yields there; None for laws of a half-space.
+    """
+
+    patches: PatchGrid
+    laws: tuple[PatchLaw, ...]
+    made_by: dict[str, str]
+    force_error: float = float("nan")
+    spread: ContactSpread | None = None
+
+    def __post_init__(self) -> None:
+        if len(self.laws) != self.patches.count:
+            raise InputError("needs one law per patch", value=len(self.laws))
+
+    def __getitem__(self, index: int) -> PatchLaw:
+        return self.laws[index]
+
+
+def write_laws(path: Path | BinaryIO, table: LawTable) -> None:
+    """Write all laws to one HDF5 file: a group ``patch_IX_IY`` per patch, a dataset per column.
+
+    Args:
+        path: File to write, by name or open; one that exists is replaced.
+        table: The laws.
+    """
+    with h5py.File(path, "w") as file:
+        file.attrs["format"] = "patchlaw laws 1"
+        file.attrs["patch_grid"] = table.patches.grid
+        file.attrs["lengths_mm"] = table.patches.lengths
+        file.attrs["origin_mm"] = table.patches.origin
+        file.attrs["force_error"] = table.force_error
+        for name, text in table.made_by.items():
+            file.attrs[f"made_by_{name}"] = text
+        for index, law in enumerate(table.laws):
+            group = file.create_group(_group_name(table.patches, index))
+            for name, unit in _COLUMNS.items():
+                group.create_dataset(name, data=getattr(law, name)).attrs["unit"] = unit
+            for name in _SCALARS:
+                group.attrs[name] = getattr(law, name)
+        if table.spread is not None:
+            group = file.create_group("spread")
+            group.attrs["load_borders_x_mm"] = table.spread.loads.borders_x
+            group.attrs["load_borders_y_mm"] = table.spread.loads.borders_y
+            for name, unit in _SPREAD.items():
+                group.create_dataset(name, data=getattr(table.spread, name)).attrs["unit"] = unit
+
+
+def read_laws(path: Path | BinaryIO) -> LawTable:
+    """Read a law file.
+
+    Args:
+        path: The file, by name or open.
+
+    Raises:
+        InputError: When the file cannot be read, is no law file or lacks anything.
+    """
+    if isinstance(path, Path) and not path.is_file():  # a pipe would be waited for
+        raise InputError("is not a readable law file: there is no such file", file=str(path))
+    try:
+        with h5py.File(path, "r") as file:
+            if file.attrs.get("format") != "patchlaw laws 1":
+                raise InputError("is not a law file of patchlaw", file=str(path))
+            patches = PatchGrid(
+                grid=_pair(file.attrs["patch_grid"], int),
+                lengths=_pair(file.attrs["lengths_mm"], float),
+                origin=_pair(file.attrs["origin_mm"], float),
+            )
+            if math.prod(patches.grid) > len(file):
+                raise InputError("lacks laws", value=patches.grid, allowed=f"{len(file)} groups")
+            groups = [file[_group_name(patches, index)] for index in range(patches.count)]
+            made_by = {
+                name.removeprefix("made_by_"): str(text)
+                for name, text in file.attrs.items()
+                if name.startswith("made_by_")
+            }
+            return LawTable(
+                patches=patches,
+                laws=tuple(map(_law, groups)),
+                made_by=made_by,
+                force_error=float(file.attrs.get("force_error", _UNKNOWN)),
+                spread=_spread(file["spread"], patches) if "spread" in file else None,
+            )
+    except InputError as error:
+        raise error.located(file=str(path)) from None
+    except Exception as error:  # h5py raises errors of many families over damaged files
+        raise InputError(f"is not a readable law file: {error}", file=str(path)) from None
+
+
+def _spread(group: Any, patches: PatchGrid) -> ContactSpread:
+    ticks = {f"ticks_{axis}": tuple(group.attrs[f"load_borders_{axis}_mm"]) for axis in "xy"}
+    loads = UnevenPartition(**ticks)
+    columns = {name: stored_numbers(group[name]) for name in _SPREAD}
+    return ContactSpread(patches=patches, loads=loads, **columns)
+
+
+def _law(group: Any) -> PatchLaw:
+    content: dict[str, Any] = {name: stored_numbers(group[name]) for name in _COLUMNS}
+    scalars = _OLDER | dict(group.attrs)
+    content.update({name: float(scalars[name]) for name in _SCALARS})
+    return PatchLaw(**content)
+
+
+def _group_name(patches: PatchGrid, index: int) -> str:
+    ix, iy = patches.unravel(index)
+    return f"patch_{ix}_{iy}"
+
+
+def _pair(values: Sequence[Any], kind: type) -> Any:
+    first, second = values
+    return kind(first), kind(second)

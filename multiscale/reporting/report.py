@@ -1,0 +1,166 @@
+"""The readable report of a run: one HTML page that needs no network."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from pathlib import Path
+
+from multiscale.history import History
+from multiscale.planning.decision import bound_text
+from multiscale.planning.forecast import Forecast, comparison
+
+_STYLE = """
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto;
+       padding: 0 1rem; color: #1c2833; }
+h1, h2 { line-height: 1.2; } h2 { margin-top: 2.2rem; }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
+th, td { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid #d5d8dc; }
+th:first-child, td:first-child { text-align: left; } th { background: #f4f6f7; }
+td.text { text-align: left; } figure { margin: 1.2rem 0; } img { max-width: 100%; }
+figcaption, .note { color: #566573; }
+.wide { overflow-x: auto; font-size: .85rem; } .wide td, .wide th { padding: .2rem .45rem; }
+.warning { border-left: 4px solid #d68910; padding-left: .8rem; }
+"""
+
+
+def report_html(
+    *,
+    title: str,
+    statements: Iterable[tuple[str, str]],
+    warnings: Sequence[str],
+    history: History,
+    figures: Mapping[str, Path],
+    made: Forecast,
+) -> str:
+    """Compose the page.
+
+    Args:
+        title: Heading.
+        statements: Topics and sentences of the plan.
+        warnings: What a user should know about validity.
+        history: The run.
+        figures: PNG files by caption; embedded into the page.
+        made: What was predicted.
+
+    Returns:
+        A complete HTML document.
+    """
+    parts = [
+        f"<h1>{escape(title)}</h1>",
+        _headline(history),
+        *(f'<p class="warning">{escape(text)}</p>' for text in warnings),
+        "<h2>What was done</h2>",
+        table(("topic", "what"), statements, text_columns={1}),
+        "<h2>Force–approach curve</h2>",
+        table(*curve_cells(history)),
+        *(figure_element(caption, path) for caption, path in figures.items()),
+        "<h2>What it took</h2>",
+        table(("what", "predicted", "real"), comparison(made, history.seconds)),
+        "<h2>What the force may be off by</h2>",
+        table(("cause", "at most"), _errors(made)),
+        *(f'<p class="note">{escape(note)}</p>' for note in history.notes),
+    ]
+    return page(title, parts)
+
+
+def page(title: str, parts: Iterable[str]) -> str:
+    """Return a complete HTML document that needs no network.
+
+    Args:
+        title: Its title.
+        parts: Elements of its body.
+    """
+    head = f'<meta charset="utf-8"><title>{escape(title)}</title><style>{_STYLE}</style>'
+    body = "\n".join(parts)
+    return f'<!doctype html>\n<html lang="en"><head>{head}</head><body>{body}</body></html>\n'
+
+
+def curve_cells(history: History) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return header and formatted rows of the force–approach table, in µm, N, MPa and %."""
+    header: tuple[str, ...] = (
+        "step", "approach [µm]", "force [N]", "pressure [MPa]", "area [%]", "separation [µm]",
+        "contacts", "Newton", "linear", "time [s]",
+    )  # fmt: skip
+    rows: list[tuple[str, ...]] = [
+        (
+            str(step.step),
+            f"{1e3 * step.approach_mm:.4g}",
+            f"{step.force_N:.6g}",
+            f"{step.mean_pressure_MPa:.5g}",
+            f"{100 * step.contact_area_fraction:.4g}",
+            f"{1e3 * step.mean_separation_mm:.4g}",
+            str(step.contacts),
+            str(step.newton_iterations),
+            str(step.linear_iterations),
+            f"{step.wall_s:.2f}",
+        )
+        for step in history
+    ]
+    if history.reference is not None:
+        heading, cells = history.reference.cells
+        header = (*header, heading)
+        rows = [(*row, cell) for row, cell in zip(rows, cells, strict=True)]
+    return header, rows
+
+
+def _errors(made: Forecast) -> Iterable[tuple[str, str]]:
+    yield from ((cause, bound_text(error)) for cause, error in made.errors.items())
+    yield "altogether", bound_text(made.error)
+    if made.slopes:
+        yield "finite slopes, outside of it, about", bound_text(made.slopes)
+
+
+def _headline(history: History) -> str:
+    if not len(history):
+        return "<p>No load step was accepted.</p>"
+    last, record = history.steps[-1], history.reference
+    error = "" if record is None else f" Discretisation error: {escape(record.label)}."
+    area = f"{100 * last.contact_area_fraction:.3g} % of the nominal area"
+    return (
+        f"<p>At an approach of {1e3 * last.approach_mm:.4g} µm the plane carries "
+        f"<b>{last.force_N:.5g} N</b> ({last.mean_pressure_MPa:.4g} MPa) on {last.contacts} "
+        f"contacts covering {area}.{error}</p>"
+    )
+
+
+def table(
+    header: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    text_columns: frozenset[int] | set[int] = frozenset(),
+) -> str:
+    """Return a table.
+
+    Args:
+        header: Heads of the columns.
+        rows: Texts of the cells.
+        text_columns: Columns that are aligned to the left.
+    """
+    head = "".join(f"<th>{escape(name)}</th>" for name in header)
+    body = "".join(
+        "<tr>"
+        + "".join(
+            f'<td class="text">{escape(cell)}</td>'
+            if index in text_columns
+            else f"<td>{escape(cell)}</td>"
+            for index, cell in enumerate(row)
+        )
+        + "</tr>"
+        for row in rows
+    )
+    return f"<table><tr>{head}</tr>{body}</table>"
+
+
+def figure_element(caption: str, path: Path) -> str:
+    """Return a figure with its caption, the picture inside the page.
+
+    Args:
+        caption: What it shows.
+        path: PNG file.
+    """
+    data = base64.b64encode(path.read_bytes()).decode()
+    return (
+        f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{data}">'
+        f"<figcaption>{escape(caption)}</figcaption></figure>"
+    )

@@ -1,0 +1,1 @@
+"""What a scene file says, read and checked section by section."""

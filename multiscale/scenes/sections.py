@@ -1,0 +1,179 @@
+"""The sections of a scene on couplings and loads, and what all sections have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+
+from multiscale.loading import Programme
+from multiscale.scenes.quantities import Approaches, Forces, Length, Tilt
+
+
+def _number(value: Any) -> Any:
+    """Refuse what pydantic would turn into a number: truth values and text."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError("is not a number (allowed: a number without quotes)")
+    return value
+
+
+Number = Annotated[float, BeforeValidator(_number)]
+
+
+class Section(BaseModel):
+    """A section of a scene: unknown keys are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class CouplingSection(Section):
+    """How micro and macro model are put together.
+
+    ``kind``: ``isolated`` takes every patch's law from what lies in it alone (Waddad et al. 2016);
+    ``consistent`` takes all laws from one solution of the whole surface under the tilt of the load
+    (where the plane is free, that which it takes on a half-space at the largest load);
+    ``concurrent`` solves the whole surface on the block at every load step, without laws;
+    ``analytic`` is the micro model alone on a half-space; ``reference`` meshes the rough surface
+    itself and has no micro model, see `ReferenceSection`; ``auto`` is concurrent or consistent,
+    whichever keeps the scene's accuracy at less cost.
+
+    ``compliance`` of the block under its patches: ``finite-element`` from the plain mesh under the
+    laws; ``decomposed`` is the half-space exactly and finite elements for the smooth rest. By
+    default decomposed, but for isolated laws and laws at points.
+
+    ``newton``: ``condensed`` solves for the patches alone, with the compliance computed once;
+    ``full`` for all displacements of the mesh. By default what is predicted to cost less.
+
+    ``love``: an isolated patch's own displacement by its pressure, its ``mean`` or that at its
+    ``centre``. ``interface``: the closure is a mean over each patch, or taken at each point.
+    ``table_tolerance``: interpolation error of the laws, relative to the force; by default 1e-4,
+    and 1e-3 with micro models that see cells.
+    """
+
+    kind: Literal["isolated", "consistent", "concurrent", "analytic", "reference", "auto"] = (
+        "consistent"
+    )
+    compliance: Literal["auto", "finite-element", "decomposed"] = "auto"
+    newton: Literal["auto", "condensed", "full"] = "auto"
+    love: Literal["mean", "centre"] = "mean"
+    interface: Literal["patchwise", "pointwise"] = "patchwise"
+    table_tolerance: Annotated[Number, Field(gt=0, lt=0.1)] | None = None
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        for clash, problem, allowed in self._clashes():
+            if clash:
+                raise ValueError(f"{problem} (allowed: {allowed})")
+        return self
+
+    def _clashes(self) -> Iterator[tuple[bool, str, str]]:
+        """Yield whether keys contradict each other, how, and what would do."""
+        if self.kind == "analytic":  # ignores what is about patches and finite elements
+            return
+        kind, points = f"kind = '{self.kind}'", self.interface == "pointwise"
+        if self.kind == "auto":
+            kind = "a kind that is left to the plan"
+        yield (
+            self.kind != "isolated" and self.love == "centre",
+            f"love = 'centre' does not go with {kind}",
+            "love = 'mean', or kind = 'isolated'",
+        )
+        lawless = self.kind in ("concurrent", "reference")
+        yield (
+            lawless and self.table_tolerance is not None,
+            f"table_tolerance = {self.table_tolerance} does not go with {kind}",
+            "leave it out: there are no laws",
+        )
+        for key, value, meant in (
+            ("compliance", self.compliance, "decomposed" if self.kind == "concurrent" else "auto"),
+            ("newton", self.newton, "auto"),
+            ("interface", self.interface, "patchwise"),
+        ):
+            yield (
+                lawless and value not in ("auto", meant),
+                f"{key} = '{value}' does not go with {kind}",
+                f"{key} = '{meant}'",
+            )
+        yield (
+            points and self.compliance == "decomposed",
+            "compliance = 'decomposed' does not go with interface = 'pointwise'",
+            "compliance = 'finite-element', or interface = 'patchwise'",
+        )
+        yield (
+            points and self.newton == "condensed",
+            "newton = 'condensed' does not go with interface = 'pointwise'",
+            "newton = 'full', or interface = 'patchwise'",
+        )
+        yield (
+            self.newton == "full" and self.compliance == "decomposed",
+            "newton = 'full' does not go with compliance = 'decomposed'",
+            "newton = 'condensed', or compliance = 'finite-element'",
+        )
+
+    @property
+    def decomposed(self) -> bool:
+        """Whether the block is the half-space and a smooth correction."""
+        if self.kind in ("analytic", "concurrent", "reference"):
+            return self.kind == "concurrent"
+        if self.compliance != "auto":
+            return self.compliance == "decomposed"
+        return self.kind == "consistent" and self.interface != "pointwise" and self.newton != "full"
+
+
+class ReferenceSection(Section):
+    """The rough surface meshed, for ``coupling.kind = "reference"``; other couplings ignore it.
+
+    ``method``: how contact is found, see `macro.ObstacleBlock`. ``mesh``: ``hexahedra`` are those
+    of ``[block]``, ``tetrahedra`` small only where contact can occur; by default hexahedra where
+    ``block.cells`` is stated. ``meshes`` of falling size are pressed alike, and their results
+    extrapolated; one alone has no error bar. ``fine``: edge length of the finest tetrahedra where
+    contact can occur, by default from the surface and the load.
+    """
+
+    method: Literal["active-set", "augmented-lagrangian"] = "active-set"
+    mesh: Literal["auto", "hexahedra", "tetrahedra"] = "auto"
+    meshes: Annotated[int, Field(ge=1, le=3, strict=True)] = 2
+    fine: Annotated[Length, Field(gt=0)] | None = None
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        if self.mesh == "hexahedra" and self.fine is not None:
+            raise ValueError(
+                f"fine = {self.fine:g} mm does not go with mesh = 'hexahedra' "
+                "(allowed: leave it out, and state block.cells; or mesh = 'tetrahedra')"
+            )
+        return self
+
+
+class LoadSection(Section):
+    """The motion of the rigid plane: turning points of its approach, or of the force on it.
+
+    ``steps`` load steps lead to every turning point. ``tilt`` are the slopes of the approach along
+    x and y about the middle of the interface; ``"free"`` lets the plane turn until the pressures
+    have no moment. ``force_change`` is the largest change of the force in one step relative to the
+    largest force so far: larger steps are halved.
+    """
+
+    approach: Approaches | None = None
+    force: Forces | None = None
+    steps: Annotated[int, Field(ge=1, le=1_000_000, strict=True)] = 8
+    tilt: Tilt = (0.0, 0.0)
+    force_change: Annotated[Number, Field(ge=1e-3, lt=1)] | None = None
+
+    @model_validator(mode="after")
+    def _one_load(self) -> Self:
+        if (self.approach is None) == (self.force is None):
+            raise ValueError("needs exactly one load (allowed: either 'approach' or 'force')")
+        return self
+
+    @property
+    def programme(self) -> Programme:
+        """What the rigid plane is made to do."""
+        return Programme(
+            quantity="approach" if self.force is None else "force",
+            points=self.approach or self.force or (),
+            steps=self.steps,
+            tilt=None if self.tilt == "free" else self.tilt,
+            force_change=self.force_change,
+        )
