@@ -11,14 +11,16 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
-from geometry.errors import InputError
+from geometry.errors import InputError, NotConverged
 from geometry.typical_contact import suggested_fine
 from micro import MODEL_NAMES
 from multiscale.comparing.level import OWN, Content, Level, content_of, flattened
-from multiscale.comparing.level_cost import predicted_seconds
 from multiscale.comparing.level_grids import Grid, coarser_grids, pressure_grid
 from multiscale.ingredients import make_surface
+from multiscale.planning.costs import predicted_cost
+from multiscale.planning.machine import Machine
 from multiscale.scene import Scene
+from multiscale.stage import make_stage
 from multiscale.stage_checks import EMBEDDED_CELLS, patch_grid
 
 LAW_HEIGHTS = 128
@@ -65,7 +67,7 @@ class _Family:
     """Makes the levels of one scene."""
 
     def __init__(self, scene: Scene, ranks: int) -> None:
-        self._scene, self._ranks = scene, ranks
+        self._scene, self._ranks, self._machine = scene, ranks, Machine()
         self._base = content_of(scene)
         stated = scene.surface.grid
         self._heights: Grid = stated if isinstance(stated, tuple) else make_surface(scene).grid
@@ -230,7 +232,8 @@ class _Family:
             content = content | {"surface": content["surface"] | {"grid": list(heights)}}
         try:
             scene = Scene.from_dict(content)
-        except InputError:
+            cost = predicted_cost(make_stage(scene), self._machine, cold=True).total
+        except (InputError, NotConverged):
             return None
         kind = scene.coupling.kind
         return Level(
@@ -238,7 +241,7 @@ class _Family:
             kind=kind,
             content=content_of(scene),
             heights=heights,
-            cost=predicted_seconds(scene, heights),
+            cost=cost,
             slopes=slopes,
             ranks=1 if kind == "analytic" else self._ranks,
         )

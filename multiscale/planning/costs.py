@@ -57,23 +57,26 @@ class Cost:
         return sum(self.seconds.values())
 
 
-def predicted_cost(stage: Stage, machine: Machine) -> Cost:
+def predicted_cost(stage: Stage, machine: Machine, *, cold: bool = False) -> Cost:
     """Predict what a run takes.
 
     Args:
         stage: The scene's ingredients.
         machine: How fast it is; only the rates that are needed are measured.
+        cold: Whether the run finds nothing on disk from earlier ones.
     """
-    works = run_work(stage)
+    kept = not cold and _correction_helps(stage) and correction_known(stage)
+    works = run_work(stage, kept=kept)
     seconds = {phase: works[phase].seconds(machine) for phase in PHASES if phase in works}
-    return Cost(seconds=seconds, memory=_memory(stage))
+    return Cost(seconds=seconds, memory=_memory(stage, kept))
 
 
-def run_work(stage: Stage) -> dict[str, Work]:
+def run_work(stage: Stage, *, kept: bool = False) -> dict[str, Work]:
     """Return the work of every phase that a run of a scene has.
 
     Args:
         stage: The scene's ingredients.
+        kept: Whether the smooth rest of its block is on disk.
     """
     works = {"surface": _surface(stage.surface.heights.size)}
     if stage.choice is not None:
@@ -86,7 +89,7 @@ def run_work(stage: Stage) -> dict[str, Work]:
             stage.meshes, step_count(programme), turning=programme.tilt is None
         )
     else:
-        works["block"], works["load steps"] = _block(stage), _load_steps(stage)
+        works["block"], works["load steps"] = _block(stage, kept), _load_steps(stage)
     if stage.embedded and stage.scene.coupling.kind == "consistent" and _bends(stage):
         works["laws"], works["block"] = works["laws"] + works["block"], Work(call=10_000)
     output = stage.scene.output
@@ -112,19 +115,22 @@ def _bends(stage: Stage) -> bool:
     return stage.scene.coupling.decomposed
 
 
+def _correction_helps(stage: Stage) -> bool:
+    """Tell whether a run would take the smooth rest of its block from disk."""
+    return stage.embedded and stage.meshes is None and _bends(stage)
+
+
 def _on_mesh(stage: Stage) -> bool:
     return stage.by_laws and not newton_choice(stage).condensed
 
 
-def _block(stage: Stage) -> Work:
+def _block(stage: Stage, kept: bool) -> Work:
     if not stage.embedded:
         return Work(call=1_000)
     coupling = stage.scene.coupling
     if coupling.decomposed:
         ready = Work(call=160_000)  # the sag by every rectangle
-        if correction_known(stage):  # this loads the finite elements
-            return ready
-        return ready + smooth_work(stage.shape, scene_loads(stage).shape)
+        return ready if kept else ready + smooth_work(stage.shape, scene_loads(stage).shape)
     work = import_work() + mesh_work(stage.shape)
     if newton_choice(stage).condensed:
         work += cycle_work(stage.shape, CYCLES_PER_PATCH * stage.patches.count)
@@ -144,7 +150,7 @@ def _load_steps(stage: Stage) -> Work:
     return (_LAW_NEWTON * steps) * dense
 
 
-def _memory(stage: Stage) -> float:
+def _memory(stage: Stage, smooth_kept: bool) -> float:
     """Return what is in use now, and what the largest phase adds."""
     model, shape = stage.micro, stage.shape
     cells = float(np.prod(model.surface.grid)) if isinstance(model, HalfSpaceModel) else 0.0
@@ -158,7 +164,7 @@ def _memory(stage: Stage) -> float:
             block += stage.meshes.bytes
         elif not stage.scene.coupling.decomposed:
             block += mesh_bytes(shape)
-        elif not correction_known(stage):
+        elif not smooth_kept:
             block += smooth_bytes(shape, scene_loads(stage).shape)
     drawn = stage.scene.output.figures and "matplotlib" not in sys.modules
     return peak_memory() + max(micro, block) + kept + _PICTURES * drawn
