@@ -12,10 +12,10 @@ from dataclasses import replace
 from typing import Any
 
 from geometry.errors import InputError, NotConverged
-from geometry.typical_contact import suggested_fine
 from micro import MODEL_NAMES
 from multiscale.comparing.level import OWN, Content, Level, content_of, flattened
 from multiscale.comparing.level_grids import Grid, coarser_grids, pressure_grid
+from multiscale.comparing.meshed_levels import meshed
 from multiscale.ingredients import make_surface
 from multiscale.planning.costs import predicted_cost
 from multiscale.planning.machine import Machine
@@ -41,9 +41,6 @@ finely; patches decide how many they are, and contacts next to the block's sides
 
 SMALL = 0.1
 """Heights and load of a reference with small slopes, relative to the scene's."""
-
-STEP = 2.0**0.5
-"""Ratio of the finest edges of neighbouring references."""
 
 
 def levels(scene: Scene, ranks: int = 1) -> tuple[Level, ...]:
@@ -180,22 +177,10 @@ class _Family:
                 yield self._level(name, self._base | changes | loads, grid)
 
     def _references(self) -> Iterator[Level | None]:
-        stated = self._base["reference"]
-        if stated["mesh"] == "hexahedra":
-            for meshes in (1, 2, 3):
-                yield self._reference(stated | {"meshes": meshes}, self._base["block"])
-            return
-        stated, block = stated | {"mesh": "tetrahedra"}, self._block(None)
-        fine = stated.get("fine") or self._finest_edge()
-        if fine is None:
-            for meshes in (1, 2, 3):
-                yield self._reference(stated | {"meshes": meshes}, block)
-            return
-        for meshes, factor in ((1, STEP * STEP), (1, 1.0), (2, 1.0), (3, 1.0), (3, 1.0 / STEP)):
-            section = stated | {"meshes": meshes, "fine": float(f"{factor * fine:.4g}")}
-            level = self._reference(section, block)
+        for mesh in meshed(self._scene, self._base, self._block(None)):
+            level = self._level(mesh.name, self._base | mesh.changes, self._heights)
             yield level
-            if (meshes, factor) == (1, 1.0) and level is not None:
+            if mesh.small_slopes_too and level is not None:
                 yield self._small_slopes(level)
 
     def _small_slopes(self, level: Level) -> Level | None:
@@ -205,20 +190,6 @@ class _Family:
             return None
         small = self._level(f"{level.name}, heights × {SMALL:g}", content, self._heights)
         return None if small is None else replace(small, scale=SMALL)
-
-    def _reference(self, section: Content, block: Content) -> Level | None:
-        several = f"{section['meshes']} mesh{'es' * (section['meshes'] > 1)}"
-        edge = f", {1e3 * section['fine']:.3g} µm" if "fine" in section else ""
-        changes = {"coupling": {"kind": "reference"}, "reference": section, "block": block}
-        return self._level(f"reference, {several}{edge}", self._base | changes, self._heights)
-
-    def _finest_edge(self) -> float | None:
-        """Return the edge of tetrahedra that fits the contacts; None where they are unknown."""
-        programme = self._scene.loading.programme
-        if programme.quantity == "force" or programme.tilt is None:
-            return None
-        surface = make_surface(self._scene)
-        return suggested_fine(surface, programme.largest, tilt=programme.tilt)
 
     def _block(self, cells: Any) -> Content:
         block = {key: value for key, value in self._base["block"].items() if key != "cells"}
