@@ -25,7 +25,8 @@ from micro.half_space import HalfSpaceModel
 from micro.hertz import HertzContact, contact_modulus
 from micro.influence import influence_matrix, mutual_influence
 from micro.love import love_centre, love_integral, love_mean, love_mutual
-from micro.models import MODEL_NAMES, MicroModel, micro_model
+from micro.model import MicroModel
+from micro.models import MODEL_NAMES, micro_model
 from micro.plane import Field, RigidPlane
 from micro.regions.island_state import IslandState
 from micro.regions.islands import IslandModel

@@ -118,15 +118,7 @@ class AsperityModel:
         return float(self.datum - heights.max()) if heights.size else np.inf
 
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
-        """Return the model of one patch on its own half-space: of the summits that it holds.
-
-        Args:
-            patches: Patches of the surface.
-            index: Flat index of the patch.
-
-        Returns:
-            The model, whose approach counts from the whole surface's highest point, and its patch.
-        """
+        """Return the model of the summits of one patch; see `MicroModel.of_patch`."""
         own = patches.index_of(self.asperities.x, self.asperities.y) == index
         return replace(self, asperities=self.asperities.subset(own)), patches.single(index)
 
@@ -178,23 +170,7 @@ class AsperityModel:
         mean_heights: ArrayLike,
         tilt: tuple[float, float] = _LEVEL,
     ) -> Response:
-        """Solve along approaches, each from the solution before it.
-
-        Args:
-            approaches: Rigid approaches in any order, shape (m,) [mm].
-            patches: Patches; every asperity lies in one.
-            mean_heights: Mean heights of the surface on the patches, shape (N,) [mm].
-            tilt: Slopes (tx, ty) of the approach.
-
-        Returns:
-            The response, in the order of ``approaches``, with a warning for each of them that
-            lies outside the range of validity.
-
-        Raises:
-            InputError: When the approaches are not a finite, non-empty list, a summit lies outside
-                the patches, or the mean heights do not fit them.
-            NotConverged: When the contact conditions cannot be met to 1e-10.
-        """
+        """Solve along approaches, each from the solution before it; see `MicroModel.respond`."""
         given = np.atleast_1d(np.asarray(approaches, float))
         sums = self.sums(patches, mean_heights)
         rows: dict[int, dict[str, Any]] = {}
@@ -217,7 +193,7 @@ class AsperityModel:
         mean_heights: ArrayLike,
         start: Any = None,
     ) -> Pressed:
-        """Solve under one plane; see `micro.models.MicroModel.press`."""
+        """Solve under one plane; see `MicroModel.press`."""
         first = np.zeros(len(self.asperities)) if start is None else start
         found = self.solution(plane.required(self.asperities), first)
         sums = self.sums(patches, mean_heights)

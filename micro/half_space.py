@@ -95,12 +95,7 @@ class HalfSpaceModel:
         return -float(self._required(self._plane(0.0, _LEVEL)).max())
 
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
-        """Return the model of one patch on its own half-space: only its cells may touch.
-
-        Args:
-            patches: Patches of the surface.
-            index: Flat index of the patch.
-        """
+        """Return the model whose cells of one patch alone may touch; see `MicroModel.of_patch`."""
         patch = patches.single(index)
         return replace(self, within=patch, periodic=False), patch
 
@@ -168,22 +163,10 @@ class HalfSpaceModel:
         mean_heights: ArrayLike,
         tilt: tuple[float, float] = _LEVEL,
     ) -> Response:
-        """Solve along approaches, each from the two solutions before it, extrapolated.
+        """Solve along approaches; see `MicroModel.respond`.
 
-        Args:
-            approaches: Rigid approaches in any order, shape (m,) [mm].
-            patches: Patches within the surface's rectangle; a cell that straddles a border is
-                shared by area.
-            mean_heights: Mean heights of the surface on the patches, shape (N,) [mm].
-            tilt: Slopes (tx, ty) of the approach.
-
-        Returns:
-            The response, in the order of ``approaches``.
-
-        Raises:
-            InputError: When the approaches are not a finite, non-empty list, the patches do not
-                fit the surface or the mean heights not the patches, or as for `solve`.
-            NotConverged: When the contact conditions cannot be met to the tolerance.
+        Each starts from the two solutions before it, extrapolated. A cell that straddles a border
+        of patches is shared by area.
         """
         sums = self._sums(patches, mean_heights)
         given = np.atleast_1d(np.asarray(approaches, float))
@@ -201,7 +184,7 @@ class HalfSpaceModel:
         mean_heights: ArrayLike,
         start: Any = None,
     ) -> Pressed:
-        """Solve under one plane; see `micro.models.MicroModel.press`."""
+        """Solve under one plane; see `MicroModel.press`."""
         sums = self._sums(patches, mean_heights)
         self._check_tilt(plane.tilt)
         state = self._pressed(plane, None if start is None else self._started(start))

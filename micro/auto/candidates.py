@@ -13,7 +13,8 @@ from micro.asperity_models import MODELS
 from micro.auto.errors import contact_error, grid_error
 from micro.auto.measures import ContactMeasures
 from micro.half_space import HalfSpaceModel
-from micro.models import MicroModel, micro_model
+from micro.model import MicroModel
+from micro.models import micro_model
 
 FACTORS = (0.25, 0.375, 0.5, 0.75, 1.0, 1.5, 2.0)
 """Cells of half-space grids along a side, relative to the surface's own."""

@@ -12,7 +12,7 @@ from geometry.errors import NotConverged
 from micro.auto.candidates import Option, half_space
 from micro.auto.errors import grid_error
 from micro.auto.measures import contact_measures
-from micro.models import MicroModel
+from micro.model import MicroModel
 
 _FINER = (1.0, 1.5, 2.0, 3.0)
 """Grids that checks are made against, relative to the surface's own."""

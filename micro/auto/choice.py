@@ -21,7 +21,7 @@ from geometry.errors import InputError
 from micro.auto.candidates import Candidate, Cost, Option, options
 from micro.auto.check import Check
 from micro.auto.measures import contact_measures
-from micro.models import MicroModel
+from micro.model import MicroModel
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -79,15 +79,7 @@ class IslandModel:
         return self.datum - self.surface.highest
 
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
-        """Return the model of one patch on its own half-space, cut out along whole cells.
-
-        Args:
-            patches: Patches of the surface.
-            index: Flat index of the patch.
-
-        Returns:
-            The model, whose approach counts from the whole surface's highest point, and its patch.
-        """
+        """Return the model of one patch cut out along whole cells; see `MicroModel.of_patch`."""
         x, y = patches.bounds(index)
         piece = self.surface.cropped(x=x, y=y)
         return replace(self, surface=piece, highest=self.datum), whole_patch(piece)
@@ -116,25 +108,11 @@ class IslandModel:
     ) -> Response:
         """Solve at approaches, each from nothing, so that none depends on another.
 
-        A patch gets the share of an island that lies in it, weighted in force with the pressure
-        that Hertz's theory would put on each height above the plane, in area with 1 on the upper
-        half; as a contact an island counts where its highest peak lies. Against half-space
-        pressures on 4 × 4 patches this misplaces a tenth of the mean patch force.
-
-        Args:
-            approaches: Rigid approaches in any order, shape (m,) [mm].
-            patches: Patches; every peak above the plane lies in one.
-            mean_heights: Mean heights of the surface on the patches, shape (N,) [mm].
-            tilt: Slopes (tx, ty) of the approach.
-
-        Returns:
-            The response, in the order of ``approaches``, with a warning for each of them that
-            lies outside the range of validity.
-
-        Raises:
-            InputError: When the approaches are not a finite, non-empty list, a peak above the
-                plane lies outside the patches, or the mean heights do not fit them.
-            NotConverged: When islands and displacements do not agree to 1e-6.
+        See `MicroModel.respond`. A patch gets the share of an island that lies in it, weighted in
+        force with the pressure that Hertz's theory would put on each height above the plane, in
+        area with 1 on the upper half; as a contact an island counts where its highest peak lies.
+        Against half-space pressures on 4 × 4 patches this misplaces a tenth of the mean patch
+        force.
         """
         planes = [
             RigidPlane.above(self.surface, approach, tilt)
@@ -150,7 +128,7 @@ class IslandModel:
         mean_heights: ArrayLike,
         start: Any = None,
     ) -> Pressed:
-        """Solve under one plane; see `micro.models.MicroModel.press`.
+        """Solve under one plane; see `MicroModel.press`.
 
         Islands are found anew under every plane: there is no start to go on from.
         """

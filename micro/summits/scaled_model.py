@@ -103,15 +103,7 @@ class ScaledModel:
         return float(self.datum - heights.max()) if heights.size else np.inf
 
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
-        """Return the model of one patch on its own half-space: of the summits that it holds.
-
-        Args:
-            patches: Patches of the surface.
-            index: Flat index of the patch.
-
-        Returns:
-            The model, whose approach counts from the whole surface's highest point, and its patch.
-        """
+        """Return the model of the summits of one patch; see `MicroModel.of_patch`."""
         return replace(self, within=(patches, index)), patches.single(index)
 
     @cached_property
@@ -153,23 +145,7 @@ class ScaledModel:
         mean_heights: ArrayLike,
         tilt: tuple[float, float] = _LEVEL,
     ) -> Response:
-        """Solve along approaches, each from the solution before it.
-
-        Args:
-            approaches: Rigid approaches in any order, shape (m,) [mm].
-            patches: Patches; every asperity lies in one.
-            mean_heights: Mean heights of the surface on the patches, shape (N,) [mm].
-            tilt: Slopes (tx, ty) of the approach.
-
-        Returns:
-            The response, in the order of ``approaches``, with a warning for each of them that
-            lies outside the range of validity.
-
-        Raises:
-            InputError: When the approaches are not a finite, non-empty list, an asperity lies
-                outside the patches, or the mean heights do not fit them.
-            NotConverged: As for `solve`.
-        """
+        """Solve along approaches, each from the solution before it; see `MicroModel.respond`."""
         means = checked_means(mean_heights, patches)
         planes = [
             RigidPlane.above(self.surface, approach, tilt)
@@ -195,7 +171,7 @@ class ScaledModel:
         mean_heights: ArrayLike,
         start: Any = None,
     ) -> Pressed:
-        """Solve under one plane; see `micro.models.MicroModel.press`."""
+        """Solve under one plane; see `MicroModel.press`."""
         scaled = self._scaled(_highest_approach([plane], self.surface))
         own = start if start is not None and len(start) == len(scaled.summits) else None
         fitted = self._fitted(scaled, plane, own)

@@ -15,7 +15,7 @@ from micro import HalfSpaceModel
 from multiscale import Run, Scene, make_stage
 from multiscale.loading import Programme
 from multiscale.planning.block_work import _side_points, mesh_unknowns, reference_work, smooth_bytes
-from multiscale.planning.costs import predicted_cost, run_work
+from multiscale.planning.costs import predicted_cost
 from multiscale.planning.machine import Machine, this_machine
 from multiscale.planning.press_work import presses, step_count
 from multiscale.planning.work import Work
