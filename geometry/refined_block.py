@@ -126,8 +126,8 @@ def places_in_reach(
         np.linspace(0.0, length, max(2, math.ceil(length / spacing) + 1))
         for length in surface.lengths
     )
-    grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-    grid = np.vstack([grid, surface.highest_point])
+    lattice = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    grid = np.vstack([lattice, surface.highest_point])
     depth = depth_below_plane(surface, grid, approach, tilt)
     return grid[depth >= min(0.0, float(depth.max()))]
 

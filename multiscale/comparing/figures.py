@@ -95,7 +95,7 @@ def maps_figure(comparison: Comparison) -> Figure:
     across = min(3, max(1, len(rows)))
     down = max(1, -(-len(rows) // across))
     figure = Figure(figsize=(3.9 * across + 0.8, 3.9 * down), layout="constrained")
-    panels: Sequence[Any] = np.atleast_1d(figure.subplots(down, across)).ravel()
+    panels: Sequence[Any] = list(np.atleast_1d(figure.subplots(down, across)).ravel())
     top = max((float(_last_pressure(comparison, row).max()) for row in rows), default=1.0)
     image = None
     for axes, row in zip(panels, rows, strict=False):

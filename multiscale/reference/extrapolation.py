@@ -73,7 +73,7 @@ def extrapolated(values: ArrayLike, sizes: ArrayLike, order: float | None = None
     ratio = h[-2] / h[-1]
     if len(h) == 2:
         assert order is not None
-        rate = np.full(len(difference), order)
+        rate: Array = np.full(len(difference), order)
         slower = np.maximum(rate - _LESS, 0.5 * order)
     else:
         rate = _observed(results, h)
@@ -135,7 +135,8 @@ def _observed(results: Array, h: Array) -> Array:
     # (h₃ᵖ − h₂ᵖ) / (h₂ᵖ − h₁ᵖ) rises with p
     with np.errstate(divide="ignore", invalid="ignore"):
         found = coarse / fine
-    low, high = (np.full(len(found), rate) for rate in (LEAST_RATE, MOST_RATE))
+    low: Array = np.full(len(found), LEAST_RATE)
+    high: Array = np.full(len(found), MOST_RATE)
     shown = (found >= _quotient(h, low)) & (found <= _quotient(h, high))
     for _ in range(60):
         middle = 0.5 * (low + high)
