@@ -6,6 +6,7 @@ all releases share, and petsc4py.
 
 from __future__ import annotations
 
+import inspect
 import logging
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -14,7 +15,8 @@ from typing import Any
 
 import basix
 import numpy as np
-from dolfinx import fem, io, jit
+from dolfinx import cpp, fem, io, jit
+from dolfinx import mesh as dmesh
 from dolfinx.fem import petsc as fem_petsc
 from numpy.typing import NDArray
 from petsc4py import PETSc
@@ -72,6 +74,34 @@ def mesh_from_gmsh(model: Any, comm: Any) -> tuple[Any, Any]:
     """
     data = _gmsh_io.model_to_mesh(model, comm, 0, gdim=3)
     return (data.mesh, data.facet_tags) if hasattr(data, "mesh") else (data[0], data[2])
+
+
+@_quiet_compiler()
+def mesh_from_cells(
+    cells: NDArray[np.int64], points: NDArray[np.float64], comm: Any
+) -> Any:
+    """Make a mesh without ghosts of straight cells that stay on the rank that gives them.
+
+    Args:
+        cells: Numbers of the nodes of this rank's hexahedra or tetrahedra in the order of dolfinx,
+            shape (cells, 8 or 4); there may be none.
+        points: This rank's share of the nodes, numbered through the ranks, shape (n, 3).
+        comm: MPI communicator.
+
+    Note:
+        Collective. The coordinate element is that of `mesh_from_gmsh`: compiled forms serve both.
+    """
+
+    def stay(*_: Any) -> Any:
+        return cpp.graph.AdjacencyList_int32(np.full((len(cells), 1), comm.rank, dtype=np.int32))
+
+    gmsh_cell = {8: 5, 4: 4}[cells.shape[1]]
+    known = inspect.signature(dmesh.create_mesh).parameters
+    if "ghost_mode" in known:
+        domain, ghosts = _gmsh_io.ufl_mesh(gmsh_cell, 3), dmesh.GhostMode.none
+        return dmesh.create_mesh(comm, cells, points, domain, ghosts, stay)
+    domain = _gmsh_io.ufl_mesh(gmsh_cell, 3, dtype=np.float64)
+    return dmesh.create_mesh(comm, cells=cells, x=points, e=domain, partitioner=stay)
 
 
 @_compiling()
