@@ -78,7 +78,10 @@ def mesh_from_gmsh(model: Any, comm: Any) -> tuple[Any, Any]:
 
 @_quiet_compiler()
 def mesh_from_cells(
-    cells: NDArray[np.int64], points: NDArray[np.float64], comm: Any
+    cells: NDArray[np.int64],
+    points: NDArray[np.float64],
+    beyond: tuple[NDArray[np.int64], NDArray[np.int64]],
+    comm: Any,
 ) -> Any:
     """Make a mesh without ghosts of straight cells that stay on the rank that gives them.
 
@@ -86,22 +89,30 @@ def mesh_from_cells(
         cells: Numbers of the nodes of this rank's hexahedra or tetrahedra in the order of dolfinx,
             shape (cells, 8 or 4); there may be none.
         points: This rank's share of the nodes, numbered through the ranks, shape (n, 3).
+        beyond: Indices of this rank's cells next to those of other ranks, and these ranks, at
+            least one pair for every common facet and none twice.
         comm: MPI communicator.
 
     Note:
         Collective. The coordinate element is that of `mesh_from_gmsh`: compiled forms serve both.
     """
-
-    def stay(*_: Any) -> Any:
-        return cpp.graph.AdjacencyList_int32(np.full((len(cells), 1), comm.rank, dtype=np.int32))
-
     gmsh_cell = {8: 5, 4: 4}[cells.shape[1]]
-    known = inspect.signature(dmesh.create_mesh).parameters
-    if "ghost_mode" in known:
-        domain, ghosts = _gmsh_io.ufl_mesh(gmsh_cell, 3), dmesh.GhostMode.none
-        return dmesh.create_mesh(comm, cells, points, domain, ghosts, stay)
-    domain = _gmsh_io.ufl_mesh(gmsh_cell, 3, dtype=np.float64)
-    return dmesh.create_mesh(comm, cells=cells, x=points, e=domain, partitioner=stay)
+    owners = np.full(len(cells), comm.rank)
+    if "ghost_mode" not in inspect.signature(dmesh.create_mesh).parameters:
+        stay = _adjacency(np.arange(len(cells)), owners)
+        domain = _gmsh_io.ufl_mesh(gmsh_cell, 3, dtype=np.float64)
+        return dmesh.create_mesh(comm, cells=cells, x=points, e=domain, partitioner=lambda *_: stay)
+    # dolfinx 0.5 finds common vertices through ghosts, and drops these afterwards
+    stay = _adjacency(*(np.concatenate(both) for both in ((np.arange(len(cells)), beyond[0]), (owners, beyond[1]))))
+    domain = _gmsh_io.ufl_mesh(gmsh_cell, 3)
+    return dmesh.create_mesh(comm, cells, points, domain, dmesh.GhostMode.none, lambda *_: stay)
+
+
+def _adjacency(rows: NDArray[np.int64], values: NDArray[np.int64]) -> Any:
+    """Return values by row, those of a row in the order given; every row has one."""
+    order = np.argsort(rows, kind="stable")
+    offsets = np.concatenate([[0], np.cumsum(np.bincount(rows))])
+    return cpp.graph.AdjacencyList_int32(values[order].astype(np.int32), offsets.astype(np.int32))
 
 
 @_compiling()

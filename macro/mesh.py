@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from geometry.collective import on_root
 from geometry.errors import InputError
-from geometry.lattice_parts import lattice_cells, lattice_part, node_planes, node_share
+from geometry.lattice_parts import cells_beyond, lattice_cells, lattice_part, node_planes, node_share
 from geometry.meshes import BlockShape
 from geometry.refined_block import RefinedShape
 from macro import compat
@@ -108,7 +108,11 @@ def _from_lattice(shape: BlockShape, comm: Any) -> BlockMesh:
     counts = (len(x) - 1, len(y) - 1, len(z) - 1)
     part = lattice_part(counts, comm.size, comm.rank)
     cells = lattice_cells(counts, part, hexahedra=shape.hexahedral)
-    mesh = compat.mesh_from_cells(cells, node_share(ticks, comm.size, comm.rank), comm)
+    boxes, others = cells_beyond(counts, comm.size, part)
+    if not shape.hexahedral:
+        boxes, others = (6 * boxes[:, None] + np.arange(6)).ravel(), np.repeat(others, 6)
+    points = node_share(ticks, comm.size, comm.rank)
+    mesh = compat.mesh_from_cells(cells, points, (boxes, others), comm)
     numbers = np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)  # empty lists too
     planes = node_planes(counts, numbers)
     facets, markers = _marked(mesh, _on_faces(planes, counts))
