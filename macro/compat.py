@@ -103,7 +103,8 @@ def mesh_from_cells(
         domain = _gmsh_io.ufl_mesh(gmsh_cell, 3, dtype=np.float64)
         return dmesh.create_mesh(comm, cells=cells, x=points, e=domain, partitioner=lambda *_: stay)
     # dolfinx 0.5 finds common vertices through ghosts, and drops these afterwards
-    stay = _adjacency(*(np.concatenate(both) for both in ((np.arange(len(cells)), beyond[0]), (owners, beyond[1]))))
+    rows = np.concatenate([np.arange(len(cells)), beyond[0]])
+    stay = _adjacency(rows, np.concatenate([owners, beyond[1]]))
     domain = _gmsh_io.ufl_mesh(gmsh_cell, 3)
     return dmesh.create_mesh(comm, cells, points, domain, dmesh.GhostMode.none, lambda *_: stay)
 
@@ -151,23 +152,19 @@ def cellwise_space(mesh: Any) -> Any:
 
 def cell_nodes(space: Any) -> NDArray[np.int32]:
     """Return the rank-local nodes of every rank-local cell, shape (cells, nodes per cell)."""
-    return _as_table(space.dofmap.list, space.mesh)
+    table = space.dofmap.list
+    if isinstance(table, np.ndarray):
+        return table
+    return table.array.reshape(-1, space.dofmap.dof_layout.num_dofs)
 
 
 def cell_vertices(mesh: Any) -> NDArray[np.int32]:
     """Return the rows of ``mesh.geometry.x`` of every rank-local cell, shape (cells, vertices)."""
     geometry = mesh.geometry
     table = geometry.dofmaps[0] if hasattr(geometry, "dofmaps") else geometry.dofmap
-    return _as_table(table, mesh)
-
-
-def _as_table(table: Any, mesh: Any) -> NDArray[np.int32]:
     if isinstance(table, np.ndarray):
         return table
-    cells = mesh.topology.index_map(mesh.topology.dim)
-    # a rank without a single cell has nothing to infer the width from
-    count = cells.size_local + cells.num_ghosts
-    return table.array.reshape(count, -1 if count else 1)
+    return table.array.reshape(-1, geometry.cmap.create_dof_layout().num_dofs)
 
 
 def lagrange_values(cell_name: str, degree: int, points: NDArray[np.float64]) -> NDArray:

@@ -93,14 +93,21 @@ def _from_gmsh(shape: BlockShape | RefinedShape, comm: Any) -> BlockMesh:
         models: list[Any] = []
         on_root(comm, lambda: models.append(gmsh_session.enter_context(shape.meshed())))
         mesh, facet_tags = compat.mesh_from_gmsh(models[0] if models else None, comm)
-    planes = _planes(shape, mesh.geometry.x) if isinstance(shape, BlockShape) else None
+    planes = _onto_planes(shape, mesh.geometry.x) if isinstance(shape, BlockShape) else None
     return BlockMesh(mesh=mesh, facet_tags=facet_tags, shape=shape, planes=planes)
 
 
-def _planes(shape: BlockShape, points: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Return the indices of the grid planes next to points of a flat block, shape (n, 3)."""
-    borders = (0.5 * (ticks[1:] + ticks[:-1]) for ticks in shape.ticks)
-    return np.stack([np.searchsorted(at, points[:, k]) for k, at in enumerate(borders)], axis=1)
+def _onto_planes(shape: BlockShape, points: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Move points of a flat block, which gmsh places to 1e-9, onto the grid planes next to them.
+
+    Returns:
+        Indices of these planes, shape (n, 3).
+    """
+    planes = np.empty(points.shape, dtype=np.intp)
+    for axis, ticks in enumerate(shape.ticks):
+        planes[:, axis] = np.searchsorted(0.5 * (ticks[1:] + ticks[:-1]), points[:, axis])
+        points[:, axis] = ticks[planes[:, axis]]
+    return planes
 
 
 def _from_lattice(shape: BlockShape, comm: Any) -> BlockMesh:
