@@ -6,6 +6,7 @@ all releases share, and petsc4py.
 
 from __future__ import annotations
 
+import inspect
 import logging
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -14,7 +15,8 @@ from typing import Any
 
 import basix
 import numpy as np
-from dolfinx import fem, io, jit
+from dolfinx import cpp, fem, io, jit
+from dolfinx import mesh as dmesh
 from dolfinx.fem import petsc as fem_petsc
 from numpy.typing import NDArray
 from petsc4py import PETSc
@@ -74,6 +76,46 @@ def mesh_from_gmsh(model: Any, comm: Any) -> tuple[Any, Any]:
     return (data.mesh, data.facet_tags) if hasattr(data, "mesh") else (data[0], data[2])
 
 
+@_quiet_compiler()
+def mesh_from_cells(
+    cells: NDArray[np.int64],
+    points: NDArray[np.float64],
+    beyond: tuple[NDArray[np.int64], NDArray[np.int64]],
+    comm: Any,
+) -> Any:
+    """Make a mesh without ghosts of straight cells that stay on the rank that gives them.
+
+    Args:
+        cells: Numbers of the nodes of this rank's hexahedra or tetrahedra in the order of dolfinx,
+            shape (cells, 8 or 4); there may be none.
+        points: This rank's share of the nodes, numbered through the ranks, shape (n, 3).
+        beyond: Indices of this rank's cells next to those of other ranks, and these ranks, at
+            least one pair for every common facet and none twice.
+        comm: MPI communicator.
+
+    Note:
+        Collective. The coordinate element is that of `mesh_from_gmsh`: compiled forms serve both.
+    """
+    gmsh_cell = {8: 5, 4: 4}[cells.shape[1]]
+    owners = np.full(len(cells), comm.rank)
+    if "ghost_mode" not in inspect.signature(dmesh.create_mesh).parameters:
+        stay = _adjacency(np.arange(len(cells)), owners)
+        domain = _gmsh_io.ufl_mesh(gmsh_cell, 3, dtype=np.float64)
+        return dmesh.create_mesh(comm, cells=cells, x=points, e=domain, partitioner=lambda *_: stay)
+    # dolfinx 0.5 finds common vertices through ghosts, and drops these afterwards
+    rows = np.concatenate([np.arange(len(cells)), beyond[0]])
+    stay = _adjacency(rows, np.concatenate([owners, beyond[1]]))
+    domain = _gmsh_io.ufl_mesh(gmsh_cell, 3)
+    return dmesh.create_mesh(comm, cells, points, domain, dmesh.GhostMode.none, lambda *_: stay)
+
+
+def _adjacency(rows: NDArray[np.int64], values: NDArray[np.int64]) -> Any:
+    """Return values by row, those of a row in the order given; every row has one."""
+    order = np.argsort(rows, kind="stable")
+    offsets = np.concatenate([[0], np.cumsum(np.bincount(rows))])
+    return cpp.graph.AdjacencyList_int32(values[order].astype(np.int32), offsets.astype(np.int32))
+
+
 @_compiling()
 def vector_space(mesh: Any, degree: int) -> Any:
     """Return the continuous Lagrange space of displacements, three components per node.
@@ -110,23 +152,19 @@ def cellwise_space(mesh: Any) -> Any:
 
 def cell_nodes(space: Any) -> NDArray[np.int32]:
     """Return the rank-local nodes of every rank-local cell, shape (cells, nodes per cell)."""
-    return _as_table(space.dofmap.list, space.mesh)
+    table = space.dofmap.list
+    if isinstance(table, np.ndarray):
+        return table
+    return table.array.reshape(-1, space.dofmap.dof_layout.num_dofs)
 
 
 def cell_vertices(mesh: Any) -> NDArray[np.int32]:
     """Return the rows of ``mesh.geometry.x`` of every rank-local cell, shape (cells, vertices)."""
     geometry = mesh.geometry
     table = geometry.dofmaps[0] if hasattr(geometry, "dofmaps") else geometry.dofmap
-    return _as_table(table, mesh)
-
-
-def _as_table(table: Any, mesh: Any) -> NDArray[np.int32]:
     if isinstance(table, np.ndarray):
         return table
-    cells = mesh.topology.index_map(mesh.topology.dim)
-    # a rank without a single cell has nothing to infer the width from
-    count = cells.size_local + cells.num_ghosts
-    return table.array.reshape(count, -1 if count else 1)
+    return table.array.reshape(-1, geometry.cmap.create_dof_layout().num_dofs)
 
 
 def lagrange_values(cell_name: str, degree: int, points: NDArray[np.float64]) -> NDArray:

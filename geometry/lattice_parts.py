@@ -1,0 +1,158 @@
+"""The cells of a rectangular lattice by number, divided among ranks in closed form.
+
+Nothing here grows with the whole lattice: a rank makes the cells of its own part, and an even share
+of the nodes, without asking another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Numbers = NDArray[np.int64]
+Counts: TypeAlias = tuple[int, int, int]
+Part: TypeAlias = tuple[range, range, range]
+
+_CORNERS = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)])
+"""Vertices of a box in the order of dolfinx: x runs first."""
+
+_TETRAHEDRA = np.array(
+    [(0, 1, 2, 4), (1, 3, 2, 4), (2, 3, 6, 4), (1, 5, 3, 4), (3, 5, 6, 4), (3, 5, 7, 6)]
+)
+"""Six positively oriented tetrahedra in a box, cut as gmsh cuts the boxes of `mesh_lattice`."""
+
+
+def lattice_part(cells: Counts, ranks: int, rank: int) -> Part:
+    """Return the box of cells that is a rank's part of a lattice.
+
+    The ranks are halved again and again, and the lattice with them, in proportion, across the axis
+    with the most cells, which cuts the fewest of them. Parts differ by rounding to whole layers;
+    they are empty only where layers are fewer than ranks.
+
+    Args:
+        cells: Cells of the lattice along x, y and z.
+        ranks: Number of parts.
+        rank: Which part.
+
+    Returns:
+        Which cells along x, y and z.
+
+    Source:
+        Recursive bisection: Berger, Bokhari, IEEE Transactions on Computers C-36 (1987) 570,
+        doi 10.1109/TC.1987.1676942.
+    """
+    part = _whole(cells)
+    while ranks > 1:
+        lower, upper, few = _halves(part, ranks)
+        if rank < few:
+            part, ranks = lower, few
+        else:
+            part, ranks, rank = upper, ranks - few, rank - few
+    return part
+
+
+def cells_beyond(cells: Counts, ranks: int, part: Part) -> tuple[Numbers, Numbers]:
+    """Return which of a part's cells share faces with those of other ranks.
+
+    Args:
+        cells: Cells of the lattice along x, y and z.
+        ranks: Number of parts.
+        part: The part of one of them.
+
+    Returns:
+        Numbers of cells in the part, in the order of `lattice_cells`, and the ranks beyond their
+        faces, shapes (n,); cells at edges of the part come more than once, with different ranks.
+    """
+    size = [len(of) for of in part]
+    numbers = np.arange(np.prod(size)).reshape(size)
+    found, others = [numbers[:0].ravel()], [numbers[:0].ravel()]
+    for axis, of in enumerate(part):
+        for last, beyond in ((0, of.start - 1), (-1, of.stop)):
+            if numbers.size and 0 <= beyond < cells[axis]:
+                layer = [np.array(each) for each in part]
+                layer[axis] = np.array([beyond])
+                places = np.stack(np.meshgrid(*layer, indexing="ij"), axis=-1).reshape(-1, 3)
+                found.append(numbers.take([last], axis=axis).ravel())
+                others.append(_ranks_at(_whole(cells), 0, ranks, places))
+    return np.concatenate(found), np.concatenate(others)
+
+
+def _whole(cells: Counts) -> Part:
+    return range(cells[0]), range(cells[1]), range(cells[2])
+
+
+def _halves(part: Part, ranks: int) -> tuple[Part, Part, int]:
+    """Return two parts of a part for half the ranks each, and the number of the lower ones."""
+    few = ranks // 2
+    axis = max(range(3), key=lambda k: len(part[k]))
+    cut = (2 * len(part[axis]) * few + ranks) // (2 * ranks)  # to the nearest layer
+    lower, upper = list(part), list(part)
+    lower[axis], upper[axis] = part[axis][:cut], part[axis][cut:]
+    return (lower[0], lower[1], lower[2]), (upper[0], upper[1], upper[2]), few
+
+
+def _ranks_at(part: Part, first: int, ranks: int, places: Numbers) -> Numbers:
+    """Return who of some ranks, who share a part, has the cells at some places (n, 3)."""
+    found = np.full(len(places), first)
+    if ranks > 1 and len(places):
+        lower, upper, few = _halves(part, ranks)
+        below = np.all([places[:, k] < of.stop for k, of in enumerate(lower)], axis=0)
+        found[below] = _ranks_at(lower, first, few, places[below])
+        found[~below] = _ranks_at(upper, first + few, ranks - few, places[~below])
+    return found
+
+
+def lattice_cells(cells: Counts, part: Part, *, hexahedra: bool) -> Numbers:
+    """Return the nodes of the cells of a part, by their numbers in the whole lattice.
+
+    The node where the planes i, j, k meet has the number (i (ny + 1) + j) (nz + 1) + k.
+
+    Args:
+        cells: Cells of the lattice along x, y and z.
+        part: Which of them, along x, y and z.
+        hexahedra: Hexahedra, or six tetrahedra in the place of each.
+
+    Returns:
+        Numbers in the order of dolfinx, shape (cells of the part, 8), or (6 times as many, 4).
+    """
+    strides = np.array([(cells[1] + 1) * (cells[2] + 1), cells[2] + 1, 1])
+    along = [stride * np.arange(of.start, of.stop) for stride, of in zip(strides, part, strict=True)]
+    first = (along[0][:, None, None] + along[1][:, None] + along[2]).ravel()
+    corners = _CORNERS @ strides
+    offsets = corners if hexahedra else corners[_TETRAHEDRA].ravel()
+    return (first[:, None] + offsets).reshape(-1, 8 if hexahedra else 4)
+
+
+def node_planes(cells: Counts, numbers: Numbers) -> NDArray[np.intp]:
+    """Return which planes across x, y and z meet at nodes.
+
+    Args:
+        cells: Cells of the lattice along x, y and z.
+        numbers: Numbers of the nodes, shape (n,).
+
+    Returns:
+        Indices of the planes, shape (n, 3).
+    """
+    planes = np.unravel_index(numbers, [count + 1 for count in cells])
+    return np.stack(planes, axis=1)
+
+
+def node_share(ticks: Sequence[Array], ranks: int, rank: int) -> Array:
+    """Return the places of an even share of a lattice's nodes, consecutive in number.
+
+    Args:
+        ticks: Coordinates of the planes across x, y and z [mm].
+        ranks: Number of shares.
+        rank: Which share.
+
+    Returns:
+        Points, shape (n, 3) [mm].
+    """
+    cells = (len(ticks[0]) - 1, len(ticks[1]) - 1, len(ticks[2]) - 1)
+    count = len(ticks[0]) * len(ticks[1]) * len(ticks[2])
+    planes = node_planes(cells, np.arange(count * rank // ranks, count * (rank + 1) // ranks))
+    return np.stack([of[planes[:, k]] for k, of in enumerate(ticks)], axis=1)

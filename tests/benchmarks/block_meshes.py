@@ -1,0 +1,90 @@
+"""Meshes of flat blocks from gmsh and from all ranks: time, memory, what ranks share, products.
+
+Run by hand on an idle machine: ``.venv/bin/python tests/benchmarks/block_meshes.py``; every line in
+clean processes, the least time of a few. Memory is the growth of rank 0's peak while the mesh is
+made. Shared are the nodes that a rank sees but another has, and neighbours the ranks it exchanges
+them with, largest over the ranks; the product is that of the stiffness with a vector.
+"""
+
+import argparse
+import json
+import os
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+ENVIRONMENT = os.environ | {
+    "OMP_NUM_THREADS": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    "OMPI_MCA_rmaps_base_oversubscribe": "1",
+    "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
+    "OMPI_MCA_btl": "^tcp",
+    "PYTHONPATH": str(ROOT),
+}
+PRODUCTS = 20
+
+
+def measure(cells: list[int], element: str, builder: str, product: bool) -> None:
+    """Make a mesh on this job's ranks; rank 0 prints what it took as JSON."""
+    from mpi4py import MPI
+    from petsc4py import PETSc
+
+    from geometry import BlockShape
+    from macro import Block, Material, block_mesh
+
+    comm = MPI.COMM_WORLD
+    PETSc.Log.begin()
+
+    def largest(value):
+        return comm.allreduce(value, op=MPI.MAX)
+
+    def peak():
+        return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+    def timed(work):
+        comm.Barrier()
+        began = time.perf_counter(), time.process_time()
+        result = work()
+        return result, largest(time.perf_counter() - began[0]), time.process_time() - began[1]
+
+    small = BlockShape(interface=(1.0, 1.0), height=0.5, cells=(1, 1, 1), element=element)
+    block_mesh(small, comm, builder)  # imports
+    shape = BlockShape(
+        interface=(1.0, 1.0), height=0.5, cells=tuple(cells), element=element, grading=4.0
+    )
+    before = peak()
+    mesh, seconds, busy = timed(lambda: block_mesh(shape, comm, builder))
+    facts = {"seconds": seconds, "busy": busy, "memory": peak() - before}
+    own = mesh.mesh.topology.index_map(3)
+    facts |= {
+        "cells": own.size_global,
+        "imbalance": largest(own.size_local) * comm.size / own.size_global,
+    }
+    if product:
+        matrix = Block(mesh, Material(young_modulus=4e3, poisson_ratio=0.15)).stiffness
+        x, y = matrix.createVecs()
+        x.set(1.0)
+        event = PETSc.Log.Event("MatMult")
+        before = event.getPerfInfo()
+        facts["product"] = min(timed(lambda: matrix.mult(x, y))[2] for _ in range(PRODUCTS))
+        after = event.getPerfInfo()
+        # PETSc counts a message where it is sent and where it is received
+        for name, key in (("messages", "numMessages"), ("bytes", "messageLength")):
+            facts[name] = largest(0.5 * (after[key] - before[key]) / PRODUCTS)
+    if comm.rank == 0:
+        print(json.dumps(facts))
+
+
+def on(ranks: int, *words: object) -> dict:
+    """Start this file on a number of ranks and return what it measured."""
+    command = ["mpirun", "-n", str(ranks), sys.executable, __file__, *map(str, words)]
+    done = subprocess.run(
+        command, cwd=ROOT, env=ENVIRONMENT, capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        sys.exit(done.stderr)
+    return json.loads(done.stdout.splitlines()[-1])
