@@ -17,7 +17,7 @@ from geometry.errors import InputError
 from macro import compat
 from macro.elasticity import Material, rigid_body_modes, stiffness_form
 from macro.mesh import BOTTOM, SIDES, BlockMesh
-from macro.multigrid import lattice_of, transfers
+from macro.multigrid import Lattice, coarser_grids, lattice_of
 from macro.solvers import linear_solver, solve_linear
 
 Sides = Literal["free", "roller"]
@@ -84,8 +84,10 @@ class Block:
     @cached_property
     def stiffness(self) -> PETSc.Mat:
         """Stiffness matrix [N/mm] with unit rows for constrained degrees of freedom."""
-        matrix = compat.assemble_matrix(compat.compile_form(self._form), self.conditions)
-        matrix.setOption(PETSc.Mat.Option.SPD, True)
+        kind = "baij" if self._lattice else "aij"
+        matrix = compat.assemble_matrix(compat.compile_form(self._form), self.conditions, kind)
+        if kind == "aij":
+            matrix.setOption(PETSc.Mat.Option.SPD, True)  # for the user's direct solvers
         matrix.setNearNullSpace(rigid_body_modes(self.space))
         return matrix
 
@@ -97,10 +99,10 @@ class Block:
     @cached_property
     def solver(self) -> PETSc.KSP:
         """Linear solver of the block alone; its preconditioner also serves the contact solves."""
-        lattice = lattice_of(self.space, self.mesh)
+        matrix, lattice = self.stiffness, self._lattice
         if lattice is None:
-            return linear_solver(self.stiffness)
-        return linear_solver(self.stiffness, transfers=lambda: transfers(lattice, self.free))
+            return linear_solver(matrix)
+        return linear_solver(matrix, coarser=lambda: coarser_grids(lattice, matrix, self.free))
 
     def solve(self, load: PETSc.Vec) -> Any:
         """Return the displacement under a nodal load.
@@ -137,6 +139,10 @@ class Block:
             displacement: Owned degrees of freedom [mm].
         """
         return float(self._bottom_row.dot(displacement))
+
+    @cached_property
+    def _lattice(self) -> Lattice | None:
+        return lattice_of(self.space, self.mesh)
 
     @cached_property
     def _form(self) -> Any:

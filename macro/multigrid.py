@@ -1,14 +1,14 @@
 """Geometric multigrid on blocks whose nodes form a rectangular lattice: the transfers.
 
 Grids coarsen where the planes of the lattice are close (see `coarsenings`), displacements are
-interpolated trilinearly in the flat lattice, and PETSc's PCMG makes the coarser matrices by
-Galerkin's products, so that all follows the true matrix, on rough blocks too. A node of a coarser
-grid lives on the rank of the node of the finer grid that it is.
+interpolated trilinearly in the flat lattice, and the coarser matrices are Galerkin's products, so
+that all follows the true matrix, on rough blocks too. A node of a coarser grid lives on the rank of
+the node of the finer grid that it is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +21,8 @@ from geometry.meshes import BlockShape
 from macro import compat
 from macro.mesh import BlockMesh
 from macro.multigrid_grids import Kept, Lines, coarsenings
+from macro.multigrid_products import galerkin
+from macro.solvers import CoarserGrid
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -39,6 +41,23 @@ class Lattice:
 
     grid: Sequence[Lines]
     nodes: Indices
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Transfer:
+    """From a grid to the next finer one.
+
+    Args:
+        weights: Of nodes by coarse nodes.
+        interpolation: Of unknowns by coarse unknowns, held ones apart.
+        free: 1 for unknowns of the finer grid that are free, 0 for those that are held.
+        coarse_free: The same for the coarser grid.
+    """
+
+    weights: PETSc.Mat
+    interpolation: PETSc.Mat
+    free: PETSc.Vec
+    coarse_free: PETSc.Vec
 
 
 def lattice_of(space: Any, mesh: BlockMesh) -> Lattice | None:
@@ -63,8 +82,26 @@ def lattice_of(space: Any, mesh: BlockMesh) -> Lattice | None:
     return Lattice(grid, found[: nodes.size_local])
 
 
-def transfers(lattice: Lattice, free: PETSc.Vec) -> list[PETSc.Mat]:
-    """Return the interpolations from every grid but the finest to the next finer one.
+def coarser_grids(lattice: Lattice, matrix: PETSc.Mat, free: PETSc.Vec) -> list[CoarserGrid]:
+    """Return the interpolations and matrices of every grid but the finest, finest grid first.
+
+    Args:
+        lattice: Nodes of the finest grid.
+        matrix: Its matrix, of PETSc's type ``baij``, with unit rows and columns where held.
+        free: 1 for unknowns that are free, 0 for those that are held.
+
+    Note:
+        Collective.
+    """
+    found = []
+    for step in transfers(lattice, free):
+        matrix = galerkin(matrix, step.weights, step.free, step.coarse_free)
+        found.append(CoarserGrid(step.interpolation, matrix))
+    return found
+
+
+def transfers(lattice: Lattice, free: PETSc.Vec) -> Iterator[Transfer]:
+    """Yield the transfers from every grid but the finest to the next finer one.
 
     What is held stays apart on every grid: held unknowns neither give nor take, and the coarser
     matrices have unit rows for them like the finest.
@@ -73,20 +110,20 @@ def transfers(lattice: Lattice, free: PETSc.Vec) -> list[PETSc.Mat]:
         lattice: Nodes of the finest grid.
         free: 1 for unknowns that are free, 0 for those that are held.
 
-    Returns:
-        The matrices, finest grid first.
+    Yields:
+        Finest grid first.
 
     Note:
         Collective.
     """
-    found, grid, nodes = [], lattice.grid, lattice.nodes
+    grid, nodes = lattice.grid, lattice.nodes
     for kept in coarsenings(grid):
         rows, stay = _node_weights(grid, kept, nodes, free.comm)
-        matrix, free = _for_displacements(rows, stay, free)
-        found.append(matrix)
+        weights = _distributed(rows, len(stay), free.comm)
+        interpolation, coarse = _for_displacements(rows, stay, free)
+        yield Transfer(weights, interpolation, free, coarse)
         nodes = np.stack([np.searchsorted(of, nodes[stay, k]) for k, of in enumerate(kept)], axis=1)
-        grid = [lines.only(of) for lines, of in zip(grid, kept, strict=True)]
-    return found
+        grid, free = [lines.only(of) for lines, of in zip(grid, kept, strict=True)], coarse
 
 
 def _node_weights(
@@ -112,6 +149,13 @@ def _node_weights(
     return rows, stay
 
 
+def _distributed(rows: sparse.csr_matrix, columns: int, comm: PETSc.Comm) -> PETSc.Mat:
+    """Return a matrix from its rows on every rank, and how many columns each owns."""
+    pattern = (part.astype(PETSc.IntType) for part in (rows.indptr, rows.indices))
+    size = ((rows.shape[0], None), (columns, None))
+    return PETSc.Mat().createAIJ(size, csr=(*pattern, rows.data), comm=comm)
+
+
 def _for_displacements(
     weights: sparse.csr_matrix, stay: Indices, free: PETSc.Vec
 ) -> tuple[PETSc.Mat, PETSc.Vec]:
@@ -119,9 +163,8 @@ def _for_displacements(
     count = weights.shape[0]
     rows = weights[np.repeat(np.arange(count), 3)]
     component = np.repeat(np.tile(np.arange(3), count), np.diff(rows.indptr))
-    pattern = (part.astype(PETSc.IntType) for part in (rows.indptr, 3 * rows.indices + component))
-    size = ((3 * count, None), (3 * len(stay), None))
-    matrix = PETSc.Mat().createAIJ(size, csr=(*pattern, rows.data), comm=free.comm)
+    rows.indices = 3 * rows.indices + component
+    matrix = _distributed(rows, 3 * len(stay), free.comm)
     coarse = matrix.createVecRight()
     same = (3 * stay[:, None] + np.arange(3)).ravel()
     coarse.array[:] = free.array_r[same]

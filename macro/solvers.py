@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
+from dataclasses import dataclass
 
 from petsc4py import PETSc
 
@@ -30,7 +31,6 @@ ALGEBRAIC_DEFAULTS: Mapping[str, object] = {
 
 GEOMETRIC_DEFAULTS: Mapping[str, object] = {
     "pc_type": "mg",
-    "pc_mg_galerkin": "both",
     "mg_levels_ksp_type": "chebyshev",
     "mg_levels_esteig_ksp_type": "cg",
     "mg_levels_pc_type": "jacobi",
@@ -69,56 +69,66 @@ def default_options(prefix: str, defaults: Mapping[str, object]) -> Iterator[Non
             database.delValue(name)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class CoarserGrid:
+    """One of the coarser grids of a geometric multigrid.
+
+    Args:
+        interpolation: From this grid to the next finer one.
+        matrix: The matrix on this grid.
+    """
+
+    interpolation: PETSc.Mat
+    matrix: PETSc.Mat
+
+
 def linear_solver(
     matrix: PETSc.Mat,
     prefix: str = PREFIX,
-    transfers: Callable[[], Sequence[PETSc.Mat]] | None = None,
+    coarser: Callable[[], Sequence[CoarserGrid]] | None = None,
 ) -> PETSc.KSP:
     """Return a solver for a symmetric positive definite matrix, its preconditioner set up.
 
     Args:
         matrix: The matrix, with its near-nullspace attached.
         prefix: Prefix of its PETSc options.
-        transfers: Makes the interpolations of a geometric multigrid, finest first; called unless
-            the user chooses another preconditioner.
+        coarser: Makes the coarser grids of a geometric multigrid, finest first; called unless the
+            user chooses another preconditioner.
 
     Note:
         Collective.
     """
     solver = PETSc.KSP().create(matrix.comm)
     solver.setOptionsPrefix(prefix)
-    solver.setOperators(matrix)
-    geometric = transfers is not None and PETSc.Options(prefix).getString("pc_type", "mg") == "mg"
-    if transfers is not None and geometric:
-        steps = transfers()
-        solver.pc.setType("mg")
-        solver.pc.setMGLevels(len(steps) + 1)
-        for level, step in enumerate(reversed(steps), start=1):
-            solver.pc.setMGInterpolation(level, step)
+    geometric = coarser is not None and PETSc.Options(prefix).getString("pc_type", "mg") == "mg"
+    if coarser is not None and geometric:
+        solver.setOperators(matrix)
+        _set_grids(solver.pc, coarser())
+    else:
+        solver.setOperators(matrix, _pointwise(matrix))
     preconditioner = GEOMETRIC_DEFAULTS if geometric else ALGEBRAIC_DEFAULTS
     with default_options(prefix, {**KRYLOV_DEFAULTS, **preconditioner}):
         solver.setFromOptions()
-        with _lean_products() if geometric and matrix.comm.size > 1 else nullcontext():
-            solver.setUp()  # multigrid reads the options of its levels here
+        solver.setUp()  # multigrid reads the options of its levels here
     return solver
 
 
-@contextmanager
-def _lean_products() -> Iterator[None]:
-    """Let PETSc form coarser matrices of several ranks without copies of the finer ones.
+def _set_grids(preconditioner: PETSc.PC, grids: Sequence[CoarserGrid]) -> None:
+    preconditioner.setType("mg")
+    preconditioner.setMGLevels(len(grids) + 1)
+    for level, grid in enumerate(reversed(grids)):
+        preconditioner.setMGInterpolation(level + 1, grid.interpolation)
+        preconditioner.getMGSmoother(level).setOperators(grid.matrix)
 
-    That takes twice the time but saves 1 kB per unknown. The products have no prefix of their own,
-    so that the option stands without one for as long as they are formed.
-    """
-    database, name = PETSc.Options(), "matptap_via"
-    if database.hasName(name):
-        yield
-        return
-    database.setValue(name, "allatonce")
-    try:
-        yield
-    finally:
-        database.delValue(name)
+
+def _pointwise(matrix: PETSc.Mat) -> PETSc.Mat:
+    """Return a matrix without blocks, which is all that most preconditioners take."""
+    if not matrix.getType().endswith("baij"):
+        return matrix
+    copy = matrix.convert("aij", PETSc.Mat())
+    copy.setOption(PETSc.Mat.Option.SPD, True)
+    copy.setNearNullSpace(matrix.getNearNullSpace())
+    return copy
 
 
 def solve_linear(solver: PETSc.KSP, load: PETSc.Vec, solution: PETSc.Vec) -> int:

@@ -63,10 +63,12 @@ class StiffPreconditioner:
 
 def _square(matrix: PETSc.Mat, dofs: NDArray[np.intp]) -> csr_array:
     """Return the rows and columns of some dofs; a copy of all would take 1 kB per dof."""
-    at = PETSc.IS().createGeneral(dofs.astype(PETSc.IntType), comm=matrix.comm)
-    part = matrix.createSubMatrix(at, at)
+    nodes = np.unique(dofs // 3)
+    at = PETSc.IS().createBlock(3, nodes.astype(PETSc.IntType), comm=matrix.comm)
+    part = matrix.createSubMatrix(at, at)  # matrices of blocks give whole ones
     rows, columns, entries = part.getValuesCSR()
-    return csr_array((entries, columns, rows), shape=part.getSize())
+    among = 3 * np.searchsorted(nodes, dofs // 3) + dofs % 3
+    return csr_array((entries, columns, rows), shape=part.getSize())[among][:, among]
 
 
 class _Split:
