@@ -6,7 +6,8 @@ named. Strong scaling on 10⁶ unknowns, weak scaling on 5·10⁵ per rank, unif
 beside what two cores get of the memory. Then messages, bytes and reductions on 1 to 8 ranks, grid
 by grid, and iterations on 10⁴ to 10⁶ unknowns, which do not depend on the machine even where ranks
 share cores. ``--large`` adds 5·10⁶ unknowns and 27 ranks; it wants 13 GB. ``--ranks N`` starts
-whatever is told of sizes alone, the iterations, on N ranks.
+what is told of sizes alone, the iterations, on N ranks. ``--facts FILE`` keeps what was measured
+for other runs, which measure the rest only.
 """
 
 import argparse
@@ -15,7 +16,6 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 
 import scaling_tables as tables
@@ -45,15 +45,26 @@ def start(ranks: int, script: str, *words: str) -> dict:
     return json.loads(done.stdout.splitlines()[-1])
 
 
-@cache
-def solved(ranks: int, sizes: str) -> dict:
-    """Return the facts of one block, measured once."""
-    return start(ranks, "scaling_rank.py", sizes)
+class Facts:
+    """Facts of blocks, each measured once.
 
+    Args:
+        file: Where they are kept from run to run; None: nowhere.
+    """
 
-def on(ranks: int, sizes: Sizes) -> dict:
-    """Return the facts of one block on a number of ranks."""
-    return solved(ranks, json.dumps(sizes))
+    def __init__(self, file: Path | None) -> None:
+        self._file, self._known = file, {}
+        if file and file.exists():
+            self._known = json.loads(file.read_text(encoding="utf-8"))
+
+    def __call__(self, ranks: int, sizes: Sizes) -> dict:
+        """Return those of one block on a number of ranks."""
+        name = json.dumps([ranks, sizes])
+        if name not in self._known:
+            self._known[name] = start(ranks, "scaling_rank.py", json.dumps(sizes))
+            if self._file:
+                self._file.write_text(json.dumps(self._known), encoding="utf-8")
+        return self._known[name]
 
 
 def block(
@@ -103,10 +114,11 @@ class Benchmark:
         scale: Share of the unknowns.
         large: Whether blocks of 5·10⁶ unknowns and 27 ranks are measured too.
         ranks: Ranks of what does not depend on them.
+        on: Facts of a block on a number of ranks.
     """
 
-    def __init__(self, scale: float, large: bool, ranks: int) -> None:
-        self.scale, self.is_large, self.ranks = scale, large, ranks
+    def __init__(self, scale: float, large: bool, ranks: int, on: Facts) -> None:
+        self.scale, self.is_large, self.ranks, self.on = scale, large, ranks, on
         self.rates: dict[int, dict[str, float]] = {}
 
     def bandwidth(self) -> None:
@@ -118,42 +130,48 @@ class Benchmark:
         """One block on 1 and 2 ranks."""
         for unknowns in (1e6, 5e6) if self.is_large else (1e6,):
             for name in PARALLEL:
-                facts = [on(ranks, SHAPES[name](self.scale * unknowns)) for ranks in (1, 2)]
+                facts = [self.on(ranks, SHAPES[name](self.scale * unknowns)) for ranks in (1, 2)]
                 tables.show_times(f"strong scaling, {name}", facts, self.rates, weak=False)
 
     def weak(self) -> None:
         """As many unknowns for each rank, on 1 and 2."""
         for unknowns in (5e5, 2.5e6) if self.is_large else (5e5,):
             for name in PARALLEL:
-                facts = [on(ranks, weak(name, self.scale * unknowns, ranks)) for ranks in (1, 2)]
+                facts = [
+                    self.on(ranks, weak(name, self.scale * unknowns, ranks)) for ranks in (1, 2)
+                ]
                 tables.show_times(f"weak scaling, {name}", facts, self.rates, weak=True)
 
     def counted(self) -> list[dict]:
         """Return the facts of the block whose messages are counted."""
         numbers = (1, 2, 4, 8, 27) if self.is_large else (1, 2, 4, 8)
-        return [on(ranks, SHAPES["uniform cube"](self.scale * 2e5)) for ranks in numbers]
+        return [self.on(ranks, SHAPES["uniform cube"](self.scale * 2e5)) for ranks in numbers]
+
+    def graded(self) -> list[dict]:
+        """Return the facts of a graded block on 2 and 8 ranks."""
+        return [self.on(ranks, SHAPES["graded 20"](self.scale * 2e5)) for ranks in (2, 8)]
 
     def counts(self) -> None:
         """What an iteration sends, grid by grid."""
         tables.show_counts("uniform cube", self.counted())
         tables.show_levels("uniform cube", self.counted())
-        graded = [on(ranks, SHAPES["graded 20"](self.scale * 2e5)) for ranks in (2, 8)]
-        tables.show_levels("graded 20", graded)
+        tables.show_levels("graded 20", self.graded())
 
     def iterations(self) -> None:
         """Iterations over sizes and shapes."""
         sizes = [self.scale * n for n in (1e4, 1e5, 1e6, 5e6)[: 4 if self.is_large else 3]]
         tables.show_iterations(
-            (name, [on(self.ranks, shape(n)) for n in sizes]) for name, shape in SHAPES.items()
+            (name, [self.on(self.ranks, shape(n)) for n in sizes]) for name, shape in SHAPES.items()
         )
 
     def model(self) -> None:
         """What the counts mean for many ranks, and how well they follow the model on few."""
         facts = {fact["ranks"]: fact for fact in self.counted()}
         seen = observed(facts[2], facts[8])
-        smaller = on(8, SHAPES["uniform cube"](self.scale * 2e5 / 8))
+        smaller = self.on(8, SHAPES["uniform cube"](self.scale * 2e5 / 8))
         tables.show_check(seen, list(facts.values()), smaller)
-        tables.show_model(seen)
+        tables.show_model("uniform cube", seen)
+        tables.show_model("graded 20", observed(*self.graded()))
 
 
 def main() -> None:
@@ -164,8 +182,11 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="a hundredth of the unknowns")
     parser.add_argument("--large", action="store_true", help="5·10⁶ unknowns and 27 ranks as well")
     parser.add_argument("--ranks", type=int, default=1, help="ranks of the iterations' part")
+    parser.add_argument("--facts", type=Path, help="JSON file that measured facts are kept in")
     choice = parser.parse_args()
-    benchmark = Benchmark(0.01 if choice.quick else 1.0, choice.large, choice.ranks)
+    benchmark = Benchmark(
+        0.01 if choice.quick else 1.0, choice.large, choice.ranks, Facts(choice.facts)
+    )
     for part in choice.parts or parts:
         getattr(benchmark, part)()
 

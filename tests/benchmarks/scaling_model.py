@@ -2,11 +2,11 @@
 
 An iteration on P ranks with n unknowns each takes
 
-    T = n w / M  +  e (λ + k o) + v n^(2/3) / β  +  r λ log₂ P  +  λ + (P − 1) o + f / M
+    T = n w / M  +  e (λ + k o) + v n^(2/3) / β  +  r λ log₂ P  +  λ + c o + f / M
 
-that is memory traffic of w bytes per unknown; e exchanges with k neighbours, and the bytes sent
-in them; r reductions; and the coarsest grid, which every rank gets whole, from its owners one by
-one, and solves with a factor of f bytes. λ + k o is LogGP's cost of k messages that overlap
+that is memory traffic of w bytes per unknown; e exchanges with k neighbours, and the bytes sent in
+them; r reductions; and the coarsest grid, which its owners send to all ranks one by one, c = P − 1,
+and every rank solves with a factor of f bytes. λ + k o is LogGP's cost of k messages that overlap
 (Alexandrov et al. 1995, doi 10.1145/215399.215427), λ log₂ P that of a reduction by recursive
 doubling (Thakur, Rabenseifner & Gropp 2005, doi 10.1177/1094342005051521). e grows with the number
 of grids, which an eightfold problem has one more of.
@@ -34,7 +34,7 @@ class Machine:
     memory: float = 5e9
     latency: float = 2e-6
     overhead: float = 0.4e-6
-    network: float = 1e9
+    network: float = 0.4e9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,9 +47,11 @@ class Iteration:
         outside: Exchanges outside of the multigrid, on the finest grid.
         volume: v, of a rank inside a large job [B].
         reductions: r.
-        coarsest: Unknowns below which a grid is solved directly.
+        unknowns: Of the block that was seen.
+        grids: Its grids but for the coarsest.
+        owners: Ranks that the nodes of the coarsest grid can lie on.
         factor: f, bytes that the coarsest solve moves.
-        gathered: Whether the coarsest grid goes to few ranks along a tree, not to all.
+        gathered: Ranks that the coarsest grid is gathered on and solved by each; 0: all.
     """
 
     traffic: float
@@ -57,18 +59,26 @@ class Iteration:
     outside: float
     volume: float
     reductions: float
-    coarsest: float
+    unknowns: float
+    grids: int
+    owners: float
     factor: float
-    gathered: bool = False
+    gathered: int = 0
 
-    def grids(self, unknowns: float) -> int:
-        """Return the number of grids above the coarsest."""
-        return max(1, math.ceil(math.log(unknowns / self.coarsest, 8.0)))
+    def rounds(self, unknowns: float) -> float:
+        """Return e for a block of some unknowns."""
+        more = max(0.0, math.log(unknowns / self.unknowns, 8.0))
+        return self.exchanges * (self.grids + more) + self.outside
+
+    def spread(self, ranks: int) -> float:
+        """Return c, the messages of the busiest rank for the coarsest grid."""
+        if not self.gathered:
+            return ranks - 1.0
+        return 2.0 * min(self.owners, ranks - 1.0) / self.gathered + self.gathered - 1.0
 
     def messages(self, unknowns: float, ranks: int) -> float:
-        """Return the messages that the busiest rank sends to neighbours and for the coarsest."""
-        rounds = self.exchanges * self.grids(unknowns) + self.outside
-        return rounds * min(ranks - 1, INSIDE) + (ranks - 1)
+        """Return the messages that the busiest rank sends."""
+        return self.rounds(unknowns) * min(ranks - 1, INSIDE) + self.spread(ranks)
 
     def seconds(self, n: float, ranks: int, on: Machine) -> dict[str, float]:
         """Return the seconds of its parts.
@@ -78,15 +88,14 @@ class Iteration:
             ranks: P.
             on: The machine.
         """
-        rounds = self.exchanges * self.grids(n * ranks) + self.outside
-        doublings = math.log2(ranks)
-        spread = on.latency * doublings * 2 if self.gathered else (ranks - 1) * on.overhead
+        exchange = on.latency + min(ranks - 1, INSIDE) * on.overhead
+        coarsest = on.latency + self.spread(ranks) * on.overhead
         return {
             "work": n * self.traffic / on.memory,
-            "neighbours": rounds * (on.latency + min(ranks - 1, INSIDE) * on.overhead),
+            "neighbours": self.rounds(n * ranks) * exchange,
             "faces": self.volume * n ** (2.0 / 3.0) / on.network,
-            "reductions": self.reductions * on.latency * doublings,
-            "coarsest": on.latency + spread + self.factor / on.memory,
+            "reductions": self.reductions * on.latency * math.log2(ranks),
+            "coarsest": coarsest + self.factor / on.memory,
         }
 
     def least(self, efficiency: float, ranks: int, on: Machine) -> float:
@@ -134,11 +143,14 @@ def observed(two: dict, most: dict) -> Iteration:
         outside=two["messages"] - inside * grids - two["levels"][-1]["messages"],
         volume=FACES * (most["bytes"] - coarsest["bytes"]) / n ** (2.0 / 3.0),
         reductions=most["reductions"],
-        coarsest=1500.0,
+        unknowns=most["dofs"],
+        grids=grids,
+        owners=coarsest["unknowns"] / 3.0,
         factor=FLOP_BYTES * coarsest["flops"],
     )
 
 
 def improved(iteration: Iteration) -> Iteration:
-    """Return it with the coarsest grid on few ranks and one reduction for each iteration."""
-    return replace(iteration, gathered=True, reductions=1.0)
+    """Return it with PETSc's remedies: coarsest grid on few ranks, dot products together."""
+    on = max(1, round(math.sqrt(2.0 * iteration.owners)))  # the fewest messages
+    return replace(iteration, gathered=on, reductions=iteration.reductions - 1.0)

@@ -100,9 +100,9 @@ def show_check(seen: Iteration, facts: list[dict], smaller: dict) -> None:
     print(f"bytes on {smaller['ranks']} ranks grow with unknowns to the power {power:.2f}")
 
 
-def show_model(seen: Iteration, on: Machine = Machine()) -> None:  # noqa: B008
+def show_model(title: str, seen: Iteration, on: Machine = Machine()) -> None:  # noqa: B008
     """Print from how many unknowns per rank many ranks pay, and what is in their way."""
-    print(f"\nmodel: {seen}\n{on}")
+    print(f"\nmodel of the {title}: {seen}\n{on}")
     print("                       unknowns per rank for        at 50 %: time and its parts [ms]")
     print(
         "ranks   solver            80 %      50 %   iteration    work  neighbours   faces  ", end=""
