@@ -16,7 +16,10 @@ import math
 from dataclasses import dataclass, replace
 
 INSIDE = 26  # neighbours of a box among boxes
-FACES = 2.0  # times as many faces as one of 2 × 2 × 2 boxes
+FACES = 6.0  # of such a box
+BOXES = {2: (2, 1, 1), 4: (2, 2, 1), 8: (2, 2, 2), 27: (3, 3, 3)}
+"""Into how many boxes ranks divide a cube along each side."""
+
 FLOP_BYTES = 3.0  # of a triangular solve: 12 bytes for an entry, two operations, twice used
 
 
@@ -80,6 +83,17 @@ class Iteration:
         """Return the messages that the busiest rank sends."""
         return self.rounds(unknowns) * min(ranks - 1, INSIDE) + self.spread(ranks)
 
+    def sent(self, unknowns: float, ranks: int) -> float:
+        """Return the bytes that the busiest rank sends to neighbours.
+
+        Args:
+            unknowns: Of a cube.
+            ranks: One of `BOXES`.
+        """
+        x, y, z = BOXES[ranks]
+        area = sum(min(2, cuts - 1) * cuts for cuts in (x, y, z)) / (x * y * z)
+        return self.volume / FACES * area * unknowns ** (2.0 / 3.0)
+
     def seconds(self, n: float, ranks: int, on: Machine) -> dict[str, float]:
         """Return the seconds of its parts.
 
@@ -98,12 +112,16 @@ class Iteration:
             "coarsest": coarsest + self.factor / on.memory,
         }
 
+    def efficiency(self, n: float, ranks: int, on: Machine) -> float:
+        """Return the share of the time that is work."""
+        parts = self.seconds(n, ranks, on)
+        return parts["work"] / sum(parts.values())
+
     def least(self, efficiency: float, ranks: int, on: Machine) -> float:
         """Return the unknowns per rank from which work is a given share of the time."""
         for k in range(20, 181):
             n = 10.0 ** (k / 20)
-            parts = self.seconds(n, ranks, on)
-            if parts["work"] >= efficiency * sum(parts.values()):
+            if self.efficiency(n, ranks, on) >= efficiency:
                 return n
         return math.inf
 
@@ -141,7 +159,7 @@ def observed(two: dict, most: dict) -> Iteration:
         traffic=traffic(two),
         exchanges=inside,
         outside=two["messages"] - inside * grids - two["levels"][-1]["messages"],
-        volume=FACES * (most["bytes"] - coarsest["bytes"]) / n ** (2.0 / 3.0),
+        volume=FACES / 3.0 * (most["bytes"] - coarsest["bytes"]) / n ** (2.0 / 3.0),
         reductions=most["reductions"],
         unknowns=most["dofs"],
         grids=grids,

@@ -90,10 +90,12 @@ def show_check(seen: Iteration, facts: list[dict], smaller: dict) -> None:
         facts: Counts on all numbers of ranks.
         smaller: Counts of an eighth of the unknowns on 8 ranks.
     """
-    print("\nmessages of the busiest rank, an iteration: boxes among boxes, and counted")
-    for fact in facts:
-        said = seen.messages(fact["dofs"], fact["ranks"]) if fact["ranks"] > 1 else 0.0
-        print(f"{fact['ranks']:5d} ranks {said:7.0f} {fact['messages']:7.0f}")
+    print("\nan iteration of the busiest rank: said by boxes among boxes, and counted")
+    print("ranks   messages: said, counted   kB: said, counted")
+    for fact in facts[1:]:
+        n, ranks = fact["dofs"], fact["ranks"]
+        print(f"{ranks:5d} {seen.messages(n, ranks):15.0f} {fact['messages']:9.0f}", end="")
+        print(f" {seen.sent(n, ranks) / 1e3:11.0f} {fact['bytes'] / 1e3:9.0f}")
     (larger,) = (fact for fact in facts if fact["ranks"] == smaller["ranks"])
     growth = (larger["bytes"] / smaller["bytes"], larger["dofs"] / smaller["dofs"])
     power = math.log(growth[0]) / math.log(growth[1])
@@ -103,14 +105,15 @@ def show_check(seen: Iteration, facts: list[dict], smaller: dict) -> None:
 def show_model(title: str, seen: Iteration, on: Machine = Machine()) -> None:  # noqa: B008
     """Print from how many unknowns per rank many ranks pay, and what is in their way."""
     print(f"\nmodel of the {title}: {seen}\n{on}")
-    print("                       unknowns per rank for        at 50 %: time and its parts [ms]")
-    print(
-        "ranks   solver            80 %      50 %   iteration    work  neighbours   faces  ", end=""
-    )
-    print("reductions  coarsest")
+    print("                           efficiency   unknowns for", end="")
+    print("     at 50 %: time of an iteration and its parts [ms]")
+    print("ranks   solver              at 10⁵ each   80 %    50 %     all    work", end="")
+    print("  neighbours  faces  reductions  coarsest")
     for ranks in (10**3, 10**4, 10**5):
-        for name, iteration in (("as it is", seen), ("coarse grid gathered", improved(seen))):
+        for name, iteration in (("as it is", seen), ("with remedies", improved(seen))):
             most, half = (iteration.least(share, ranks, on) for share in (0.8, 0.5))
             parts = [1e3 * part for part in iteration.seconds(half, ranks, on).values()]
-            print(f"{ranks:6d}  {name:20s} {most:9.0f} {half:9.0f} {sum(parts):11.3f}", end="")
-            print(" {:7.3f} {:11.3f} {:7.3f} {:11.3f} {:9.3f}".format(*parts))
+            share = iteration.efficiency(1e5, ranks, on)
+            print(f"{ranks:6d}  {name:20s} {share:9.0%} {most:9.0f} {half:7.0f}", end="")
+            print(f" {sum(parts):7.2f}", end="")
+            print(" {:7.2f} {:11.2f} {:6.2f} {:11.2f} {:9.2f}".format(*parts))
