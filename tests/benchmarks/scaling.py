@@ -1,22 +1,27 @@
 """Scaling of the block's solve: times on 1 and 2 ranks, counts on more, and what they mean.
 
-Run by hand on an idle machine: ``.venv/bin/python tests/benchmarks/scaling.py [--quick]``.
-Strong scaling on 10⁶ unknowns, weak scaling on 5·10⁵ per rank; then iterations, messages, bytes and
-reductions on 1, 2, 4 and 8 ranks, which do not depend on the machine even where ranks share cores.
-Messages and bytes are those that the busiest rank sends, reductions those that every rank joins.
+Run by hand on an idle machine: ``.venv/bin/python tests/benchmarks/scaling.py [PART …] [--quick]
+[--large]``. Parts: bandwidth, strong, weak, counts, iterations, model; all of them unless some are
+named. Strong scaling on 10⁶ unknowns, weak scaling on 5·10⁵ per rank, uniform and graded, told
+beside what two cores get of the memory. Then messages, bytes and reductions on 1 to 8 ranks, grid
+by grid, and iterations on 10⁴ to 10⁶ unknowns, which do not depend on the machine even where ranks
+share cores. ``--large`` adds 5·10⁶ unknowns and 27 ranks; it wants 13 GB. ``--ranks N`` starts
+what is told of sizes alone, the iterations, on N ranks. ``--facts FILE`` keeps what was measured
+for other runs, which measure the rest only.
 """
 
 import argparse
 import json
-import math
 import os
-import resource
 import subprocess
 import sys
-import time
+from collections.abc import Callable
 from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+import scaling_tables as tables
+from scaling_model import observed
+
+HERE = Path(__file__).parent
 ENVIRONMENT = os.environ | {
     "OMP_NUM_THREADS": "1",
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
@@ -24,163 +29,166 @@ ENVIRONMENT = os.environ | {
     "OMPI_MCA_rmaps_base_oversubscribe": "1",
     "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
     "OMPI_MCA_btl": "^tcp",
-    "PYTHONPATH": str(ROOT),
+    "PYTHONPATH": str(HERE.parents[1]),
 }
-# A cluster's network, for the model: latency [s] and bandwidth per rank [B/s]; an all-reduce takes
-# a latency for each doubling of the ranks.
-LATENCY, BANDWIDTH = 2e-6, 2e9
-# Eight ranks have 7 neighbours and 3 faces between them each; inside a larger job it is 26 and 6.
-NEIGHBOURS, FACES = 26 / 7, 2.0
-SOLVES = 3
+Sizes = dict[str, object]
 
 
-def measure(cells: tuple[int, int, int], grading: float) -> None:
-    """Solve under one loaded patch on this job's ranks; rank 0 prints what it took as JSON."""
-    import numpy as np
-    from mpi4py import MPI
-    from petsc4py import PETSc
-
-    from geometry.meshes import BlockShape
-    from geometry.patches import PatchGrid
-    from macro import Block, Interface, Material, block_mesh
-
-    comm = MPI.COMM_WORLD
-    PETSc.Log.begin()
-    height = cells[2] / cells[0]  # cells are cubes
-    shape = BlockShape(interface=(1.0, 1.0), height=height, cells=cells, grading=grading)
-    seconds = {}
-
-    def timed(name, work):
-        comm.Barrier()
-        began = time.perf_counter()
-        result = work()
-        seconds[name] = min(seconds.get(name, math.inf), slowest(time.perf_counter() - began))
-        return result
-
-    def slowest(value):
-        return comm.allreduce(value, op=MPI.MAX)
-
-    mesh = timed("mesh", lambda: block_mesh(shape, comm))
-    block = Block(mesh, Material(young_modulus=4000.0, poisson_ratio=0.15))
-    timed("stiffness", lambda: block.stiffness)
-    solver = timed("set-up", lambda: block.solver)
-    patches = PatchGrid(grid=(4, 4), lengths=(1.0, 1.0))
-    load = Interface(block, patches).load(np.eye(16)[5])
-    solution = load.duplicate()
-    event = PETSc.Log.Event("KSPSolve")
-    before = event.getPerfInfo()
-    for _ in range(SOLVES):
-        timed("solve", lambda: solver.solve(load, solution))
-    after = event.getPerfInfo()
-    count = {name: (after[name] - before[name]) / (SOLVES * solver.its) for name in after}
-    owned = comm.allgather(block.owned_dofs)
-    facts = {
-        "ranks": comm.size,
-        "dofs": block.dofs,
-        "iterations": solver.its,
-        "seconds": seconds,
-        # PETSc counts a message where it is sent and where it is received
-        "messages": slowest(0.5 * count["numMessages"]),
-        "bytes": slowest(0.5 * count["messageLength"]),
-        "reductions": slowest(count["numReductions"]),
-        "imbalance": max(owned) * comm.size / block.dofs,
-        "flops": comm.allreduce(count["flops"]),
-        "memory": comm.allreduce(1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss),
-    }
-    if comm.rank == 0:
-        print(json.dumps(facts))
-
-
-def on(ranks: int, cells: tuple[int, int, int], grading: float) -> dict:
-    """Start this file on a number of ranks and return what it measured."""
-    words = [sys.executable, __file__, "--cells", *map(str, cells), "--grading", str(grading)]
+def start(ranks: int, script: str, *words: str) -> dict:
+    """Start a script of this folder on a number of ranks and return what it prints as JSON."""
     done = subprocess.run(
-        ["mpirun", "-n", str(ranks), *words],
-        cwd=ROOT, env=ENVIRONMENT, capture_output=True, text=True, check=False,
+        ["mpirun", "-n", str(ranks), sys.executable, str(HERE / script), *words],
+        env=ENVIRONMENT, capture_output=True, text=True, check=False,
     )  # fmt: skip
     if done.returncode:
         sys.exit(done.stderr)
     return json.loads(done.stdout.splitlines()[-1])
 
 
-def show_times(title: str, facts: list[dict], weak: bool) -> None:
-    """Print times and efficiencies; the first row is the measure of the others."""
-    print(f"\n{title}\n{'ranks':>5s} {'unknowns':>10s} {'its':>4s}", end="")
-    names = list(facts[0]["seconds"])
-    print("".join(f" {name + ' [s]':>13s}" for name in names), " efficiency of solve, kB/unknown")
-    for fact in facts:
-        gain = facts[0]["seconds"]["solve"] / fact["seconds"]["solve"]
-        # a longer solve by more iterations is no loss of parallel efficiency: it is told beside
-        efficiency = gain if weak else gain * facts[0]["ranks"] / fact["ranks"]
-        print(f"{fact['ranks']:5d} {fact['dofs']:10d} {fact['iterations']:4d}", end="")
-        print("".join(f" {fact['seconds'][name]:13.2f}" for name in names), end="")
-        print(f" {efficiency:11.0%} {fact['memory'] / fact['dofs'] / 1e3:21.1f}")
+class Facts:
+    """Facts of blocks, each measured once.
+
+    Args:
+        file: Where they are kept from run to run; None: nowhere.
+    """
+
+    def __init__(self, file: Path | None) -> None:
+        self._file, self._known = file, {}
+        if file and file.exists():
+            self._known = json.loads(file.read_text(encoding="utf-8"))
+
+    def __call__(self, ranks: int, sizes: Sizes) -> dict:
+        """Return those of one block on a number of ranks."""
+        name = json.dumps([ranks, sizes])
+        if name not in self._known:
+            self._known[name] = start(ranks, "scaling_rank.py", json.dumps(sizes))
+            if self._file:
+                self._file.write_text(json.dumps(self._known), encoding="utf-8")
+        return self._known[name]
 
 
-def show_counts(facts: list[dict]) -> None:
-    """Print what an iteration takes, whatever the machine."""
-    print("\nan iteration, on ranks that share cores")
-    print("ranks   unknowns  its  messages       kB  reductions  imbalance  flops/unknown")
-    for fact in facts:
-        print(
-            f"{fact['ranks']:5d} {fact['dofs']:10d} {fact['iterations']:4d} "
-            f"{fact['messages']:9.1f} {fact['bytes'] / 1e3:8.1f} {fact['reductions']:11.1f} "
-            f"{fact['imbalance']:10.3f} {fact['flops'] / fact['dofs']:14.0f}"
+def block(
+    unknowns: float,
+    *,
+    cells: tuple[float, float, float] = (1, 1, 1),
+    lengths: tuple[float, float, float] = (1, 1, 1),
+    grading: float = 1.0,
+) -> Sizes:
+    """Return a block of some proportions with about so many unknowns.
+
+    Args:
+        unknowns: Three for each node.
+        cells: Numbers of cells along x, y and z relative to each other.
+        lengths: Sides [mm].
+        grading: Height of the lowest layer relative to the top one.
+    """
+    share = (unknowns / 3.0 / (cells[0] * cells[1] * cells[2])) ** (1.0 / 3.0)
+    nx, ny, nz = (max(2, round(share * part) - 1) for part in cells)
+    x, y, z = lengths
+    return {"interface": [x, y], "height": z, "cells": [nx, ny, nz], "grading": grading}
+
+
+SHAPES: dict[str, Callable[[float], Sizes]] = {
+    "uniform cube": lambda n: block(n),
+    "graded 10": lambda n: block(n, cells=(2, 2, 1), grading=10.0),
+    "graded 20": lambda n: block(n, cells=(2, 2, 1), grading=20.0),
+    "tall cells 8:1": lambda n: block(n, cells=(2, 2, 1), lengths=(1, 1, 4)),
+    "flat cells 8:1": lambda n: block(n, lengths=(1, 1, 0.125)),
+    "slab 16:16:1": lambda n: block(n, cells=(16, 16, 1), lengths=(16, 16, 1)),
+    "column 1:1:16": lambda n: block(n, cells=(1, 1, 16), lengths=(1, 1, 16)),
+}
+PARALLEL = ("uniform cube", "graded 20")
+
+
+def weak(name: str, unknowns: float, ranks: int) -> Sizes:
+    """Return a block with the cells of one rank's once for each rank, side by side."""
+    sizes = SHAPES[name](unknowns)
+    (x, y), (nx, ny, nz) = sizes["interface"], sizes["cells"]
+    return sizes | {"interface": [ranks * x, y], "cells": [ranks * nx, ny, nz]}
+
+
+class Benchmark:
+    """The parts, each of which measures and prints.
+
+    Args:
+        scale: Share of the unknowns.
+        large: Whether blocks of 5·10⁶ unknowns and 27 ranks are measured too.
+        ranks: Ranks of what does not depend on them.
+        on: Facts of a block on a number of ranks.
+    """
+
+    def __init__(self, scale: float, large: bool, ranks: int, on: Facts) -> None:
+        self.scale, self.is_large, self.ranks, self.on = scale, large, ranks, on
+        self.rates: dict[int, dict[str, float]] = {}
+
+    def bandwidth(self) -> None:
+        """What one core gets of the memory, and two at once."""
+        self.rates = {ranks: start(ranks, "stream_triad.py", "--json") for ranks in (1, 2)}
+        tables.show_bandwidth(self.rates)
+
+    def strong(self) -> None:
+        """One block on 1 and 2 ranks."""
+        for unknowns in (1e6, 5e6) if self.is_large else (1e6,):
+            for name in PARALLEL:
+                facts = [self.on(ranks, SHAPES[name](self.scale * unknowns)) for ranks in (1, 2)]
+                tables.show_times(f"strong scaling, {name}", facts, self.rates, weak=False)
+
+    def weak(self) -> None:
+        """As many unknowns for each rank, on 1 and 2."""
+        for unknowns in (5e5, 2.5e6) if self.is_large else (5e5,):
+            for name in PARALLEL:
+                facts = [
+                    self.on(ranks, weak(name, self.scale * unknowns, ranks)) for ranks in (1, 2)
+                ]
+                tables.show_times(f"weak scaling, {name}", facts, self.rates, weak=True)
+
+    def counted(self) -> list[dict]:
+        """Return the facts of the block whose messages are counted."""
+        numbers = (1, 2, 4, 8, 27) if self.is_large else (1, 2, 4, 8)
+        return [self.on(ranks, SHAPES["uniform cube"](self.scale * 2e5)) for ranks in numbers]
+
+    def graded(self) -> list[dict]:
+        """Return the facts of a graded block on 2 and 8 ranks."""
+        return [self.on(ranks, SHAPES["graded 20"](self.scale * 2e5)) for ranks in (2, 8)]
+
+    def counts(self) -> None:
+        """What an iteration sends, grid by grid."""
+        tables.show_counts("uniform cube", self.counted())
+        tables.show_levels("uniform cube", self.counted())
+        tables.show_levels("graded 20", self.graded())
+
+    def iterations(self) -> None:
+        """Iterations over sizes and shapes."""
+        sizes = [self.scale * n for n in (1e4, 1e5, 1e6, 5e6)[: 4 if self.is_large else 3]]
+        tables.show_iterations(
+            (name, [self.on(self.ranks, shape(n)) for n in sizes]) for name, shape in SHAPES.items()
         )
 
-
-def show_model(one: dict, most: dict) -> None:
-    """Print what the counts mean for many ranks.
-
-    An iteration on P ranks with n unknowns each takes n c + m α + v n^(2/3) / β + r α log₂ P: work
-    c of one rank, m messages, volume v over the faces of a rank's part, r reductions.
-    """
-    work = one["seconds"]["solve"] / (one["iterations"] * one["dofs"])
-    volume = FACES * most["bytes"] / (most["dofs"] / most["ranks"]) ** (2.0 / 3.0)
-    m, r = NEIGHBOURS * most["messages"], most["reductions"]
-
-    def iteration(n: float, ranks: int) -> float:
-        network = m * LATENCY + volume * n ** (2.0 / 3.0) / BANDWIDTH
-        return n * work + network + r * LATENCY * math.log2(ranks)
-
-    print(f"\nmodel: {1e9 * work:.0f} ns of work per unknown and iteration, m = {m:.0f}, ", end="")
-    print(f"v = {volume:.0f} B, r = {r:.1f}; α = {LATENCY:.0e} s, β = {BANDWIDTH:.0e} B/s")
-    print("ranks   unknowns per rank for 80 %, 50 % efficiency, and the iteration [ms] at 50 %")
-    for ranks in (10**3, 10**4, 10**5):
-        sizes = [10 ** (k / 20) for k in range(20, 161)]
-        least = {
-            wanted: next((n for n in sizes if n * work / iteration(n, ranks) >= wanted), math.inf)
-            for wanted in (0.8, 0.5)
-        }
-        half = 1e3 * iteration(least[0.5], ranks)
-        print(f"{ranks:6d} {least[0.8]:12.0f} {least[0.5]:12.0f} {half:22.2f}")
+    def model(self) -> None:
+        """What the counts mean for many ranks, and how well they follow the model on few."""
+        facts = {fact["ranks"]: fact for fact in self.counted()}
+        seen = observed(facts[2], facts[8])
+        smaller = self.on(8, SHAPES["uniform cube"](self.scale * 2e5 / 8))
+        tables.show_check(seen, list(facts.values()), smaller)
+        tables.show_model("uniform cube", seen)
+        tables.show_model("graded 20", observed(*self.graded()))
 
 
 def main() -> None:
-    """Measure and print all tables, or be one of the ranks measured."""
+    """Measure and print what is asked for."""
+    parts = ("bandwidth", "strong", "weak", "counts", "iterations", "model")
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--quick", action="store_true", help="a thousandth of the unknowns")
-    parser.add_argument("--grading", type=float, default=1.0)
-    parser.add_argument("--cells", type=int, nargs=3, help="be one rank of a measurement")
+    parser.add_argument("parts", nargs="*", choices=[*parts, []], metavar="PART")
+    parser.add_argument("--quick", action="store_true", help="a hundredth of the unknowns")
+    parser.add_argument("--large", action="store_true", help="5·10⁶ unknowns and 27 ranks as well")
+    parser.add_argument("--ranks", type=int, default=1, help="ranks of the iterations' part")
+    parser.add_argument("--facts", type=Path, help="JSON file that measured facts are kept in")
     choice = parser.parse_args()
-    if choice.cells:
-        return measure(tuple(choice.cells), choice.grading)
-    scale = 10 if choice.quick else 1
-    edges = {name: edge // scale for name, edge in {"strong": 68, "weak": 54, "counts": 40}.items()}
-
-    def cube(edge: int, layers: int | None = None) -> tuple[int, int, int]:
-        return (edge, edge, layers or edge)
-
-    strong = [on(ranks, cube(edges["strong"]), choice.grading) for ranks in (1, 2)]
-    show_times("strong scaling", strong, weak=False)
-    weak = [
-        on(ranks, cube(edges["weak"], ranks * edges["weak"]), choice.grading) for ranks in (1, 2)
-    ]
-    show_times("weak scaling", weak, weak=True)
-    counts = [on(ranks, cube(edges["counts"]), choice.grading) for ranks in (1, 2, 4, 8)]
-    show_counts(counts)
-    show_model(strong[0], counts[-1])
-    return None
+    benchmark = Benchmark(
+        0.01 if choice.quick else 1.0, choice.large, choice.ranks, Facts(choice.facts)
+    )
+    for part in choice.parts or parts:
+        getattr(benchmark, part)()
 
 
 if __name__ == "__main__":
