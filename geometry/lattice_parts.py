@@ -120,7 +120,9 @@ def lattice_cells(cells: Counts, part: Part, *, hexahedra: bool) -> Numbers:
         Numbers in the order of dolfinx, shape (cells of the part, 8), or (6 times as many, 4).
     """
     strides = np.array([(cells[1] + 1) * (cells[2] + 1), cells[2] + 1, 1])
-    along = [stride * np.arange(of.start, of.stop) for stride, of in zip(strides, part, strict=True)]
+    along = [
+        stride * np.arange(of.start, of.stop) for stride, of in zip(strides, part, strict=True)
+    ]
     first = (along[0][:, None, None] + along[1][:, None] + along[2]).ravel()
     corners = _CORNERS @ strides
     offsets = corners if hexahedra else corners[_TETRAHEDRA].ravel()

@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 
 from geometry.collective import on_root
 from geometry.errors import InputError
-from geometry.lattice_parts import cells_beyond, lattice_cells, lattice_part, node_planes, node_share
+from geometry.lattice_parts import (
+    cells_beyond,
+    lattice_cells,
+    lattice_part,
+    node_planes,
+    node_share,
+)
 from geometry.meshes import BlockShape
 from geometry.refined_block import RefinedShape
 from macro import compat
@@ -22,8 +28,8 @@ BOTTOM, TOP, SIDES = 1, 2, 3
 
 Builder: TypeAlias = Literal["auto", "gmsh", "lattice"]
 
-GMSH_CELLS = 50_000
-"""Cells of a flat block up to which gmsh meshes it where nobody says who should."""
+GMSH_CELLS = 20_000
+"""Cells of a flat block up to which gmsh meshes it where nobody asks: 0.1 s longer, and no more."""
 
 _FACES = np.array([1, 2, 4, 8, 16, 32], dtype=np.uint8).reshape(3, 2)
 """Bits of a lattice's faces: the first and the last plane across x, y and z."""
@@ -52,9 +58,7 @@ class BlockMesh:
         return self.mesh.comm
 
 
-def block_mesh(
-    shape: BlockShape | RefinedShape, comm: Any, builder: Builder = "auto"
-) -> BlockMesh:
+def block_mesh(shape: BlockShape | RefinedShape, comm: Any, builder: Builder = "auto") -> BlockMesh:
     """Mesh a block, distributed over all ranks.
 
     gmsh meshes the whole block on rank 0, whose memory and time grow with it, and dolfinx
@@ -80,11 +84,11 @@ def block_mesh(
             value=builder,
             allowed=", ".join(get_args(Builder)),
         )
-    flat = isinstance(shape, BlockShape)
-    if builder == "lattice" and not flat:
+    if isinstance(shape, BlockShape):
+        if builder == "lattice" or (builder == "auto" and shape.cell_count > GMSH_CELLS):
+            return _from_lattice(shape, comm)
+    elif builder == "lattice":
         raise InputError("only flat blocks are lattices", value=builder, allowed="auto, gmsh")
-    if flat and (builder == "lattice" or (builder == "auto" and shape.cell_count > GMSH_CELLS)):
-        return _from_lattice(shape, comm)
     return _from_gmsh(shape, comm)
 
 
@@ -134,9 +138,7 @@ def _on_faces(planes: NDArray[np.intp], counts: tuple[int, int, int]) -> NDArray
     return np.bitwise_or.reduce(bits.astype(np.uint8), axis=1)
 
 
-def _marked(
-    mesh: Any, faces: NDArray[np.uint8]
-) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def _marked(mesh: Any, faces: NDArray[np.uint8]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """Return this rank's facets on the block's faces, ascending, and their markers."""
     topology = mesh.topology
     topology.create_connectivity(3, 2)

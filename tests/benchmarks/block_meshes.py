@@ -2,8 +2,8 @@
 
 Run by hand on an idle machine: ``.venv/bin/python tests/benchmarks/block_meshes.py``; every line in
 clean processes, the least time of a few. Memory is the growth of rank 0's peak while the mesh is
-made. Shared are the nodes that a rank sees but another has, and neighbours the ranks it exchanges
-them with, largest over the ranks; the product is that of the stiffness with a vector.
+made. The product is that of the stiffness with a vector, in CPU time of rank 0; its messages and
+bytes are those that the busiest rank sends.
 """
 
 import argparse
@@ -26,6 +26,7 @@ ENVIRONMENT = os.environ | {
     "PYTHONPATH": str(ROOT),
 }
 PRODUCTS = 20
+REPEATS = 3
 
 
 def measure(cells: list[int], element: str, builder: str, product: bool) -> None:
@@ -88,3 +89,51 @@ def on(ranks: int, *words: object) -> dict:
     if done.returncode:
         sys.exit(done.stderr)
     return json.loads(done.stdout.splitlines()[-1])
+
+
+def show(title: str, rows: list[tuple[object, ...]], product: bool) -> None:
+    """Measure and print a table; rows are (ranks, element, builder, cells along x, y, z)."""
+    head = "ranks element builder      cells  wall [s]  rank 0: CPU [s]       MB  imbalance"
+    print(f"\n{title}\n{head}{'  product [ms]  messages      kB' if product else ''}")
+    for ranks, element, builder, *cells in rows:
+        words = ["--be", *cells, element, builder, *(["--product"] if product else [])]
+        facts = [on(int(str(ranks)), *words) for _ in range(REPEATS)]
+        least = {name: min(fact[name] for fact in facts) for name in facts[0]}
+        print(
+            f"{ranks!s:>5s} {element!s:>7s} {builder!s:>7s} {least['cells']:10d} "
+            f"{least['seconds']:9.2f} {least['busy']:16.2f} {least['memory'] / 1e6:8.0f} "
+            f"{least['imbalance']:10.3f}",
+            end="" if product else "\n",
+        )
+        if product:
+            print(
+                f" {1e3 * least['product']:13.2f} {least['messages']:9.1f} "
+                f"{least['bytes'] / 1e3:7.1f}"
+            )
+
+
+def main() -> None:
+    """Measure and print all tables, or be one of the ranks measured."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--quick", action="store_true", help="up to 10⁵ cells only")
+    parser.add_argument("--be", nargs=5, help="be one rank of a measurement: cells, element, maker")
+    parser.add_argument("--product", action="store_true", help="measure products as well")
+    choice = parser.parse_args()
+    if choice.be:
+        *cells, element, builder = choice.be
+        return measure([int(count) for count in cells], element, builder, choice.product)
+    sizes = [(20, 20, 15), (28, 28, 25), (40, 40, 25), (64, 64, 24)]
+    if not choice.quick:
+        sizes += [(158, 158, 40), (250, 250, 48)]
+    builders = ("gmsh", "lattice")
+    rows = [(n, "Q1", maker, *size) for size in sizes for n in (1, 2) for maker in builders]
+    show("hexahedra", rows, product=False)
+    rows = [(n, "P1", maker, 30, 30, 20) for n in (1, 2) for maker in builders]
+    show("tetrahedra", rows, product=False)
+    rows = [(n, "Q1", maker, 40, 40, 25) for n in (1, 2, 4, 8) for maker in builders]
+    show("what a product of the stiffness costs", rows, product=True)
+    return None
+
+
+if __name__ == "__main__":
+    main()

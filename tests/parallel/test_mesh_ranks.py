@@ -1,0 +1,67 @@
+"""gmsh's flat blocks and those that all ranks make are the same meshes on any number of ranks."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+SCRIPT = Path(__file__).with_name("mesh_ranks_script.py")
+CASES = {  # volume, bottom, sides; areas of the top and the patches follow
+    "wide hexahedra": (0.7 * 1.8 * 2.8, 1.8 * 2.8, 0.7 * 2.0 * (1.8 + 2.8)),
+    "quadratic hexahedra": (1.4, 2.0, 4.2),
+    "wide tetrahedra": (0.7 * 1.8 * 2.8, 1.8 * 2.8, 0.7 * 2.0 * (1.8 + 2.8)),
+    "quadratic tetrahedra": (1.4, 2.0, 4.2),
+    "rod": (1.4, 2.0, 4.2),
+    "box": (1.4, 2.0, 4.2),
+}
+RANKS = (1, 2, 3, 4)
+
+
+@pytest.fixture(scope="module")
+def found(mpirun, root):
+    """Return what was found on every number of ranks."""
+    results = {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", str(root))
+        for ranks in RANKS:
+            done = mpirun(ranks, SCRIPT)
+            assert done.returncode == 0, done.stdout + done.stderr
+            results[ranks] = json.loads(done.stdout.splitlines()[-1])
+    return results
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_meshes_are_the_same(found, case):
+    meshes = [found[ranks][case][builder] for ranks in RANKS for builder in ("gmsh", "lattice")]
+    assert all(mesh["exact"] == meshes[0]["exact"] for mesh in meshes)
+    volume, bottom, sides = CASES[case]
+    for mesh in meshes:
+        measures = mesh["measures"]
+        # sums of products: round-off
+        assert measures["volume"] == pytest.approx(volume, rel=1e-13)
+        assert measures["areas"] == pytest.approx([bottom, bottom, sides], rel=1e-13)
+        assert measures["patches"] == pytest.approx([0.5] * 4, rel=1e-13)
+        assert measures["unknowns"] == meshes[0]["measures"]["unknowns"]
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_solutions_are_the_same(found, case):
+    work = [
+        found[ranks][case][builder]["measures"]["work"]
+        for ranks in RANKS
+        for builder in ("gmsh", "lattice")
+    ]
+    # the same matrix but for the order of sums; the solver leaves 1e-10, the work its square
+    np.testing.assert_allclose(work, work[0], rtol=1e-12)
+    assert work[0] > 0.0
+
+
+def test_cells_are_spread_without_ghosts(found):
+    for ranks in RANKS:
+        for case in CASES:
+            lattice = found[ranks][case]["lattice"]
+            assert lattice["ghosts"] == 0 and len(lattice["cells_of_ranks"]) == ranks
+    assert found[2]["quadratic hexahedra"]["lattice"]["cells_of_ranks"] == [8, 4]
+    assert sorted(found[4]["rod"]["lattice"]["cells_of_ranks"]) == [0, 0, 1, 1]
+    assert sorted(found[4]["box"]["lattice"]["cells_of_ranks"]) == [0, 0, 0, 6]
