@@ -129,19 +129,10 @@ class Iteration:
 def traffic(fact: dict) -> float:
     """Return the bytes per unknown that an iteration's products move at least.
 
-    Of a level the multigrid takes as many products as it has exchanges but for the two transfers;
-    conjugate gradients take one more of the finest.
+    Conjugate gradients take one of the finest grid; the coarsest has a factor instead.
     """
-    finest, *coarser = fact["levels"]
-    inside = exchanges(fact) - 2.0
-    moved = (1.0 + inside) * finest["product_bytes"]
-    moved += inside * sum(level["product_bytes"] for level in coarser[:-1])
-    return moved / fact["dofs"]
-
-
-def exchanges(fact: dict) -> float:
-    """Return the exchanges of a cycle on its finest grid, from a run on two ranks."""
-    return fact["levels"][0]["messages"]
+    finest, *coarser = (level["product_bytes"] for level in fact["levels"][:-1])
+    return (finest + fact["products"] * sum((finest, *coarser))) / fact["dofs"]
 
 
 def observed(two: dict, most: dict) -> Iteration:
@@ -151,18 +142,17 @@ def observed(two: dict, most: dict) -> Iteration:
         two: Facts on 2 ranks, where an exchange is one message.
         most: Facts on 8 ranks, each of which has 3 of its 6 faces inside.
     """
-    inside = exchanges(two)
+    *inside, last = (level["messages"] for level in two["levels"])
     coarsest = most["levels"][-1]
-    grids = len(two["levels"]) - 1
     n = most["dofs"] / most["ranks"]
     return Iteration(
         traffic=traffic(two),
-        exchanges=inside,
-        outside=two["messages"] - inside * grids - two["levels"][-1]["messages"],
+        exchanges=sum(inside) / len(inside),
+        outside=two["messages"] - sum(inside) - last,
         volume=FACES / 3.0 * (most["bytes"] - coarsest["bytes"]) / n ** (2.0 / 3.0),
         reductions=most["reductions"],
         unknowns=most["dofs"],
-        grids=grids,
+        grids=len(inside),
         owners=coarsest["unknowns"] / 3.0,
         factor=FLOP_BYTES * coarsest["flops"],
     )

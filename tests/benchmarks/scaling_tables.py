@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable
 
-from scaling_model import Iteration, Machine, improved
+from scaling_model import Iteration, Machine, improved, traffic
 
 
 def show_bandwidth(rates: dict[int, dict[str, float]]) -> None:
@@ -24,20 +24,24 @@ def ceiling(rates: dict[int, dict[str, float]], ranks: int, name: str = "triad")
 
 
 def show_times(title: str, facts: list[dict], rates: dict, weak: bool) -> None:
-    """Print times and efficiencies; the first row is the measure of the others."""
+    """Print times and efficiencies; the first row is the measure of the others.
+
+    The floor is the share of the solve that its products' bytes alone take as a stream.
+    """
     print(f"\n{title}\nranks   unknowns  its", end="")
     names = list(facts[0]["seconds"])
     print("".join(f" {name + ' [s]':>11s}" for name in names), end="")
-    print("  efficiency of solve, of its ceiling  products [GB/s]  kB/unknown")
+    print("  efficiency of solve, of its ceiling   floor  kB/unknown")
     for fact in facts:
         gain = facts[0]["seconds"]["solve"] / fact["seconds"]["solve"]
         # a longer solve by more iterations is no loss of parallel efficiency: it is told beside
         efficiency = gain if weak else gain * facts[0]["ranks"] / fact["ranks"]
-        finest = fact["levels"][0]
+        moved = traffic(fact) * fact["dofs"] * fact["iterations"]
+        floor = moved / rates[fact["ranks"]]["triad"] if rates else math.nan
         print(f"{fact['ranks']:5d} {fact['dofs']:10d} {fact['iterations']:4d}", end="")
         print("".join(f" {fact['seconds'][name]:11.2f}" for name in names), end="")
         print(f" {efficiency:20.0%} {efficiency / ceiling(rates, fact['ranks']):15.0%}", end="")
-        print(f" {finest['product_bytes'] / finest['product_s'] / 1e9:16.1f}", end="")
+        print(f" {floor / fact['seconds']['solve']:7.0%}", end="")
         print(f" {fact['memory'] / fact['dofs'] / 1e3:11.2f}")
 
 
@@ -104,7 +108,13 @@ def show_check(seen: Iteration, facts: list[dict], smaller: dict) -> None:
 
 def show_model(title: str, seen: Iteration, on: Machine = Machine()) -> None:  # noqa: B008
     """Print from how many unknowns per rank many ranks pay, and what is in their way."""
-    print(f"\nmodel of the {title}: {seen}\n{on}")
+    print(f"\nmodel of the {title}: w = {seen.traffic:.0f} B, v = {seen.volume:.0f} B, ", end="")
+    print(
+        f"e = {seen.exchanges:.1f} × grids ({seen.grids} for {seen.unknowns} unknowns) + ", end=""
+    )
+    print(f"{seen.outside:.0f}, r = {seen.reductions:.1f}, f = {seen.factor / 1e3:.0f} kB;", end="")
+    print(f" M = {on.memory:.0e} B/s, λ = {on.latency:.0e} s, o = {on.overhead:.0e} s, ", end="")
+    print(f"β = {on.network:.0e} B/s")
     print("                           efficiency   unknowns for", end="")
     print("     at 50 %: time of an iteration and its parts [ms]")
     print("ranks   solver              at 10⁵ each   80 %    50 %     all    work", end="")

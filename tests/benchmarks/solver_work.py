@@ -20,7 +20,7 @@ from pathlib import Path
 
 from mpi4py import MPI
 from petsc4py import PETSc
-from scaling_rank import PARTS, logged, stored
+from scaling_rank import INSIDE, PARTS, logged, stored
 from stream_triad import bandwidth
 
 from macro.solvers import PREFIX
@@ -29,9 +29,6 @@ from multiscale import ReferenceCoupling, Run, Scene
 COMM = MPI.COMM_WORLD
 SCENE = Path(__file__).parents[2] / "demos" / "scenes" / "paper.toml"
 REFERENCE = ("coupling.kind=reference", "reference.mesh=hexahedra", "reference.meshes=1")
-INSIDE = "MG Apply"
-"""PETSc's name of the stage of the log that a multigrid's cycles are in."""
-
 SHARES = ("finest", "coarser", "transfers", "coarsest", "CG's K", "CG's rest", "Newton, contact")
 
 
