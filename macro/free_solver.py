@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.errors import NotConverged
+from macro.held_preconditioner import HeldPreconditioner
+from macro.projection import Projection
 from macro.solvers import reason_name
 
 Array = NDArray[np.float64]
@@ -42,7 +43,8 @@ class FreeSolver:
         self._ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
         self._ksp.setTolerances(max_it=1000)
         self._ksp.pc.setType("python")
-        self._ksp.pc.setPythonContext(_Projected(preconditioner.apply, self._left))
+        self._mended = HeldPreconditioner(matrix, preconditioner, self._left)
+        self._ksp.pc.setPythonContext(self._mended)
 
     def hold(self, dofs: NDArray[np.intp], motions: Array | None = None) -> None:
         """Hold degrees of freedom but for common motions, and free all others.
@@ -53,6 +55,7 @@ class FreeSolver:
                 orthonormal, all ranks together. None: they stand still.
         """
         self._left.hold(dofs, np.zeros((len(dofs), 0)) if motions is None else motions)
+        self._mended.hold(dofs)
 
     def improve(self, solution: PETSc.Vec, residual: PETSc.Vec, tolerance: float) -> int:
         """Change what is free of a solution until its residual is small.
@@ -84,31 +87,6 @@ class FreeSolver:
             )
         solution.axpy(1.0, step)
         return int(self._ksp.its)
-
-
-class Projection:
-    """The orthogonal projection P: identity on what is free, Q Qᵀ on what is held.
-
-    Args:
-        comm: MPI communicator.
-    """
-
-    def __init__(self, comm: Any) -> None:
-        self._comm = comm
-        self._dofs: NDArray[np.intp] = np.empty(0, dtype=np.intp)
-        self._motions: Array = np.empty((0, 0))
-
-    def hold(self, dofs: NDArray[np.intp], motions: Array) -> None:
-        """Hold degrees of freedom but for motions Q; see `FreeSolver.hold`."""
-        self._dofs, self._motions = dofs, motions
-
-    def project(self, vector: PETSc.Vec) -> None:
-        """Project a vector in place; collective."""
-        values, q = vector.array, self._motions
-        shares = q.T @ values[self._dofs]
-        if shares.size:
-            shares = self._comm.allreduce(shares, op=MPI.SUM)
-        values[self._dofs] = q @ shares
 
 
 class _Projected:

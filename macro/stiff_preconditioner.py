@@ -8,7 +8,7 @@ from petsc4py import PETSc
 from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import splu
 
-from macro.free_solver import Projection
+from macro.projection import Projection
 
 Array = NDArray[np.float64]
 
