@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
@@ -11,30 +9,44 @@ from petsc4py import PETSc
 from geometry.errors import NotConverged
 from macro.held_preconditioner import HeldPreconditioner
 from macro.projection import Projection
-from macro.solvers import reason_name
+from macro.solvers import PREFIX, reason_name
 
 Array = NDArray[np.float64]
+
+TOLERANCE = 1e-9
+"""What a contact may miss: residual and complementarity, relative to the contact forces.
+
+Forces are then known to 2e-11 and contact areas to 3e-11, forces of single nodes to 2e-10 of the
+largest: residuals swing from node to node, and add up to little. Each tenth costs one iteration on
+hexahedra and two to three on quadratic tetrahedra, of 12 and 30.
+"""
+
+
+def asked_tolerance() -> float:
+    """Return `TOLERANCE`, or what the user asks for by ``-patchlaw_ksp_rtol``."""
+    return float(PETSc.Options(PREFIX).getReal("ksp_rtol", TOLERANCE))
 
 
 class FreeSolver:
     """Conjugate gradients where some degrees of freedom are held, or move together.
 
     With P the orthogonal projection on the vectors that are left, the operator is P A P and the
-    preconditioner P M P. Held degrees of freedom that a rigid plane takes along add as many
-    unknowns as the plane has motions, and no second solve.
+    preconditioner P M P, mended (see `HeldPreconditioner`). Held degrees of freedom that a rigid
+    plane takes along add as many unknowns as the plane has motions, and no second solve.
 
     Args:
         matrix: Symmetric positive definite matrix A of all of them.
         preconditioner: A preconditioner M of it.
+        layers: Of unknowns around held ones that the preconditioner is mended on.
 
     Note:
         Every method is collective.
     """
 
-    def __init__(self, matrix: PETSc.Mat, preconditioner: PETSc.PC) -> None:
+    def __init__(self, matrix: PETSc.Mat, preconditioner: PETSc.PC, layers: int = 2) -> None:
         self._left = Projection(matrix.comm.tompi4py())
         operator = PETSc.Mat().createPython(
-            matrix.getSizes(), _Projected(matrix.mult, self._left), comm=matrix.comm
+            matrix.getSizes(), _Projected(matrix, self._left), comm=matrix.comm
         )
         operator.setUp()
         self._ksp = PETSc.KSP().create(matrix.comm)
@@ -43,7 +55,7 @@ class FreeSolver:
         self._ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
         self._ksp.setTolerances(max_it=1000)
         self._ksp.pc.setType("python")
-        self._mended = HeldPreconditioner(matrix, preconditioner, self._left)
+        self._mended = HeldPreconditioner(matrix, preconditioner, self._left, layers)
         self._ksp.pc.setPythonContext(self._mended)
 
     def hold(self, dofs: NDArray[np.intp], motions: Array | None = None) -> None:
@@ -90,14 +102,11 @@ class FreeSolver:
 
 
 class _Projected:
-    """A linear map on vectors of the range of a projection, back into that range."""
+    """P A: what PETSc calls to multiply vectors of the range of P."""
 
-    def __init__(self, apply: Any, left: Projection) -> None:
-        self._apply, self._left = apply, left
+    def __init__(self, matrix: PETSc.Mat, left: Projection) -> None:
+        self._matrix, self._left = matrix, left
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Write P A x."""
-        self._apply(x, y)
+        self._matrix.mult(x, y)
         self._left.project(y)
-
-    apply = mult

@@ -11,18 +11,17 @@ from macro.projection import Projection
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-_LAYERS = 2  # of unknowns around held ones
 _SWEEPS = 2
-_SYMMETRIC_FROM_ZERO = PETSc.Mat.SORType.SYMMETRY_SWEEP | 16  # 16: SOR_ZERO_INITIAL_GUESS
+_FROM_ZERO = int(PETSc.Mat.SORType.SYMMETRY_SWEEP) | int(PETSc.Mat.SORType.ZERO_INITIAL_GUESS)
 
 
 class HeldPreconditioner:
     """The preconditioner M of all degrees of freedom, mended around those that are held.
 
-    P M P, with P the projection on what is left, makes its largest errors beside held degrees of
-    freedom: what M wants to move there is just cut off. Symmetric Gauss–Seidel sweeps S ≈ A⁻¹ on
-    the unknowns close by, before and after, smooth them again (a multiplicative Schwarz method,
-    Smith, Bjørstad & Gropp 1996, ch. 1):
+    P M P, with P the projection on what is left, errs most beside held degrees of freedom: what M
+    wants to move there is just cut off. Symmetric Gauss–Seidel sweeps S ≈ A⁻¹ on the unknowns
+    close by, before and after it, smooth that away (a multiplicative Schwarz method; Smith,
+    Bjørstad & Gropp 1996, ch. 1):
 
         2 S − S A S + (1 − S A) P M P (1 − A S),
 
@@ -33,20 +32,20 @@ class HeldPreconditioner:
         matrix: Symmetric positive definite matrix A.
         preconditioner: M.
         left: P; its user tells it what is held.
+        layers: Of unknowns around held ones that count as close by.
 
     Note:
         Everything here is collective.
     """
 
-    def __init__(self, matrix: PETSc.Mat, preconditioner: PETSc.PC, left: Projection) -> None:
-        self._own, self._preconditioner, self._left = (
-            matrix.getDiagonalBlock(),
-            preconditioner,
-            left,
-        )
+    def __init__(
+        self, matrix: PETSc.Mat, preconditioner: PETSc.PC, left: Projection, layers: int
+    ) -> None:
+        self._own = matrix.getDiagonalBlock()
+        self._preconditioner, self._left, self._layers = preconditioner, left, layers
         self._work = matrix.createVecRight()
-        self._near: Indices = np.empty(0, dtype=np.intp)
-        self._around = self._near
+        self._held: Indices | None = None
+        self._close: _Surroundings | None = None
 
     def hold(self, dofs: Indices) -> None:
         """Move to other held degrees of freedom.
@@ -54,49 +53,81 @@ class HeldPreconditioner:
         Args:
             dofs: Local indices of what this rank owns, shape (n,).
         """
-        near = dofs
-        for _ in range(_LAYERS):
-            near = self._neighbours(near)
-        self._near = near = np.setdiff1d(near, dofs)
-        if not len(near):
+        if self._held is not None and np.array_equal(dofs, self._held):
             return
-        self._around = around = self._neighbours(near)
-        self._rows = self._own.createSubMatrix(_indices(near), _indices(around))
-        at = np.searchsorted(around, near)
-        self._square = self._rows.createSubMatrix(_indices(np.arange(len(near))), _indices(at))
-        self._load, self._sag = self._square.createVecs()
+        if self._close is not None:
+            self._close.destroy()
+        self._held = dofs
+        self._close = _Surroundings(self._own, dofs, self._layers) if len(dofs) else None
 
     def apply(self, _pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write the preconditioner's y for x."""
-        near, around = self._near, self._around
+        close = self._close
         x.copy(self._work)
-        if len(near):
-            before = self._swept(x.array_r[near])
-            pushed, sag = self._rows.createVecs()
-            sag.array[:] = before
-            self._rows.multTranspose(sag, pushed)
-            self._work.array[around] -= pushed.array_r
+        if close is not None:
+            before = close.swept(x.array_r[close.near])
+            self._work.array[close.around] -= close.pushed(before)
         self._left.project(self._work)
         self._preconditioner.apply(self._work, y)
         self._left.project(y)
-        if len(near):
-            y.array[near] += before
-            pushed.array[:] = y.array_r[around]
-            self._rows.mult(pushed, sag)
-            y.array[near] += self._swept(x.array_r[near] - sag.array_r)
+        if close is not None:
+            y.array[close.near] += before
+            left = x.array_r[close.near] - close.forces(y.array_r[close.around])
+            y.array[close.near] += close.swept(left)
 
-    def _swept(self, load: Array) -> Array:
-        """Return S of a load."""
-        self._load.array[:] = load
-        self._square.SOR(self._load, self._sag, sortype=_SYMMETRIC_FROM_ZERO, its=_SWEEPS)
+
+class _Surroundings:
+    """The part of a matrix of one process around some of its degrees of freedom.
+
+    Attributes:
+        near: Unknowns close to them, which they do not belong to, shape (n,).
+        around: What these have entries with, shape (m,).
+    """
+
+    def __init__(self, matrix: PETSc.Mat, dofs: Indices, layers: int) -> None:
+        near = dofs
+        for _ in range(layers):
+            near = _neighbours(matrix, near)
+        self.near = near = np.setdiff1d(near, dofs)
+        self.around = _neighbours(matrix, near)
+        self._rows = matrix.createSubMatrix(_indices(near), _indices(self.around))
+        within = np.searchsorted(self.around, near)
+        self._square = self._rows.createSubMatrix(_indices(np.arange(len(near))), _indices(within))
+        self._outer, self._inner = self._rows.createVecs()
+        self._sag = self._inner.duplicate()
+
+    def swept(self, load: Array) -> Array:
+        """Return the displacements of `near` that sweeps find under their load, shape (n,)."""
+        self._inner.array[:] = load
+        self._square.SOR(self._inner, self._sag, sortype=_FROM_ZERO, its=_SWEEPS)
         return self._sag.array_r.copy()
 
-    def _neighbours(self, dofs: Indices) -> Indices:
-        """Return what a row of some degrees of freedom has entries for, sorted."""
-        if not len(dofs):
-            return dofs
-        _, columns, _ = self._own.createSubMatrix(_indices(dofs)).getValuesCSR()
-        return np.unique(columns).astype(np.intp)
+    def pushed(self, sag: Array) -> Array:
+        """Return the forces on `around` by displacements of `near`, shape (m,)."""
+        self._inner.array[:] = sag
+        self._rows.multTranspose(self._inner, self._outer)
+        return self._outer.array_r
+
+    def forces(self, sag: Array) -> Array:
+        """Return the forces on `near` by displacements of `around`, shape (n,)."""
+        self._outer.array[:] = sag
+        self._rows.mult(self._outer, self._inner)
+        return self._inner.array_r
+
+    def destroy(self) -> None:
+        """Give the matrices back, which would else wait for Python's collector."""
+        for part in (self._rows, self._square):
+            part.destroy()
+
+
+def _neighbours(matrix: PETSc.Mat, dofs: Indices) -> Indices:
+    """Return what rows of a matrix have entries for, sorted."""
+    if not len(dofs):
+        return dofs
+    rows = matrix.createSubMatrix(_indices(dofs))
+    columns = np.unique(rows.getValuesCSR()[1]).astype(np.intp)
+    rows.destroy()
+    return columns
 
 
 def _indices(of: Indices) -> PETSc.IS:
