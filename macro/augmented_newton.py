@@ -14,9 +14,6 @@ from macro.solvers import reason_name
 from macro.stiff_preconditioner import StiffPreconditioner
 from macro.top_nodes import TopNodes
 
-TOLERANCE = 1e-10
-"""Residual of the equilibrium that a solution may have, relative to its contact forces."""
-
 LOOSEST, SPARE = 0.03, 0.3
 """Relative residual of linear solves, at first, and in tolerances that are asked for."""
 
