@@ -7,9 +7,10 @@ depth beyond the plane. With the nodal contact forces λ = −(K u)_z that is
 
 The active set holds the nodes that touch; in turn the block is solved with d = 0 on it, and it
 loses the nodes that are pulled and gains those that penetrate (Hintermüller, Ito & Kunisch 2002,
-doi 10.1137/S1052623401383558). A set that still changes is solved for roughly. Motions of the plane that follow from its loads are unknowns of the
-same linear solves: the active nodes move with the plane. Conjugate gradients are preconditioned by
-the multigrid of the block without contact.
+doi 10.1137/S1052623401383558). Sets that still change are solved for roughly, the last one well.
+Motions of the plane that follow from its loads are unknowns of the same linear solves: the active
+nodes move with the plane. Conjugate gradients are preconditioned by the multigrid of the block
+without contact, mended around the active nodes.
 """
 
 from __future__ import annotations

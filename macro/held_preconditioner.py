@@ -44,7 +44,7 @@ class HeldPreconditioner:
         self._own = matrix.getDiagonalBlock()
         self._preconditioner, self._left, self._layers = preconditioner, left, layers
         self._work = matrix.createVecRight()
-        self._held: Indices | None = None
+        self._held: Indices = np.empty(0, dtype=np.intp)
         self._close: _Surroundings | None = None
 
     def hold(self, dofs: Indices) -> None:
@@ -53,12 +53,13 @@ class HeldPreconditioner:
         Args:
             dofs: Local indices of what this rank owns, shape (n,).
         """
-        if self._held is not None and np.array_equal(dofs, self._held):
+        if np.array_equal(dofs, self._held):
             return
         if self._close is not None:
             self._close.destroy()
         self._held = dofs
-        self._close = _Surroundings(self._own, dofs, self._layers) if len(dofs) else None
+        close = _Surroundings(self._own, dofs, self._layers)
+        self._close = close if len(close.near) else None
 
     def apply(self, _pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write the preconditioner's y for x."""
