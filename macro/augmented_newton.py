@@ -47,7 +47,7 @@ class FacetNewton:
         self._equilibrium, self._law, self._interface = equilibrium, law, interface
         self._top, self._plane, block = top, plane, equilibrium.block
         self._preconditioner = StiffPreconditioner(
-            block.stiffness, block.solver.pc, interface.points_by_dofs
+            block.stiffness, block.solver.pc, interface.points_by_dofs, layers=3 - block.degree
         )
         self._ksp = PETSc.KSP().create(block.stiffness.comm)
         self._ksp.setPC(self._preconditioner.pc)
