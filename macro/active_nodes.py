@@ -7,9 +7,10 @@ depth beyond the plane. With the nodal contact forces λ = −(K u)_z that is
 
 The active set holds the nodes that touch; in turn the block is solved with d = 0 on it, and it
 loses the nodes that are pulled and gains those that penetrate (Hintermüller, Ito & Kunisch 2002,
-doi 10.1137/S1052623401383558). Motions of the plane that follow from its loads are unknowns of the
-same linear solves: the active nodes move with the plane. Conjugate gradients are preconditioned by
-the multigrid of the block without contact.
+doi 10.1137/S1052623401383558). Sets that still change are solved for roughly, the last one well.
+Motions of the plane that follow from its loads are unknowns of the same linear solves: the active
+nodes move with the plane. Conjugate gradients are preconditioned by the multigrid of the block
+without contact, mended around the active nodes.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from petsc4py import PETSc
 
 from geometry.control import Control
 from macro.block import Block
-from macro.free_solver import FreeSolver
+from macro.free_solver import FreeSolver, asked_tolerance
 from macro.history_start import Start, StepHistory
 from macro.obstacle_state import Found
 from macro.rigid_plane import RigidPlane, Task, not_found
@@ -30,12 +31,9 @@ from macro.top_nodes import TopNodes
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-TOLERANCE = 1e-10
-"""What a solution may miss: residual and complementarity, relative to the contact forces."""
-
-_LOOSE = 1e-2  # relative residual while the active set still changes
-_MOST_SETS = 80
-_PATIENCE = 10  # sets without progress before nodes change one by one
+_LOOSE, _CLOSER = 0.1, 1e-2  # relative residuals while the active set changes, and hardly does
+_MOST_SOLVES = 100
+_PATIENCE = 10  # solves without progress before nodes change one by one
 _CLOSED = 1e-8  # gap, relative to the displacements, that is none
 _ROUNDING = 1e-15  # of the block's size: nothing
 _SOFT = 8.0  # springs under a plane that nothing holds yet: E* times this over the block's width
@@ -55,7 +53,9 @@ class ActiveNodes:
 
     def __init__(self, block: Block, top: TopNodes, plane: RigidPlane) -> None:
         self._block, self._top, self._plane = block, top, plane
-        self._solver = FreeSolver(block.stiffness, block.solver.pc)
+        # one layer of quadratic elements reaches as far as two of linear ones
+        self._solver = FreeSolver(block.stiffness, block.solver.pc, layers=3 - block.degree)
+        self._tolerance = asked_tolerance()
         self._work = block.stiffness.createVecRight()
         self._history = StepHistory(block.owned_dofs, len(top.dofs))
         modulus, half = block.material.contact_modulus, plane.half
@@ -74,30 +74,36 @@ class ActiveNodes:
         displacement = self._block.stiffness.createVecRight()
         displacement.array[:] = start.displacement
         plane, active = self._started(task, start, displacement)
-        spent, tolerance, fewest, waited = 0, _LOOSE, np.inf, 0
-        for sets in range(1, _MOST_SETS + 1):
+        sets, spent, tolerance, fewest, waited = 1, 0, _LOOSE, np.inf, 0
+        for _ in range(_MOST_SOLVES):
             held = self._held(task, active)
             if held is None:
                 plane, active = self._resettled(task, plane, displacement, active)
+                sets += 1
                 continue
             more, missed = self._solve(task, plane, displacement, active, held, tolerance)
             spent += more
             forces, depth = self._forces(displacement), self._depth(plane, displacement)
             large = self._largest(forces[active])
-            pulled = active & (forces < -TOLERANCE * large)
-            pressed = ~active & (depth > TOLERANCE * self._largest(displacement.array_r))
-            changed, total = self._count(pulled | pressed), self._count(active)
+            pulled = active & (forces < -self._tolerance * large)
+            pressed = ~active & (depth > self._tolerance * self._largest(displacement.array_r))
+            moved = pulled | pressed
+            changed, total = self._count(moved), self._count(active)
             # the forces that a solve starts from may be far larger than those it finds
-            exact = missed <= TOLERANCE * max(self._norm(forces[active]), self._nothing)
+            exact = missed <= self._tolerance * max(self._norm(forces[active]), self._nothing)
             if not changed and exact:
                 return self._found(control, plane, displacement, active, sets, spent)
             fewest, waited = (changed, 0) if changed < fewest else (fewest, waited + 1)
-            # a settled or nearly settled set is worth solving for well
-            near = changed <= max(1, total // 200) or waited > _PATIENCE
-            tolerance = TOLERANCE if near else _LOOSE
-            moved = pulled | pressed
+            sets += changed > 0
+            tolerance = self._next(tolerance, changed, total, waited)
             active = active ^ (self._first(moved) if waited > _PATIENCE else moved)
-        raise not_found(control, "ACTIVE_SET_CYCLES", _MOST_SETS)
+        raise not_found(control, "ACTIVE_SET_CYCLES", sets)
+
+    def _next(self, tolerance: float, changed: int, total: int, waited: int) -> float:
+        """Return how well the next set is solved for: a nearly settled one better, then well."""
+        if changed > max(1, total // 200) and waited <= _PATIENCE:
+            return _LOOSE
+        return self._tolerance if tolerance <= _CLOSER else _CLOSER
 
     def _started(self, task: Task, start: Start, displacement: PETSc.Vec) -> tuple[Array, Flags]:
         """Return the first plane and active set: those of before and nodes that penetrate."""
@@ -122,7 +128,7 @@ class ActiveNodes:
         held = self._plane.held(task.free, active)
         borne = held @ np.linalg.lstsq(held, task.wanted, rcond=None)[0]
         lost = np.abs(task.wanted - borne).max(initial=0.0)
-        return None if lost > TOLERANCE * (task.force or 0.0) else held
+        return None if lost > self._tolerance * (task.force or 0.0) else held
 
     def _solve(
         self,

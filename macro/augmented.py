@@ -20,10 +20,11 @@ from petsc4py import PETSc
 from geometry.control import Control
 from geometry.patches import PatchGrid
 from macro.augmented_law import AugmentedLaw, facet_sizes
-from macro.augmented_newton import LOOSEST, SPARE, TOLERANCE, FacetNewton
+from macro.augmented_newton import LOOSEST, SPARE, FacetNewton
 from macro.block import Block
 from macro.contact import Contact
 from macro.equilibrium import Equilibrium
+from macro.free_solver import asked_tolerance
 from macro.history_start import Start, StepHistory
 from macro.interface import Interface
 from macro.obstacle_state import Found
@@ -71,6 +72,7 @@ class AugmentedFacets:
         unit = block.material.contact_modulus / facet_sizes(points.cell, points.weight)
         self._stiff = _HARD * unit if penalty is None else np.full_like(unit, penalty)
         self._soft = np.minimum(_SOFT * unit, self._stiff)
+        self._tolerance = asked_tolerance()
         self._penetration = PENETRATION[block.degree]
         self._law = AugmentedLaw(np.sum(points.values * rest[points.nodes], axis=1))
         self._contact = Contact(interface, sampling, [self._law])
@@ -103,7 +105,7 @@ class AugmentedFacets:
             excess = depth / max(self._penetration * self._largest(displacement.array_r), _TINY)
             hard = bool(np.all(law.slope >= self._stiff))
             hard = bool(self._block.mesh.comm.allreduce(hard, op=MPI.LAND))
-            if hard and tolerance <= TOLERANCE and (excess <= 1.0 or not self._exact):
+            if hard and tolerance <= self._tolerance and (excess <= 1.0 or not self._exact):
                 return self._found(control, displacement, steps, spent)
             if self._exact:
                 law.multiplier = law.pressure(closure)
@@ -112,7 +114,7 @@ class AugmentedFacets:
             before = excess
             law.slope = np.minimum(_HARDER * law.slope, hardest)
             near = min(0.1 * tolerance, SPARE * self._penetration * excess) if self._exact else 0.0
-            tolerance = max(TOLERANCE, near) if hard or not self._exact else tolerance
+            tolerance = max(self._tolerance, near) if hard or not self._exact else tolerance
         raise not_found(control, "MULTIPLIERS", _MOST_UPDATES)
 
     def _found(self, control: Control, displacement: PETSc.Vec, steps: int, spent: int) -> Found:

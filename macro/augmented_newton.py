@@ -14,9 +14,6 @@ from macro.solvers import reason_name
 from macro.stiff_preconditioner import StiffPreconditioner
 from macro.top_nodes import TopNodes
 
-TOLERANCE = 1e-10
-"""Residual of the equilibrium that a solution may have, relative to its contact forces."""
-
 LOOSEST, SPARE = 0.03, 0.3
 """Relative residual of linear solves, at first, and in tolerances that are asked for."""
 
@@ -50,7 +47,7 @@ class FacetNewton:
         self._equilibrium, self._law, self._interface = equilibrium, law, interface
         self._top, self._plane, block = top, plane, equilibrium.block
         self._preconditioner = StiffPreconditioner(
-            block.stiffness, block.solver.pc, interface.points_by_dofs
+            block.stiffness, block.solver.pc, interface.points_by_dofs, layers=3 - block.degree
         )
         self._ksp = PETSc.KSP().create(block.stiffness.comm)
         self._ksp.setPC(self._preconditioner.pc)

@@ -2,38 +2,51 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.errors import NotConverged
-from macro.solvers import reason_name
+from macro.held_preconditioner import HeldPreconditioner
+from macro.projection import Projection
+from macro.solvers import PREFIX, reason_name
 
 Array = NDArray[np.float64]
+
+TOLERANCE = 1e-9
+"""What a contact may miss: residual and complementarity, relative to the contact forces.
+
+Forces are then known to 2e-11 and contact areas to 3e-11, forces of single nodes to 2e-10 of the
+largest: residuals swing from node to node, and add up to little. Each tenth costs one iteration on
+hexahedra and two to three on quadratic tetrahedra, of 12 and 30.
+"""
+
+
+def asked_tolerance() -> float:
+    """Return `TOLERANCE`, or what the user asks for by ``-patchlaw_ksp_rtol``."""
+    return float(PETSc.Options(PREFIX).getReal("ksp_rtol", TOLERANCE))
 
 
 class FreeSolver:
     """Conjugate gradients where some degrees of freedom are held, or move together.
 
     With P the orthogonal projection on the vectors that are left, the operator is P A P and the
-    preconditioner P M P. Held degrees of freedom that a rigid plane takes along add as many
-    unknowns as the plane has motions, and no second solve.
+    preconditioner P M P, mended (see `HeldPreconditioner`). Held degrees of freedom that a rigid
+    plane takes along add as many unknowns as the plane has motions, and no second solve.
 
     Args:
         matrix: Symmetric positive definite matrix A of all of them.
         preconditioner: A preconditioner M of it.
+        layers: Of unknowns around held ones that the preconditioner is mended on.
 
     Note:
         Every method is collective.
     """
 
-    def __init__(self, matrix: PETSc.Mat, preconditioner: PETSc.PC) -> None:
+    def __init__(self, matrix: PETSc.Mat, preconditioner: PETSc.PC, layers: int = 2) -> None:
         self._left = Projection(matrix.comm.tompi4py())
         operator = PETSc.Mat().createPython(
-            matrix.getSizes(), _Projected(matrix.mult, self._left), comm=matrix.comm
+            matrix.getSizes(), _Projected(matrix, self._left), comm=matrix.comm
         )
         operator.setUp()
         self._ksp = PETSc.KSP().create(matrix.comm)
@@ -42,7 +55,8 @@ class FreeSolver:
         self._ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
         self._ksp.setTolerances(max_it=1000)
         self._ksp.pc.setType("python")
-        self._ksp.pc.setPythonContext(_Projected(preconditioner.apply, self._left))
+        self._mended = HeldPreconditioner(matrix, preconditioner, self._left, layers)
+        self._ksp.pc.setPythonContext(self._mended)
 
     def hold(self, dofs: NDArray[np.intp], motions: Array | None = None) -> None:
         """Hold degrees of freedom but for common motions, and free all others.
@@ -53,6 +67,7 @@ class FreeSolver:
                 orthonormal, all ranks together. None: they stand still.
         """
         self._left.hold(dofs, np.zeros((len(dofs), 0)) if motions is None else motions)
+        self._mended.hold(dofs)
 
     def improve(self, solution: PETSc.Vec, residual: PETSc.Vec, tolerance: float) -> int:
         """Change what is free of a solution until its residual is small.
@@ -86,40 +101,12 @@ class FreeSolver:
         return int(self._ksp.its)
 
 
-class Projection:
-    """The orthogonal projection P: identity on what is free, Q Qᵀ on what is held.
-
-    Args:
-        comm: MPI communicator.
-    """
-
-    def __init__(self, comm: Any) -> None:
-        self._comm = comm
-        self._dofs: NDArray[np.intp] = np.empty(0, dtype=np.intp)
-        self._motions: Array = np.empty((0, 0))
-
-    def hold(self, dofs: NDArray[np.intp], motions: Array) -> None:
-        """Hold degrees of freedom but for motions Q; see `FreeSolver.hold`."""
-        self._dofs, self._motions = dofs, motions
-
-    def project(self, vector: PETSc.Vec) -> None:
-        """Project a vector in place; collective."""
-        values, q = vector.array, self._motions
-        shares = q.T @ values[self._dofs]
-        if shares.size:
-            shares = self._comm.allreduce(shares, op=MPI.SUM)
-        values[self._dofs] = q @ shares
-
-
 class _Projected:
-    """A linear map on vectors of the range of a projection, back into that range."""
+    """P A: what PETSc calls to multiply vectors of the range of P."""
 
-    def __init__(self, apply: Any, left: Projection) -> None:
-        self._apply, self._left = apply, left
+    def __init__(self, matrix: PETSc.Mat, left: Projection) -> None:
+        self._matrix, self._left = matrix, left
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Write P A x."""
-        self._apply(x, y)
+        self._matrix.mult(x, y)
         self._left.project(y)
-
-    apply = mult

@@ -79,8 +79,9 @@ class ObstacleBlock:
     def press(self, control: Control) -> ObstacleState:
         """Find the contact of one load step, starting from those before.
 
-        A force and a moment of zero are met to 1e-10 of the force. Without any force the plane
-        just touches the highest node, tilted as is prescribed or as it was last.
+        A force and a moment of zero are met to `macro.free_solver.TOLERANCE` of the force, or to
+        what ``-patchlaw_ksp_rtol`` asks for. Without any force the plane just touches the highest
+        node, tilted as is prescribed or as it was last.
 
         Args:
             control: What is prescribed of the plane.

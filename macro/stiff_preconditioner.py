@@ -8,7 +8,8 @@ from petsc4py import PETSc
 from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import splu
 
-from macro.free_solver import Projection
+from macro.held_preconditioner import HeldPreconditioner
+from macro.projection import Projection
 
 Array = NDArray[np.float64]
 
@@ -16,14 +17,15 @@ Array = NDArray[np.float64]
 class StiffPreconditioner:
     """M⁻¹ = P B P + (1 − P) S⁻¹ (1 − P), for a matrix K + C with stiff springs C at some dofs.
 
-    B is a preconditioner of K. P holds the dofs with springs but for their motions with the plane;
-    S is the part of K + C between them, factorised by every rank for what it owns. The stiffer the
+    B is a preconditioner of K. P holds the dofs with springs but for their motions with the plane,
+    and P B P is mended around them (see `HeldPreconditioner`); S is the part of K + C between them, factorised by every rank for what it owns. The stiffer the
     springs, the less the two parts see of each other.
 
     Args:
         matrix: K.
         preconditioner: B.
         points_by_dofs: −w φ of every quadrature point, shape (points, dofs) [mm²].
+        layers: Of unknowns that P B P is mended on.
 
     Attributes:
         pc: The preconditioner for PETSc.
@@ -33,10 +35,14 @@ class StiffPreconditioner:
     """
 
     def __init__(
-        self, matrix: PETSc.Mat, preconditioner: PETSc.PC, points_by_dofs: PETSc.Mat
+        self,
+        matrix: PETSc.Mat,
+        preconditioner: PETSc.PC,
+        points_by_dofs: PETSc.Mat,
+        layers: int,
     ) -> None:
         self._matrix, self._points = matrix, points_by_dofs
-        self._split = _Split(matrix, preconditioner)
+        self._split = _Split(matrix, preconditioner, layers)
         self.pc = PETSc.PC().create(matrix.comm)
         self.pc.setOperators(matrix)
         self.pc.setType("python")
@@ -74,22 +80,22 @@ def _square(matrix: PETSc.Mat, dofs: NDArray[np.intp]) -> csr_array:
 class _Split:
     """What PETSc calls to apply the preconditioner."""
 
-    def __init__(self, matrix: PETSc.Mat, preconditioner: PETSc.PC) -> None:
-        self._preconditioner, self._part = preconditioner, matrix.createVecRight()
-        self._left = Projection(matrix.comm.tompi4py())
+    def __init__(self, matrix: PETSc.Mat, preconditioner: PETSc.PC, layers: int) -> None:
+        self._part, self._left = matrix.createVecRight(), Projection(matrix.comm.tompi4py())
+        self._mended = HeldPreconditioner(matrix, preconditioner, self._left, layers)
         self._dofs: NDArray[np.intp] = np.empty(0, dtype=np.intp)
         self._factors: object = None
 
     def set(self, dofs: NDArray[np.intp], motions: Array, square: csc_array) -> None:
         self._dofs = dofs
         self._left.hold(dofs, motions)
+        self._mended.hold(dofs)
         self._factors = splu(square) if len(dofs) else None
 
-    def apply(self, _pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+    def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        self._mended.apply(pc, x, y)
         x.copy(self._part)
         self._left.project(self._part)
-        self._preconditioner.apply(self._part, y)
-        self._left.project(y)
         self._part.axpby(1.0, -1.0, x)  # (1 − P) x, at the dofs with springs alone
         rest = self._part.array_r[self._dofs]
         self._part.set(0.0)

@@ -46,7 +46,7 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
             failure = _stepped(run, keeper, interruption)
             if run.steps:
                 terminal.show_history(comm, run.history())
-                files = on_root(comm, lambda: write_results(folder, run, options=options))
+                files = write_results(folder, run, options=options)
                 if scene.output.fields:
                     files += write_fields(folder, run)
                 terminal.show_comparison(comm, run.forecast, run.seconds)

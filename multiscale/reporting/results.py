@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from geometry.collective import on_root
+from geometry.collective import on_root, together
 from multiscale import plan
 from multiscale.law_tables.law_files import write_laws
 from multiscale.reference.coupling import ReferenceCoupling
-from multiscale.reporting.outputs import write_json, write_tables, write_text, write_whole, written
+from multiscale.reporting.outputs import (
+    write_bytes,
+    write_json,
+    write_tables,
+    write_text,
+    write_whole,
+    written,
+)
 from multiscale.reporting.provenance import provenance
 from multiscale.reporting.report import report_html
 from multiscale.run import Run
@@ -24,10 +32,15 @@ _FILES = (
     "surface.png", "curves.png", "pressures.png", "laws.png", "fields.xdmf", "fields.h5",
     "fields.bp",
 )  # fmt: skip
+_RESOLUTION = 130  # of figures [dots per inch]
+_MOST_FIGURES = 4
+
+Drawing = tuple[str, str, bytes]
+"""A figure: name of its file, caption, PNG."""
 
 
 def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
-    """Write the files of a run, finished or stopped; call it on one rank.
+    """Write the files of a run, finished or stopped: rank 0 writes, all draw.
 
     Args:
         folder: Where to; made when missing.
@@ -36,7 +49,19 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
 
     Returns:
         The files written.
+
+    Note:
+        Collective.
     """
+    drawn: list[Drawing] = []
+    if run.scene.output.figures and run.steps:
+        with run.phase("output"):
+            drawn = _drawn(run)
+    return on_root(run.comm, lambda: _written(folder, run, drawn, options))
+
+
+def _written(folder: Path, run: Run, drawn: list[Drawing], options: list[str]) -> list[Path]:
+    """Write the files of a run with the figures drawn."""
     made = run.forecast
     history = run.history()
     _remove_older(folder)
@@ -44,21 +69,17 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
     table = run.table
     if table is not None:
         files.append(write_whole(folder / "laws.h5", lambda path: write_laws(path, table)))
-    output = run.scene.output
-    drawn = {}
-    if output.figures and len(history):
-        with run.phase("output"):
-            for name, caption, figure in _figures(run):
-                drawn[caption] = write_figure(folder / f"{name}.png", figure)
-        files.extend(drawn.values())
+    figures = {caption: folder / f"{name}.png" for name, caption, _ in drawn}
+    for path, (_, _, content) in zip(figures.values(), drawn, strict=True):
+        files.append(write_bytes(path, content))
     files.append(write_json(folder / "provenance.json", provenance(run, options=options)))
-    if output.report:
+    if run.scene.output.report:
         page = report_html(
             title=f"patchlaw: {run.scene.name}",
             statements=plan.statements(run.stage, made),
             warnings=list(plan.warnings(run.stage, made)),
-            history=run.history(),
-            figures=drawn,
+            history=history,
+            figures=figures,
             made=made,
         )
         files.append(write_text(folder / "report.html", page))
@@ -87,32 +108,55 @@ def write_figure(path: Path, figure: Figure) -> Path:
         path: File to write.
         figure: A matplotlib figure.
     """
-    return write_whole(path, lambda partial: figure.savefig(partial, dpi=130))
+    return write_whole(path, lambda partial: figure.savefig(partial, dpi=_RESOLUTION))
 
 
-def _figures(run: Run) -> Iterator[tuple[str, str, Figure]]:
-    """Yield file name, caption and figure; matplotlib is loaded only when one is wanted."""
+def _drawn(run: Run) -> list[Drawing]:
+    """Draw the figures, each on a rank of its own where there are as many; rank 0 gets them."""
+    comm = run.comm
+    rank, size = (0, 1) if comm is None else (comm.rank, comm.size)
+
+    def draw() -> dict[int, Drawing]:
+        if rank >= _MOST_FIGURES:
+            return {}
+        mine = list(enumerate(_figures(run)))[rank::size]
+        return {at: (name, caption, _png(make())) for at, (name, caption, make) in mine}
+
+    drawn = together(comm, draw)
+    if comm is not None:
+        drawn = {at: one for part in comm.gather(drawn) or () for at, one in part.items()}
+    return [drawn[at] for at in sorted(drawn)]
+
+
+def _png(figure: Figure) -> bytes:
+    content = BytesIO()
+    figure.savefig(content, dpi=_RESOLUTION)
+    return content.getvalue()
+
+
+def _figures(run: Run) -> Iterator[tuple[str, str, Callable[[], Figure]]]:
+    """Yield file name, caption and maker; matplotlib is loaded only when a figure is wanted."""
     from multiscale import figures
 
-    stage, history = run.stage, run.history()
+    stage, history, table = run.stage, run.history(), run.table
     yield (
         "surface",
         "The rough surface with its summits and the patches.",
-        figures.surface_figure(stage.surface, stage.asperities, stage.patches),
+        lambda: figures.surface_figure(stage.surface, stage.asperities, stage.patches),
     )
     bands = "" if history.reference is None else " Bands: error bars about mesh size zero."
     yield (
         "curves",
         f"Mean pressure, contact area and mean separation.{bands}",
-        figures.history_figure({run.scene.coupling.kind: history}),
+        lambda: figures.history_figure({run.scene.coupling.kind: history}),
     )
     yield (
         "pressures",
         "Mean pressure of every patch at the last load step.",
-        figures.pressure_figure(history),
+        lambda: figures.pressure_figure(history),
     )
-    if run.table is not None:
-        yield "laws", "The patch laws.", figures.law_figure(run.table)
+    if table is not None:
+        yield "laws", "The patch laws.", lambda: figures.law_figure(table)
 
 
 def write_fields(folder: Path, run: Run) -> list[Path]:

@@ -24,6 +24,17 @@ _UNIT = r"\(?(?:[^\W\d]+|%)(?:\s*(?:\^|\*\*)\s*[+-]?[0-9]{1,2}(?![0-9])|[²³⁴
 _QUANTITY = re.compile(rf"\s*{_NUMBER}\s*(?:\*?\s*{_UNIT}(?:\s*[*/·]\s*{_UNIT}|\s+{_UNIT})*)?\s*")
 _LONGEST = 100  # characters
 
+_COMMON = {
+    "mm": {"m": 1e3, "mm": 1.0, "um": 1e-3, "µm": 1e-3},
+    "MPa": {"Pa": 1e-6, "kPa": 1e-3, "MPa": 1.0, "GPa": 1e3},
+    "": {"um/mm": 1e-3},
+    "N": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
+    "s": {"s": 1.0, "min": 60.0, "h": 3600.0},
+}
+"""Units that most scenes do with: a third of a second less than pint's."""
+
+_IN_COMMON = re.compile(rf"\s*({_NUMBER})\s*([^\W\d]+(?:/mm)?)\s*")
+
 _SIZES = {
     "mm": (1e-15, 1e15),
     "MPa": (1e-15, 1e15),
@@ -73,7 +84,10 @@ def parse_quantity(value: Any, unit: str) -> float:
 
 
 def _with_unit(text: str, unit: str) -> float:
-    """Convert a string with a unit by pint."""
+    """Convert a string with a unit, by pint unless it is a common one."""
+    common = _IN_COMMON.fullmatch(text)
+    if common and common[2] in _COMMON.get(unit, {}) and len(text) <= _LONGEST:
+        return float(common[1]) * _COMMON[unit][common[2]]
     allowed = f"(allowed: a quantity in units of {_named(unit)}, such as {_EXAMPLES[unit]})"
     # pint would also do sums, and 9**9**9 for as long as it takes
     if len(text) > _LONGEST or not _QUANTITY.fullmatch(text):

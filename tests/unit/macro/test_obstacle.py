@@ -173,7 +173,7 @@ def test_patches_share_force_area_and_closure():
 def test_failed_step_changes_nothing(monkeypatch):
     found = obstacle()
     found.press(Control(approach=4e-3))
-    monkeypatch.setattr(active_nodes, "_MOST_SETS", 1)
+    monkeypatch.setattr(active_nodes, "_MOST_SOLVES", 1)
     with pytest.raises(NotConverged, match=r"an approach of 0\.02 mm did not converge: ACTIVE_SET"):
         found.press(Control(approach=20e-3))
     monkeypatch.undo()

@@ -1,8 +1,11 @@
 """Reading scenes: what is accepted, and the words with which the rest is refused."""
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
+import pint
 import pytest
 
 from geometry.errors import InputError
@@ -180,6 +183,26 @@ def test_stress_and_slope_units():
     scene = Scene.load(PAPER, ["block.young_modulus='4e9 Pa'", "load.tilt=['5 um/mm', 0]"])
     assert scene.block.young_modulus == pytest.approx(4000.0, rel=1e-15)  # one rounding
     assert scene.loading.tilt == pytest.approx((5e-3, 0.0), rel=1e-14)  # one rounding
+
+
+@pytest.mark.parametrize("number", ["8", "0.3", "7.7e-1"])
+def test_common_units_are_those_of_pint(number):
+    quantity = pint.UnitRegistry().Quantity
+    for unit in ("mm", "um", "µm", "m"):
+        scene = Scene.load(PAPER, [f"block.height='{number} {unit}'"])
+        assert scene.block.height == quantity(f"{number} {unit}").to("mm").magnitude
+    for unit in ("Pa", "kPa", "MPa", "GPa"):
+        scene = Scene.load(PAPER, [f"block.young_modulus='{number} {unit}'"])
+        assert scene.block.young_modulus == quantity(f"{number} {unit}").to("MPa").magnitude
+    by_slope = Scene.load(PAPER, [f"load.tilt=['{number} um/mm', 0]"])
+    assert by_slope.loading.tilt[0] == quantity(f"{number} um/mm").to("dimensionless").magnitude
+
+
+def test_the_papers_scene_needs_no_registry_of_units():
+    code = f"import sys; from multiscale import Scene; Scene.load('{PAPER}'); " + (
+        "sys.exit('pint' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False, timeout=60).returncode == 0
 
 
 def test_paths_start_in_the_folder_of_the_scene(tmp_path):

@@ -1,0 +1,135 @@
+"""Preconditioner of a block some of whose degrees of freedom are held."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from macro.projection import Projection
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+_SWEEPS = 2
+_FROM_ZERO = int(PETSc.Mat.SORType.SYMMETRY_SWEEP) | int(PETSc.Mat.SORType.ZERO_INITIAL_GUESS)
+
+
+class HeldPreconditioner:
+    """The preconditioner M of all degrees of freedom, mended around those that are held.
+
+    P M P, with P the projection on what is left, errs most beside held degrees of freedom: what M
+    wants to move there is just cut off. Symmetric Gauss–Seidel sweeps S ≈ A⁻¹ on the unknowns
+    close by, before and after it, smooth that away (a multiplicative Schwarz method; Smith,
+    Bjørstad & Gropp 1996, ch. 1):
+
+        2 S − S A S + (1 − S A) P M P (1 − A S),
+
+    symmetric and positive definite like M. A stands for what ranks own of it, so that the sweeps
+    need no messages.
+
+    Args:
+        matrix: Symmetric positive definite matrix A.
+        preconditioner: M.
+        left: P; its user tells it what is held.
+        layers: Of unknowns around held ones that count as close by.
+
+    Note:
+        Everything here is collective.
+    """
+
+    def __init__(
+        self, matrix: PETSc.Mat, preconditioner: PETSc.PC, left: Projection, layers: int
+    ) -> None:
+        self._own = matrix.getDiagonalBlock()
+        self._preconditioner, self._left, self._layers = preconditioner, left, layers
+        self._work = matrix.createVecRight()
+        self._held: Indices = np.empty(0, dtype=np.intp)
+        self._close: _Surroundings | None = None
+
+    def hold(self, dofs: Indices) -> None:
+        """Move to other held degrees of freedom.
+
+        Args:
+            dofs: Local indices of what this rank owns, shape (n,).
+        """
+        if np.array_equal(dofs, self._held):
+            return
+        if self._close is not None:
+            self._close.destroy()
+        self._held = dofs
+        close = _Surroundings(self._own, dofs, self._layers)
+        self._close = close if len(close.near) else None
+
+    def apply(self, _pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write the preconditioner's y for x."""
+        close = self._close
+        x.copy(self._work)
+        if close is not None:
+            before = close.swept(x.array_r[close.near])
+            self._work.array[close.around] -= close.pushed(before)
+        self._left.project(self._work)
+        self._preconditioner.apply(self._work, y)
+        self._left.project(y)
+        if close is not None:
+            y.array[close.near] += before
+            left = x.array_r[close.near] - close.forces(y.array_r[close.around])
+            y.array[close.near] += close.swept(left)
+
+
+class _Surroundings:
+    """The part of a matrix of one process around some of its degrees of freedom.
+
+    Attributes:
+        near: Unknowns close to them, which they do not belong to, shape (n,).
+        around: What these have entries with, shape (m,).
+    """
+
+    def __init__(self, matrix: PETSc.Mat, dofs: Indices, layers: int) -> None:
+        near = dofs
+        for _ in range(layers):
+            near = _neighbours(matrix, near)
+        self.near = near = np.setdiff1d(near, dofs)
+        self.around = _neighbours(matrix, near)
+        self._rows = matrix.createSubMatrix(_indices(near), _indices(self.around))
+        within = np.searchsorted(self.around, near)
+        self._square = self._rows.createSubMatrix(_indices(np.arange(len(near))), _indices(within))
+        self._outer, self._inner = self._rows.createVecs()
+        self._sag = self._inner.duplicate()
+
+    def swept(self, load: Array) -> Array:
+        """Return the displacements of `near` that sweeps find under their load, shape (n,)."""
+        self._inner.array[:] = load
+        self._square.SOR(self._inner, self._sag, sortype=_FROM_ZERO, its=_SWEEPS)
+        return self._sag.array_r.copy()
+
+    def pushed(self, sag: Array) -> Array:
+        """Return the forces on `around` by displacements of `near`, shape (m,)."""
+        self._inner.array[:] = sag
+        self._rows.multTranspose(self._inner, self._outer)
+        return self._outer.array_r
+
+    def forces(self, sag: Array) -> Array:
+        """Return the forces on `near` by displacements of `around`, shape (n,)."""
+        self._outer.array[:] = sag
+        self._rows.mult(self._outer, self._inner)
+        return self._inner.array_r
+
+    def destroy(self) -> None:
+        """Give the matrices back, which would else wait for Python's collector."""
+        for part in (self._rows, self._square):
+            part.destroy()
+
+
+def _neighbours(matrix: PETSc.Mat, dofs: Indices) -> Indices:
+    """Return what rows of a matrix have entries for, sorted."""
+    if not len(dofs):
+        return dofs
+    rows = matrix.createSubMatrix(_indices(dofs))
+    columns = np.unique(rows.getValuesCSR()[1]).astype(np.intp)
+    rows.destroy()
+    return columns
+
+
+def _indices(of: Indices) -> PETSc.IS:
+    return PETSc.IS().createGeneral(of.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
