@@ -2,10 +2,12 @@
 
 import json
 
+import numpy as np
 from mpi4py import MPI
 
 from geometry import BlockShape
 from macro import Block, Material, block_mesh
+from macro.multigrid import coarser_grids, lattice_of
 
 COMM = MPI.COMM_WORLD
 CASES = {
@@ -16,6 +18,22 @@ CASES = {
     # fewer nodes of the coarsest grid than ranks could share
     "column": {"cells": (1, 1, 6)},
 }
+
+
+def missed(block):
+    """Return by how much products with coarser matrices M x miss Pᵀ(A(P x)), relative to them."""
+    finer, worst = block.stiffness, 0.0
+    for grid in coarser_grids(lattice_of(block.space, block.mesh), finer, block.free):
+        x = grid.matrix.createVecRight()
+        x.array[:] = np.random.default_rng(COMM.rank).standard_normal(x.getLocalSize())
+        expected, found = x.duplicate(), x.duplicate()
+        fine = grid.interpolation.createVecLeft()
+        grid.interpolation.mult(x, fine)
+        grid.interpolation.multTranspose(finer * fine, expected)
+        grid.matrix.mult(x, found)
+        found.axpy(-1.0, expected)
+        worst, finer = max(worst, found.norm() / expected.norm()), grid.matrix
+    return worst
 
 
 def run(shape):
@@ -31,6 +49,7 @@ def run(shape):
         "norm": found.norm(),
         "iterations": block.solver.its,
         "preconditioner": block.solver.pc.getType(),
+        "missed": missed(block),
     }
 
 

@@ -1,4 +1,4 @@
-"""Geometric multigrid is the same method on 1 and 2 ranks."""
+"""Geometric multigrid is the same method on 1, 2 and 3 ranks."""
 
 import json
 from pathlib import Path
@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 SCRIPT = Path(__file__).with_name("multigrid_ranks_script.py")
+CASES = ["graded", "margin", "quadratic", "tetrahedra", "column"]
 
 
 @pytest.fixture(scope="module")
@@ -14,18 +15,25 @@ def found(mpirun, root):
     results = {}
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTHONPATH", str(root))
-        for ranks in (1, 2):
+        for ranks in (1, 2, 3):
             done = mpirun(ranks, SCRIPT)
             assert done.returncode == 0, done.stdout + done.stderr
             results[ranks] = json.loads(done.stdout.splitlines()[-1])
     return results
 
 
-@pytest.mark.parametrize("case", ["graded", "margin", "quadratic", "tetrahedra", "column"])
-def test_solves_do_not_depend_on_the_ranks(found, case):
-    serial, parallel = (found[n][case] for n in (1, 2))
+@pytest.mark.parametrize("ranks", [2, 3])
+@pytest.mark.parametrize("case", CASES)
+def test_solves_do_not_depend_on_the_ranks(found, case, ranks):
+    serial, parallel = found[1][case], found[ranks][case]
     assert serial["preconditioner"] == parallel["preconditioner"] == "mg"
     # residuals of 1e-10 on both sides, seen through the condition of a small block
     assert parallel["norm"] == pytest.approx(serial["norm"], rel=1e-8)
     # the method is the same; its eigenvalues are estimated from a random start
     assert abs(parallel["iterations"] - serial["iterations"]) <= 2
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 3])
+@pytest.mark.parametrize("case", CASES)
+def test_coarser_matrices_are_galerkin_products(found, case, ranks):
+    assert found[ranks][case]["missed"] < 1e-13  # rounding of a few hundred terms

@@ -1,0 +1,85 @@
+"""Matrices of coarser grids against dense Galerkin products, and the blocks they are made from."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from geometry import BlockShape
+from macro import Block, Material, block_mesh
+from macro.multigrid import coarser_grids, lattice_of, transfers
+from macro.multigrid_products import galerkin
+from macro.petsc_blocks import block_rows
+
+
+def make(sides="free", **changes):
+    shape = BlockShape(**{"interface": (1.0, 0.8), "height": 0.9, "cells": (6, 5, 4)} | changes)
+    material = Material(young_modulus=4e3, poisson_ratio=0.3)
+    return Block(block_mesh(shape, MPI.COMM_SELF), material, sides)
+
+
+def dense(matrix):
+    rows, columns = (np.arange(size, dtype=PETSc.IntType) for size in matrix.getSize())
+    return matrix.getValues(rows, columns)
+
+
+def grids_of(block):
+    return coarser_grids(lattice_of(block.space, block.mesh), block.stiffness, block.free)
+
+
+@pytest.mark.parametrize("sides", ["free", "roller"])
+@pytest.mark.parametrize("element", ["Q1", "P1", "Q2"])
+def test_every_grid_has_the_galerkin_product(element, sides):
+    cells = (3, 3, 2) if element == "Q2" else (6, 5, 4)
+    block = make(sides, element=element, cells=cells, grading=3.0)
+    finer = dense(block.stiffness)
+    for grid in grids_of(block):
+        interpolation = dense(grid.interpolation)
+        expected = interpolation.T @ finer @ interpolation
+        # rounding of sums of some hundred terms
+        np.testing.assert_allclose(dense(grid.matrix), expected, atol=1e-13 * expected.max())
+        finer = expected
+
+
+def test_single_unknowns_may_be_held_anywhere():
+    block = make()
+    step = next(transfers(lattice_of(block.space, block.mesh), block.free))
+    free = block.free
+    held = np.flatnonzero(free.array_r)[[5, 40, 41, -1]]  # also amid coarse nodes
+    free.array[held] = 0.0
+    matrix = block.stiffness.copy()
+    matrix.zeroRowsColumns(held.astype(PETSc.IntType), 1.0)
+    found = dense(galerkin(matrix, step.weights, free, step.coarse_free))
+    weights = np.kron(dense(step.weights), np.eye(3)) * free.array_r[:, None]
+    expected = weights.T @ dense(matrix) @ weights
+    stay = step.coarse_free.array_r > 0.0
+    expected[~stay], expected[:, ~stay] = 0.0, 0.0
+    expected[~stay, ~stay] = 1.0
+    np.testing.assert_allclose(found, expected, atol=1e-13 * expected.max())
+
+
+def test_rows_are_multiplied_in_any_number_of_pieces(monkeypatch):
+    whole = dense(grids_of(make())[0].matrix)
+    monkeypatch.setattr("macro.multigrid_products._AT_ONCE", 7)
+    pieces = dense(grids_of(make())[0].matrix)
+    np.testing.assert_allclose(pieces, whole, atol=1e-13 * whole.max())  # order of sums
+
+
+def test_blocks_are_those_of_the_matrix():
+    matrix = make("roller").stiffness
+    with block_rows(matrix) as rows:
+        blocks = rows.own.data.reshape(-1, 3, 3).transpose(0, 2, 1).copy()
+        starts, columns = rows.own.indptr.copy(), rows.own.indices.copy()
+        assert rows.beside.nnz == len(rows.ghosts) == 0
+    expected = dense(matrix)
+    found = np.zeros_like(expected)
+    for node, (first, last) in enumerate(zip(starts[:-1], starts[1:], strict=True)):
+        for block, column in zip(blocks[first:last], columns[first:last], strict=True):
+            found[3 * node : 3 * node + 3, 3 * column : 3 * column + 3] = block
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_other_types_of_matrices_are_refused():
+    with pytest.raises(PETSc.Error):
+        with block_rows(make().unsupported_stiffness):
+            pass
