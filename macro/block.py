@@ -15,10 +15,10 @@ from petsc4py import PETSc
 
 from geometry.errors import InputError
 from macro import compat
+from macro.block_solver import block_solver
 from macro.elasticity import Material, rigid_body_modes, stiffness_form
 from macro.mesh import BOTTOM, SIDES, BlockMesh
-from macro.multigrid import lattice_of, transfers
-from macro.solvers import linear_solver, solve_linear
+from macro.solvers import solve_linear
 
 Sides = Literal["free", "roller"]
 
@@ -97,10 +97,7 @@ class Block:
     @cached_property
     def solver(self) -> PETSc.KSP:
         """Linear solver of the block alone; its preconditioner also serves the contact solves."""
-        lattice = lattice_of(self.space, self.mesh)
-        if lattice is None:
-            return linear_solver(self.stiffness)
-        return linear_solver(self.stiffness, transfers=lambda: transfers(lattice, self.free))
+        return block_solver(self.stiffness, self.space, self.mesh, self.material, self.free)
 
     def solve(self, load: PETSc.Vec) -> Any:
         """Return the displacement under a nodal load.

@@ -82,7 +82,7 @@ def transfers(lattice: Lattice, free: PETSc.Vec) -> list[PETSc.Mat]:
     found, grid, nodes = [], lattice.grid, lattice.nodes
     for kept in coarsenings(grid):
         rows, stay = _node_weights(grid, kept, nodes, free.comm)
-        matrix, free = _for_displacements(rows, stay, free)
+        matrix, free = for_displacements(rows, stay, free)
         found.append(matrix)
         nodes = np.stack([np.searchsorted(of, nodes[stay, k]) for k, of in enumerate(kept)], axis=1)
         grid = [lines.only(of) for lines, of in zip(grid, kept, strict=True)]
@@ -112,16 +112,31 @@ def _node_weights(
     return rows, stay
 
 
-def _for_displacements(
-    weights: sparse.csr_matrix, stay: Indices, free: PETSc.Vec
+def for_displacements(
+    weights: sparse.csr_matrix, stay: Indices, free: PETSc.Vec, *, blocks: bool = False
 ) -> tuple[PETSc.Mat, PETSc.Vec]:
-    """Interpolate three components at a time, held ones apart; return also who is free then."""
+    """Interpolate three components at a time, held ones apart.
+
+    Args:
+        weights: What this rank's nodes take from all coarse nodes, numbered rank after rank.
+        stay: The nodes that are this rank's coarse nodes.
+        free: 1 for unknowns that are free, 0 for those that are held.
+        blocks: Whether the matrix, and what is formed with it, shall know of the components.
+
+    Returns:
+        The matrix, and what ``free`` is for the coarse unknowns.
+
+    Note:
+        Collective.
+    """
     count = weights.shape[0]
     rows = weights[np.repeat(np.arange(count), 3)]
     component = np.repeat(np.tile(np.arange(3), count), np.diff(rows.indptr))
     pattern = (part.astype(PETSc.IntType) for part in (rows.indptr, 3 * rows.indices + component))
     size = ((3 * count, None), (3 * len(stay), None))
-    matrix = PETSc.Mat().createAIJ(size, csr=(*pattern, rows.data), comm=free.comm)
+    matrix = PETSc.Mat().createAIJ(
+        size, bsize=3 if blocks else None, csr=(*pattern, rows.data), comm=free.comm
+    )
     coarse = matrix.createVecRight()
     same = (3 * stay[:, None] + np.arange(3)).ravel()
     coarse.array[:] = free.array_r[same]
