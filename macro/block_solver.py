@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from petsc4py import PETSc
@@ -50,17 +51,17 @@ def block_solver(
         Collective.
     """
     lattice, ratio = lattice_of(space, mesh), material.poisson_ratio
-    limit = COMPRESSIBLE if lattice is None else STIFF
     asked = PETSc.Options(PREFIX).getString("pc_type", "")
+    limit = COMPRESSIBLE if lattice is None else STIFF
     if not asked and ratio > limit and matrix.getSize()[0] <= FACTORISED:
         return linear_solver(matrix, preconditioner=DIRECT_DEFAULTS)
-    if lattice is not None:
-        smoother = smoothing(ratio, hexahedral=mesh.shape.hexahedral)
-        steps = lambda: transfers(lattice, free)  # noqa: E731
-        return linear_solver(matrix, transfers=steps, preconditioner=smoother)
-    if mesh.shape.degree == 2 and asked in ("", "mg"):
+    if asked not in ("", "mg") or (lattice is None and mesh.shape.degree == 1):
+        return linear_solver(matrix)
+    if lattice is None:
         return two_degree_solver(matrix, space, free)
-    return linear_solver(matrix)
+    smoother = smoothing(ratio, hexahedral=mesh.shape.hexahedral)
+    steps = partial(transfers, lattice, free)
+    return linear_solver(matrix, transfers=steps, preconditioner=smoother)
 
 
 def smoothing(poisson_ratio: float, *, hexahedral: bool) -> Mapping[str, object]:

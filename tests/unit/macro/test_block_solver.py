@@ -81,12 +81,13 @@ def test_the_users_smoother_wins(options):
     assert solver.getMGCoarseSolve().pc.getType() == "jacobi"
 
 
-def test_all_solvers_find_the_same(options):
+@pytest.mark.parametrize("element", ["P1", "P2*"])
+def test_all_solvers_find_the_same(options, element):
     fields = []
     for kind in (None, "gamg", "cholesky"):
         if kind:
             options(pc_type=kind)
-        block = make("P2*", 0.3)
+        block = make(element, 0.3)
         load = block.stiffness.createVecRight()
         load.set(1.0)
         load.pointwiseMult(load, block.free)
