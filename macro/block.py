@@ -15,10 +15,11 @@ from petsc4py import PETSc
 
 from geometry.errors import InputError
 from macro import compat
+from macro.block_solver import block_solver
 from macro.elasticity import Material, rigid_body_modes, stiffness_form
 from macro.mesh import BOTTOM, SIDES, BlockMesh
-from macro.multigrid import Lattice, coarser_grids, lattice_of
-from macro.solvers import linear_solver, solve_linear
+from macro.multigrid import Lattice, lattice_of
+from macro.solvers import solve_linear
 
 Sides = Literal["free", "roller"]
 
@@ -99,10 +100,9 @@ class Block:
     @cached_property
     def solver(self) -> PETSc.KSP:
         """Linear solver of the block alone; its preconditioner also serves the contact solves."""
-        matrix, lattice = self.stiffness, self._lattice
-        if lattice is None:
-            return linear_solver(matrix)
-        return linear_solver(matrix, coarser=lambda: coarser_grids(lattice, matrix, self.free))
+        return block_solver(
+            self.stiffness, self.space, self.mesh.shape, self._lattice, self.material, self.free
+        )
 
     def solve(self, load: PETSc.Vec) -> Any:
         """Return the displacement under a nodal load.

@@ -6,8 +6,10 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import ufl
 from dolfinx import fem
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.errors import InputError
@@ -98,9 +100,20 @@ def rigid_body_modes(space: Any) -> PETSc.NullSpace:
     Note:
         Collective.
     """
-    nodes = space.dofmap.index_map
-    coordinates = PETSc.Vec().createMPI(
-        (3 * nodes.size_local, 3 * nodes.size_global), bsize=3, comm=space.mesh.comm
-    )
-    coordinates.array[:] = space.tabulate_dof_coordinates()[: nodes.size_local].ravel()
+    owned = space.dofmap.index_map.size_local
+    return rigid_body_modes_at(space.tabulate_dof_coordinates()[:owned], space.mesh.comm)
+
+
+def rigid_body_modes_at(points: NDArray[np.float64], comm: Any) -> PETSc.NullSpace:
+    """Return the six rigid body modes of nodes.
+
+    Args:
+        points: Coordinates of the nodes of this rank, shape (n, 3) [mm].
+        comm: MPI communicator.
+
+    Note:
+        Collective.
+    """
+    coordinates = PETSc.Vec().createMPI((points.size, None), bsize=3, comm=comm)
+    coordinates.array[:] = points.ravel()
     return PETSc.NullSpace().createRigidBody(coordinates)

@@ -86,12 +86,15 @@ class _Surroundings:
     """
 
     def __init__(self, matrix: PETSc.Mat, dofs: Indices, layers: int) -> None:
-        near = dofs
+        nodes = np.unique(dofs // 3)
         for _ in range(layers):
-            near = _neighbours(matrix, near)
-        self.near = near = np.setdiff1d(near, dofs)
-        self.around = _neighbours(matrix, near)
-        self._rows = matrix.createSubMatrix(_indices(near), _indices(self.around))
+            nodes = _neighbours(matrix, nodes)
+        beside = _neighbours(matrix, nodes)
+        every, self.around = _unknowns(nodes), _unknowns(beside)
+        self.near = near = np.setdiff1d(every, dofs)
+        whole = _part(matrix, nodes, beside)
+        self._rows = whole.createSubMatrix(_indices(np.searchsorted(every, near)))
+        whole.destroy()
         within = np.searchsorted(self.around, near)
         self._square = self._rows.createSubMatrix(_indices(np.arange(len(near))), _indices(within))
         self._outer, self._inner = self._rows.createVecs()
@@ -121,14 +124,26 @@ class _Surroundings:
             part.destroy()
 
 
-def _neighbours(matrix: PETSc.Mat, dofs: Indices) -> Indices:
-    """Return what rows of a matrix have entries for, sorted."""
-    if not len(dofs):
-        return dofs
-    rows = matrix.createSubMatrix(_indices(dofs))
-    columns = np.unique(rows.getValuesCSR()[1]).astype(np.intp)
+def _neighbours(matrix: PETSc.Mat, nodes: Indices) -> Indices:
+    """Return the nodes that some nodes have entries with, sorted."""
+    if not len(nodes):
+        return nodes
+    rows = _part(matrix, nodes)
+    found = np.unique(rows.getValuesCSR()[1] // 3).astype(np.intp)
     rows.destroy()
-    return columns
+    return found
+
+
+def _part(matrix: PETSc.Mat, rows: Indices, columns: Indices | None = None) -> PETSc.Mat:
+    """Return the entries of whole nodes with whole nodes, without blocks."""
+    wanted = None if columns is None else _indices(_unknowns(columns))
+    part = matrix.createSubMatrix(_indices(_unknowns(rows)), wanted)
+    return part.convert("aij") if part.getType() == "seqbaij" else part
+
+
+def _unknowns(nodes: Indices) -> Indices:
+    """Return the unknowns of nodes, three each."""
+    return (3 * nodes[:, None] + np.arange(3)).ravel()
 
 
 def _indices(of: Indices) -> PETSc.IS:

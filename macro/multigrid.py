@@ -120,7 +120,7 @@ def transfers(lattice: Lattice, free: PETSc.Vec) -> Iterator[Transfer]:
     for kept in coarsenings(grid):
         rows, stay = _node_weights(grid, kept, nodes, free.comm)
         weights = _distributed(rows, len(stay), free.comm)
-        interpolation, coarse = _for_displacements(rows, stay, free)
+        interpolation, coarse = for_displacements(rows, stay, free)
         yield Transfer(weights, interpolation, free, coarse)
         nodes = np.stack([np.searchsorted(of, nodes[stay, k]) for k, of in enumerate(kept)], axis=1)
         grid, free = [lines.only(of) for lines, of in zip(grid, kept, strict=True)], coarse
@@ -149,22 +149,37 @@ def _node_weights(
     return rows, stay
 
 
-def _distributed(rows: sparse.csr_matrix, columns: int, comm: PETSc.Comm) -> PETSc.Mat:
+def _distributed(
+    rows: sparse.csr_matrix, columns: int, comm: PETSc.Comm, block_size: int | None = None
+) -> PETSc.Mat:
     """Return a matrix from its rows on every rank, and how many columns each owns."""
     pattern = (part.astype(PETSc.IntType) for part in (rows.indptr, rows.indices))
     size = ((rows.shape[0], None), (columns, None))
-    return PETSc.Mat().createAIJ(size, csr=(*pattern, rows.data), comm=comm)
+    return PETSc.Mat().createAIJ(size, bsize=block_size, csr=(*pattern, rows.data), comm=comm)
 
 
-def _for_displacements(
-    weights: sparse.csr_matrix, stay: Indices, free: PETSc.Vec
+def for_displacements(
+    weights: sparse.csr_matrix, stay: Indices, free: PETSc.Vec, *, blocks: bool = False
 ) -> tuple[PETSc.Mat, PETSc.Vec]:
-    """Interpolate three components at a time, held ones apart; return also who is free then."""
+    """Interpolate three components at a time, held ones apart.
+
+    Args:
+        weights: What this rank's nodes take from all coarse nodes, numbered rank after rank.
+        stay: The nodes that are this rank's coarse nodes.
+        free: 1 for unknowns that are free, 0 for those that are held.
+        blocks: Whether the matrix, and what is formed with it, shall know of the components.
+
+    Returns:
+        The matrix, and what ``free`` is for the coarse unknowns.
+
+    Note:
+        Collective.
+    """
     count = weights.shape[0]
     rows = weights[np.repeat(np.arange(count), 3)]
     component = np.repeat(np.tile(np.arange(3), count), np.diff(rows.indptr))
     rows.indices = 3 * rows.indices + component
-    matrix = _distributed(rows, 3 * len(stay), free.comm)
+    matrix = _distributed(rows, 3 * len(stay), free.comm, 3 if blocks else None)
     coarse = matrix.createVecRight()
     same = (3 * stay[:, None] + np.arange(3)).ravel()
     coarse.array[:] = free.array_r[same]

@@ -25,9 +25,12 @@ ALGEBRAIC_DEFAULTS: Mapping[str, object] = {
     "pc_type": "gamg",
     "pc_gamg_threshold": 0.01,
     "mg_levels_ksp_type": "chebyshev",
+    "mg_levels_ksp_max_it": 4,
+    "mg_levels_ksp_chebyshev_esteig": "0,0.05,0,1.05",
     "mg_levels_pc_type": "jacobi",
 }
-"""Smoothed aggregation; Jacobi smooths on every release of PETSc."""
+"""Smoothed aggregation; Jacobi smooths on every release of PETSc. Four steps over a wide range of
+eigenvalues take a fourth fewer iterations than two, in the same time."""
 
 GEOMETRIC_DEFAULTS: Mapping[str, object] = {
     "pc_type": "mg",
@@ -39,6 +42,12 @@ GEOMETRIC_DEFAULTS: Mapping[str, object] = {
 }
 """Grids of the block itself. Three steps of smoothing, or Gauss–Seidel, take fewer iterations
 but more time."""
+
+DIRECT_DEFAULTS: Mapping[str, object] = {
+    "pc_type": "cholesky",
+    "pc_factor_mat_solver_type": "mumps",
+}
+"""A factorisation, distributed over the ranks."""
 
 
 @contextmanager
@@ -86,6 +95,7 @@ def linear_solver(
     matrix: PETSc.Mat,
     prefix: str = PREFIX,
     coarser: Callable[[], Sequence[CoarserGrid]] | None = None,
+    preconditioner: Mapping[str, object] | None = None,
 ) -> PETSc.KSP:
     """Return a solver for a symmetric positive definite matrix, its preconditioner set up.
 
@@ -94,6 +104,7 @@ def linear_solver(
         prefix: Prefix of its PETSc options.
         coarser: Makes the coarser grids of a geometric multigrid, finest first; called unless the
             user chooses another preconditioner.
+        preconditioner: Options of the preconditioner that stand before the usual ones.
 
     Note:
         Collective.
@@ -106,8 +117,8 @@ def linear_solver(
         _set_grids(solver.pc, coarser())
     else:
         solver.setOperators(matrix, _pointwise(matrix))
-    preconditioner = GEOMETRIC_DEFAULTS if geometric else ALGEBRAIC_DEFAULTS
-    with default_options(prefix, {**KRYLOV_DEFAULTS, **preconditioner}):
+    usual = GEOMETRIC_DEFAULTS if geometric else ALGEBRAIC_DEFAULTS
+    with default_options(prefix, {**KRYLOV_DEFAULTS, **usual, **(preconditioner or {})}):
         solver.setFromOptions()
         solver.setUp()  # multigrid reads the options of its levels here
     return solver

@@ -1,10 +1,11 @@
-"""What several folders of tests share: starting a command under MPI."""
+"""What several folders of tests share: starting a command under MPI, counting iterations."""
 
 import os
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 # a test computes what it tests, and leaves nothing in the home of who runs it
@@ -44,3 +45,26 @@ def mpirun(root):
         )
 
     return start
+
+
+@pytest.fixture(scope="session")
+def iterations():
+    """Return a function that counts a block's iterations to 1e-8 under a load of all frequencies.
+
+    It makes sure of the true residual.
+    """
+
+    def count(block):
+        load = block.stiffness.createVecRight()
+        load.array[:] = np.random.default_rng(5).standard_normal(block.owned_dofs)
+        load.pointwiseMult(load, block.free)
+        found, residual = load.duplicate(), load.duplicate()
+        block.solver.setTolerances(rtol=1e-8)
+        block.solver.solve(load, found)
+        assert block.solver.reason > 0
+        block.stiffness.mult(found, residual)
+        residual.axpy(-1.0, load)
+        assert residual.norm() < 1.1e-8 * load.norm()
+        return block.solver.its
+
+    return count

@@ -5,11 +5,13 @@ import json
 import numpy as np
 from mpi4py import MPI
 
-from geometry import BlockShape
+from geometry import BlockShape, RefinedShape
 from macro import Block, Material, block_mesh
 from macro.multigrid import coarser_grids, lattice_of
 
 COMM = MPI.COMM_WORLD
+CUBE = {"interface": (1.0, 1.0), "height": 1.0}
+CENTRE = {"places": np.array([[0.5, 0.5]]), "coarse": 0.3}
 CASES = {
     "graded": {"cells": (10, 8, 6), "grading": 10.0},
     "margin": {"cells": (6, 6, 6), "margin": 1.0, "margin_cells": 3, "margin_grading": 5.0},
@@ -17,13 +19,21 @@ CASES = {
     "tetrahedra": {"cells": (6, 6, 6), "element": "P1", "grading": 4.0},
     # fewer nodes of the coarsest grid than ranks could share
     "column": {"cells": (1, 1, 6)},
+    "stiff volume": {"cells": (8, 8, 6), "poisson_ratio": 0.49},
+    "incompressible": {"cells": (4, 4, 3), "element": "Q2", "poisson_ratio": 0.4999},
+    "refined": {"fine": 0.08, "element": "P2"},
+    "refined, linear": {"fine": 0.05, "element": "P1"},
+    "refined, incompressible": {"fine": 0.1, "element": "P2", "poisson_ratio": 0.4999},
 }
 
 
 def missed(block):
     """Return by how much products with coarser matrices M x miss Pᵀ(A(P x)), relative to them."""
+    lattice = lattice_of(block.space, block.mesh)
+    if lattice is None:
+        return 0.0
     finer, worst = block.stiffness, 0.0
-    for grid in coarser_grids(lattice_of(block.space, block.mesh), finer, block.free):
+    for grid in coarser_grids(lattice, finer, block.free):
         x = grid.matrix.createVecRight()
         x.array[:] = np.random.default_rng(COMM.rank).standard_normal(x.getLocalSize())
         expected, found = x.duplicate(), x.duplicate()
@@ -36,10 +46,14 @@ def missed(block):
     return worst
 
 
-def run(shape):
+def run(case):
     """Return what must not depend on the number of ranks, and the preconditioner."""
-    mesh = block_mesh(BlockShape(interface=(1.0, 1.0), height=1.0, **shape), COMM)
-    block = Block(mesh, Material(young_modulus=4000.0, poisson_ratio=0.3), "roller")
+    content = dict(case)
+    ratio = content.pop("poisson_ratio", 0.3)
+    refined = "fine" in content
+    shape = RefinedShape(**CUBE, **CENTRE, **content) if refined else BlockShape(**CUBE, **content)
+    material = Material(young_modulus=4000.0, poisson_ratio=ratio)
+    block = Block(block_mesh(shape, COMM), material, "roller")
     load = block.stiffness.createVecRight()
     load.set(1.0)
     load.pointwiseMult(load, block.free)
@@ -54,6 +68,6 @@ def run(shape):
 
 
 if __name__ == "__main__":
-    result = {name: run(shape) for name, shape in CASES.items()}
+    result = {name: run(case) for name, case in CASES.items()}
     if COMM.rank == 0:
         print(json.dumps(result))

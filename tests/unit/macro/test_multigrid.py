@@ -131,45 +131,40 @@ SHAPES = {
     "column": {"interface": (0.02, 0.02), "cells": (4, 4, 50)},
     "margin": {"cells": (10, 10, 8), "grading": 10.0} | MARGIN | {"margin_grading": 10.0},
     "tetrahedra": {"cells": (14, 14, 10), "grading": 10.0, "element": "P1"},
+    "quadratic tetrahedra": {"cells": (7, 7, 5), "grading": 10.0, "element": "P2"},
     "quadratic": {"cells": (8, 8, 6), "grading": 10.0, "element": "Q2"},
 }
 
 
-def iterations(block):
-    """Return the iterations to 1e-8 under a load of all frequencies, and the true residual."""
-    load = block.stiffness.createVecRight()
-    load.array[:] = np.random.default_rng(5).standard_normal(block.owned_dofs)
-    load.pointwiseMult(load, block.free)
-    found, residual = load.duplicate(), load.duplicate()
-    block.solver.setTolerances(rtol=1e-8)
-    block.solver.solve(load, found)
-    block.stiffness.mult(found, residual)
-    residual.axpy(-1.0, load)
-    return block.solver.its, residual.norm() / load.norm()
-
-
 @pytest.mark.parametrize("name", SHAPES)
-def test_iterations_do_not_depend_on_the_shape(name):
+def test_iterations_do_not_depend_on_the_shape(iterations, name):
     block = make("roller" if name in ("tall", "margin") else "free", **SHAPES[name])
-    count, residual = iterations(block)
+    count = iterations(block)
     assert block.solver.pc.getType() == "mg"
-    # 9 … 15 were counted, 18 with tetrahedra; eigenvalues are estimated from a random start
-    assert count <= (24 if name == "tetrahedra" else 18)
-    assert residual < 1.1e-8
+    # 9 … 15 were counted, 8 … 10 with tetrahedra; eigenvalues are estimated from a random start
+    assert count <= (14 if "tetrahedra" in name else 18)
 
 
-def test_iterations_stay_on_a_rough_block():
+def test_iterations_stay_on_a_rough_block(iterations):
     x = (np.arange(32) + 0.5) / 32
     heights = 0.02 * np.outer(np.sin(2 * np.pi * x), np.cos(4 * np.pi * x))
     surface = Surface(heights=heights, lengths=(1.0, 1.0))
     shape = BlockShape(**CUBE, cells=(16, 16, 10), grading=10.0)
     mesh, _ = rough_block_mesh(shape, surface, MPI.COMM_SELF)
     block = Block(mesh, Material(young_modulus=4e3, poisson_ratio=0.3))
-    assert iterations(block)[0] <= 18
+    assert iterations(block) <= 18
 
 
-def test_nearly_incompressible_blocks_converge():
-    assert iterations(make(poisson_ratio=0.49, cells=(12, 12, 8)))[0] <= 80  # 52 were counted
+@pytest.mark.parametrize(
+    ("element", "ratio", "bound"),
+    [("Q1", 0.46, 14), ("Q1", 0.49, 15), ("P1", 0.49, 18), ("Q2", 0.49, 22), ("Q1", 0.495, 17)],
+)
+def test_nearly_incompressible_blocks_take_more_smoothing(iterations, element, ratio, bound):
+    # 9, 10, 13, 17 and 12 were counted; twice to four times as many with two steps of smoothing
+    cells = (6, 6, 4) if element == "Q2" else (12, 12, 8)
+    block = make(poisson_ratio=ratio, cells=cells, element=element, grading=4.0)
+    assert block.solver.pc.getType() == "mg"
+    assert iterations(block) <= bound
 
 
 def test_same_displacement_as_by_algebraic_multigrid():

@@ -1,0 +1,90 @@
+"""Which linear solver a block gets: by its mesh, its element and its Poisson's ratio.
+
+Towards ν = ½ the volume becomes stiff beside the shape by λ/μ = 2ν/(1 − 2ν), and what smooths the
+one on a grid, or interpolates it to the next, does nothing for the other: iterations grow with
+(1 − 2ν)^-½. On lattices a polynomial over a range of eigenvalues that is wider by as much, and of a
+degree that follows, buys this back up to ν = 0.495; beyond, and on other meshes, so does a
+factorisation, where it fits.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+from petsc4py import PETSc
+
+from geometry.meshes import BlockShape
+from geometry.refined_block import RefinedShape
+from macro.elasticity import Material
+from macro.multigrid import Lattice, coarser_grids
+from macro.multigrid_degrees import two_degree_solver
+from macro.solvers import DIRECT_DEFAULTS, PREFIX, linear_solver
+
+COMPRESSIBLE = 0.45
+"""Poisson's ratio up to which every multigrid does as it is."""
+
+STIFF = 0.495
+"""Poisson's ratio up to which multigrid does on lattices, with more smoothing."""
+
+FACTORISED = 100_000
+"""Unknowns up to which a factorisation replaces multigrid for what is nearly incompressible."""
+
+_DEGREES = (4, 8)  # of the smoothing polynomial
+_SMALLEST = 0.005  # eigenvalue smoothed, over the largest
+
+
+def block_solver(
+    matrix: PETSc.Mat,
+    space: Any,
+    shape: BlockShape | RefinedShape,
+    lattice: Lattice | None,
+    material: Material,
+    free: PETSc.Vec,
+) -> PETSc.KSP:
+    """Return a solver for a block's stiffness; PETSc's options of the user win.
+
+    Args:
+        matrix: The stiffness with unit rows for held unknowns, its near-nullspace attached.
+        space: Its space.
+        shape: What was meshed.
+        lattice: The lattice that its nodes form, if they do.
+        material: What it is of.
+        free: 1 for unknowns that are free, 0 for those that are held.
+
+    Note:
+        Collective.
+    """
+    ratio = material.poisson_ratio
+    asked = PETSc.Options(PREFIX).getString("pc_type", "")
+    limit = COMPRESSIBLE if lattice is None else STIFF
+    if not asked and ratio > limit and matrix.getSize()[0] <= FACTORISED:
+        return linear_solver(matrix, preconditioner=DIRECT_DEFAULTS)
+    if lattice is not None and isinstance(shape, BlockShape):
+        smoother = smoothing(ratio, hexahedral=shape.hexahedral) if asked in ("", "mg") else {}
+        grids = partial(coarser_grids, lattice, matrix, free)
+        return linear_solver(matrix, coarser=grids, preconditioner=smoother)
+    if asked in ("", "mg") and shape.degree == 2:
+        return two_degree_solver(matrix, space, free)
+    return linear_solver(matrix)
+
+
+def smoothing(poisson_ratio: float, *, hexahedral: bool) -> Mapping[str, object]:
+    """Return PETSc's options of the smoother on a lattice's grids.
+
+    Args:
+        poisson_ratio: Poisson's ratio of the block.
+        hexahedral: Whether its cells are hexahedra.
+    """
+    if hexahedral and poisson_ratio <= COMPRESSIBLE:
+        return {}
+    stiffer = 1.0 / (1.0 - 2.0 * poisson_ratio)
+    degree = min(max(round(math.sqrt(stiffer)), _DEGREES[0]), _DEGREES[1])
+    smallest = min(max(0.5 / stiffer, _SMALLEST), 0.05)
+    return {
+        "mg_levels_pc_type": "pbjacobi",
+        "mg_levels_ksp_max_it": degree,
+        "mg_levels_ksp_chebyshev_esteig": f"0,{smallest:g},0,1.05",
+    }

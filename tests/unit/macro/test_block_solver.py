@@ -1,0 +1,110 @@
+"""Which solver a block gets, and that the user's options win."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from geometry import BlockShape, RefinedShape
+from macro import Block, Material, block_mesh, block_solver
+from macro.block_solver import smoothing
+
+CUBE = {"interface": (1.0, 1.0), "height": 1.0}
+COARSE = {"places": np.array([[0.5, 0.5]]), "fine": 0.3, "coarse": 0.5}
+
+
+def make(element, ratio):
+    refined = element.endswith("*")
+    shape = (
+        RefinedShape(**CUBE, **COARSE, element=element[:2])
+        if refined
+        else BlockShape(**CUBE, cells=(4, 4, 3), element=element)
+    )
+    material = Material(young_modulus=4e3, poisson_ratio=ratio)
+    return Block(block_mesh(shape, MPI.COMM_SELF), material)
+
+
+@pytest.fixture
+def options():
+    """Give a function that sets PETSc's options as a user does; they go afterwards."""
+    database, names = PETSc.Options("patchlaw_"), []
+
+    def put(**values):
+        for name, value in values.items():
+            database[name] = value
+            names.append(name)
+
+    yield put
+    for name in names:
+        database.delValue(name)
+
+
+@pytest.mark.parametrize(
+    ("element", "ratio", "kind"),
+    [
+        ("Q1", 0.495, "mg"),
+        ("Q2", 0.4999, "cholesky"),
+        ("P1*", 0.45, "gamg"),  # * without a lattice
+        ("P2*", 0.45, "mg"),
+        ("P1*", 0.46, "cholesky"),
+        ("P2*", 0.46, "cholesky"),
+    ],
+)
+def test_choice(iterations, element, ratio, kind):
+    block = make(element, ratio)
+    assert block.solver.pc.getType() == kind
+    if kind == "cholesky":
+        assert iterations(block) <= 2
+
+
+@pytest.mark.parametrize(("element", "kind"), [("Q1", "mg"), ("P1*", "gamg"), ("P2*", "mg")])
+def test_what_is_too_large_is_not_factorised(monkeypatch, iterations, element, kind):
+    monkeypatch.setattr(block_solver, "FACTORISED", 100)
+    blocks = [make(element, ratio) for ratio in (0.4975, 0.499375)]
+    assert [block.solver.pc.getType() for block in blocks] == [kind, kind]
+    # four times nearer to 1/2: twice the iterations
+    counts = [iterations(block) for block in blocks]
+    assert counts[1] < 2.3 * counts[0]
+
+
+@pytest.mark.parametrize(("element", "ratio"), [("Q1", 0.3), ("P2*", 0.3), ("P2*", 0.49)])
+@pytest.mark.parametrize("kind", ["jacobi", "gamg"])
+def test_the_users_preconditioner_wins(options, element, ratio, kind):
+    options(pc_type=kind)
+    assert make(element, ratio).solver.pc.getType() == kind
+
+
+def test_the_users_smoother_wins(options):
+    options(mg_levels_pc_type="sor", mg_coarse_pc_type="jacobi")
+    solver = make("P2*", 0.3).solver.pc
+    assert solver.getMGSmoother(1).pc.getType() == "sor"
+    assert solver.getMGCoarseSolve().pc.getType() == "jacobi"
+
+
+@pytest.mark.parametrize("element", ["P1", "P2*"])
+def test_all_solvers_find_the_same(options, element):
+    fields = []
+    for kind in (None, "gamg", "cholesky"):
+        if kind:
+            options(pc_type=kind)
+        block = make(element, 0.3)
+        load = block.stiffness.createVecRight()
+        load.set(1.0)
+        load.pointwiseMult(load, block.free)
+        fields.append(block.solve(load).x.array)
+    for other in fields[:2]:
+        # residuals of 1e-10 through a condition number of about 1e3
+        np.testing.assert_allclose(other, fields[2], atol=1e-7 * np.abs(fields[2]).max())
+
+
+def test_smoothing_follows_the_stiffness_of_the_volume():
+    assert smoothing(0.45, hexahedral=True) == {}
+    steps = [
+        smoothing(ratio, hexahedral=False)["mg_levels_ksp_max_it"] for ratio in (0, 0.49, 0.4999)
+    ]
+    assert steps == [4, 7, 8]
+    ranges = [
+        smoothing(ratio, hexahedral=True)["mg_levels_ksp_chebyshev_esteig"]
+        for ratio in (0.46, 0.49, 0.4999)
+    ]
+    assert ranges == ["0,0.04,0,1.05", "0,0.01,0,1.05", "0,0.005,0,1.05"]
