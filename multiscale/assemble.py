@@ -109,7 +109,7 @@ def assemble(stage: Stage, table: LawTable | None, comm: Any) -> tuple[Coupling,
 
 
 def _with_laws(stage: Stage, table: LawTable, comm: Any) -> tuple[Coupling, Interface | None]:
-    if newton_choice(stage).condensed or _only_condensed(stage, table):
+    if newton_choice(stage, table).condensed:
         return CondensedCoupling(table, yielding(stage, table, comm)), None
     from macro import PressedBlock
 
@@ -118,13 +118,6 @@ def _with_laws(stage: Stage, table: LawTable, comm: Any) -> tuple[Coupling, Inte
     mode = stage.scene.coupling.interface
     pressed = PressedBlock(interface.block, interface, laws, mode=mode)
     return EmbeddedCoupling(pressed, table), interface
-
-
-def _only_condensed(stage: Stage, table: LawTable) -> bool:
-    """Whether laws that turned out to be no functions of closure rule out the mesh's Newton."""
-    coupling = stage.scene.coupling
-    left_open = coupling.newton == "auto" and coupling.interface == "patchwise"
-    return left_open and any(law.is_punch for law in table.laws)
 
 
 def _concurrent(stage: Stage, comm: Any) -> Coupling:

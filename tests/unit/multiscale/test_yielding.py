@@ -90,7 +90,9 @@ def test_one_rectangle_per_patch_is_a_compliance():
     np.testing.assert_allclose(
         block.displacement(local, at), plain.displacement(local, at), rtol=1e-13
     )
-    np.testing.assert_allclose(block.slope(local, at, BOTH), plain.slope(local, at, BOTH), rtol=1e-13)
+    np.testing.assert_allclose(
+        block.slope(local, at, BOTH), plain.slope(local, at, BOTH), rtol=1e-13
+    )
 
 
 def test_equal_correction_everywhere_needs_no_places():
