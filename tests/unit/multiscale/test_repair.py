@@ -25,7 +25,7 @@ def rows(pressure):
 
 def noisy(seed=3):
     clean = 4e5 * APPROACH**1.5
-    return np.abs(clean + np.random.default_rng(seed).normal(0.0, 0.1, 9) * clean.max()) * (
+    return np.abs(clean + np.random.default_rng(seed).normal(0.0, 0.2, 9) * clean.max()) * (
         APPROACH > 0.0
     )
 
