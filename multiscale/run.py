@@ -106,7 +106,7 @@ class Run:
     @property
     def finished(self) -> bool:
         """Whether the load programme has come to its end."""
-        ends = self.position.targets == len(self.scene.loading.programme.targets)
+        ends = self.position.targets == self.scene.loading.programme.count
         return ends and not self.position.ahead
 
     def checkpoint(self, name: str, state: Arrays) -> Checkpoint:

@@ -50,7 +50,7 @@ def predicted_seconds(scene: Scene, heights: tuple[int, int]) -> float:
         heights: Heights of its surface.
     """
     kind, model = scene.coupling.kind, scene.micro.model
-    steps = len(scene.loading.programme.targets)
+    steps = scene.loading.programme.count
     if kind == "reference":
         fine = TYPICAL_EDGE / (scene.reference.fine or TYPICAL_EDGE)
         return REFERENCE * steps * fine**2 * (1.0 + COARSER * (scene.reference.meshes - 1))

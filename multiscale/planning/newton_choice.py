@@ -70,7 +70,7 @@ def newton_choice(stage: Stage, table: LawTable | None = None) -> NewtonChoice:
         return NewtonChoice(condensed=False, why="laws at points need the whole mesh")
     if coupling.newton != "auto":
         return NewtonChoice(condensed=coupling.newton == "condensed", why="as the scene asks")
-    patches, steps = stage.patches.count, len(stage.scene.loading.programme.targets)
+    patches, steps = stage.patches.count, stage.scene.loading.programme.count
     compliance = CYCLES_PER_PATCH * patches
     full = full_cycles(stage, steps)
     fewer = "fewer" if compliance < full else "more"
