@@ -88,12 +88,15 @@ class Correction:
         over_y = _interval_means(self.y, patches.borders_y)
         means = np.einsum("ia,jb,abm->ijm", over_x, over_y, self.values, optimize=True)
         share_x, share_y = (
-            _overlaps(getattr(self.loads, borders), getattr(patches, borders))
-            for borders in ("borders_x", "borders_y")
+            _overlaps(ours, theirs) / np.diff(ours)[:, None]
+            for ours, theirs in (
+                (self.loads.borders_x, patches.borders_x),
+                (self.loads.borders_y, patches.borders_y),
+            )
         )
-        spread = np.einsum("ki,lj->klij", share_x, share_y)
-        spread = spread.reshape(self.loads.count, patches.count) / self.loads.areas[:, None]
-        return np.asarray(means.reshape(patches.count, -1) @ spread)
+        means = means.reshape(patches.count, *self.loads.shape)
+        spread = np.einsum("pkl,ki,lj->pij", means, share_x, share_y, optimize=True)
+        return np.asarray(spread.reshape(patches.count, patches.count))
 
 
 def _interval_means(ticks: Array, borders: Array) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import ceil, floor
 from typing import Any, Self
 
 import numpy as np
@@ -23,6 +24,8 @@ from micro.response import Pressed, Response
 Array = NDArray[np.float64]
 
 _LEVEL = (0.0, 0.0)
+_FEWEST = 4  # heights along a side of a surface
+_TIE = 1e-9  # of a cell: a centre on a border belongs to the patch above, whatever rounding says
 _OUT_OF_REACH = 1e3
 """Sides of the surface by which cells are lowered that may not touch."""
 
@@ -95,9 +98,17 @@ class HalfSpaceModel:
         return -float(self._required(self._plane(0.0, _LEVEL)).max())
 
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
-        """Return the model whose cells of one patch alone may touch; see `MicroModel.of_patch`."""
-        patch = patches.single(index)
-        return replace(self, within=patch, periodic=False), patch
+        """Return the model of the cells of one patch; see `MicroModel.of_patch`.
+
+        Model and patch count places from the corner of the first of these cells.
+        """
+        own, bounds = patches.single(index), patches.bounds(index)
+        cells = zip(bounds, self.surface.spacing, self.surface.grid, strict=True)
+        x, y = (_whole_cells(*axis) for axis in cells)
+        patch = replace(own, origin=(own.origin[0] - x[0], own.origin[1] - y[0]))
+        piece = self.surface.cropped(x=x, y=y)
+        model = replace(self, surface=piece, within=patch, periodic=False, highest=self.datum)
+        return model, patch
 
     def solve(
         self,
@@ -255,8 +266,10 @@ class HalfSpaceModel:
             return None
         edges = self.within.borders_x, self.within.borders_y
         x, y = (
-            (centres >= border[0]) & (centres < border[-1])
-            for centres, border in zip((self.surface.x, self.surface.y), edges, strict=True)
+            (centres >= border[0] - _TIE * side) & (centres < border[-1] - _TIE * side)
+            for centres, border, side in zip(
+                (self.surface.x, self.surface.y), edges, self.surface.spacing, strict=True
+            )
         )
         return ~(x[:, None] & y)
 
@@ -277,3 +290,10 @@ class HalfSpaceModel:
     def _pressing(self) -> Pressing:
         grids = ElasticGrids(periodic=self.periodic)
         return Pressing(grids=grids, spacing=self.surface.spacing, tolerance=self.tolerance)
+
+
+def _whole_cells(interval: tuple[float, float], side: float, count: int) -> tuple[float, float]:
+    """Return the whole cells, as many as a surface needs, that an interval lies in [mm]."""
+    first, last = floor(interval[0] / side + _TIE), ceil(interval[1] / side - _TIE)
+    first = max(min(first, count - _FEWEST), 0) if last - first < _FEWEST else first
+    return first * side, max(last, first + _FEWEST) * side

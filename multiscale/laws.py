@@ -69,6 +69,7 @@ class PatchLaw:
         stiffness_error: The same of the stiffness; NaN where nobody estimated it.
         warned_from: Mean pressure from which on the micro model warned that the contacts lie
             outside its range of validity [MPa]; infinite when it never did.
+        repaired: Largest change that made falling rows rise, see `repair.evened`.
     """
 
     closure: Array
@@ -82,6 +83,7 @@ class PatchLaw:
     interpolation_error: float = 0.0
     stiffness_error: float = float("nan")
     warned_from: float = np.inf
+    repaired: float = 0.0
 
     def __post_init__(self) -> None:
         names = ("closure", "pressure", "approach", "contact_area_fraction", "contacts", "relief")

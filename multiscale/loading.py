@@ -84,9 +84,14 @@ class Programme:
     @property
     def targets(self) -> list[float]:
         """Values of the prescribed quantity at the load steps, before any is halved."""
-        ends = zip((0.0, *self.points), self.points, strict=False)
-        legs = [np.linspace(start, end, self.steps + 1)[1:] for start, end in ends]
-        return [float(value) for leg in legs for value in leg]
+        ends = np.array((0.0, *self.points))
+        legs = np.linspace(ends[:-1], ends[1:], self.steps + 1, axis=1)[:, 1:]
+        return [float(value) for value in legs.ravel()]
+
+    @property
+    def count(self) -> int:
+        """Number of load steps, before any is halved."""
+        return self.steps * len(self.points)
 
     @property
     def largest(self) -> float:

@@ -181,7 +181,7 @@ def _load(stage: Stage) -> str:
     programme = stage.scene.loading.programme
     scale, unit = (1.0, "N") if programme.quantity == "force" else (1e3, "µm")
     way = ", ".join(f"{scale * point:g} {unit}" for point in programme.points)
-    text = f"{len(programme.targets)} steps to {_article(programme.quantity)} of {way}"
+    text = f"{programme.count} steps to {_article(programme.quantity)} of {way}"
     if programme.force_change is not None:
         text += f", halved where the force changes by more than {programme.force_change:.3g}"
     if programme.tilt is None:

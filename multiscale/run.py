@@ -18,9 +18,11 @@ from multiscale.coupling import EmbeddedCoupling
 from multiscale.couplings.blocks import final_field, load_together
 from multiscale.history import History, LoadStep
 from multiscale.law_tables.law_files import LawTable, read_laws, write_laws
+from multiscale.law_tables.repair import repair_notes
 from multiscale.loading import Coupling, Drive, Position, Restorable
 from multiscale.planning.choices import settled_keys
 from multiscale.planning.forecast import Forecast, forecast
+from multiscale.planning.newton_choice import newton_choice
 from multiscale.records import Arrays
 from multiscale.reference.coupling import ReferenceCoupling, recorded, reference_notes
 from multiscale.reporting.validity import range_notes
@@ -104,7 +106,7 @@ class Run:
     @property
     def finished(self) -> bool:
         """Whether the load programme has come to its end."""
-        ends = self.position.targets == len(self.scene.loading.programme.targets)
+        ends = self.position.targets == self.scene.loading.programme.count
         return ends and not self.position.ahead
 
     def checkpoint(self, name: str, state: Arrays) -> Checkpoint:
@@ -172,6 +174,10 @@ class Run:
                 f"interpolation error of the laws between their rows: {self.table.force_error:.1e} "
                 f"of the force, {max(errors):.1e} of a patch's pressure or the mean, if more"
             )
+            notes += repair_notes(self.table.laws)
+            planned, taken = newton_choice(self.stage), newton_choice(self.stage, self.table)
+            if taken.condensed != planned.condensed:
+                notes.append(f"Newton condensed to the patches, not full: {taken.why}")
         imbalances = [abs(step.imbalance) for step in self.steps if step.imbalance is not None]
         if imbalances:
             notes.append(f"force against the support's reaction: equal to {max(imbalances):.1e}")

@@ -36,7 +36,7 @@ def compared(
     common: dict[str, Any] = {
         "scene": scene.name,
         "quantity": programme.quantity,
-        "steps": len(programme.targets),
+        "steps": programme.count,
         "grid": _grid(scene, found),
         "curves": {one.level.name: one.curves for one in found},
     }

@@ -62,6 +62,19 @@ def damped_turn(stiffness: Array, missing: Array, arms: Array, farthest: float) 
     return np.asarray(turns[int(np.argmax(near))])
 
 
+def _answers(stiffness: Array, yielding: Array, ways: Array) -> Array:
+    """Return the forces by which contacts on what yields answer ways of the plane, shape (M, k)."""
+    forces = np.zeros_like(ways)
+    near = np.flatnonzero(stiffness.any(axis=1))  # the others carry nothing
+    own = stiffness[np.ix_(near, near)]
+    matrix = np.eye(near.size) + own @ yielding[np.ix_(near, near)]
+    try:
+        forces[near] = np.linalg.solve(matrix, own @ ways[near])
+    except np.linalg.LinAlgError:
+        forces[near] = np.linalg.lstsq(matrix, own @ ways[near], rcond=None)[0]
+    return forces
+
+
 class ConcurrentNewton:
     """Steps from one press of the micro model to the next.
 
@@ -99,12 +112,8 @@ class ConcurrentNewton:
         turn = np.where(moves, 0.0, prescribed(control) - trial.plane)
         lag = yielding @ (found - trial.assumed)
         sides = np.column_stack([shape @ turn - lag, shape[:, moves]])
-        matrix = np.eye(found.size) + stiffness @ yielding
-        try:
-            sides = np.linalg.solve(matrix, stiffness @ sides)
-        except np.linalg.LinAlgError:
-            sides = np.linalg.lstsq(matrix, stiffness @ sides, rcond=None)[0]
-        alone, by_plane = sides[:, 0], sides[:, 1:]
+        answered = _answers(stiffness, yielding, sides)
+        alone, by_plane = answered[:, 0], answered[:, 1:]
         if moves.any():
             loads = shape[:, moves].T
             missing = -trial.excess(control)[moves] - loads @ alone

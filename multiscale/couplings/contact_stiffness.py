@@ -73,5 +73,8 @@ def corrected(stiffness: Array, secants: Sequence[Secant]) -> Array:
         before, now = float(change @ expected), float(change @ force)
         if before <= 0.0 or now <= _LEAST_WORK * before:
             continue
-        result += np.outer(force, force) / now - np.outer(expected, expected) / before
+        near = np.flatnonzero((force != 0.0) | (expected != 0.0))
+        force, expected = force[near], expected[near]
+        part = np.outer(force, force) / now - np.outer(expected, expected) / before
+        result[np.ix_(near, near)] += part
     return result

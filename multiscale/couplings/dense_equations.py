@@ -12,6 +12,7 @@ from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
 from multiscale.couplings.yielding import UniformLoads, Yielding
+from multiscale.law_tables.tangent import Tangent
 from multiscale.loading import described
 
 if TYPE_CHECKING:
@@ -95,11 +96,9 @@ class DenseEquations:
         load = self.area * (self.lever.T @ point.pressure)
         return Iterate(local, plane, point, missing, load)
 
-    def tangent(self, now: Iterate) -> Array:
-        """Return the derivative of closure + displacement over the local approaches, (N, N)."""
-        matrix = self.block.slope(now.local, now.point)
-        matrix[np.diag_indices_from(matrix)] += now.point.dclosure
-        return matrix
+    def tangent(self, now: Iterate) -> Tangent:
+        """Return the derivative of closure + displacement over the local approaches."""
+        return Tangent.of(now.point, lambda of: self.block.slope(now.local, now.point, of))
 
 
 class LoadCase:
@@ -148,7 +147,7 @@ class LoadCase:
             return float(plain.max())
         equations = self._equations
         rounding = _ROUNDING * max(equations.reach, approach)  # of approaches: what it makes of
-        steepest = float(np.abs(equations.tangent(iterate)).sum(axis=1).max())  # closures, and of
+        steepest = equations.tangent(iterate).steepest  # closures, and of
         blur = equations.area * float(iterate.point.dpressure.sum())  # the force
         known = max(approach, steepest * rounding / TOLERANCE)
         measure = max(self.force, blur * rounding / TOLERANCE)

@@ -117,7 +117,7 @@ class DenseNewton:
         equations, unit = self._equations, case.unit[case.free]
         lever = equations.lever[:, case.free] * unit
         right = np.column_stack((now.missing, lever))
-        solved = np.linalg.solve(equations.tangent(now), right)
+        solved = equations.tangent(now).solve(right)
         step, columns = solved[:, 0], solved[:, 1:]
         change = np.zeros(3)
         if not case.free.any():

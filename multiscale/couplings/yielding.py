@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from multiscale.laws import LawPoint
 
 Array = NDArray[np.float64]
+Patches = NDArray[np.intp]
 
 
 class Yielding(Protocol):
@@ -30,8 +31,14 @@ class Yielding(Protocol):
             point: Their laws there.
         """
 
-    def slope(self, local: Array, point: LawPoint, /) -> Array:
-        """Return the derivatives over the local approaches, shape (N, N)."""
+    def slope(self, local: Array, point: LawPoint, of: Patches, /) -> Array:
+        """Return the derivatives over the local approaches of some patches, shape (N, L).
+
+        Args:
+            local: Local approaches of the patches, shape (N,) [mm].
+            point: Their laws there.
+            of: The patches, ascending, shape (L,).
+        """
 
 
 class UniformLoads:
@@ -49,9 +56,9 @@ class UniformLoads:
         """Return C p; see `Yielding.displacement`."""
         return np.asarray(self._compliance @ point.pressure)
 
-    def slope(self, _local: Array, point: LawPoint) -> Array:
+    def slope(self, _local: Array, point: LawPoint, of: Patches) -> Array:
         """Return C dp/ds; see `Yielding.slope`."""
-        return np.asarray(self._compliance * point.dpressure)
+        return np.asarray(self._compliance[:, of] * point.dpressure[of])
 
 
 class SpreadLoads:
@@ -82,9 +89,18 @@ class SpreadLoads:
         forces = self._area * shares * point.pressure[self._spread.owner]
         return self._half_space @ point.pressure + self._means @ forces[self._order]
 
-    def slope(self, local: Array, point: LawPoint) -> Array:
+    def slope(self, local: Array, point: LawPoint, of: Patches) -> Array:
         """Return the derivative; see `Yielding.slope`."""
         (shares, change), owner = self._spread.shares(local), self._spread.owner
         rise = self._area * (change * point.pressure[owner] + shares * point.dpressure[owner])
-        columns = np.add.reduceat(self._means * rise[self._order], self._starts, axis=1)
-        return np.asarray(self._half_space * point.dpressure + columns)
+        parts, starts = self._parts_of(of)
+        columns = self._means[:, parts] * rise[self._order[parts]]
+        columns = np.add.reduceat(columns, starts, axis=1) if len(of) else columns
+        return np.asarray(self._half_space[:, of] * point.dpressure[of] + columns)
+
+    def _parts_of(self, patches: Patches) -> tuple[Patches, Patches]:
+        """Return the rectangles of some patches among all in order, and where each patch begins."""
+        counts = np.diff(self._starts, append=len(self._order))
+        wanted = np.isin(np.arange(self.count), patches)
+        starts = np.cumsum(counts[wanted]) - counts[wanted]
+        return np.flatnonzero(np.repeat(wanted, counts)), starts

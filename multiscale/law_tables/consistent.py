@@ -12,7 +12,7 @@ from geometry.patches import PatchGrid
 from micro import MicroModel, influence_matrix
 from multiscale.law_tables.law_files import LawTable
 from multiscale.law_tables.refinement import MOST_ROWS
-from multiscale.law_tables.spread import Sinking, check_division
+from multiscale.law_tables.spread import Sinking
 from multiscale.law_tables.whole_surface import WholeSurface
 
 Array = NDArray[np.float64]
@@ -45,8 +45,9 @@ def consistent_laws(
         tolerance: Interpolation error of the force, see `refinement.refined`.
         most_rows: Rows that are solved at most.
         tilt: Slopes of the plane that presses the surface; laws serve other planes less well.
-        sinking: What the block that the laws are for sinks more than a half-space, on rectangles
-            that divide the patches; the table then tells where the contacts are.
+        sinking: What the block that the laws are for sinks more than a half-space. Where its
+            rectangles divide the patches, the table then tells where the contacts are; smaller
+            patches tell so themselves.
         comm: MPI communicator; its first rank solves, so that the table is the same to the bit on
             any number of ranks.
 
@@ -68,8 +69,6 @@ def consistent_laws(
         tilt=tilt,
         sinking=sinking,
     )
-    if sinking is not None:
-        check_division(patches, sinking.loads)
     laws, error, spread = on_root(comm, lambda: whole.tabulated(approach_end, tolerance, most_rows))
     return LawTable(
         patches=patches,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,12 +14,12 @@ from micro import MicroModel
 from micro.love import love_centre, love_mean
 from multiscale.law_tables.law_files import LawTable
 from multiscale.law_tables.refinement import MOST_ROWS, law_of, refined
+from multiscale.law_tables.repair import evened
 from multiscale.laws import PatchLaw
 
 Array = NDArray[np.float64]
 _MOST_TRIALS = 40  # in search of the approach that gives a closure
 _BEYOND_FALL = 0.25  # of a patch's own displacement, by which a block may be the softer under it
-_UNEVEN = 1e-3  # of the range of closures: a fall below is no fall
 _LOVE = {"mean": love_mean, "centre": love_centre}
 
 
@@ -94,7 +94,8 @@ class IsolatedPatch:
             return made[:, None]
 
         def laws(made: Array) -> list[PatchLaw]:
-            return [law_of(_even(made[:, 0]), self.touch, self.reach)]
+            kept, change = evened(made[:, 0])
+            return [replace(law_of(kept, self.touch, self.reach), repaired=change)]
 
         made, _ = refined(
             rows,
@@ -120,21 +121,6 @@ class IsolatedPatch:
         # closure falls again before it: go as far as the block lets the patch's surface sink
         pressure = self.rows(np.array([closure]))[0, 2]
         return float(closure + _BEYOND_FALL * self.compliance * pressure)
-
-
-def _even(rows: Array) -> Array:
-    """Keep rows whose pressure exceeds all before, and whose closure is not a little below those.
-
-    A closure that falls for good is kept: the patch's stiffness has outgrown its own half-space.
-    One a little below those before is an unevenness of the micro model, and left out.
-    """
-    highest = np.maximum.accumulate(rows[:, 1:3], axis=0)
-    fall = highest[:, 0] - rows[:, 1]
-    uneven = (fall > 0.0) & (fall < _UNEVEN * np.ptp(rows[:, 1]))
-    uneven |= np.concatenate(([False], (np.diff(highest[:, 0]) == 0.0) & (fall[1:] == 0.0)))
-    uneven &= np.arange(len(rows)) < np.argmax(rows[:, 1])
-    rising = np.concatenate(([True], highest[1:, 1] > highest[:-1, 1]))
-    return rows[rising & ~uneven]
 
 
 def isolated_laws(

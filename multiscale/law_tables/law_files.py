@@ -13,6 +13,7 @@ import h5py
 from geometry.errors import InputError
 from geometry.partition import UnevenPartition
 from geometry.patches import PatchGrid
+from multiscale.law_tables.repair import evened_law
 from multiscale.law_tables.spread import ContactSpread
 from multiscale.laws import PatchLaw
 from multiscale.records import stored_numbers
@@ -31,10 +32,12 @@ _SCALARS = {
     "interpolation_error": "1",
     "stiffness_error": "1",
     "warned_from": "MPa",
+    "repaired": "1",
 }
 _SPREAD = {"approach": "mm", "forces": "N", "correction": "mm/N"}
 _UNKNOWN = float("nan")
-_OLDER = {"stiffness_error": _UNKNOWN, "warned_from": float("inf")}  # files that lack these
+_OLDER = {"stiffness_error": _UNKNOWN, "warned_from": float("inf"), "repaired": 0.0}
+"""What files may lack."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,6 +101,10 @@ def write_laws(path: Path | BinaryIO, table: LawTable) -> None:
 def read_laws(path: Path | BinaryIO) -> LawTable:
     """Read a law file.
 
+    The pressure of a patch alone rises with the approach; where noise in a table from elsewhere
+    makes it fall, it is repaired, and the law says by how much (`PatchLaw.repaired`). Consistent
+    laws are taken as they are: neighbours that take load over make their pressures fall.
+
     Args:
         path: The file, by name or open.
 
@@ -123,9 +130,10 @@ def read_laws(path: Path | BinaryIO) -> LawTable:
                 for name, text in file.attrs.items()
                 if name.startswith("made_by_")
             }
+            whole = made_by.get("coupling") == "consistent"
             return LawTable(
                 patches=patches,
-                laws=tuple(map(_law, groups)),
+                laws=tuple(map(_law if whole else _evened, groups)),
                 made_by=made_by,
                 force_error=float(file.attrs.get("force_error", _UNKNOWN)),
                 spread=_spread(file["spread"], patches) if "spread" in file else None,
@@ -148,6 +156,10 @@ def _law(group: Any) -> PatchLaw:
     scalars = _OLDER | dict(group.attrs)
     content.update({name: float(scalars[name]) for name in _SCALARS})
     return PatchLaw(**content)
+
+
+def _evened(group: Any) -> PatchLaw:
+    return evened_law(_law(group))
 
 
 def _group_name(patches: PatchGrid, index: int) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multiscale.law_tables.patch_laws import PatchLaws
+from multiscale.law_tables.tangent import Tangent
 from multiscale.laws import LawPoint, PatchLaw
 
 Array = NDArray[np.float64]
@@ -73,8 +74,7 @@ class Errors:
             local, closure, pressure = row[:, :3].T
             guess = old.along(local)
             off = guess.closure - closure + compliance @ (guess.pressure - pressure)
-            shift = np.linalg.solve(compliance * guess.dpressure + np.diag(guess.dclosure), off)
-            wrong = guess.pressure - pressure - guess.dpressure * shift
+            wrong = guess.pressure - pressure - guess.dpressure * _shift(guess, compliance, off)
             load = max(float(pressure.mean()), least)
             true = _stiffness(laws.along(local), compliance)
             change = _stiffness(guess, compliance) - true
@@ -177,6 +177,11 @@ def law_of(rows: Array, touch: float, reach: float) -> PatchLaw:
         touch=touch,
         reach=reach,
     )
+
+
+def _shift(point: LawPoint, compliance: Array, off: Array) -> Array:
+    """Return how far local approaches are off by a lack of closure, shape (N,) [mm]."""
+    return Tangent.of(point, lambda of: compliance[:, of] * point.dpressure[of]).solve(off)
 
 
 def _stiffness(point: LawPoint, compliance: Array) -> Array:

@@ -57,7 +57,12 @@ class ContactSpread:
     correction: Array
 
     def __post_init__(self) -> None:
-        check_division(self.patches, self.loads)
+        if not divides(self.loads, self.patches):
+            raise InputError(
+                "the rectangles of the loads must divide the patches",
+                value=self.loads.shape,
+                allowed="grid lines on all borders of the patches",
+            )
         rows, count, parts = len(self.approach), self.patches.count, self.loads.count
         shapes = self.approach.shape, self.forces.shape, self.correction.shape
         expected = (rows, count), (rows, parts), (parts, parts)
@@ -111,19 +116,17 @@ class ContactSpread:
         return np.where(loaded.any(axis=1), loaded.argmax(axis=1), len(self.approach) - 1)
 
 
-def check_division(patches: PatchGrid, loads: Partition) -> None:
-    """Refuse rectangles that do not divide the patches.
+def divides(loads: Partition, patches: PatchGrid) -> bool:
+    """Tell whether rectangles divide patches: have grid lines on all of their borders.
 
-    Raises:
-        InputError: When they do not.
+    Args:
+        loads: The rectangles.
+        patches: The patches.
     """
     slack = 1e-9 * max(patches.lengths)
     for axis in ("borders_x", "borders_y"):
         borders, lines = getattr(patches, axis), getattr(loads, axis)
         away = np.abs(np.subtract.outer(borders, lines)).min(axis=1) > slack
         if away.any() or abs(lines[0] - borders[0]) + abs(lines[-1] - borders[-1]) > slack:
-            raise InputError(
-                "the rectangles of the loads must divide the patches",
-                value=loads.shape,
-                allowed=f"grid lines on all {axis} of the patches",
-            )
+            return False
+    return True

@@ -13,7 +13,7 @@ from geometry.patches import PatchGrid
 from micro import Field, MicroModel, Response, RigidPlane
 from multiscale.coupling import tilted_approaches
 from multiscale.law_tables.refinement import law_of, refined
-from multiscale.law_tables.spread import ContactSpread, Sinking
+from multiscale.law_tables.spread import ContactSpread, Sinking, divides
 from multiscale.laws import PatchLaw
 
 Array = NDArray[np.float64]
@@ -178,7 +178,7 @@ class WholeSurface:
         return laws, error, self._spread(seen)
 
     def _spread(self, seen: list[tuple[Array, Array]]) -> ContactSpread | None:
-        if self.sinking is None:
+        if self.sinking is None or not divides(self.sinking.loads, self.patches):
             return None
         local, forces = (np.concatenate(parts) for parts in zip(*seen, strict=True))
         order = np.argsort(local[:, 0], kind="stable")

@@ -56,7 +56,7 @@ def chosen_model(
     kind, plane = scene.coupling.kind, estimated_plane(scene, surface)
     at = reach(surface, plane, summits=_FEW_SUMMITS)
     by_laws = kind in ("isolated", "consistent")
-    solutions = SOLUTIONS_OF_LAWS if by_laws else len(scene.loading.programme.targets)
+    solutions = SOLUTIONS_OF_LAWS if by_laws else scene.loading.programme.count
     count = solutions if kind != "concurrent" else presses(scene.loading.programme)
 
     def cost(model: str, cells: int) -> float:

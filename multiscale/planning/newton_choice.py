@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:  # which is made with what is said here
+    from multiscale.law_tables.law_files import LawTable
     from multiscale.stage import Stage
 
 
@@ -17,6 +18,9 @@ of them loaded: 39 in 8 steps; with 2 of 64 in reach 36 in 40)."""
 CYCLES_PER_PATCH = 11
 """Multigrid cycles that the compliance of one patch takes (the paper's cube with 4 × 4 and 8 × 8
 patches)."""
+
+
+_UNLESS = "; should a patch turn out to be flat, condensed all the same"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +46,7 @@ def full_cycles(stage: Stage, steps: int) -> int:
     return steps * min(max(stage.reached_patches, 1), MOST_CYCLES_PER_STEP)
 
 
-def newton_choice(stage: Stage) -> NewtonChoice:
+def newton_choice(stage: Stage, table: LawTable | None = None) -> NewtonChoice:
     """Choose as the scene asks, or what is predicted to take fewer multigrid cycles.
 
     The full Newton spends cycles on load steps until its basis of earlier solutions spans what
@@ -50,22 +54,36 @@ def newton_choice(stage: Stage) -> NewtonChoice:
 
     Args:
         stage: The scene's ingredients, of a coupling with laws.
+        table: The laws, once made: those of flat patches rule out the mesh's Newton.
     """
     coupling = stage.scene.coupling
     if coupling.decomposed:
         return NewtonChoice(condensed=True, why="the decomposed block is its compliance")
+    flat = 0 if table is None else sum(law.is_punch for law in table.laws)
+    if flat and _left_open(stage):
+        why = (
+            f"{flat} of {stage.patches.count} patches are flat, and their pressure is a function "
+            "of closure nowhere"
+        )
+        return NewtonChoice(condensed=True, why=why)
     if coupling.interface == "pointwise":
         return NewtonChoice(condensed=False, why="laws at points need the whole mesh")
     if coupling.newton != "auto":
         return NewtonChoice(condensed=coupling.newton == "condensed", why="as the scene asks")
-    patches, steps = stage.patches.count, len(stage.scene.loading.programme.targets)
+    patches, steps = stage.patches.count, stage.scene.loading.programme.count
     compliance = CYCLES_PER_PATCH * patches
     full = full_cycles(stage, steps)
     fewer = "fewer" if compliance < full else "more"
+    unless = "" if compliance < full or table or stage.by_summits else _UNLESS
     return NewtonChoice(
         condensed=compliance < full,
         why=(
             f"the compliance of {patches} patches takes about {compliance} multigrid cycles, "
-            f"{fewer} than {steps} load steps on the mesh with about {full}"
+            f"{fewer} than {steps} load steps on the mesh with about {full}{unless}"
         ),
     )
+
+
+def _left_open(stage: Stage) -> bool:
+    coupling = stage.scene.coupling
+    return coupling.newton == "auto" and coupling.interface == "patchwise"

@@ -139,7 +139,7 @@ def step_count(programme: Programme) -> int:
     Args:
         programme: What the plane is made to do.
     """
-    steps = len(programme.targets)
+    steps = programme.count
     if programme.force_change is None:
         return steps
     return max(steps, int(np.ceil(len(programme.points) / programme.force_change)))

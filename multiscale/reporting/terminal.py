@@ -20,6 +20,8 @@ from multiscale.planning.forecast import Forecast, comparison
 from multiscale.reporting.report import curve_cells
 from multiscale.stage import Stage
 
+_MOST_ROWS = 60  # load steps that are printed; files hold them all
+
 
 def speaks(comm: Any) -> bool:
     """Tell whether this process talks to the terminal and writes files."""
@@ -107,7 +109,7 @@ def progress(
     Yields:
         The function to call with every load step.
     """
-    steps = None if programme.force_change else len(programme.targets)  # some may be halved
+    steps = None if programme.force_change else programme.count  # some may be halved
     if comm is not None:
         of = "" if steps is None else f"/{steps}"
         yield lambda step: say(comm, f"load step {step.step}{of}: {_in_short(step)}")
@@ -167,6 +169,9 @@ def show_history(comm: Any, history: History) -> None:
     table = Table(box=None, padding=(0, 2, 0, 0))
     for name in header:
         table.add_column(escape(name.replace(" [", "\n[")), justify="right")
+    half = _MOST_ROWS // 2
+    if len(rows) > _MOST_ROWS:
+        rows[half:-half] = [("…", f"{len(rows) - _MOST_ROWS} more", *[""] * (len(header) - 2))]
     for row in rows:
         table.add_row(*row)
     console.print(table)

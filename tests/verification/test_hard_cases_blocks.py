@@ -74,16 +74,30 @@ def test_no_tolerance_knows_a_unit(kind):
         assert measured(length, modulus) == pytest.approx(here, rel=1e-10)
 
 
-@pytest.mark.parametrize("kind", ["consistent", "concurrent"])
-@pytest.mark.parametrize("unit", ["m", "um"])
-def test_metres_and_micrometres(kind, unit):
-    size = {"m": 1e3, "um": 1e-3}[unit]
-    there = history(
-        coupling__kind=kind, surface__lengths=[f"1 {unit}"] * 2, block__height=f"1 {unit}",
-        load__approach=f"{8 * size} um", block__young_modulus="4e9 Pa",
-    )  # fmt: skip
-    here = history(coupling__kind=kind)
-    assert there.force_N[-1] / size**2 == pytest.approx(here.force_N[-1], rel=1e-10)
+WAYS = {
+    "analytic": {"coupling__kind": "analytic"},
+    "isolated": {"coupling__kind": "isolated", "coupling__newton": "condensed"},
+    "isolated on the mesh": {"coupling__kind": "isolated", "coupling__newton": "full"},
+    "at points": {"coupling__kind": "isolated", "coupling__interface": "pointwise"},
+    "consistent": {"coupling__kind": "consistent"},
+    "concurrent": {"coupling__kind": "concurrent"},
+    "reference": {"coupling__kind": "reference", "reference__meshes": 1},
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_metres_and_micrometres(way):
+    # hard: lengths that no power of two scales, so that every rounding is another one
+    here = history(**WAYS[way])
+    for unit, size in (("m", 1e3), ("um", 1e-3)):
+        there = history(
+            surface__lengths=[f"1 {unit}"] * 2, block__height=f"1 {unit}",
+            load__approach=f"{8 * size} um", block__young_modulus="4e9 Pa", **WAYS[way],
+        )  # fmt: skip
+        assert there.force_N[-1] / size**2 == pytest.approx(here.force_N[-1], rel=1e-10)
+        pressure = here.patch_pressure_MPa[-1]
+        limit = 1e-10 * pressure.max()
+        np.testing.assert_allclose(there.patch_pressure_MPa[-1], pressure, rtol=0.0, atol=limit)
 
 
 def test_a_slender_column_adds_its_own_length():

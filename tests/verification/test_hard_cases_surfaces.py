@@ -7,7 +7,7 @@ from hard_cases import centred, from_file, history, scene
 from geometry.errors import InputError
 from geometry.files import read_surface
 from geometry.missing import filled
-from multiscale import make_stage
+from multiscale import make_stage, run
 from multiscale.plan import statements, warnings
 
 X, Y = centred(32)
@@ -48,6 +48,17 @@ def test_a_flat_patch_alone_needs_the_condensed_newton(tmp_path):
         history(micro__model="elliptic", **surface)
     with pytest.raises(Exception, match=r"function of closure nowhere.*newton = 'condensed'"):
         history(coupling__kind="isolated", coupling__newton="full", **surface)
+    # left open, it is taken after all; the plan says that it may be, the run that it was
+    left_open = scene(coupling__kind="isolated", **surface)
+    assert "should a patch turn out to be flat" in dict(statements(make_stage(left_open)))["newton"]
+    found = run(left_open)
+    assert found.force_N[-1] > 0.0
+    assert any(
+        "Newton condensed to the patches, not full: 16 of 16 patches are flat" in note
+        for note in found.notes
+    )
+    asked = history(coupling__kind="isolated", coupling__newton="condensed", **surface)
+    assert not any("not full" in note for note in asked.notes)
 
 
 def test_full_contact_is_as_stiff_as_a_flat_surface(tmp_path):

@@ -48,6 +48,7 @@ def programme(*points, quantity="approach", **more):
 def test_legs_are_divided_evenly():
     targets = programme(8.0, 2.0, 5.0, steps=3).targets
     np.testing.assert_allclose(targets, [8 / 3, 16 / 3, 8, 6, 4, 2, 3, 4, 5], rtol=1e-15)
+    assert programme(8.0, 2.0, 5.0, steps=3).count == len(targets)
 
 
 def test_steps_are_numbered_through():

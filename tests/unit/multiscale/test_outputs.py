@@ -1,6 +1,7 @@
 """Files appear whole or not at all."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from geometry.errors import NotWritten
 from geometry.patches import PatchGrid
 from multiscale.history import COLUMNS, PATCH_COLUMNS, History, LoadStep, PatchState
 from multiscale.reporting.outputs import write_tables, write_text, write_whole
+from multiscale.reporting.terminal import show_history
 
 
 @pytest.fixture
@@ -80,3 +82,16 @@ def test_failed_write_leaves_the_old_file(tmp_path):
         write_whole(path, fail)
     assert path.read_text(encoding="utf-8") == "old"
     assert [entry.name for entry in tmp_path.iterdir()] == ["report.html"]
+
+
+def test_a_long_history_is_printed_in_part(history, capsys):
+    """Ten thousand rows would take the terminal longer than the solution; files have them all."""
+    steps = tuple(replace(history.steps[0], step=number) for number in range(1, 1001))
+    show_history(None, replace(history, steps=steps))
+    told = capsys.readouterr().out.splitlines()
+    first = [line.split()[0] for line in told if line.strip()]
+    assert "940 more" in " ".join(told)
+    rows = [word for word in first if word.isdigit()]
+    assert rows == [str(n) for n in (*range(1, 31), *range(971, 1001))]
+    show_history(None, history)
+    assert "more" not in capsys.readouterr().out

@@ -6,11 +6,12 @@ import pytest
 from geometry import PatchGrid
 from geometry.errors import InputError
 from multiscale.couplings.yielding import SpreadLoads, UniformLoads
-from multiscale.law_tables.spread import ContactSpread, check_division
+from multiscale.law_tables.spread import ContactSpread, divides
 from multiscale.laws import LawPoint
 
 PATCHES = PatchGrid(grid=(2, 1), lengths=(2.0, 1.0))
 LOADS = PatchGrid(grid=(4, 2), lengths=(2.0, 1.0))
+BOTH = np.arange(2)
 LEAN = np.array([-1e-3, 1e-3])
 APPROACH = np.linspace(0.0, 8e-3, 9)[:, None] + LEAN
 
@@ -89,7 +90,9 @@ def test_one_rectangle_per_patch_is_a_compliance():
     np.testing.assert_allclose(
         block.displacement(local, at), plain.displacement(local, at), rtol=1e-13
     )
-    np.testing.assert_allclose(block.slope(local, at), plain.slope(local, at), rtol=1e-13)
+    np.testing.assert_allclose(
+        block.slope(local, at, BOTH), plain.slope(local, at, BOTH), rtol=1e-13
+    )
 
 
 def test_equal_correction_everywhere_needs_no_places():
@@ -106,7 +109,8 @@ def test_slope_is_the_derivative(local):
     half_space, correction = matrices(LOADS)
     block = SpreadLoads(half_space, spread(correction=correction))
     local, h = np.array(local), 1e-8
-    slope = block.slope(local, point(local))
+    slope = block.slope(local, point(local), BOTH)
+    np.testing.assert_array_equal(block.slope(local, point(local), BOTH[1:]), slope[:, 1:])
     for j in range(2):
         step = h * np.eye(2)[j]
         ahead, behind = (
@@ -139,5 +143,6 @@ def test_what_does_not_fit_is_refused(changes, text):
 
 def test_loads_must_divide_the_patches():
     odd = PatchGrid(grid=(3, 3), lengths=PATCHES.lengths)
-    with pytest.raises(InputError, match="the rectangles of the loads must divide the patches"):
-        check_division(PATCHES, odd)
+    assert not divides(odd, PATCHES) and divides(LOADS, PATCHES) and divides(PATCHES, PATCHES)
+    beyond = PatchGrid(grid=(4, 1), lengths=(4.0, 1.0))  # lines on all borders, and more outside
+    assert not divides(beyond, PATCHES)
