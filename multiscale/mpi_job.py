@@ -1,4 +1,4 @@
-"""The MPI job that this process belongs to, and whether it came together as its launcher meant it."""
+"""The MPI job of this process, and whether it came together as its launcher meant it."""
 
 from __future__ import annotations
 

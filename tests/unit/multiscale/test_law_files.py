@@ -89,7 +89,7 @@ def test_other_files_are_refused(tmp_path):
     with pytest.raises(InputError, match="is not a readable law file"):
         read_laws(path)
     path.write_bytes(seal(b"no HDF5"))
-    with pytest.raises(InputError, match="laws.h5: is not a readable law file: "):
+    with pytest.raises(InputError, match=r"laws.h5: is not a readable law file: "):
         read_laws(path)
     path.write_bytes(sealed(lambda file: file.create_dataset("x", data=1)))
     with pytest.raises(InputError, match=r"laws.h5: is not a law file of patchlaw"):
@@ -100,7 +100,9 @@ def test_files_without_a_checksum_are_refused(table, tmp_path):
     path = tmp_path / "laws.h5"
     with h5py.File(path, "w") as file:  # as they were written before there was one
         file.attrs["format"] = "patchlaw laws 1"
-    with pytest.raises(InputError, match="laws.h5: has no checksum before its content: it is none"):
+    with pytest.raises(
+        InputError, match=r"laws.h5: has no checksum before its content: it is none"
+    ):
         read_laws(path)
 
 

@@ -193,6 +193,7 @@ def test_files(capsys, tmp_path):
         float(rows[-1][name]) for name in ("force_N", "force_error_N", "force_N_mesh_2")
     )
     assert 0.0 < abs(value - finest) < 4.0 * error
+    assert "nan" not in (tmp_path / "reference.csv").read_text(encoding="utf-8")  # but empty cells
     facts = json.loads((tmp_path / "provenance.json").read_text(encoding="utf-8"))
     assert facts["micro_model"] is None
     assert facts["unknowns"] == facts["reference"]["unknowns"][-1]

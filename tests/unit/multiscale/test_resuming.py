@@ -16,10 +16,10 @@ from multiscale import Run, Scene
 from multiscale.cli import main
 from multiscale.planning import choices
 from multiscale.restart.checkpoint import read_checkpoint, write_checkpoint
-from multiscale.sealed_files import seal
 from multiscale.restart.folder_lock import FolderLock
 from multiscale.restart.journal import Journal, journalled
 from multiscale.restart.resuming import Keeper, kept_choices, with_journal
+from multiscale.sealed_files import seal
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 ALONE = {"coupling": {"kind": "analytic"}, "micro": {"model": "half-space"}}

@@ -30,7 +30,7 @@ def test_any_changed_byte_is_found(path):
         damaged = bytearray(whole)
         damaged[at] ^= 0x10
         path.write_bytes(damaged)
-        with pytest.raises(InputError, match="its checksum does not fit its content|has no check"):
+        with pytest.raises(InputError, match=r"its checksum does not fit its content|has no check"):
             unsealed(path)
     for damaged in (whole[:-1], whole + b"\0", whole[:300]):
         path.write_bytes(damaged)
