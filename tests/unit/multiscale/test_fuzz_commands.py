@@ -14,7 +14,7 @@ few = settings(
 )
 
 
-@settings(few, max_examples=20)
+@settings(few, max_examples=8)
 @given(asked)
 def test_comparisons_of_any_scenes(tmp_path_factory, drawn):
     path = tmp_path_factory.getbasetemp() / "compared.toml"
