@@ -125,8 +125,9 @@ def digest(arrays: Mapping[str, Any]) -> str:
 
 def _refused(path: Path, problem: str, cause: InputError | None = None) -> InputError:
     told: dict[str, Any] = {} if cause is None else {"value": cause.value, "allowed": cause.allowed}
-    text = f"{problem}; remove it, or run without --resume to begin anew"
-    return InputError(text, file=str(path), **told)
+    return InputError(
+        f"{problem}; remove it, or run without --resume to begin anew", file=str(path), **told
+    )
 
 
 def _arrays(checkpoint: Checkpoint) -> Arrays:

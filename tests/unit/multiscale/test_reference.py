@@ -262,6 +262,15 @@ REFUSED = {
 }  # fmt: skip
 
 
+def test_hexahedra_need_their_number():
+    data = scene("reference.mesh=hexahedra").model_dump(by_alias=True, exclude_none=True)
+    del data["block"]["cells"]
+    with pytest.raises(
+        InputError, match=r"block.cells = None: is needed by reference.mesh = 'hexahe"
+    ):
+        make_stage(Scene.from_dict(data))
+
+
 @pytest.mark.parametrize(("overrides", "text"), REFUSED.values(), ids=REFUSED)
 def test_what_does_not_fit_is_refused(overrides, text):
     with pytest.raises(InputError, match=re.escape(str(PAPER)) + ".*" + re.escape(text)):
