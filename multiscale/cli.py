@@ -14,6 +14,7 @@ from geometry.errors import InputError, PatchlawError
 from multiscale import commands
 from multiscale.comparing import command as compare_command
 from multiscale.doctor import command as doctor_command
+from multiscale.mpi_job import world
 from multiscale.reporting import terminal
 
 _MOST_PATIENT = 5.0  # with other ranks, at the end [s]
@@ -43,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Note:
         Collective over all processes of the MPI job.
     """
-    comm = _world()
+    comm = world()
     meeting = None if comm is None else comm.Dup()  # none else must send anything through it
     words = list(sys.argv[1:] if arguments is None else arguments)
     cut = words.index("--") if "--" in words else len(words)
@@ -142,13 +143,6 @@ def _add_interruption(parser: argparse.ArgumentParser) -> None:
 def _summary(command: Any) -> str:
     """Return the first line of a command's docstring."""
     return command.__doc__.partition("\n")[0]
-
-
-def _world() -> Any:
-    """Return the communicator of an MPI job, or None for a process on its own."""
-    from mpi4py import MPI
-
-    return MPI.COMM_WORLD if MPI.COMM_WORLD.size > 1 else None
 
 
 def _given_to_petsc(options: list[str]) -> list[str]:

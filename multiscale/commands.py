@@ -14,6 +14,7 @@ from geometry.statistics import roughness
 from multiscale import plan
 from multiscale.couplings.blocks import load_together
 from multiscale.law_tables.law_files import write_laws
+from multiscale.mpi_job import refuse_strangers
 from multiscale.planning.forecast import Forecast, forecast
 from multiscale.reporting import terminal
 from multiscale.reporting.outputs import write_whole
@@ -205,7 +206,12 @@ def scene_and_folder(
         choice: Parsed words of the command line.
         comm: MPI communicator; None for a process on its own.
         ending: What the folder's name has behind the scene's, unless the user names a folder.
+
+    Raises:
+        InputError: When the scene or the folder cannot be used, or this process is one of several
+            that should be one MPI job and are not.
     """
+    refuse_strangers()
 
     def read() -> tuple[Scene, Path]:
         scene = Scene.load(choice.scene, choice.set)

@@ -13,6 +13,7 @@ from geometry.collective import on_root
 from geometry.errors import InputError, NotConverged, PatchlawError
 from micro import HalfSpaceModel, finite_slope_effect
 from multiscale.comparing.level_results import STATUS_OF_EXIT, LevelResult, curves_of, write_result
+from multiscale.mpi_job import world
 from multiscale.run import Run
 from multiscale.scene import Scene
 
@@ -44,7 +45,7 @@ def main(request: Path) -> int:
     scene = Scene.from_dict(asked["scene"])
     comm = None
     if scene.coupling.kind != "analytic":  # the micro model alone needs neither MPI nor elements
-        comm = _world()
+        comm = world()
         _rehearse(scene, comm)
     result = level_result(scene, comm, key=asked["key"], slopes=asked["slopes"])
     on_root(comm, lambda: write_result(Path(asked["result"]), result))
@@ -127,13 +128,6 @@ def _peak_megabytes() -> float:
     except (OSError, IndexError):
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         return peak / (2.0**20 if sys.platform == "darwin" else 1024.0)
-
-
-def _world() -> Any:
-    """Return the communicator of an MPI job, or None for a process on its own."""
-    from mpi4py import MPI
-
-    return MPI.COMM_WORLD if MPI.COMM_WORLD.size > 1 else None
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -89,22 +90,30 @@ def curves_of(history: History) -> Curves | None:
 
 
 def write_result(path: Path, result: LevelResult) -> Path:
-    """Write a result as JSON, whole or not at all."""
+    """Write a result as JSON, whole or not at all, with a checksum."""
     content = {name: getattr(result, name) for name in result.__slots__}
     if result.curves is not None:
         content["curves"] = _content(result.curves)
-    return write_json(path, content)
+    return write_json(path, {"sha256": _digest(content), "result": content})
 
 
 def read_result(path: Path) -> LevelResult | None:
-    """Read a result; None when there is none that can be read."""
+    """Read a result; None when there is none that can be read, or it is damaged."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        content = kept["result"]
+        if kept["sha256"] != _digest(content):
+            return None
         if content["curves"] is not None:
             content["curves"] = _curves(content["curves"])
         return LevelResult(**content)
-    except (OSError, ValueError, KeyError, TypeError, PatchlawError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError, PatchlawError):
         return None
+
+
+def _digest(content: Any) -> str:
+    """Return the SHA-256 of what JSON can hold; numbers come back from a file as they were."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def _content(curves: Curves) -> dict[str, Any]:

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from multiscale.doctor.examination import Finding
+from multiscale.mpi_job import strangers
 
-_SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS")
 _LAUNCHERS = {"Open MPI": "Open MPI", "HYDRA": "MPICH", "MPICH": "MPICH", "Intel": "Intel MPI"}
 
 
@@ -54,10 +54,10 @@ def launcher(comm: Any) -> list[Finding]:
     from mpi4py import MPI
 
     library = MPI.Get_library_version().strip().partition(",")[0].splitlines()[0]
-    size = max((int(os.environ.get(name) or 1) for name in _SIZES), default=1)
-    if size > 1 and MPI.COMM_WORLD.size == 1:
-        text = f"started as one of {size} processes, but each stands alone ({library})"
-        remedy = "start with the launcher of this MPI; see demos/hpc/README.md, host MPI"
+    found = strangers()
+    if found is not None:
+        text = f"started as one of {found[1]} processes, but each stands alone ({library})"
+        remedy = f"start with the mpirun of {library}, or srun --mpi=pmix; see demos/hpc/README.md"
         return [Finding("launcher", "fail", text, remedy)]
     if comm is not None and comm.rank > 0:
         return []  # rank 0 alone looks for the command

@@ -17,6 +17,7 @@ from multiscale.law_tables.repair import evened_law
 from multiscale.law_tables.spread import ContactSpread
 from multiscale.laws import PatchLaw
 from multiscale.records import stored_numbers
+from multiscale.sealed_files import sealed, unsealed
 
 _COLUMNS = {
     "approach": "mm",
@@ -35,9 +36,7 @@ _SCALARS = {
     "repaired": "1",
 }
 _SPREAD = {"approach": "mm", "forces": "N", "correction": "mm/N"}
-_UNKNOWN = float("nan")
-_OLDER = {"stiffness_error": _UNKNOWN, "warned_from": float("inf"), "repaired": 0.0}
-"""What files may lack."""
+FORMAT = "patchlaw laws 2"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,30 +71,39 @@ class LawTable:
 def write_laws(path: Path | BinaryIO, table: LawTable) -> None:
     """Write all laws to one HDF5 file: a group ``patch_IX_IY`` per patch, a dataset per column.
 
+    A checksum stands before the content; see `multiscale.sealed_files`.
+
     Args:
         path: File to write, by name or open; one that exists is replaced.
         table: The laws.
     """
-    with h5py.File(path, "w") as file:
-        file.attrs["format"] = "patchlaw laws 1"
-        file.attrs["patch_grid"] = table.patches.grid
-        file.attrs["lengths_mm"] = table.patches.lengths
-        file.attrs["origin_mm"] = table.patches.origin
-        file.attrs["force_error"] = table.force_error
-        for name, text in table.made_by.items():
-            file.attrs[f"made_by_{name}"] = text
-        for index, law in enumerate(table.laws):
-            group = file.create_group(_group_name(table.patches, index))
-            for name, unit in _COLUMNS.items():
-                group.create_dataset(name, data=getattr(law, name)).attrs["unit"] = unit
-            for name in _SCALARS:
-                group.attrs[name] = getattr(law, name)
-        if table.spread is not None:
-            group = file.create_group("spread")
-            group.attrs["load_borders_x_mm"] = table.spread.loads.borders_x
-            group.attrs["load_borders_y_mm"] = table.spread.loads.borders_y
-            for name, unit in _SPREAD.items():
-                group.create_dataset(name, data=getattr(table.spread, name)).attrs["unit"] = unit
+    content = sealed(lambda file: _fill(file, table))
+    if isinstance(path, Path):
+        path.write_bytes(content)
+    else:
+        path.write(content)
+
+
+def _fill(file: Any, table: LawTable) -> None:
+    file.attrs["format"] = FORMAT
+    file.attrs["patch_grid"] = table.patches.grid
+    file.attrs["lengths_mm"] = table.patches.lengths
+    file.attrs["origin_mm"] = table.patches.origin
+    file.attrs["force_error"] = table.force_error
+    for name, text in table.made_by.items():
+        file.attrs[f"made_by_{name}"] = text
+    for index, law in enumerate(table.laws):
+        group = file.create_group(_group_name(table.patches, index))
+        for name, unit in _COLUMNS.items():
+            group.create_dataset(name, data=getattr(law, name)).attrs["unit"] = unit
+        for name in _SCALARS:
+            group.attrs[name] = getattr(law, name)
+    if table.spread is not None:
+        group = file.create_group("spread")
+        group.attrs["load_borders_x_mm"] = table.spread.loads.borders_x
+        group.attrs["load_borders_y_mm"] = table.spread.loads.borders_y
+        for name, unit in _SPREAD.items():
+            group.create_dataset(name, data=getattr(table.spread, name)).attrs["unit"] = unit
 
 
 def read_laws(path: Path | BinaryIO) -> LawTable:
@@ -109,39 +117,45 @@ def read_laws(path: Path | BinaryIO) -> LawTable:
         path: The file, by name or open.
 
     Raises:
-        InputError: When the file cannot be read, is no law file or lacks anything.
+        InputError: When the file cannot be read, is no law file, damaged, lacks anything, or was
+            written before law files had a checksum.
     """
+    name = str(path) if isinstance(path, Path) else None
     if isinstance(path, Path) and not path.is_file():  # a pipe would be waited for
-        raise InputError("is not a readable law file: there is no such file", file=str(path))
+        raise InputError("is not a readable law file: there is no such file", file=name)
     try:
-        with h5py.File(path, "r") as file:
-            if file.attrs.get("format") != "patchlaw laws 1":
-                raise InputError("is not a law file of patchlaw", file=str(path))
-            patches = PatchGrid(
-                grid=_pair(file.attrs["patch_grid"], int),
-                lengths=_pair(file.attrs["lengths_mm"], float),
-                origin=_pair(file.attrs["origin_mm"], float),
-            )
-            if math.prod(patches.grid) > len(file):
-                raise InputError("lacks laws", value=patches.grid, allowed=f"{len(file)} groups")
-            groups = [file[_group_name(patches, index)] for index in range(patches.count)]
-            made_by = {
-                name.removeprefix("made_by_"): str(text)
-                for name, text in file.attrs.items()
-                if name.startswith("made_by_")
-            }
-            whole = made_by.get("coupling") == "consistent"
-            return LawTable(
-                patches=patches,
-                laws=tuple(map(_law if whole else _evened, groups)),
-                made_by=made_by,
-                force_error=float(file.attrs.get("force_error", _UNKNOWN)),
-                spread=_spread(file["spread"], patches) if "spread" in file else None,
-            )
+        with h5py.File(unsealed(path), "r") as file:
+            if file.attrs.get("format") != FORMAT:
+                raise InputError("is not a law file of patchlaw", file=name)
+            return _table(file)
     except InputError as error:
-        raise error.located(file=str(path)) from None
-    except Exception as error:  # h5py raises errors of many families over damaged files
-        raise InputError(f"is not a readable law file: {error}", file=str(path)) from None
+        raise error.located(file=name) from None
+    except Exception as error:  # h5py raises errors of many families
+        raise InputError(f"is not a readable law file: {error}", file=name) from None
+
+
+def _table(file: Any) -> LawTable:
+    patches = PatchGrid(
+        grid=_pair(file.attrs["patch_grid"], int),
+        lengths=_pair(file.attrs["lengths_mm"], float),
+        origin=_pair(file.attrs["origin_mm"], float),
+    )
+    if math.prod(patches.grid) > len(file):
+        raise InputError("lacks laws", value=patches.grid, allowed=f"{len(file)} groups")
+    groups = [file[_group_name(patches, index)] for index in range(patches.count)]
+    made_by = {
+        name.removeprefix("made_by_"): str(text)
+        for name, text in file.attrs.items()
+        if name.startswith("made_by_")
+    }
+    law = _law if made_by.get("coupling") == "consistent" else _evened
+    return LawTable(
+        patches=patches,
+        laws=tuple(map(law, groups)),
+        made_by=made_by,
+        force_error=float(file.attrs["force_error"]),
+        spread=_spread(file["spread"], patches) if "spread" in file else None,
+    )
 
 
 def _spread(group: Any, patches: PatchGrid) -> ContactSpread:
@@ -153,8 +167,7 @@ def _spread(group: Any, patches: PatchGrid) -> ContactSpread:
 
 def _law(group: Any) -> PatchLaw:
     content: dict[str, Any] = {name: stored_numbers(group[name]) for name in _COLUMNS}
-    scalars = _OLDER | dict(group.attrs)
-    content.update({name: float(scalars[name]) for name in _SCALARS})
+    content.update({name: float(group.attrs[name]) for name in _SCALARS})
     return PatchLaw(**content)
 
 

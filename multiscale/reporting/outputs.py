@@ -124,7 +124,7 @@ def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) 
     Args:
         path: File to write.
         header: Names of the columns.
-        rows: Their values; None leaves a cell empty.
+        rows: Their values; what is not known, None or NaN, leaves a cell empty, in every table.
     """
 
     def write(partial: Path) -> None:
@@ -145,5 +145,9 @@ def _write_text(path: Path, text: str) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """Return numpy scalars as Python's own: their text is the same on every numpy release."""
-    return value.item() if hasattr(value, "item") else value
+    """Return what stands in a cell: numpy's scalars as Python's own, nothing for NaN.
+
+    The text of Python's numbers is the same on every numpy release.
+    """
+    plain = value.item() if hasattr(value, "item") else value
+    return None if plain != plain else plain

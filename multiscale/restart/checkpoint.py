@@ -6,7 +6,6 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +26,9 @@ from multiscale.records import (
     unpacked,
 )
 from multiscale.reporting.outputs import write_bytes
+from multiscale.sealed_files import sealed, unsealed
 
-FORMAT = "patchlaw checkpoint 1"
+FORMAT = "patchlaw checkpoint 2"
 _PATCH = "patches."
 
 
@@ -68,13 +68,13 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> Path:
         NotWritten: When the file cannot be written.
     """
     arrays = _arrays(checkpoint)
-    image = BytesIO()  # HDF5 itself may not survive a full disk
-    with h5py.File(image, "w") as file:
+
+    def fill(file: Any) -> None:
         file.attrs["format"] = FORMAT
-        file.attrs["sha256"] = digest(arrays)
         for name, array in arrays.items():
             file.create_dataset(name, data=array)
-    return write_bytes(path, image.getvalue())
+
+    return write_bytes(path, sealed(fill))
 
 
 def read_checkpoint(path: Path) -> Checkpoint:
@@ -89,10 +89,10 @@ def read_checkpoint(path: Path) -> Checkpoint:
     if not path.is_file():  # a pipe would be waited for
         raise _refused(path, "is no file")
     try:
-        with h5py.File(path, "r") as file:
+        with h5py.File(unsealed(path), "r") as file:
             form = str(file.attrs.get("format", ""))
             if form != FORMAT:
-                raise _refused(path, "is not a checkpoint of this patchlaw", form, FORMAT)
+                raise InputError("is not a checkpoint of this patchlaw", value=form, allowed=FORMAT)
             arrays: Arrays = {}
 
             def read(name: str, item: Any) -> None:
@@ -100,13 +100,11 @@ def read_checkpoint(path: Path) -> Checkpoint:
                     arrays[name] = stored_numbers(item)
 
             file.visititems(read)
-            if str(file.attrs.get("sha256", "")) != digest(arrays):
-                raise _refused(path, "is damaged: its checksum does not fit its content")
         return _checkpoint(arrays)
     except InputError as error:
-        raise error.located(file=str(path)) from None
+        raise _refused(path, error.problem, error) from None
     except OSError as error:
-        raise _refused(path, f"is damaged or cannot be read: {error}") from None
+        raise _refused(path, f"cannot be read: {error}") from None
     except Exception as error:  # a sound checksum over what this version cannot understand
         raise _refused(path, f"is not understood: {error!r}") from None
 
@@ -125,10 +123,11 @@ def digest(arrays: Mapping[str, Any]) -> str:
     return whole.hexdigest()
 
 
-def _refused(path: Path, problem: str, value: str | None = None, allowed: str = "") -> InputError:
-    told = {} if value is None else {"value": value, "allowed": allowed}
-    text = f"{problem}; remove it, or run without --resume to begin anew"
-    return InputError(text, file=str(path), **told)
+def _refused(path: Path, problem: str, cause: InputError | None = None) -> InputError:
+    told: dict[str, Any] = {} if cause is None else {"value": cause.value, "allowed": cause.allowed}
+    return InputError(
+        f"{problem}; remove it, or run without --resume to begin anew", file=str(path), **told
+    )
 
 
 def _arrays(checkpoint: Checkpoint) -> Arrays:

@@ -19,6 +19,8 @@ from hypothesis import strategies as st
 ROOT = Path(__file__).parents[2]
 sys.path[:0] = [str(ROOT / "tests" / "unit" / name) for name in ("geometry", "multiscale")]
 
+import command_words  # noqa: E402
+import compared_inputs  # noqa: E402
 import height_files  # noqa: E402
 import scene_inputs  # noqa: E402
 import stored_inputs  # noqa: E402
@@ -50,7 +52,7 @@ def doors(folder):
         "scenes, planned",
         scene_inputs.scenes(),
         lambda data: scene_inputs.planned(write(scene, text(data))),
-        0.4,
+        0.3,
     )
     yield (
         "scenes, run",
@@ -75,6 +77,18 @@ def doors(folder):
         st.tuples(height_files.anything, height_files.sides),
         lambda drawn: height_files.read(write(folder / f"h{drawn[0][0]}", drawn[0][1]), drawn[1]),
         0.2,
+    )
+    yield (
+        "comparisons",
+        compared_inputs.asked,
+        lambda drawn: compared_inputs.compared(write(scene, text(drawn[0])), *drawn[1:]),
+        0.05,
+    )
+    yield (
+        "command lines",
+        command_words.lines,
+        lambda words: command_words.called(write(scene, set_), words),
+        0.05,
     )
     for name, whole, reader in zip(
         ("law files", "checkpoints"), (laws, checkpoint), stored_inputs.READERS, strict=True

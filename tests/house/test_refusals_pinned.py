@@ -1,57 +1,13 @@
-"""Every text with which the packages refuse something is pinned by a test."""
+"""Every text with which the packages refuse is pinned by a test, and stands on the page."""
 
 import ast
 from pathlib import Path
 
 import pytest
+from refusals import PACKAGES, PAGE, ROOT, all_refusals, page, refusals
 
-ROOT = Path(__file__).parents[2]
-PACKAGES = ("geometry", "micro", "macro", "multiscale")
-ERRORS = {"InputError", "NotConverged", "NotWritten"}
-OF_A_SCENE = {"quantities.py", "sections.py", "scene.py", "scene_files.py"}  # by way of pydantic
-LENGTH = 18  # characters of a message that a test must have in common with it
-
-
-def literal_parts(node):
-    """Return the fixed parts of a text in the source, none when it is made elsewhere."""
-    if isinstance(node, ast.Constant) and isinstance(node.value, str):
-        return [node.value]
-    if isinstance(node, ast.JoinedStr):
-        return [part.value for part in node.values if isinstance(part, ast.Constant)]
-    return []
-
-
-def assigned(tree):
-    """Return the texts that names are given anywhere in a module."""
-    found = {}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Assign):
-            for target in node.targets:
-                pairs = [(target, node.value)]
-                if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple):
-                    pairs = list(zip(target.elts, node.value.elts, strict=False))
-                for name, value in pairs:
-                    if isinstance(name, ast.Name) and literal_parts(value):
-                        found.setdefault(name.id, []).append(value)
-    return found
-
-
-def messages(path):
-    """Yield line and fixed parts of every text that a module refuses with."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    texts = assigned(tree)
-    names = ERRORS | ({"ValueError"} if path.name in OF_A_SCENE else set())
-    for node in ast.walk(tree):
-        if not isinstance(node, ast.Call):
-            continue
-        if getattr(node.func, "id", "") not in names or not node.args:
-            continue
-        first = node.args[0]
-        given = texts.get(first.id, []) if isinstance(first, ast.Name) else [first]
-        for value in given:
-            parts = sorted((part.strip() for part in literal_parts(value)), key=len)
-            if parts and len(parts[-1]) > 3:
-                yield node.lineno, [part for part in parts if len(part) >= LENGTH] or parts[-1:]
+LENGTH = 24  # characters of a message that a test must have in common with it
+WHOLE = 15  # or all of a part of it, between two gaps, that is not shorter
 
 
 def pieces(text, length):
@@ -82,12 +38,18 @@ def pinned():
 def test_every_refusal_is_pinned(package, pinned):
     known = pieces(pinned, LENGTH)
     missing = [
-        f"{path.name}:{line}: {' … '.join(parts)}"
-        for path in sorted((ROOT / package).rglob("*.py"))
-        for line, parts in messages(path)
-        if not any(pieces(part, LENGTH) & known or part in pinned for part in parts)
+        f"{one.module}:{one.line}: {one.text}"
+        for one in all_refusals()
+        if one.module.startswith(f"{package}/")
+        and not any(pieces(part, LENGTH) & known for part in one.parts)
+        and not any(part in pinned for part in one.parts if len(part) >= WHOLE)
+        and max(one.parts, key=len) not in pinned
     ]
     assert not missing, "\n".join(missing)
+
+
+def test_the_page_is_complete():
+    assert PAGE.read_text(encoding="utf-8") == page(), "run tests/house/refusals.py"
 
 
 def test_the_search_finds(tmp_path):
@@ -97,6 +59,22 @@ def test_the_search_finds(tmp_path):
         "    problem, allowed = f'the size {x} does not fit at all', 'more'\n"
         "    raise InputError(problem, allowed=allowed)\n"
         "def g():\n"
-        "    raise NotConverged('the balance', reason='stagnation')\n"
+        "    raise NotConverged('the balance', reason='stagnation', remedy='less')\n"
+        "def h():\n"
+        "    for wrong, problem, allowed in ((1, 'is odd', 'even'), (2, 'is even', f'{x} odd')):\n"
+        "        raise InputError(problem, allowed=allowed)\n"
+        "def _refused(problem):\n"
+        "    return InputError(f'{problem}; go away')\n"
+        "def i():\n"
+        "    raise _refused('a stranger')\n"
+        "def j():\n"
+        "    finite_pair(x, 'no pair')\n"
+        "def k(path):\n"
+        "    raise NotWritten(path)\n"
     )
-    assert list(messages(module)) == [(3, ["does not fit at all"]), (5, ["the balance"])]
+    found = {(one.code, one.text, one.more) for one in refusals(module)}
+    assert found == {
+        (2, "the size … does not fit at all", "more"), (3, "the balance", "less"),
+        (2, "is odd", "even"), (2, "is even", "… odd"), (2, "a stranger; go away", ""),
+        (2, "no pair", ""),
+    }  # fmt: skip

@@ -3,6 +3,7 @@
 import csv
 import os
 import platform
+import re
 import shutil
 import socket
 import subprocess
@@ -172,6 +173,18 @@ def test_slurm_itself_can_start_the_ranks(slurm):
     assert '"2: 2 on ' in done.stdout
 
 
+def test_processes_that_stand_alone_refuse_to_run(slurm):
+    """Without PMI every task is an MPI job of its own: Open MPI 4 ends it, 5 leaves it to us."""
+    words = ("-m", "multiscale", "run", SCENE, "--out", slurm.folder / "alone", "--set", *SMALL)
+    done = subprocess.run(
+        ["srun", "--mpi=none", "--ntasks=2", sys.executable, *map(str, words)],
+        cwd=slurm.folder, env=slurm.environment, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode != 0
+    assert re.search(r"each stands alone|not built with SLURM", done.stderr), done.stderr
+    assert not (slurm.folder / "alone").exists()
+
+
 SLOW = """
 import sys, time
 from multiscale.cli import main
@@ -184,6 +197,28 @@ def slowly(self):
 Run.load_steps = slowly
 sys.exit(main())
 """
+
+
+def test_a_cancelled_job_loses_no_load_step(slurm, reference):
+    """Slurm sends SIGTERM to every process; mpirun may kill the ranks before they have ended."""
+    out, slow = slurm.folder / "cancelled", slurm.folder / "slow.py"
+    slow.write_text(SLOW, encoding="utf-8")
+    words = (SCRIPTS / "run.sbatch", SCENE, out, "--resume", "--set", *SMALL, "load.steps=40")
+    slurm.environment["PATCHLAW"] = f"{sys.executable} {slow}"
+    job = slurm.submit(*words)
+    slurm.wait(lambda: (out / "checkpoint.h5").is_file(), 60)
+    time.sleep(3.0)  # some load steps
+    slurm.say("scancel", job)
+    assert slurm.finish(job, 60) == {"CANCELLED"}, slurm.logs()
+    assert (out / "checkpoint.h5").is_file()
+    slurm.environment["PATCHLAW"] = f"{sys.executable} -m multiscale"
+    job = slurm.submit("--output=again.log", *words)
+    assert slurm.finish(job, 120) == {"COMPLETED"}, slurm.logs()
+    said = (slurm.folder / "again.log").read_text(encoding="utf-8")
+    (kept,) = re.findall(r"goes on after load step (\d+)", said)
+    assert 0 < int(kept) < 40
+    # equations are solved to 1e-10 of the load, from whatever start
+    np.testing.assert_allclose(forces(out), reference("load.steps=40"), rtol=1e-8)
 
 
 def test_a_run_longer_than_the_limit_goes_on_after_it(slurm, reference):

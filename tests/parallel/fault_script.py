@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+import time
 
 from mpi4py import MPI
 
@@ -38,8 +39,15 @@ def signalled(self, step):
         os.kill(os.getpid(), signal.SIGUSR1)
 
 
-keep = commands.Keeper.keep
+def slow(self, control):
+    """Make load steps last."""
+    time.sleep(0.3)
+    return press(self, control)
+
+
+keep, press = commands.Keeper.keep, CondensedCoupling.press
 rank, what, place, *words = int(sys.argv[1]), *sys.argv[2:]
 if MPI.COMM_WORLD.rank == rank:
-    setattr(*PLACES[place], {"bug": bug, "one-sided": one_sided, "signal": signalled}[what])
+    actions = {"bug": bug, "one-sided": one_sided, "signal": signalled, "slow": slow}
+    setattr(*PLACES[place], actions[what])
 sys.exit(main(words))

@@ -14,14 +14,21 @@ SMALL = ["surface.grid=[48, 48]", "load.steps=2", "block.cells=[4, 4, 3]", "patc
 # leave some without a patch whose law they would tabulate
 COLUMN = ["block.height=8 mm", "block.cells=[4, 4, 32]"]
 HALF_SPACE = "micro.model=half-space"
+REFERENCE = ["coupling.kind=reference", "reference.mesh=hexahedra", "reference.meshes=1"]
 SCENES = {
     "isolated, patchwise": [*COLUMN, "coupling.kind=isolated", "coupling.newton=full"],
     "isolated, pointwise": [*COLUMN, "coupling.kind=isolated", "coupling.interface=pointwise"],
     "isolated, condensed": [*COLUMN, "coupling.kind=isolated", "coupling.newton=condensed"],
     "consistent": ["coupling.kind=consistent", HALF_SPACE],
+    "consistent, pointwise": [
+        *COLUMN, "coupling.kind=consistent", HALF_SPACE, "coupling.interface=pointwise",
+    ],
     "concurrent": ["coupling.kind=concurrent", HALF_SPACE],
     "analytic": ["coupling.kind=analytic", HALF_SPACE],
-}
+    "analytic, one summit": ["coupling.kind=analytic", "load.approach=0.5 um"],
+    "reference, active sets": [*COLUMN, *REFERENCE],
+    "reference, augmented": [*COLUMN, *REFERENCE, "reference.method=augmented-lagrangian"],
+}  # fmt: skip
 
 
 def main():

@@ -1,8 +1,15 @@
 """What goes wrong on one rank ends all within seconds, with one message."""
 
 import csv
+import os
+import signal
+import subprocess
+import sys
+import time
 
 import pytest
+from conftest import MPI_ENVIRONMENT
+from killed_runs import largest_difference, members
 
 SCRIPT = "tests/parallel/fault_script.py"
 WORDS = (
@@ -47,3 +54,39 @@ def test_signal_to_one_rank_stops_all_and_any_number_goes_on(mpirun, tmp_path):
     assert "goes on after load step 2" in done.stdout
     with (out / "history.csv").open(encoding="utf-8") as file:
         assert [row["step"] for row in csv.DictReader(file)] == ["1", "2", "3"]
+
+
+LONG = [word.replace("steps=3", "steps=60") for word in WORDS]
+
+
+@pytest.fixture(scope="module")
+def undisturbed(mpirun, tmp_path_factory):
+    """Folder of a run that nobody disturbed."""
+    out = tmp_path_factory.mktemp("undisturbed")
+    assert mpirun(1, "-m", "multiscale", *LONG, out, timeout=100).returncode == 0
+    return out
+
+
+@pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGUSR1], ids=["SIGTERM", "SIGUSR1"])
+def test_mpirun_that_is_told_to_end_loses_no_load_step(mpirun, root, tmp_path, undisturbed, sent):
+    """It hands SIGUSR1 on and waits; after SIGTERM it kills the ranks within a second or two."""
+    command = ["mpirun", "-n", "2", sys.executable, SCRIPT, "1", "slow", "load step", *LONG]
+    out, log = tmp_path / "out", tmp_path / "log"
+    with log.open("wb") as file:
+        started = subprocess.Popen(
+            [*command, str(out)], cwd=root, env=os.environ | MPI_ENVIRONMENT, stdout=file,
+            stderr=subprocess.STDOUT, start_new_session=True,
+        )  # fmt: skip
+        until = time.monotonic() + 60.0
+        while "load step 2/60" not in log.read_text(encoding="utf-8"):
+            assert time.monotonic() < until, log.read_text(encoding="utf-8")
+            time.sleep(0.05)
+        started.send_signal(sent)
+        code = started.wait(timeout=60)
+    assert code == 4 if sent == signal.SIGUSR1 else code not in (0, 2, 3, 5), log.read_text()
+    assert not members(started.pid)
+    done = mpirun(1, "-m", "multiscale", *LONG, out, "--resume", timeout=100)
+    assert done.returncode == 0, done.stderr
+    shown = done.stdout
+    assert "goes on after load step " in shown and "goes on after load step 60" not in shown
+    assert largest_difference(out, undisturbed) <= 1e-10  # the tolerance of the Newton iteration

@@ -168,9 +168,9 @@ def test_subsets_keep_what_belongs_to_the_surface():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"x": [0.1]}, "arrays differ in shape"),
-        ({"border_x": [0.1]}, "arrays differ in shape"),
-        ({"angle": [[0.0], [1.0]]}, "arrays differ in shape"),
+        ({"x": [0.1]}, "the asperities' arrays differ in shape"),
+        ({"border_x": [0.1]}, "the asperities' arrays differ in shape"),
+        ({"angle": [[0.0], [1.0]]}, "the asperities' arrays differ in shape"),
         ({"radius_minor": [1.0, 4.0]}, "principal radii are not R' ≥ R'' > 0"),
         ({"radius_minor": [0.0, 1.0]}, "principal radii are not R' ≥ R'' > 0"),
         ({"radius_major": [np.nan, 4.0]}, "principal radii are not R' ≥ R'' > 0"),

@@ -77,7 +77,7 @@ def test_point_lists_may_carry_rounded_coordinates(tmp_path):
         ("a.xyz", "0 0 1\n1 0 1\nnan 1 1\n", "some coordinates x, y are not finite"),
         ("a.xyz", "0 0 1\n1 0 1\n1 1 1\n", "2 × 2: 1 places are empty, 0 taken more than once"),
         ("a.xyz", "0 0 1\n1 0 1\n1 1 1\n0 1 1\n0 1 1\n", "0 places are empty, 1 taken more"),
-        ("a.xyz", "0 0 1\n1 0 1\n2.3 1 1\n3 1 1\n", "not evenly spaced along x"),
+        ("a.xyz", "0 0 1\n1 0 1\n2.3 1 1\n3 1 1\n", "the points are not evenly spaced along x"),
     ],
 )
 def test_unreadable_content_names_the_file_and_the_fault(tmp_path, name, text, message):
@@ -112,7 +112,7 @@ def test_arrays_of_other_kinds_are_refused(tmp_path, array):
 def test_lengths_are_needed_where_the_file_has_none(tmp_path, name):
     np.save(tmp_path / "scan.npy", HEIGHTS)
     np.savetxt(tmp_path / "scan.txt", HEIGHTS)
-    with pytest.raises(InputError, match=rf"{name}: the file has no lengths"):
+    with pytest.raises(InputError, match=rf"{name}: the file has no lengths, they must be given"):
         read_surface(tmp_path / name)
 
 

@@ -73,5 +73,6 @@ def test_errors_of_the_library_are_passed_on_in_one_line(monkeypatch, file, text
 
 def test_without_the_library_the_formats_and_the_extra_are_named(monkeypatch, file):
     monkeypatch.setitem(sys.modules, "SurfaceTopography", None)  # an import of None fails
-    with pytest.raises(InputError, match=r"\.opd is not known.*patchlaw\[instruments\].*\.xyz"):
+    message = r"\.opd is not known here; instruments' formats need .*patchlaw\[instruments\].*\.xyz"
+    with pytest.raises(InputError, match=message):
         read_surface(file)

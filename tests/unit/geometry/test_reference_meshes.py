@@ -88,7 +88,10 @@ def test_hexahedra_are_halved_in_all_directions():
         ({"mesh": "hexahedra"}, "hexahedra need their number"),
         ({"mesh": "hexahedra", "cells": (4, 4, 4), "element": "P2"}, "not an element of hexahedra"),
         ({"mesh": "hexahedra", "cells": (8, 8, 1)}, r"^\(8, 8, 1\): too few hexahedra for 3 "),
-        ({"mesh": "hexahedra", "cells": (3, 3, 3)}, "too few hexahedra for 3 meshes"),
+        (
+            {"mesh": "hexahedra", "cells": (3, 3, 3)},
+            "for 3 meshes that differ along x, y and z",
+        ),
         ({"element": "Q1"}, "element is unknown"),
         ({"fine": 0.0}, "finest edge length is out of range"),
         ({"fine": np.nan}, "finest edge length is out of range"),

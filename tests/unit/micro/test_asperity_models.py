@@ -191,7 +191,7 @@ def test_refuses(cluster):
         model.solve(np.inf)
     with pytest.raises(InputError, match=r"\(3,\): every patch needs one mean height"):
         model.respond([1e-3], patches=PATCHES, mean_heights=np.zeros(3))
-    with pytest.raises(InputError, match="at least one approach"):
+    with pytest.raises(InputError, match="a response needs at least one approach"):
         model.respond([], patches=ONE_PATCH, mean_heights=[0.0])
     corner = PatchGrid(grid=(1, 1), lengths=(0.5, 0.5))
     with pytest.raises(InputError, match="points lie outside the patches"):

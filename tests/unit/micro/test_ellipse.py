@@ -82,5 +82,5 @@ def test_refuses_radii(radii):
 
 @pytest.mark.parametrize("value", [-0.1, 1.0, np.nan])
 def test_refuses_eccentricity(value):
-    with pytest.raises(InputError, match=r"not one of an ellipse \(allowed: 0 ≤ e < 1\)"):
+    with pytest.raises(InputError, match=r"is not one of an ellipse \(allowed: 0 ≤ e < 1\)"):
         force_factor(value)

@@ -171,7 +171,7 @@ def test_refusals(surface):
         free.solve(np.nan)
     with pytest.raises(InputError, match=r"-1\.0: the force must not be negative"):
         free.solve_force(-1.0)
-    with pytest.raises(InputError, match="at least one approach"):
+    with pytest.raises(InputError, match="a response needs at least one approach"):
         free.respond([], patches=PATCHES, mean_heights=np.zeros(6))
     with pytest.raises(InputError, match="every patch needs one mean height"):
         free.respond([1e-3], patches=PATCHES, mean_heights=np.zeros(5))

@@ -133,7 +133,7 @@ def test_refuses(surface, model):
         IslandModel(surface=surface, contact_modulus=0.0)
     with pytest.raises(InputError, match="nan: the approach must be finite"):
         model.solve(np.nan)
-    with pytest.raises(InputError, match="at least one approach"):
+    with pytest.raises(InputError, match="a response needs at least one approach"):
         respond(model, [])
     with pytest.raises(InputError, match=r"\(3,\): every patch needs one mean height"):
         model.respond([1e-3], patches=PATCHES, mean_heights=np.zeros(3))

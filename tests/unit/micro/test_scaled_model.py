@@ -12,6 +12,7 @@ from geometry import (
     patch_means,
     synthesise,
 )
+from geometry.errors import NotConverged
 from micro import BORDERS, CURVATURES, MODELS, ScaledModel, asperity_model, micro_model
 
 E_STAR = 4000.0
@@ -167,6 +168,13 @@ def test_flat_surface():
     assert np.isfinite(scaled(flat).solve(1e-3).force).all()
 
 
+def test_a_fit_that_does_not_settle_is_told(surface, monkeypatch):
+    monkeypatch.setattr("micro.summits.scaled_model._MOST_PASSES", 1)
+    message = r"the fit of curvatures to contacts at an approach of 0\.008 mm did not converge"
+    with pytest.raises(NotConverged, match=message):
+        scaled(surface, curvature="contact").solve(8e-3)
+
+
 def test_refuses(surface):
     with pytest.raises(InputError, match=r"'tip': this scale of the curvature is unknown.*contact"):
         scaled(surface, curvature="tip")
@@ -180,5 +188,5 @@ def test_refuses(surface):
         ScaledModel(kind="circular", surface=surface, contact_modulus=-1.0)
     with pytest.raises(InputError, match="inf: the approach must be finite"):
         scaled(surface).solve(np.inf)
-    with pytest.raises(InputError, match="at least one approach"):
+    with pytest.raises(InputError, match="a response needs at least one approach"):
         respond(scaled(surface), [])

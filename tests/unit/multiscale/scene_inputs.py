@@ -215,7 +215,7 @@ def damaged(draw):
     return bytes(data)
 
 
-def _takes_long(scene):
+def takes_long(scene):
     """Whether a scene is large, but may fit into the memory of some machine."""
     sizes = [scene.surface.grid, scene.patches.grid]
     return any(isinstance(size, tuple) and 1e5 < math.prod(size) < 1e12 for size in sizes)
@@ -228,7 +228,7 @@ def planned(path, overrides=()):
     """
     try:
         scene = Scene.load(path, overrides)
-        if _takes_long(scene):
+        if takes_long(scene):
             return "not tried"
         stage = make_stage(scene)
         made = forecast(stage)
@@ -250,7 +250,7 @@ def ran(path):
     """Run a small scene without files; return how that ended, "not tried" if it is not small."""
     try:
         scene = Scene.load(path)
-        if _takes_long(scene):
+        if takes_long(scene):
             return "not tried"
         stage = make_stage(scene)
         meshes = [] if stage.meshes is None else stage.meshes.unknowns

@@ -11,6 +11,7 @@ from multiscale.law_tables.law_files import read_laws, write_laws
 from multiscale.restart.checkpoint import read_checkpoint, write_checkpoint
 from multiscale.run import Run
 from multiscale.scene import Scene
+from multiscale.sealed_files import seal
 
 ODD = (
     np.zeros(0), np.zeros(1), np.zeros((3, 3)), np.full(5, np.nan), np.full(5, 1e308), np.arange(5),
@@ -61,7 +62,7 @@ def rewritten(draw, whole):
                     file.create_group(name)
                 elif change == "link":
                     file[name] = h5py.ExternalLink("/etc/passwd", "/")
-    return image.getvalue()
+    return seal(image.getvalue())
 
 
 def read(path, reader):

@@ -173,7 +173,7 @@ def test_plane_that_touches_nothing_carries_nothing():
 def test_force_on_open_patches_is_refused():
     newton = DenseNewton(HertzLaws(np.full(16, np.inf)), compliance(), PATCHES)
     for force in (0.0, 1.0):
-        with pytest.raises(NotConverged, match=r"condensed block at force .* NO_CONTACT"):
+        with pytest.raises(NotConverged, match=r"the condensed block at force .* NO_CONTACT"):
             newton.solve(Control(force=force))
 
 

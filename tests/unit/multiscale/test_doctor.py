@@ -73,6 +73,7 @@ def test_singletons_under_a_foreign_launcher_are_seen(monkeypatch):
     (found,) = doctor_machine.launcher(None)
     assert found.state == "fail"
     assert "one of 4 processes" in found.text
+    assert "Open MPI" in found.remedy or "MPICH" in found.remedy
 
 
 def test_too_many_threads_are_seen(monkeypatch):

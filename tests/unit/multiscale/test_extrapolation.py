@@ -117,8 +117,8 @@ def test_one_mesh_has_no_bar():
     [
         (np.zeros((2, 1)), [1.0, 2.0], 2.0, "mesh sizes must fall"),
         (np.zeros((2, 1)), [2.0, 1.0], None, "two meshes show no rate"),
-        (np.zeros((2, 1)), [3.0, 2.0, 1.0], 2.0, "do not fit together"),
-        (np.zeros((2, 1)), [2.0, 1.0], 0.0, "order must be positive"),
+        (np.zeros((2, 1)), [3.0, 2.0, 1.0], 2.0, "results and mesh sizes do not fit together"),
+        (np.zeros((2, 1)), [2.0, 1.0], 0.0, "the order must be positive"),
     ],
 )
 def test_what_does_not_fit_is_refused(values, sizes, order, text):

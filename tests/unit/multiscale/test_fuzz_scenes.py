@@ -82,6 +82,17 @@ def test_sizes_are_refused_before_anything_is_allocated(tmp_path, key, value, te
     assert text in refused(tmp_path, key, value)
 
 
+def test_a_law_for_every_patch_takes_memory(tmp_path, monkeypatch):
+    monkeypatch.setattr("multiscale.stage_checks.os.sysconf", lambda name: 1200)  # of 1.4 MB
+    path = tmp_path / "scene.toml"
+    data = put(put(BASE, "coupling.kind", "isolated"), "block.cells", [4, 4, 2])
+    path.write_text(toml(put(data, "patches.grid", [12, 12])), encoding="utf-8")
+    with pytest.raises(
+        InputError, match=r"\[12, 12\]: a law for every patch needs about 0.00216 GB"
+    ):
+        make_stage(Scene.load(path))
+
+
 def test_more_bombs(tmp_path):
     fine = refused(tmp_path, "reference.fine", "1 nm", kind="reference")
     assert "reference.fine = 1.0000000000000002e-06: the reference needs about" in fine

@@ -84,7 +84,8 @@ def test_open_patch():
     assert not law.at(np.array([0.0, 5e-3]))[0].any()
     assert law.area_fraction_at(1e-3) == 0.0
     assert law.contacts_at(1e-3) == 0
-    with pytest.raises(InputError, match=r"closure beyond the end .*first touch at 0.005 mm"):
+    message = r"closure beyond the end of the patch law.*first touch at 0.005 mm"
+    with pytest.raises(InputError, match=message):
         law.at(6e-3)
 
 
@@ -104,14 +105,14 @@ def test_area_and_separation():
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"closure": np.linspace(1e-3, 9e-3, 11)}, "columns of one length"),
+        ({"closure": np.linspace(1e-3, 9e-3, 11)}, "a patch law needs columns of one length"),
         (
             {"approach": np.r_[np.full(2, 1e-3), np.linspace(2e-3, 9e-3, 10)]},
-            "increasing approach",
+            "a patch law needs a strictly increasing approach",
         ),
         ({"pressure": np.r_[0.0, np.full(11, np.nan)]}, "a patch law needs a finite pressure"),
         ({"pressure": np.r_[0.0, -1.0, np.ones(10)]}, "needs a pressure without tension"),
-        ({"pressure": np.linspace(1, 2, 12)}, "starts at zero pressure"),
+        ({"pressure": np.linspace(1, 2, 12)}, "a patch law starts at zero pressure"),
     ],
 )
 def test_impossible_tables_are_refused(changes, text):

@@ -9,7 +9,7 @@ import pytest
 from geometry.errors import NotWritten
 from geometry.patches import PatchGrid
 from multiscale.history import COLUMNS, PATCH_COLUMNS, History, LoadStep, PatchState
-from multiscale.reporting.outputs import write_tables, write_text, write_whole
+from multiscale.reporting.outputs import write_csv, write_tables, write_text, write_whole
 from multiscale.reporting.terminal import show_history
 
 
@@ -62,6 +62,14 @@ def test_patch_rows_follow_the_flat_index(history, tmp_path):
         ("1", "0"),
     ]
     assert [float(row["closure_mm"]) for row in rows[:6]] == [i / 3 for i in range(6)]
+
+
+def test_what_is_not_known_is_empty(tmp_path):
+    rows = [(1, None, float("nan"), np.float64("nan")), (2, 0.5, np.float64(0.25), np.int64(3))]
+    path = write_csv(tmp_path / "a.csv", list("abcd"), rows)
+    assert path.read_text(encoding="utf-8").split() == ["a,b,c,d", "1,,,", "2,0.5,0.25,3"]
+    found = np.genfromtxt(path, delimiter=",", names=True)  # what readers make of it
+    assert np.isnan([found[name][0] for name in "bcd"]).all()
 
 
 def test_columns_are_attributes(history):

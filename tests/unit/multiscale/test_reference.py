@@ -193,6 +193,7 @@ def test_files(capsys, tmp_path):
         float(rows[-1][name]) for name in ("force_N", "force_error_N", "force_N_mesh_2")
     )
     assert 0.0 < abs(value - finest) < 4.0 * error
+    assert "nan" not in (tmp_path / "reference.csv").read_text(encoding="utf-8")  # but empty cells
     facts = json.loads((tmp_path / "provenance.json").read_text(encoding="utf-8"))
     assert facts["micro_model"] is None
     assert facts["unknowns"] == facts["reference"]["unknowns"][-1]
@@ -259,6 +260,15 @@ REFUSED = {
     "interface": (["coupling.interface=pointwise"], "interface = 'pointwise' does not go with k"),
     "table": (["coupling.table_tolerance=1e-3"], "table_tolerance = 0.001 does not go with kind"),
 }  # fmt: skip
+
+
+def test_hexahedra_need_their_number():
+    data = scene("reference.mesh=hexahedra").model_dump(by_alias=True, exclude_none=True)
+    del data["block"]["cells"]
+    with pytest.raises(
+        InputError, match=r"block.cells = None: is needed by reference.mesh = 'hexahe"
+    ):
+        make_stage(Scene.from_dict(data))
 
 
 @pytest.mark.parametrize(("overrides", "text"), REFUSED.values(), ids=REFUSED)

@@ -19,6 +19,7 @@ from multiscale.restart.checkpoint import read_checkpoint, write_checkpoint
 from multiscale.restart.folder_lock import FolderLock
 from multiscale.restart.journal import Journal, journalled
 from multiscale.restart.resuming import Keeper, kept_choices, with_journal
+from multiscale.sealed_files import seal
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 ALONE = {"coupling": {"kind": "analytic"}, "micro": {"model": "half-space"}}
@@ -172,12 +173,13 @@ def test_journal_of_another_run_is_not_taken(tmp_path, ended):
 @pytest.mark.parametrize(
     ("damage", "text"),
     [
-        (lambda path: path.write_bytes(path.read_bytes()[:3000]), "is damaged or cannot be read"),
-        (lambda path: path.write_bytes(b"nothing of the kind"), "is damaged or cannot be read"),
+        (lambda path: path.write_bytes(path.read_bytes()[:3000]), "its checksum does not fit its"),
+        (lambda path: path.write_bytes(b"nothing of the kind"), "has no checksum before its conte"),
+        (lambda path: path.write_bytes(seal(b"no HDF5")), "cannot be read: "),
         (lambda path: flip(path), "its checksum does not fit its content"),
         (lambda path: relabel(path), "'patchlaw checkpoint 99': is not a checkpoint of this"),
     ],
-    ids=["cut", "foreign", "a bit flipped", "another format"],
+    ids=["cut", "foreign", "no HDF5", "a bit flipped", "another format"],
 )
 def test_damaged_checkpoint_is_refused_and_stays(tmp_path, ended, capsys, damage, text):
     path, _ = interrupted(tmp_path / "out", ended)
@@ -198,6 +200,7 @@ def flip(path):
 def relabel(path):
     with h5py.File(path, "r+") as file:
         file.attrs["format"] = "patchlaw checkpoint 99"
+    path.write_bytes(seal(path.read_bytes()))
 
 
 @pytest.mark.parametrize(

@@ -67,6 +67,13 @@ def test_refusal_names_file_key_and_value(override, text):
         Scene.load(PAPER, [override])
 
 
+def test_heights_of_a_file_have_their_grid():
+    data = Scene.load(PAPER).model_dump(by_alias=True, exclude_none=True)
+    data["surface"] = {"file": "a.npy", "grid": "auto", "lengths": [1.0, 1.0]}
+    with pytest.raises(InputError, match="surface: grid = 'auto' needs a 'spectrum'"):
+        Scene.from_dict(data)
+
+
 @pytest.mark.parametrize(
     ("overrides", "text"),
     [

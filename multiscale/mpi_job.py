@@ -1,0 +1,52 @@
+"""The MPI job of this process, and whether it came together as its launcher meant it."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from geometry.errors import InputError
+
+# what launchers tell every process of the number of processes: Open MPI's mpirun; Hydra (MPICH,
+# Intel MPI) and others that speak PMI; Hydra, of one node; Slurm's srun
+_SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS")
+
+
+def world() -> Any:
+    """Return the communicator of an MPI job, or None for a process on its own."""
+    from mpi4py import MPI
+
+    return MPI.COMM_WORLD if MPI.COMM_WORLD.size > 1 else None
+
+
+def strangers() -> tuple[str, int] | None:
+    """Tell whether a launcher started several processes that do not know of each other.
+
+    Returns:
+        The variable by which the launcher says so, and how many they are; None when all is well.
+    """
+    if world() is not None:
+        return None
+    told = {name: os.environ.get(name, "") for name in _SIZES}
+    counts = {name: int(text) for name, text in told.items() if text.isdigit()}
+    name = max(counts, key=lambda name: counts[name], default="")
+    return (name, counts[name]) if name and counts[name] > 1 else None
+
+
+def refuse_strangers() -> None:
+    """Refuse to compute what every other process of this start computes as well.
+
+    Raises:
+        InputError: When the launcher is not the one of the MPI that mpi4py was built with.
+    """
+    found = strangers()
+    if found is None:
+        return
+    name, count = found
+    raise InputError(
+        f"this is one of {count} processes, but each stands alone and would compute the whole "
+        "scene: the launcher is not that of mpi4py's MPI; start with the mpirun that `patchlaw "
+        f"doctor` names. For {count} independent runs, unset {name}",
+        key=name,
+        value=count,
+    )

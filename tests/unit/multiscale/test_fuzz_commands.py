@@ -1,0 +1,41 @@
+"""Comparisons of any scenes, and command lines of any words, end in order or in one line."""
+
+import json
+
+from command_words import called, lines
+from compared_inputs import asked, compared
+from hypothesis import HealthCheck, given, settings
+from scene_inputs import BASE, toml
+
+from multiscale.comparing.level_results import LevelResult, read_result, write_result
+
+few = settings(
+    derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)
+)
+
+
+@settings(few, max_examples=8)
+@given(asked)
+def test_comparisons_of_any_scenes(tmp_path_factory, drawn):
+    path = tmp_path_factory.getbasetemp() / "compared.toml"
+    path.write_text(toml(drawn[0]), encoding="utf-8", errors="surrogatepass")
+    compared(path, *drawn[1:])
+
+
+@settings(few, max_examples=15)
+@given(lines)
+def test_command_lines_of_any_words(tmp_path_factory, words):
+    path = tmp_path_factory.getbasetemp() / "called.toml"
+    path.write_text(toml(BASE), encoding="utf-8")
+    called(path, words)
+
+
+def test_a_kept_level_that_was_damaged_is_run_again(tmp_path):
+    path = write_result(tmp_path / "a.json", LevelResult(key="a", status="done", start_s=0.25))
+    whole = path.read_text(encoding="utf-8")
+    assert read_result(path).start_s == 0.25
+    for damaged in (whole.replace("0.25", "0.35"), whole[:-9], "[" * 10**5, "{}", '"sha256"', ""):
+        path.write_text(damaged, encoding="utf-8")
+        assert read_result(path) is None
+    path.write_text(json.dumps(json.loads(whole)["result"]), encoding="utf-8")  # of earlier ones
+    assert read_result(path) is None

@@ -1,0 +1,48 @@
+"""Processes that a launcher started together and that do not know of each other are noticed."""
+
+import pytest
+
+from geometry.errors import InputError
+from multiscale.cli import main
+from multiscale.mpi_job import refuse_strangers, strangers
+
+PAPER = "demos/scenes/paper.toml"
+
+
+@pytest.mark.parametrize(
+    ("told", "found"),
+    [
+        ({}, None),
+        ({"PMI_SIZE": "1"}, None),
+        ({"SLURM_NTASKS": "16"}, None),  # of the batch script itself, which starts no rank
+        ({"PMI_SIZE": "4"}, ("PMI_SIZE", 4)),
+        ({"PMI_SIZE": "4", "MPI_LOCALNRANKS": "2"}, ("PMI_SIZE", 4)),
+        ({"SLURM_STEP_NUM_TASKS": "3", "PMI_SIZE": ""}, ("SLURM_STEP_NUM_TASKS", 3)),
+        ({"OMPI_COMM_WORLD_SIZE": "2"}, ("OMPI_COMM_WORLD_SIZE", 2)),
+    ],
+)
+def test_what_launchers_tell(monkeypatch, told, found):
+    for name, value in told.items():
+        monkeypatch.setenv(name, value)
+    assert strangers() == found
+
+
+@pytest.mark.parametrize("command", ["run", "plan", "laws", "surface"])
+def test_nothing_is_computed_many_times(monkeypatch, tmp_path, capsys, command):
+    monkeypatch.setenv("PMI_SIZE", "64")
+    out = tmp_path / "out"
+    assert main([command, PAPER, "--out", str(out), "--set", "surface.grid=[16, 16]"]) == 2
+    told = capsys.readouterr().err
+    assert "PMI_SIZE = 64: this is one of 64 processes, but each stands alone" in told
+    assert "For 64 independent runs, unset PMI_SIZE" in told
+    assert not out.exists()
+
+
+def test_one_process_is_no_stranger():
+    refuse_strangers()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PMI_SIZE", "2")
+        with pytest.raises(
+            InputError, match="the launcher is not that of mpi4py's MPI; start with"
+        ):
+            refuse_strangers()
