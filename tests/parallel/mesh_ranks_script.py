@@ -5,14 +5,16 @@ import json
 import sys
 from pathlib import Path
 
+import numpy as np
 from mpi4py import MPI
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "unit" / "macro"))
 
 from mesh_facts import cells_of, faces_of, measures_of
 
-from geometry import BlockShape
-from macro import BOTTOM, SIDES, TOP, block_mesh
+from geometry import BlockShape, PatchGrid
+from macro import BOTTOM, SIDES, TOP, Block, Material, block_mesh
+from macro.top_nodes import TopNodes
 
 COMM = MPI.COMM_WORLD
 WIDE = {"margin": 0.4, "margin_cells": 2, "margin_grading": 3.0, "grading": 5.0}
@@ -40,10 +42,24 @@ def facts(shape, builder):
     }
 
 
+def regions(patterns):
+    """Return in how many regions nodes of a top are in contact, for patterns (9, 8) of contact."""
+    shape = BlockShape(interface=(8.0, 7.0), height=1.0, cells=(8, 7, 1))
+    mesh = block_mesh(shape, COMM, "lattice")
+    block = Block(mesh, Material(young_modulus=1.0, poisson_ratio=0.3))
+    top = TopNodes(block, PatchGrid(grid=(1, 1), lengths=(8.0, 7.0)))
+    at = np.rint(top.x).astype(int), np.rint(top.y).astype(int)
+    return [top.regions(pattern[at]) for pattern in patterns]
+
+
 if __name__ == "__main__":
     result = {
         name: {builder: facts(shape, builder) for builder in ("gmsh", "lattice")}
         for name, shape in SHAPES.items()
     }
+    # sparse to dense, from single nodes to one region that winds through all ranks
+    shares = np.random.default_rng(5).random((12, 9, 8))
+    patterns = shares < np.linspace(0.05, 0.7, 12)[:, None, None]
+    result["regions"] = {"found": regions(patterns), "patterns": patterns.astype(int).tolist()}
     if COMM.rank == 0:
         print(json.dumps(result))

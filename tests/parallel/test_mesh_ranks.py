@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 SCRIPT = Path(__file__).with_name("mesh_ranks_script.py")
 CASES = {  # volume, bottom, sides; areas of the top and the patches follow
@@ -65,3 +66,12 @@ def test_cells_are_spread_without_ghosts(found):
     assert found[2]["quadratic hexahedra"]["lattice"]["cells_of_ranks"] == [8, 4]
     assert sorted(found[4]["rod"]["lattice"]["cells_of_ranks"]) == [0, 0, 1, 1]
     assert sorted(found[4]["box"]["lattice"]["cells_of_ranks"]) == [0, 0, 0, 6]
+
+
+def test_regions_of_contact_go_on_across_ranks(found):
+    for ranks in RANKS:
+        result = found[ranks]["regions"]
+        # facets connect all of their four nodes: each node to the eight around it
+        expected = [ndimage.label(pattern, np.ones((3, 3)))[1] for pattern in result["patterns"]]
+        assert result["found"] == expected
+        assert max(expected) > 5 and min(expected) == 1
