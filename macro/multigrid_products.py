@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
@@ -105,9 +104,7 @@ def _products(
         yield left[first:last].T.tocsr().tobsr((1, 1)) @ half
 
 
-def _sum_of_parts(
-    parts: list[sparse.bsr_matrix], coarse: Indices, weights: PETSc.Mat
-) -> PETSc.Mat:
+def _sum_of_parts(parts: list[sparse.bsr_matrix], coarse: Indices, weights: PETSc.Mat) -> PETSc.Mat:
     """Add parts of the coarser matrix, of all ranks, at the coarse nodes that they are of."""
     comm, owners = weights.comm, weights.getOwnershipRangesColumn()
     owner = np.searchsorted(owners, coarse, side="right")

@@ -1,5 +1,7 @@
 """Matrices of coarser grids against dense Galerkin products, and the blocks they are made from."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -73,7 +75,7 @@ def test_blocks_are_those_of_the_matrix():
         assert rows.beside.nnz == len(rows.ghosts) == 0
     expected = dense(matrix)
     found = np.zeros_like(expected)
-    for node, (first, last) in enumerate(zip(starts[:-1], starts[1:], strict=True)):
+    for node, (first, last) in enumerate(pairwise(starts)):
         for block, column in zip(blocks[first:last], columns[first:last], strict=True):
             found[3 * node : 3 * node + 3, 3 * column : 3 * column + 3] = block
     np.testing.assert_array_equal(found, expected)
