@@ -37,11 +37,14 @@ GEOMETRIC_DEFAULTS: Mapping[str, object] = {
     "mg_levels_ksp_type": "chebyshev",
     "mg_levels_esteig_ksp_type": "cg",
     "mg_levels_pc_type": "jacobi",
-    "mg_coarse_pc_type": "redundant",
-    "mg_coarse_redundant_pc_type": "cholesky",
+    "mg_coarse_pc_type": "telescope",
+    "mg_coarse_telescope_ksp_type": "preonly",
+    "mg_coarse_telescope_pc_type": "cholesky",
 }
-"""Grids of the block itself. Three steps of smoothing, or Gauss–Seidel, take fewer iterations
-but more time."""
+"""Grids of the block itself. One rank alone solves on the coarsest: to have all of them do it takes
+messages from all to all. Two steps of smoothing before and after: one takes 1.7 to 1.9 times the
+iterations and three 0.7 to 0.8 of them, in the same time; Gauss–Seidel takes two to four times it.
+"""
 
 DIRECT_DEFAULTS: Mapping[str, object] = {
     "pc_type": "cholesky",
@@ -117,7 +120,8 @@ def linear_solver(
         _set_grids(solver.pc, coarser())
     else:
         solver.setOperators(matrix, _pointwise(matrix))
-    usual = GEOMETRIC_DEFAULTS if geometric else ALGEBRAIC_DEFAULTS
+    one_rank = {"mg_coarse_pc_telescope_reduction_factor": matrix.comm.size}
+    usual = {**GEOMETRIC_DEFAULTS, **one_rank} if geometric else ALGEBRAIC_DEFAULTS
     with default_options(prefix, {**KRYLOV_DEFAULTS, **usual, **(preconditioner or {})}):
         solver.setFromOptions()
         solver.setUp()  # multigrid reads the options of its levels here
