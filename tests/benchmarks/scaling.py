@@ -189,6 +189,7 @@ def main() -> None:
     )
     for part in choice.parts or parts:
         getattr(benchmark, part)()
+        sys.stdout.flush()
 
 
 if __name__ == "__main__":
