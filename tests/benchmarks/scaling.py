@@ -19,7 +19,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import scaling_tables as tables
-from scaling_model import observed
+from scaling_model import Machine, observed
 
 HERE = Path(__file__).parent
 ENVIRONMENT = os.environ | {
@@ -170,8 +170,8 @@ class Benchmark:
         seen = observed(facts[2], facts[8])
         smaller = self.on(8, SHAPES["uniform cube"](self.scale * 2e5 / 8))
         tables.show_check(seen, list(facts.values()), smaller)
-        tables.show_model("uniform cube", seen)
-        tables.show_model("graded 20", observed(*self.graded()))
+        tables.show_model("uniform cube", seen, Machine())
+        tables.show_model("graded 20", observed(*self.graded()), Machine())
 
 
 def main() -> None:
