@@ -19,7 +19,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import scaling_tables as tables
-from scaling_model import observed
+from scaling_model import Machine, observed
 
 HERE = Path(__file__).parent
 ENVIRONMENT = os.environ | {
@@ -170,25 +170,28 @@ class Benchmark:
         seen = observed(facts[2], facts[8])
         smaller = self.on(8, SHAPES["uniform cube"](self.scale * 2e5 / 8))
         tables.show_check(seen, list(facts.values()), smaller)
-        tables.show_model("uniform cube", seen)
-        tables.show_model("graded 20", observed(*self.graded()))
+        tables.show_model("uniform cube", seen, Machine())
+        tables.show_model("graded 20", observed(*self.graded()), Machine())
 
 
 def main() -> None:
     """Measure and print what is asked for."""
     parts = ("bandwidth", "strong", "weak", "counts", "iterations", "model")
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("parts", nargs="*", choices=[*parts, []], metavar="PART")
+    parser.add_argument("parts", nargs="*", metavar="PART", help=", ".join(parts))
     parser.add_argument("--quick", action="store_true", help="a hundredth of the unknowns")
     parser.add_argument("--large", action="store_true", help="5·10⁶ unknowns and 27 ranks as well")
     parser.add_argument("--ranks", type=int, default=1, help="ranks of the iterations' part")
     parser.add_argument("--facts", type=Path, help="JSON file that measured facts are kept in")
     choice = parser.parse_args()
+    if unknown := set(choice.parts) - set(parts):
+        parser.error(f"unknown part {', '.join(unknown)}; there are {', '.join(parts)}")
     benchmark = Benchmark(
         0.01 if choice.quick else 1.0, choice.large, choice.ranks, Facts(choice.facts)
     )
     for part in choice.parts or parts:
         getattr(benchmark, part)()
+        sys.stdout.flush()
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ import math
 import resource
 import sys
 import time
+from collections.abc import Callable
 
 import numpy as np
 from mpi4py import MPI
@@ -45,7 +46,7 @@ class Clock:
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
 
-    def __call__(self, name: str, work):
+    def __call__(self, name: str, work: Callable):
         """Time work between barriers and return what it returns."""
         COMM.Barrier()
         began = time.perf_counter()
@@ -97,10 +98,10 @@ def product(matrix: PETSc.Mat) -> dict[str, float]:
     }
 
 
-def levels(pc: PETSc.PC, cycle) -> list[dict[str, float]]:
+def levels(pc: PETSc.PC, cycle: Callable) -> list[dict[str, float]]:
     """Return what the levels of a multigrid are and take per cycle, the finest first."""
     found = []
-    for level in reversed(range(pc.getMGLevels() if pc.getType() == "mg" else 0)):
+    for level in reversed(range(pc.getMGLevels())):
         matrix = pc.getMGSmoother(level).getOperators()[0]
         parts = [cycle(f"{part} Level {level}") for part in PARTS[: 3 if level else 1]]
         found.append(
@@ -117,6 +118,38 @@ def levels(pc: PETSc.PC, cycle) -> list[dict[str, float]]:
     return found
 
 
+class Counts:
+    """What PETSc counts of a solver's iterations, by event.
+
+    Args:
+        solver: A solver with a multigrid, all set up.
+    """
+
+    def __init__(self, solver: PETSc.KSP) -> None:
+        grids = range(solver.pc.getMGLevels())
+        self._stages = dict.fromkeys((f"{part} Level {n}" for part in PARTS for n in grids), INSIDE)
+        self._stages |= {"KSPSolve": None, "MatMult": INSIDE}
+        self._before = {name: logged(name, stage) for name, stage in self._stages.items()}
+        self._after = self._before
+        self._iterations = 0
+
+    def stop(self, iterations: int) -> None:
+        """Count no further; all solves took so many iterations."""
+        self._after = {name: logged(name, stage) for name, stage in self._stages.items()}
+        self._iterations = iterations
+
+    def __call__(self, name: str) -> dict[str, float]:
+        """Return the counts of an event for one iteration."""
+        after, before = self._after[name], self._before[name]
+        return {key: (after[key] - before[key]) / self._iterations for key in after}
+
+
+def loaded(block: Block) -> PETSc.Vec:
+    """Return the load of a patch amid the interface."""
+    patches = PatchGrid(grid=(4, 4), lengths=block.mesh.shape.interface)
+    return Interface(block, patches).load(np.eye(16)[5])
+
+
 def measure(sizes: dict) -> dict:
     """Return the facts of one block.
 
@@ -130,38 +163,30 @@ def measure(sizes: dict) -> dict:
     block = Block(mesh, Material(young_modulus=4000.0, poisson_ratio=0.15))
     clock("matrix", lambda: block.stiffness)
     solver = clock("set-up", lambda: block.solver)
-    patches = PatchGrid(grid=(4, 4), lengths=tuple(sizes["interface"]))
-    load = Interface(block, patches).load(np.eye(16)[5])
+    load = loaded(block)
     solution = load.duplicate()
-    solver.solve(load, solution)  # the first one sets up messages and tunes nothing else
-    stages = {"KSPSolve": None, "MatMult": INSIDE}
-    names = [f"{part} Level {level}" for part in PARTS for level in range(solver.pc.getMGLevels())]
-    stages |= dict.fromkeys(names, INSIDE)
-    before = {name: logged(name, stage) for name, stage in stages.items()}
+    solver.solve(load, solution)  # the first one sets up messages
+    counts = Counts(solver)
     for _ in range(SOLVES):
         clock("solve", lambda: solver.solve(load, solution))
-
-    def each(name: str) -> dict[str, float]:
-        after = logged(name, stages[name])
-        return {key: (after[key] - before[name][key]) / (SOLVES * solver.its) for key in after}
-
-    count = each("KSPSolve")
-    own = COMM.allgather(block.owned_dofs)
+    counts.stop(SOLVES * solver.its)
+    whole = counts("KSPSolve")
+    flops = COMM.allreduce(whole["flops"])
     return {
         "ranks": COMM.size,
         "dofs": block.dofs,
         "iterations": solver.its,
         "seconds": clock.seconds,
-        "messages": slowest(0.5 * count["numMessages"]),
-        "bytes": slowest(0.5 * count["messageLength"]),
-        "reductions": slowest(count["numReductions"]),
-        "imbalance": max(own) * COMM.size / block.dofs,
-        "flops": COMM.allreduce(count["flops"]),
+        "messages": slowest(0.5 * whole["numMessages"]),
+        "bytes": slowest(0.5 * whole["messageLength"]),
+        "reductions": slowest(whole["numReductions"]),
+        "flops": flops,
+        "imbalance": slowest(whole["flops"]) * COMM.size / flops,
         "memory": COMM.allreduce(resident()),
         "memory_rank": slowest((resident() - bare) / block.owned_dofs),
         # of each grid but the coarsest, in a cycle
-        "products": each("MatMult")["count"] / max(solver.pc.getMGLevels() - 1, 1),
-        "levels": levels(solver.pc, each),
+        "products": counts("MatMult")["count"] / max(solver.pc.getMGLevels() - 1, 1),
+        "levels": levels(solver.pc, counts),
     }
 
 

@@ -106,7 +106,7 @@ def show_check(seen: Iteration, facts: list[dict], smaller: dict) -> None:
     print(f"bytes on {smaller['ranks']} ranks grow with unknowns to the power {power:.2f}")
 
 
-def show_model(title: str, seen: Iteration, on: Machine = Machine()) -> None:  # noqa: B008
+def show_model(title: str, seen: Iteration, on: Machine) -> None:
     """Print from how many unknowns per rank many ranks pay, and what is in their way."""
     print(f"\nmodel of the {title}: w = {seen.traffic:.0f} B, v = {seen.volume:.0f} B, ", end="")
     print(

@@ -10,7 +10,7 @@ ROOT = Path(__file__).parents[2]
 HPC = ROOT / "demos" / "hpc"
 RUNNER = ROOT / "tests" / "releases" / "run"
 SCRIPTS = [*sorted(HPC.glob("*.sbatch")), RUNNER, ROOT / ".ci" / "run", ROOT / "setup.sh"]
-PAGE = (HPC / "README.md").read_text(encoding="utf-8")
+PAGES = {path.name: path.read_text(encoding="utf-8") for path in sorted(HPC.glob("*.md"))}
 
 
 def call(*words):
@@ -35,11 +35,21 @@ def test_definition_installs_as_everybody_does_and_compiles_ahead():
     assert f"export XDG_CACHE_HOME={made}\n" in steps["environment"]
 
 
-def test_page_names_files_that_exist():
-    names = set(re.findall(r"\b((?:demos|tests)/[\w/]+\.\w+)\b", PAGE))
-    assert {f"demos/hpc/{path.name}" for path in HPC.glob("*.sbatch")} <= names
+@pytest.mark.parametrize("page", PAGES)
+def test_page_names_files_that_exist(page):
+    names = set(re.findall(r"\b((?:demos|tests)/[\w/]+\.\w+)\b", PAGES[page]))
+    assert names
     for name in names:
         assert (ROOT / name).is_file(), name
+    for link in re.findall(r"\]\(([\w./]+)\)", PAGES[page]):
+        assert (HPC / link).is_file(), link
+
+
+def test_every_script_and_page_is_named():
+    page = PAGES["README.md"]
+    for path in (*HPC.glob("*.sbatch"), HPC / "patchlaw.def", HPC / "spack.yaml"):
+        assert f"demos/hpc/{path.name}" in page
+    assert set(PAGES) - {"README.md"} == set(re.findall(r"\]\(([\w.]+\.md)\)", page))
 
 
 def test_runner_says_how_it_is_called():
