@@ -18,8 +18,9 @@ class StiffPreconditioner:
     """M⁻¹ = P B P + (1 − P) S⁻¹ (1 − P), for a matrix K + C with stiff springs C at some dofs.
 
     B is a preconditioner of K. P holds the dofs with springs but for their motions with the plane,
-    and P B P is mended around them (see `HeldPreconditioner`); S is the part of K + C between them, factorised by every rank for what it owns. The stiffer the
-    springs, the less the two parts see of each other.
+    and P B P is mended around them (see `HeldPreconditioner`); S is the part of K + C between them,
+    factorised by every rank for what it owns. The stiffer the springs, the less the two parts see
+    of each other.
 
     Args:
         matrix: K.
