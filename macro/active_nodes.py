@@ -56,7 +56,7 @@ class ActiveNodes:
         # one layer of quadratic elements reaches as far as two of linear ones
         self._solver = FreeSolver(block.stiffness, block.solver.pc, layers=3 - block.degree)
         self._tolerance = asked_tolerance()
-        self._work = block.stiffness.createVecRight()
+        self._residual = block.stiffness.createVecRight()
         self._history = StepHistory(block.owned_dofs, len(top.dofs))
         modulus, half = block.material.contact_modulus, plane.half
         self._nothing = 1e-17 * modulus * half**2  # N
@@ -74,16 +74,18 @@ class ActiveNodes:
         displacement = self._block.stiffness.createVecRight()
         displacement.array[:] = start.displacement
         plane, active = self._started(task, start, displacement)
-        sets, spent, tolerance, fewest, waited = 1, 0, _LOOSE, np.inf, 0
+        sets, spent, tolerance, changed, fewest, waited = 1, 0, _LOOSE, 1, np.inf, 0
         for _ in range(_MOST_SOLVES):
             held = self._held(task, active)
             if held is None:
                 plane, active = self._resettled(task, plane, displacement, active)
-                sets += 1
+                sets, changed = sets + 1, 1
                 continue
+            if changed:
+                self._put_on(plane, displacement, active)
             more, missed = self._solve(task, plane, displacement, active, held, tolerance)
             spent += more
-            forces, depth = self._forces(displacement), self._depth(plane, displacement)
+            forces, depth = self._forces, self._depth(plane, displacement)
             large = self._largest(forces[active])
             pulled = active & (forces < -self._tolerance * large)
             pressed = ~active & (depth > self._tolerance * self._largest(displacement.array_r))
@@ -139,25 +141,25 @@ class ActiveNodes:
         held: Array,
         tolerance: float,
     ) -> tuple[int, float]:
-        """Solve with the active nodes on the plane, and move it.
+        """Solve with the active nodes on the plane, where they are, and move it.
 
         Returns:
             Linear iterations, and the norm of the residual that was allowed [N].
         """
         if not self._count(active):
-            displacement.set(0.0)
             return 0, 0.0
         dofs, levers = self._top.dofs[active], self._plane.levers(task.free)[active]
         motions = levers @ held
-        displacement.array[dofs] -= self._depth(plane, displacement)[active]
         before = displacement.array_r[dofs].copy()
-        residual = self._residual(displacement)
+        residual = self._residual.copy()
         scale = self._norm(residual.array_r[dofs])
         residual.array[dofs] -= motions @ (held.T @ task.wanted)
         scale = max(scale, float(np.linalg.norm(held.T @ task.wanted)), self._nothing)
         self._solver.hold(dofs, motions)
         allowed = 0.5 * tolerance * scale
         spent = self._solver.improve(displacement, residual, allowed)
+        if spent:
+            self._update_residual(displacement)
         shares = self._sum(motions.T @ (before - displacement.array_r[dofs]))
         plane[task.free] += self._plane.unit[task.free] * (held @ shares)
         return spent, allowed
@@ -173,7 +175,8 @@ class ActiveNodes:
     ) -> Found:
         depth = self._depth(plane, displacement)
         displacement.array[self._top.dofs] -= np.where(active, depth, np.maximum(depth, 0.0))
-        pressing = np.where(active, np.maximum(self._forces(displacement), 0.0), 0.0)
+        self._update_residual(displacement)
+        pressing = np.where(active, np.maximum(self._forces, 0.0), 0.0)
         # vertices of quadratic triangles touch without a force
         touching = active | (depth > -_CLOSED * self._largest(displacement.array_r))
         found = Found(
@@ -189,14 +192,25 @@ class ActiveNodes:
         self._history.add(Start(plane, found.displacement, found.pressing), force)
         return found
 
-    def _residual(self, displacement: PETSc.Vec) -> PETSc.Vec:
-        """Return −K u, whose entries at the top are the contact forces with their sign turned."""
-        self._block.stiffness.mult(displacement, self._work)
-        self._work.scale(-1.0)
-        return self._work
+    def _put_on(self, plane: Array, displacement: PETSc.Vec, active: Flags) -> None:
+        """Put active nodes on the plane; without any, the block is at rest."""
+        if self._count(active):
+            depth = self._depth(plane, displacement)
+            displacement.array[self._top.dofs[active]] -= depth[active]
+        else:
+            displacement.set(0.0)
+        self._update_residual(displacement)
 
-    def _forces(self, displacement: PETSc.Vec) -> Array:
-        return self._residual(displacement).array_r[self._top.dofs].copy()
+    def _update_residual(self, displacement: PETSc.Vec) -> None:
+        """Move the residual −K u to a displacement; at the top it is the contact forces."""
+        self._block.stiffness.mult(displacement, self._residual)
+        self._residual.scale(-1.0)
+
+    @property
+    def _forces(self) -> Array:
+        """Contact forces of this rank's nodes of the top at the residual's displacement [N]."""
+        forces: Array = self._residual.array_r[self._top.dofs]
+        return forces
 
     def _sag(self, displacement: PETSc.Vec) -> Array:
         return -displacement.array_r[self._top.dofs]
