@@ -28,6 +28,8 @@ touch, where closures are not known that well, it is relative to what they are k
 _FARTHEST = 1e3  # halves of the diagonal up to which a first contact is looked for
 _ROUNDING = 8.0 * float(np.finfo(float).eps)  # of approaches, and of the closures laws start at
 _BISECTIONS = 30  # for a start: a few digits will do
+_BENDS = 40  # Newton steps, or bisections, to a place on all laws
+_FLATTEST = 1e-3  # rise of t over s that is one
 
 
 class Laws(Protocol):
@@ -95,6 +97,32 @@ class DenseEquations:
         missing = self.lever @ plane - point.closure - self.block.displacement(local, point)
         load = self.area * (self.lever.T @ point.pressure)
         return Iterate(local, plane, point, missing, load)
+
+    def bent(self, now: Iterate, step: Array, plane: Array) -> Iterate:
+        """Evaluate where a step leads that is straight in the patches' approaches if alone.
+
+        Alone on the block a patch is approached by t = c + y p, y its own compliance. Across a kink
+        or a wall of a law p jumps over s, but goes on evenly over t, where dp/dt ≤ 1/y. Patches
+        whose t does not rise with s go straight.
+
+        Args:
+            now: Where the step starts.
+            step: Change of the local approaches, shape (N,) [mm].
+            plane: The plane after the step, shape (3,).
+        """
+        rise = now.point.dclosure + self.block.own * now.point.dpressure
+        wanted = now.point.closure + self.block.own * now.point.pressure + rise * step
+        low, high = now.local, now.local + 2.0 * np.maximum(rise, 1.0) * step
+        local = now.local + step
+        for _ in range(_BENDS):
+            point = self.laws.along(local)
+            ahead = (wanted - point.closure - self.block.own * point.pressure) * np.sign(step)
+            low, high = np.where(ahead > 0.0, local, low), np.where(ahead > 0.0, high, local)
+            slope = np.maximum(point.dclosure + self.block.own * point.dpressure, _FLATTEST)
+            newton = local + ahead * np.sign(step) / slope
+            inside = (newton - low) * (newton - high) < 0.0
+            local = np.where(inside, newton, 0.5 * (low + high))
+        return self.at(np.where(rise > _FLATTEST, local, now.local + step), plane)
 
     def tangent(self, now: Iterate) -> Tangent:
         """Return the derivative of closure + displacement over the local approaches."""

@@ -157,10 +157,19 @@ class DenseNewton:
     def _searched(
         self, case: LoadCase, now: Iterate, ds: Array, dq: Array, reference: float, spent: int
     ) -> Iterate:
-        """Halve a Newton step until the residual is below those of the last steps."""
+        """Bend a Newton step along the laws, or halve it, until the residual falls.
+
+        A straight step is taken where it lowers the residual, else the better one of both where
+        that is below those of the last steps.
+        """
+        before = case.residual(now)
         for share in 0.5 ** np.arange(_MOST_HALVINGS):
-            trial = self._equations.at(now.local + share * ds, now.plane + share * dq)
-            if case.residual(trial) <= (1.0 - _DECREASE * share) * reference:
+            step, plane = share * ds, now.plane + share * dq
+            trial, enough = self._equations.at(now.local + step, plane), 1.0 - _DECREASE * share
+            if case.residual(trial) <= enough * before:
+                return trial
+            trial = min(trial, self._equations.bent(now, step, plane), key=case.residual)
+            if case.residual(trial) <= enough * reference:
                 return trial
         raise case.failure("DIVERGED_LINE_SEARCH", spent)
 

@@ -23,6 +23,10 @@ class Yielding(Protocol):
     def count(self) -> int:
         """Number of patches N."""
 
+    @property
+    def own(self) -> Array:
+        """What a patch moves by unit pressure on it, roughly, shape (N,) [mm/MPa]."""
+
     def displacement(self, local: Array, point: LawPoint, /) -> Array:
         """Return the displacements that the contacts see, shape (N,) [mm].
 
@@ -50,7 +54,7 @@ class UniformLoads:
 
     def __init__(self, compliance: Array) -> None:
         self._compliance = compliance
-        self.count = len(compliance)
+        self.count, self.own = len(compliance), np.diagonal(compliance)
 
     def displacement(self, _local: Array, point: LawPoint) -> Array:
         """Return C p; see `Yielding.displacement`."""
@@ -76,6 +80,7 @@ class SpreadLoads:
     def __init__(self, half_space: Array, spread: ContactSpread) -> None:
         self._half_space, self._spread = half_space, spread
         self._area, self.count = spread.patches.area, len(half_space)
+        self.own = np.diagonal(half_space)
         patches, owner = np.arange(self.count), spread.owner
         means = np.equal.outer(patches, owner) * spread.loads.areas / self._area
         # columns of one patch side by side: their sums are the bulk of a Newton step
