@@ -84,7 +84,10 @@ def test_mpirun_that_is_told_to_end_loses_no_load_step(mpirun, root, tmp_path, u
         started.send_signal(sent)
         code = started.wait(timeout=60)
     assert code == 4 if sent == signal.SIGUSR1 else code not in (0, 2, 3, 5), log.read_text()
-    assert not members(started.pid)
+    until = time.monotonic() + 20.0
+    while members(started.pid):  # mpirun of Open MPI 5 does not wait for those it has signalled
+        assert time.monotonic() < until
+        time.sleep(0.05)
     done = mpirun(1, "-m", "multiscale", *LONG, out, "--resume", timeout=100)
     assert done.returncode == 0, done.stderr
     shown = done.stdout

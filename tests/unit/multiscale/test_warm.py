@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -20,15 +21,24 @@ COUPLINGS = {
 }
 
 
-def call(home, *words, compiler=None):
+def begin(home, *words, compiler=None):
     environment = os.environ | {"XDG_CACHE_HOME": str(home), "OMP_NUM_THREADS": "1"}
     if compiler:
         environment["CC"] = compiler
-    return subprocess.run(
+    return subprocess.Popen(
         [sys.executable, "-m", "multiscale", *map(str, words)],
-        cwd=Path(__file__).parents[3], env=environment, capture_output=True, text=True,
-        check=False, timeout=150,
+        cwd=Path(__file__).parents[3], env=environment, stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
+
+
+def end(process):
+    told, complaint = process.communicate(timeout=150)
+    return SimpleNamespace(returncode=process.returncode, stdout=told, stderr=complaint)
+
+
+def call(home, *words, compiler=None):
+    return end(begin(home, *words, compiler=compiler))
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +60,14 @@ def test_runs_need_no_compiler_afterwards(warmed, tmp_path, scene):
     words = ("run", SCENE, "--out", tmp_path / "out", "--set", *SMALL, *scene)
     done = call(warmed, *words, compiler="/bin/false")
     assert done.returncode == 0, done.stderr
+
+
+def test_processes_that_want_the_same_forms_at_once_do_not_harm_each_other(tmp_path):
+    begun = [begin(tmp_path, "warm", "--element", "Q1") for _ in range(3)]
+    ended = [end(process) for process in begun]
+    assert [done.returncode for done in ended] == [0, 0, 0], [done.stderr for done in ended]
+    assert len({done.stdout for done in ended}) == 1  # as many forms for all
+    assert not list((tmp_path / "fenics").glob("*.tmp*"))
 
 
 def test_without_warming_the_same_run_says_what_to_do(tmp_path):
