@@ -30,7 +30,9 @@ def sealed(fill: Callable[[Any], None]) -> bytes:
     image = BytesIO()  # HDF5 itself may not survive a full disk
     with h5py.File(image, "w", userblock_size=_ROOM) as file:
         fill(file)
-    return seal(image.getvalue())
+    content = image.getbuffer()
+    content[:_ROOM] = _head(content)
+    return image.getvalue()
 
 
 def seal(content: bytes) -> bytes:
@@ -39,8 +41,7 @@ def seal(content: bytes) -> bytes:
     Args:
         content: The file's bytes, with room for the checksum.
     """
-    check = hashlib.sha256(memoryview(content)[_ROOM:]).hexdigest().encode()
-    return (_MARK + check + b"\n").ljust(_ROOM, b"\0") + content[_ROOM:]
+    return _head(content) + content[_ROOM:]
 
 
 def unsealed(source: Path | BinaryIO) -> BytesIO:
@@ -56,6 +57,12 @@ def unsealed(source: Path | BinaryIO) -> BytesIO:
     content = source.read_bytes() if isinstance(source, Path) else source.read()
     if not content.startswith(_MARK):
         raise InputError("has no checksum before its content: it is none of ours, or an older one")
-    if content != seal(content):
+    if content[:_ROOM] != _head(content):
         raise InputError("is damaged: its checksum does not fit its content")
     return BytesIO(content)
+
+
+def _head(content: bytes | memoryview) -> bytes:
+    """Return what stands before the content that HDF5 sees: mark, checksum, zeros."""
+    check = hashlib.sha256(memoryview(content)[_ROOM:]).hexdigest()
+    return (_MARK + check.encode() + b"\n").ljust(_ROOM, b"\0")

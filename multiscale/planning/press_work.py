@@ -107,9 +107,10 @@ def press_work(stage: Stage, *, sagging: bool, alone: bool = False) -> Work:
     if isinstance(model, HalfSpaceModel):
         cells = int(np.prod(model.surface.grid))
     at = reach(stage.surface, stage.furthest, int(stage.reached.sum()))
-    if alone:
-        count = max(stage.reached_patches, 1)
-        at = replace(at, box=at.box / stage.patches.count, summits=at.summits // count)
+    if alone:  # on the piece of the surface that is the patch
+        cells //= stage.patches.count
+        heights = at.heights // stage.patches.count
+        at = replace(at, heights=heights, summits=at.summits // max(stage.reached_patches, 1))
     return kind_work(kind, cells, at, sagging=sagging)
 
 

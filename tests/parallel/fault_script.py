@@ -15,6 +15,7 @@ from multiscale.couplings.condensed import CondensedCoupling
 run = sys.modules["multiscale.run"]  # the package's attribute of that name is the function
 PLACES = {
     "surface": (run, "on_root"),
+    "plan": (commands.terminal, "show_plan"),
     "laws": (run, "make_table"),
     "block": (run, "assemble"),
     "load step": (CondensedCoupling, "press"),

@@ -23,6 +23,7 @@ WORDS = (
     ("rank", "place"),
     [
         (1, "surface"),
+        (1, "plan"),
         (1, "laws"),
         (1, "block"),
         (1, "load step"),

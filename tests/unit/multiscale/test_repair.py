@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import h5py
 import numpy as np
 import pytest
 from scipy.optimize import minimize
@@ -111,10 +110,3 @@ def test_laws_of_a_whole_surface_may_fall(tmp_path):
 
 def test_rounding_is_not_told():
     assert not list(repair_notes([replace(law(APPROACH), repaired=1e-9)]))
-
-
-def test_older_files_were_never_repaired(tmp_path):
-    write_laws(tmp_path / "laws.h5", table([APPROACH], "isolated"))
-    with h5py.File(tmp_path / "laws.h5", "a") as file:
-        del file["patch_0_0"].attrs["repaired"]
-    assert read_laws(tmp_path / "laws.h5")[0].repaired == 0.0

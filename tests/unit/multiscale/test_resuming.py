@@ -1,5 +1,6 @@
 """Checkpoints: what is kept, what is refused, and that a resumed run meets the undisturbed one."""
 
+import os
 import shutil
 import subprocess
 import sys
@@ -282,6 +283,15 @@ def test_folder_of_a_file_cannot_be_locked(tmp_path):
 def test_folder_that_cannot_be_made_is_refused():
     with pytest.raises(InputError, match="'/proc/nothing': cannot be written to"):
         FolderLock(Path("/proc/nothing")).hold()
+
+
+def test_read_only_folder_is_refused_before_anything_is_made(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(os, "access", lambda path, mode: False)  # root may write everywhere
+    assert main(["run", str(PAPER), "--out", str(tmp_path / "out")]) == 2
+    told = capsys.readouterr()
+    assert f"--out = '{tmp_path}/out': {tmp_path} cannot be written to" in told.err
+    assert not told.out
+    assert not list(tmp_path.iterdir())
 
 
 def test_wrong_input_met_late_leaves_nothing(capsys, tmp_path, monkeypatch):

@@ -5,11 +5,16 @@ import subprocess
 import sys
 from pathlib import Path
 
+<<<<<<< HEAD
 import pint
+=======
+import numpy as np
+>>>>>>> faults
 import pytest
 
 from geometry.errors import InputError
 from multiscale.scene import Scene
+from multiscale.stage import make_stage
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 
@@ -217,6 +222,27 @@ def test_paths_start_in_the_folder_of_the_scene(tmp_path):
     text = PAPER.read_text(encoding="utf-8").replace("spectrum = {", 'file = "scan.npy" # {')
     path.write_text(text, encoding="utf-8")
     assert Scene.load(path).surface_path == tmp_path / "scan.npy"
+
+
+@pytest.mark.parametrize(
+    ("named", "found"),
+    [
+        ("../heights/scan.npy", "heights/scan.npy"),  # out of the scene's folder is allowed
+        ("{}/heights/scan.npy", "heights/scan.npy"),
+        ("~/scan.npy", "scenes/~/scan.npy"),  # as a shell would not have it
+    ],
+)
+def test_where_files_of_heights_are_looked_for(tmp_path, named, found):
+    for place in (tmp_path / "heights", tmp_path / "scenes" / "~"):
+        place.mkdir(parents=True)
+        np.save(place / "scan.npy", np.random.default_rng(1).random((8, 8)))
+    path = tmp_path / "scenes" / "scene.toml"
+    text = f'surface = {{ file = "{named.format(tmp_path)}", lengths = [1.0, 1.0] }}\n'
+    text += "block = { young_modulus = 4e3, poisson_ratio = 0.3 }\npatches.grid = [1, 1]\n"
+    path.write_text(text + "load.approach = 0.01\n", encoding="utf-8")
+    scene = Scene.load(path)
+    assert scene.surface_path.resolve() == tmp_path / found
+    assert make_stage(scene).surface.source == str(scene.surface_path)
 
 
 def test_scene_is_frozen():
