@@ -16,6 +16,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import cached_property
 from pathlib import Path
 
 import scaling_tables as tables
@@ -119,11 +120,14 @@ class Benchmark:
 
     def __init__(self, scale: float, large: bool, ranks: int, on: Facts) -> None:
         self.scale, self.is_large, self.ranks, self.on = scale, large, ranks, on
-        self.rates: dict[int, dict[str, float]] = {}
+
+    @cached_property
+    def rates(self) -> dict[int, dict[str, float]]:
+        """Bandwidths on 1 and 2 ranks; never kept in a file, for they belong to the moment."""
+        return {ranks: start(ranks, "stream_triad.py", "--json") for ranks in (1, 2)}
 
     def bandwidth(self) -> None:
         """What one core gets of the memory, and two at once."""
-        self.rates = {ranks: start(ranks, "stream_triad.py", "--json") for ranks in (1, 2)}
         tables.show_bandwidth(self.rates)
 
     def strong(self) -> None:

@@ -17,9 +17,7 @@ def show_bandwidth(rates: dict[int, dict[str, float]]) -> None:
 
 
 def ceiling(rates: dict[int, dict[str, float]], ranks: int, name: str = "triad") -> float:
-    """Return the parallel efficiency of work that waits for memory alone; nan when not measured."""
-    if not rates:
-        return math.nan
+    """Return the parallel efficiency of work that waits for memory alone."""
     return min(1.0, rates[ranks][name] / (ranks * rates[1][name]))
 
 
@@ -37,7 +35,7 @@ def show_times(title: str, facts: list[dict], rates: dict, weak: bool) -> None:
         # a longer solve by more iterations is no loss of parallel efficiency: it is told beside
         efficiency = gain if weak else gain * facts[0]["ranks"] / fact["ranks"]
         moved = traffic(fact) * fact["dofs"] * fact["iterations"]
-        floor = moved / rates[fact["ranks"]]["triad"] if rates else math.nan
+        floor = moved / rates[fact["ranks"]]["triad"]
         print(f"{fact['ranks']:5d} {fact['dofs']:10d} {fact['iterations']:4d}", end="")
         print("".join(f" {fact['seconds'][name]:11.2f}" for name in names), end="")
         print(f" {efficiency:20.0%} {efficiency / ceiling(rates, fact['ranks']):15.0%}", end="")
