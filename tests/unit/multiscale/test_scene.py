@@ -5,11 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-<<<<<<< HEAD
-import pint
-=======
 import numpy as np
->>>>>>> faults
+import pint
 import pytest
 
 from geometry.errors import InputError
