@@ -4,7 +4,11 @@ Towards ν = ½ the volume becomes stiff beside the shape by λ/μ = 2ν/(1 − 
 one on a grid, or interpolates it to the next, does nothing for the other: iterations grow with
 (1 − 2ν)^-½. On lattices a polynomial over a range of eigenvalues that is wider by as much, and of a
 degree that follows, buys this back up to ν = 0.495; beyond, and on other meshes, so does a
-factorisation, where it fits.
+factorisation, where it fits. Counted to 1e-8, from 10⁴ to 2·10⁵ unknowns:
+
+    lattices        7 to 10 with tetrahedra; at ν = 0.49 13 (Q1), 14 (P1), 16 to 23 (Q2)
+    refined meshes  11 to 15 up to ν = 0.3, 18 at 0.4, 24 at 0.45
+    factorised      1 to 2; 10⁵ unknowns take 4 to 6 s and 1 GB, once
 """
 
 from __future__ import annotations
@@ -30,7 +34,8 @@ STIFF = 0.495
 """Poisson's ratio up to which multigrid does on lattices, with more smoothing."""
 
 FACTORISED = 100_000
-"""Unknowns up to which a factorisation replaces multigrid for what is nearly incompressible."""
+"""Unknowns up to which a factorisation replaces multigrid for what is nearly incompressible; what
+is larger has multigrid as it is, and twice its iterations for every fourth of 1 − 2ν."""
 
 _DEGREES = (4, 8)  # of the smoothing polynomial
 _SMALLEST = 0.005  # eigenvalue smoothed, over the largest

@@ -2,8 +2,8 @@
 
 Linear displacements are quadratic ones, so that the transfer is exact: the middle of an edge takes
 the mean of its ends. Galerkin's product makes the matrix of the vertices, on curved cells too; it
-is eight times smaller than the first and smoothed aggregation, which quadratic shape functions
-mislead about what couples strongly, is made for its like.
+is seven times smaller, and smoothed aggregation is made for its like. On all nodes that takes ten
+times as long to set up, and twice as long to solve.
 """
 
 from __future__ import annotations

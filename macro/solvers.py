@@ -30,7 +30,7 @@ ALGEBRAIC_DEFAULTS: Mapping[str, object] = {
     "mg_levels_pc_type": "jacobi",
 }
 """Smoothed aggregation; Jacobi smooths on every release of PETSc. Four steps over a wide range of
-eigenvalues take a fourth fewer iterations than two, in the same time."""
+eigenvalues take a fourth fewer iterations than the usual two, in about the same time."""
 
 GEOMETRIC_DEFAULTS: Mapping[str, object] = {
     "pc_type": "mg",
