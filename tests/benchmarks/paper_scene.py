@@ -39,9 +39,9 @@ def run(ranks: int) -> dict[str, float]:
 def main() -> None:
     """Print one column per number of ranks."""
     repeats = int(sys.argv[1]) if len(sys.argv) > 1 else 5
-    ENVIRONMENT["PYTHONPYCACHEPREFIX"] = tempfile.mkdtemp()
-    run(1)  # compiles them
-    runs = [(run(1), run(2)) for _ in range(repeats)]
+    with tempfile.TemporaryDirectory() as ENVIRONMENT["PYTHONPYCACHEPREFIX"]:
+        run(1)  # compiles them
+        runs = [(run(1), run(2)) for _ in range(repeats)]
     print(f"{'phase':20s} {'1 rank':>8s} {'2 ranks':>8s}   (median of {repeats}, seconds)")
     for phase in runs[0][0]:
         medians = [statistics.median(pair[i][phase] for pair in runs) for i in (0, 1)]

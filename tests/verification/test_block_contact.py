@@ -26,7 +26,7 @@ def test_bottom_bears_the_force_of_the_interface(mode, element):
     for approach in (2e-3, 8e-3):
         state = pressed.press(Control(approach=approach, tilt=(1e-3, -2e-3)))
         assert state.force > 0.0
-        # residuals of 1e-10 of the load, added up over the nodes
+        # residuals of 1e-9 of the load, added up over the nodes
         assert state.reaction == pytest.approx(state.force, rel=1e-9)
         assert state.force == pytest.approx(
             state.pressure.sum() * interface.patches.area, rel=1e-12
@@ -105,9 +105,9 @@ def test_default_tolerances_take_few_steps_and_give_the_same_answer(mode):
     pressed = PressedBlock(interface.block, interface, laws, mode)
     states = [pressed.press(Control(approach=1e-3 * k)) for k in range(1, 9)]
     assert max(state.newton_iterations for state in states) <= 6
-    assert all(state.residuals[-1] <= 1e-10 for state in states)
+    assert all(state.residuals[-1] <= 1e-9 for state in states)
     alone = PressedBlock(interface.block, interface, laws, mode).press(Control(approach=8e-3))
-    # the answer does not depend on the path: laws without hysteresis, residuals below 1e-10
+    # the answer does not depend on the path: laws without hysteresis, residuals below 1e-9
     np.testing.assert_allclose(states[-1].pressure, alone.pressure, rtol=1e-8)
 
 
@@ -139,7 +139,7 @@ def test_nearly_rigid_laws_still_converge(mode):
         state = pressed.press(Control(approach=approach))
     # what a rigid plane would do: closures stay at the touch, 4 orders stiffer than the block
     assert state.closure.max() < 6.2e-3
-    assert state.residuals[-1] <= 1e-10
+    assert state.residuals[-1] <= 1e-9
 
 
 def test_patchwise_pressures_solve_the_condensed_problem():
@@ -161,4 +161,4 @@ def test_patchwise_pressures_solve_the_condensed_problem():
 
     expected = root(mismatch, np.zeros(6), tol=1e-13).x
     state = PressedBlock(block, interface, laws).press(Control(approach=8e-3, tilt=(1e-3, 2e-3)))
-    np.testing.assert_allclose(state.pressure, expected, rtol=1e-8)  # two solves of 1e-10
+    np.testing.assert_allclose(state.pressure, expected, rtol=1e-8)  # two solves of 1e-9
