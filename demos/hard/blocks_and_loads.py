@@ -172,7 +172,7 @@ def to_and_fro(kind: str, **changes: Any) -> tuple[Any, ...]:
 
 for kind in ("isolated", "consistent", "concurrent"):
     full = {"coupling__newton": "full"} if kind == "isolated" else {}
-    case(17, f"up and down, {kind}", "forces come back", 1e-8)(
+    case(17, f"up and down, {kind}", "forces come back", 2e-8)(
         lambda kind=kind, full=full: to_and_fro(kind, **full)
     )
 

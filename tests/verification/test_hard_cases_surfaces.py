@@ -8,6 +8,8 @@ from geometry.errors import InputError
 from geometry.files import read_surface
 from geometry.missing import filled
 from multiscale import make_stage, run
+from multiscale.couplings import blocks
+from multiscale.couplings.blocks import scene_loads
 from multiscale.plan import statements, warnings
 
 X, Y = centred(32)
@@ -91,6 +93,24 @@ def test_patches_with_nothing_in_them(tmp_path):
     ]
     np.testing.assert_allclose(forces, forces[0], rtol=1e-12)  # rounding
     assert laws.force_N[-1] == pytest.approx(forces[0], rel=1e-3)
+
+
+def test_four_thousand_patches(monkeypatch):
+    # hard: 4096² matrices; only loaded patches enter them, and the block is told fewer forces
+    fine = {"surface__grid": [128, 128], "patches__grid": [64, 64]}
+    stage = make_stage(scene(coupling__kind="consistent", **fine))
+    assert scene_loads(stage).shape == (36, 36)  # 32, the outermost halved twice
+    monkeypatch.setattr(blocks, "_MOST_LOADS", 16)  # as without so many patches, and cheaper
+    laws, whole = (history(coupling__kind=kind, **fine) for kind in ("consistent", "concurrent"))
+    largest = whole.patch_pressure_MPa[-1].max()
+    assert np.count_nonzero(whole.patch_pressure_MPa[-1]) > 50
+    # tables are made to 1e-3; so many patches add nothing to that
+    assert laws.force_N[-1] == pytest.approx(whole.force_N[-1], rel=1e-3)
+    limit = 0.02 * largest  # their pressures to ten times as much
+    np.testing.assert_allclose(laws.patch_pressure_MPa, whole.patch_pressure_MPa, atol=limit)
+    few = history(coupling__kind="concurrent", surface__grid=[128, 128])
+    gathered = whole.patch_pressure_MPa[-1].reshape(4, 16, 4, 16).mean(axis=(1, 3)).ravel()
+    np.testing.assert_allclose(gathered, few.patch_pressure_MPa[-1], atol=1e-10 * largest)
 
 
 @pytest.mark.parametrize("shape", [(1, 32), (32, 1), (3, 3)])

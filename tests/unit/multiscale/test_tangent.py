@@ -1,0 +1,54 @@
+"""Patches without load leave the linear system; what is left is the whole one."""
+
+import numpy as np
+import pytest
+
+from multiscale.law_tables.tangent import Tangent
+from multiscale.laws import LawPoint
+
+RNG = np.random.default_rng(2)
+YIELDS = 1e-5 * (np.eye(12) + 0.05 * RNG.uniform(0.0, 1.0, (12, 12)))
+
+
+def point(loaded, falling=()):
+    """Twelve patches of which some are loaded; the closure of some falls without load."""
+    pressure, slope, closure = np.zeros(12), np.zeros(12), np.ones(12)
+    pressure[loaded], slope[loaded] = 3.0, 4e4
+    closure[loaded] = 0.7
+    closure[list(falling)] = -0.2
+    return LawPoint(np.zeros(12), pressure, closure, slope)
+
+
+def tangent(at):
+    asked = []
+
+    def slope(of):
+        asked.append(of)
+        return YIELDS[:, of] * at.dpressure[of]
+
+    made = Tangent.of(at, slope)
+    np.testing.assert_array_equal(asked[0], made.loaded)
+    return made
+
+
+@pytest.mark.parametrize("loaded", [[2, 5, 11], [], list(range(12))])
+@pytest.mark.parametrize("falling", [(), (4,)])
+def test_is_the_whole_system(loaded, falling):
+    at = point(loaded, falling if len(loaded) < 12 else ())
+    whole = YIELDS * at.dpressure + np.diag(at.dclosure)
+    made = tangent(at)
+    for right in (RNG.standard_normal(12), RNG.standard_normal((12, 3))):
+        np.testing.assert_allclose(made.solve(right), np.linalg.solve(whole, right), rtol=1e-12)
+    assert made.steepest == pytest.approx(np.abs(whole).sum(axis=1).max(), rel=1e-14)
+
+
+def test_only_loaded_patches_are_asked_for():
+    assert list(tangent(point([2, 5])).loaded) == [2, 5]
+    # first touch: no pressure yet, but the closure does not follow the approach alone
+    assert list(tangent(point([2, 5], falling=[7])).loaded) == [2, 5, 7]
+
+
+def test_a_singular_system_is_told():
+    at = LawPoint(np.zeros(2), np.ones(2), np.zeros(2), np.zeros(2))
+    with pytest.raises(np.linalg.LinAlgError):
+        Tangent.of(at, lambda of: np.zeros((2, len(of)))).solve(np.ones(2))
