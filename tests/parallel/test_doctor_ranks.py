@@ -13,12 +13,12 @@ def test_doctor_tells_ranks_and_hosts_once(mpirun):
 
 def test_a_check_that_fails_on_one_rank_fails_for_all(mpirun):
     code = (
-        "import sys; from mpi4py import MPI; from multiscale.cli import main\n"
-        "from multiscale.doctor import machine as doctor_machine\n"
+        "import sys; from mpi4py import MPI; from multiscale.doctor import machine;"
+        "from multiscale.cli import main\n"
         "def broken(comm):\n"
         "    if comm.rank == 1: raise OSError('only here')\n"
         "    return []\n"
-        "doctor_machine.blas = broken\n"
+        "machine.blas = broken\n"
         "sys.exit(main(['doctor']))"
     )
     done = mpirun(2, "-c", code, timeout=100)
