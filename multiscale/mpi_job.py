@@ -8,7 +8,8 @@ from typing import Any
 from geometry.errors import InputError
 
 # what launchers tell every process of the number of processes: Open MPI's mpirun; Hydra (MPICH,
-# Intel MPI) and others that speak PMI; Hydra, of one node; Slurm's srun
+# Intel MPI) and others that speak PMI; Hydra, of one node; Slurm's srun, inside which the others
+# may have been started: the first that is set counts
 _SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS")
 
 
@@ -27,10 +28,9 @@ def strangers() -> tuple[str, int] | None:
     """
     if world() is not None:
         return None
-    told = {name: os.environ.get(name, "") for name in _SIZES}
-    counts = {name: int(text) for name, text in told.items() if text.isdigit()}
-    name = max(counts, key=lambda name: counts[name], default="")
-    return (name, counts[name]) if name and counts[name] > 1 else None
+    told = ((name, os.environ.get(name, "")) for name in _SIZES)
+    name, count = next(((name, int(text)) for name, text in told if text.isdigit()), ("", 1))
+    return (name, count) if count > 1 else None
 
 
 def refuse_strangers() -> None:

@@ -19,6 +19,8 @@ PAPER = "demos/scenes/paper.toml"
         ({"PMI_SIZE": "4", "MPI_LOCALNRANKS": "2"}, ("PMI_SIZE", 4)),
         ({"SLURM_STEP_NUM_TASKS": "3", "PMI_SIZE": ""}, ("SLURM_STEP_NUM_TASKS", 3)),
         ({"OMPI_COMM_WORLD_SIZE": "2"}, ("OMPI_COMM_WORLD_SIZE", 2)),
+        # mpirun -n 1 in a step of four
+        ({"OMPI_COMM_WORLD_SIZE": "1", "SLURM_STEP_NUM_TASKS": "4"}, None),
     ],
 )
 def test_what_launchers_tell(monkeypatch, told, found):
