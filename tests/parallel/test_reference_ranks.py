@@ -52,7 +52,7 @@ def test_same_numbers_on_any_number_of_ranks(mpirun, root, tmp_path, scene):
         assert (out / "fields.xdmf").exists() == ("output.fields=true" in scene)
     for ranks in (2, 3):
         for one, more in zip(results[1], results[ranks], strict=True):
-            # residuals of 1e-9 of the contact forces; the area's border follows them
+            # residuals of 1e-10 of the contact forces; the area's border follows them
             assert np.all(np.abs(more - one) <= 1e-8 * np.abs(one).max(axis=0))
 
 

@@ -88,7 +88,7 @@ def test_force_and_approach_are_two_ways_to_the_same_contact():
     for approach in (4e-3, 6e-3, 12e-3, 3e-3):
         one = by_approach.press(Control(approach=approach, tilt=lean))
         other = by_force.press(Control(force=one.force, tilt=lean))
-        # both are converged to 1e-9 of the contact forces
+        # both are converged to 1e-10 of the contact forces
         assert other.approach == pytest.approx(approach, rel=1e-8)
         assert other.force == pytest.approx(one.force, rel=1e-9)
         assert (other.nodes, other.contacts) == (one.nodes, one.contacts)
@@ -100,7 +100,7 @@ def test_a_small_force_after_a_large_one_is_met():
     found = obstacle()
     for force in (20.0, 1e-6):
         state = found.press(Control(force=force))
-        # solves are converged to 1e-9 of the contact forces found, not of those before
+        # solves are converged to 1e-10 of the contact forces found, not of those before
         assert state.force == pytest.approx(force, rel=2e-10)
         assert state.reaction == pytest.approx(force, rel=2e-10)
 
