@@ -28,7 +28,7 @@ from macro.multigrid_degrees import two_degree_solver
 from macro.solvers import DIRECT_DEFAULTS, PREFIX, linear_solver
 
 COMPRESSIBLE = 0.45
-"""Poisson's ratio up to which every multigrid does as it is."""
+"""Poisson's ratio up to which multigrid does without a lattice."""
 
 SOFT = 0.3
 """Poisson's ratio up to which points alone smooth hexahedra; beyond, more smoothing takes half the

@@ -35,7 +35,7 @@ def errors(element, method, edges):
     found = []
     for count in edges:
         _, state = sphere(element, method, count)
-        assert state.reaction == pytest.approx(state.force, rel=1e-9)  # of linear solves to 1e-9
+        assert state.reaction == pytest.approx(state.force, rel=1e-9)  # of linear solves to 1e-10
         found.append(state.force / float(CONTACT.force) - 1.0)
     return found
 
