@@ -76,7 +76,7 @@ class Block:
     @cached_property
     def conditions(self) -> list[Any]:
         """Dirichlet conditions: the clamped bottom and, on request, the rollers."""
-        clamped = fem.locate_dofs_topological(self.space, 2, self._facets(BOTTOM))
+        clamped = self._nodes(self._facets(BOTTOM))
         conditions = [fem.dirichletbc(np.zeros(3, PETSc.ScalarType), clamped, self.space)]
         if self.sides == "roller":
             conditions += [self._roller(axis) for axis in (0, 1)]
@@ -164,12 +164,22 @@ class Block:
     def _bottom_row(self) -> PETSc.Vec:
         """Sum of the unconstrained stiffness' rows of the bottom's vertical displacements."""
         lift = fem.Function(self.space)
-        lift.x.array[fem.locate_dofs_topological(self.space.sub(2), 2, self._facets(BOTTOM))] = 1.0
-        lift.x.scatter_forward()
+        lift.x.array[3 * self._nodes(self._facets(BOTTOM)) + 2] = 1.0
         return compat.assemble_vector(compat.compile_form(ufl.action(self._form, lift)))
 
     def _facets(self, marker: int) -> NDArray[np.int32]:
         return self.mesh.facet_tags.find(marker)
+
+    def _nodes(self, facets: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Return the nodes of all ranks' facets that this rank sees, ghosts too, ascending.
+
+        dolfinx asks the ranks that a rank exchanges nodes with. Two ranks that both see a node of
+        a third need not be such, but the third, who has the node, is asked by both.
+        """
+        marks = fem.Function(self.space)
+        marks.x.array[3 * fem.locate_dofs_topological(self.space, 2, facets)] = 1.0
+        marks.x.scatter_forward()
+        return np.flatnonzero(marks.x.array[::3]).astype(np.int32)
 
     def _roller(self, axis: int) -> Any:
         """Fix the normal displacement on the two side planes across an axis."""
@@ -179,6 +189,5 @@ class Block:
         place = dmesh.compute_midpoints(self.mesh.mesh, 2, facets)[:, axis]
         slack = 1e-6 * (high - low)  # far below a cell, far above rounding
         across = facets[(place < low + slack) | (place > high - slack)]
-        part = self.space.sub(axis)
-        dofs = fem.locate_dofs_topological(part, 2, across)
-        return fem.dirichletbc(PETSc.ScalarType(0.0), dofs, part)
+        dofs = 3 * self._nodes(across) + axis
+        return fem.dirichletbc(PETSc.ScalarType(0.0), dofs, self.space.sub(axis))

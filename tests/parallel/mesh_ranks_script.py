@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "unit" / "macro"))
 from mesh_facts import cells_of, faces_of, measures_of
 
 from geometry import BlockShape, PatchGrid
-from macro import BOTTOM, SIDES, TOP, Block, Material, block_mesh
+from macro import BOTTOM, SIDES, TOP, Block, Material, block_mesh, compat
 from macro.top_nodes import TopNodes
 
 COMM = MPI.COMM_WORLD
@@ -42,6 +42,23 @@ def facts(shape, builder):
     }
 
 
+def dealt(order):
+    """Return the measures of a box whose six tetrahedra are dealt out in some order."""
+    made = compat.mesh_from_cells
+
+    def deal(cells, points, _beyond, comm):
+        mine = np.concatenate(comm.allgather(cells))[order][comm.rank :: comm.size]
+        others = np.delete(np.arange(comm.size), comm.rank)
+        beyond = np.repeat(np.arange(len(mine)), len(others)), np.tile(others, len(mine))
+        return made(mine, points, beyond, comm)
+
+    compat.mesh_from_cells = deal
+    shape = BlockShape(interface=(1.0, 2.0), height=0.7, **SHAPES["box"])
+    block = block_mesh(shape, COMM, "lattice")
+    compat.mesh_from_cells = made
+    return measures_of(block)
+
+
 def regions(patterns):
     """Return in how many regions nodes of a top are in contact, for patterns (9, 8) of contact."""
     shape = BlockShape(interface=(8.0, 7.0), height=1.0, cells=(8, 7, 1))
@@ -57,6 +74,8 @@ if __name__ == "__main__":
         name: {builder: facts(shape, builder) for builder in ("gmsh", "lattice")}
         for name, shape in SHAPES.items()
     }
+    orders = np.random.default_rng(2).permuted(np.tile(np.arange(6), (10, 1)), axis=1)
+    result["dealt"] = [dealt(order) for order in orders]
     # sparse to dense, from single nodes to one region that winds through all ranks
     shares = np.random.default_rng(5).random((12, 9, 8))
     patterns = shares < np.linspace(0.05, 0.7, 12)[:, None, None]

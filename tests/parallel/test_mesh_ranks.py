@@ -58,6 +58,15 @@ def test_solutions_are_the_same(found, case):
     assert work[0] > 0.0
 
 
+def test_supports_hold_nodes_on_every_rank(found):
+    # dealt out, a rank can meet a support in a node alone, whose facets all belong to others
+    whole = found[1]["box"]["gmsh"]["measures"]
+    for ranks in RANKS:
+        for measures in found[ranks]["dealt"]:
+            assert measures["unknowns"] == whole["unknowns"]
+            assert measures["work"] == pytest.approx(whole["work"], rel=1e-12)  # as above
+
+
 def test_cells_are_spread_without_ghosts(found):
     for ranks in RANKS:
         for case in CASES:
