@@ -108,8 +108,8 @@ def press_work(stage: Stage, *, sagging: bool, alone: bool = False) -> Work:
         cells = int(np.prod(model.surface.grid))
     at = reach(stage.surface, stage.furthest, int(stage.reached.sum()))
     if alone:
-        count = max(stage.reached_patches, 1)
-        at = replace(at, box=at.box / stage.patches.count, summits=at.summits // count)
+        cells //= stage.patches.count  # under the patch; as much of them is within reach
+        at = replace(at, summits=at.summits // max(stage.reached_patches, 1))
     return kind_work(kind, cells, at, sagging=sagging)
 
 
