@@ -21,15 +21,15 @@ ODD = (
     "--set", "--json", "--element Q1", "--element Q9", "-- -ksp_rtol 1e-9", "-- nothing", "--",
     "-h", "-x", "--ranks 2", "SCENE", "/dev/null",
 )  # fmt: skip
-settings_ = st.builds("--set {}={}".format, st.sampled_from(sorted(KEYS)), odd_text)
-odd_words = st.one_of(st.sampled_from(ODD), settings_, odd_text)
+changes = st.builds("--set {}={}".format, st.sampled_from(sorted(KEYS)), odd_text)
+odd_words = st.one_of(st.sampled_from(ODD), changes, odd_text)
 # what would take its time when it is right: a level or a form of its own, a look at the machine
 DEAR = {"compare", "doctor", "warm"}
 ALONE = {"schema", "doctor", "warm"}
 
 
 @st.composite
-def lines(draw):
+def command_lines(draw):
     """Draw the words of a command line, mostly of the right form."""
     command = draw(st.sampled_from(COMMANDS) if draw(st.integers(0, 9)) else odd_text)
     words = [command] if command in ALONE or not draw(st.integers(0, 9)) else [command, SCENE]
@@ -40,7 +40,7 @@ def lines(draw):
     return words if command not in DEAR else [*words, "--nothing"]
 
 
-lines = lines()
+lines = command_lines()
 
 
 def called(scene, words):
