@@ -21,6 +21,7 @@ from micro.ellipse import (
     force_factor,
 )
 from micro.finite_slope import finite_slope_effect
+from micro.free_sides import FreeSides
 from micro.half_space import HalfSpaceModel
 from micro.half_space_state import HalfSpaceState
 from micro.hertz import HertzContact, contact_modulus
@@ -47,6 +48,7 @@ __all__ = [
     "Choice",
     "Contacts",
     "Field",
+    "FreeSides",
     "HalfSpace",
     "HalfSpaceModel",
     "HalfSpaceState",

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 from geometry.collective import on_root
 from geometry.errors import InputError
-from micro import HalfSpaceModel, MicroModel, resampled
+from micro import FreeSides, HalfSpaceModel, MicroModel, resampled
 from multiscale.blocks import (
     bending_block,
+    contact_correction,
+    contact_model,
     embedding,
-    fine_loads,
-    smooth_correction,
     yielding,
 )
 from multiscale.concurrent import TOLERANCE, ConcurrentCoupling
@@ -57,15 +57,16 @@ def make_table(stage: Stage, comm: Any) -> LawTable:
             file=stage.scene.file,
         )
     if kind == "consistent":
+        sinking = bending_block(stage, comm)
         return consistent_laws(
-            stage.model,
+            stage.model if sinking is None else contact_model(stage),
             stage.patches,
             mean_heights=stage.mean_heights,
             approach_end=on_root(comm, lambda: stage.approach_end),
             tolerance=stage.table_tolerance,
             most_rows=stage.table_rows,
             tilt=stage.furthest[1],
-            sinking=bending_block(stage, comm),
+            sinking=sinking,
             comm=comm,
         )
     return isolated_laws(
@@ -123,20 +124,22 @@ def _only_condensed(stage: Stage, table: LawTable) -> bool:
 
 
 def _concurrent(stage: Stage, comm: Any) -> Coupling:
-    model = stage.model
+    model = contact_model(stage)
+    sides = None
     if isinstance(model, HalfSpaceModel):
         model = replace(model, tolerance=1e-2 * TOLERANCE)
+        sides = model.sides
     return ConcurrentCoupling(
         model,
         stage.patches,
         stage.mean_heights,
-        smooth_correction(stage, fine_loads(stage), comm),
-        coarse=None if stage.by_summits else _coarse_model(stage),
+        contact_correction(stage, comm),
+        coarse=None if stage.by_summits else _coarse_model(stage, sides),
         comm=comm,
     )
 
 
-def _coarse_model(stage: Stage) -> MicroModel | None:
+def _coarse_model(stage: Stage, sides: FreeSides | None) -> MicroModel | None:
     """Return a half-space of fewer cells; None where the surface itself has no more."""
     surface = stage.surface
     cells = min(surface.grid[0], _COARSE), min(surface.grid[1], _COARSE)
@@ -146,4 +149,5 @@ def _coarse_model(stage: Stage) -> MicroModel | None:
         surface=resampled(surface, cells),
         contact_modulus=stage.model.contact_modulus,
         highest=surface.highest,
+        sides=sides,
     )
