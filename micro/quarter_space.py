@@ -39,8 +39,8 @@ class QuarterSpace:
         poisson_ratio: ν.
 
     Source:
-        Hetényi 1970, doi 10.1115/1.3408506; Keer, Lee & Mura 1983,
-        doi 10.1016/0020-7683(83)90029-8.
+        Hetényi 1970, J. Appl. Mech. 37, 75-80; Keer, Lee & Mura 1983, Int. J. Solids Struct.
+        19, 497-508.
     """
 
     def __init__(self, poisson_ratio: float) -> None:
