@@ -12,7 +12,7 @@ from micro.convolution import Convolution
 from micro.free_sides import FreeSides
 from micro.kernels import padded_spectrum, periodic_spectrum
 from micro.reach import Box
-from micro.side_cells import SideCells, side_cells
+from micro.side_cells import SideCells, SomeCells, side_cells
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -67,10 +67,7 @@ class ElasticGrid:
         periodic: bool,
         sides: tuple[SideCells, Box] | None = None,
     ) -> None:
-        self._sides: tuple[SideCells, Indices, Indices] | None = None
-        if sides is not None:
-            beside, (rows, columns) = sides
-            self._sides = beside, _indices(rows), _indices(columns)
+        self._beside = None if sides is None else _Beside(*sides)
         self.grid, self.spacing, self.periodic = grid, spacing, periodic
         nx, ny = grid
         if periodic:
@@ -92,20 +89,16 @@ class ElasticGrid:
         """Return the displacement by pressures on all cells, shape (nx, ny) [mm]."""
         self.products += 1
         found = self._compliance(pressure.copy())
-        if self._sides is not None:
-            beside, rows, columns = self._sides
-            found += beside.displacement(pressure, rows, columns)
+        if self._beside is not None:
+            found += self._beside.all.displacement(pressure)
         return found
 
     def comply(self, cells: Cells, pressure: Array) -> Array:
         """Return roughly the displacements of some cells by pressures on them, shape (n,) [mm]."""
         self.products += 1
         found = _among(cells, pressure, self._compliance_of_cells)
-        if self._sides is not None:
-            beside, rows, columns = self._sides
-            field = np.zeros((len(cells.rows), self.grid[1]))
-            field.ravel()[cells.place] = pressure
-            found += beside.displacement(field, rows[cells.rows], columns).ravel()[cells.place]
+        if self._beside is not None:
+            found += self._beside.of_cells(cells, pressure)
         return found
 
     def resist(self, cells: Cells, displacement: Array) -> Array:
@@ -113,8 +106,27 @@ class ElasticGrid:
         return _among(cells, displacement, self._stiffness)
 
 
-def _indices(part: slice) -> Indices:
-    return np.arange(part.start, part.stop)
+class _Beside:
+    """What free sides add on a grid, and on those of its cells that were last asked for."""
+
+    def __init__(self, sides: SideCells, box: Box) -> None:
+        self._sides = sides
+        self._rows, self._columns = (np.arange(part.start, part.stop) for part in box)
+        self.all = sides.among(self._rows, self._columns)
+        self._last: tuple[Cells, SomeCells, Indices, tuple[int, int]] | None = None
+
+    def of_cells(self, cells: Cells, pressure: Array) -> Array:
+        """Return the displacements of some cells by pressures on them, shape (n,) [mm]."""
+        if self._last is None or self._last[0] is not cells:
+            row, column = np.divmod(cells.place, len(self._columns))
+            columns, column = np.unique(column, return_inverse=True)
+            some = self._sides.among(self._rows[cells.rows], self._columns[columns])
+            place = row * len(columns) + column.ravel()
+            self._last = cells, some, place, (len(cells.rows), len(columns))
+        _, some, place, shape = self._last
+        field = np.zeros(shape)
+        field.ravel()[place] = pressure
+        return np.asarray(some.displacement(field).ravel()[place])
 
 
 def _among(cells: Cells, values: Array, convolution: Convolution) -> Array:

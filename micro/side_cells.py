@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -15,7 +16,7 @@ from micro.free_sides import FreeSides
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-_NEAREST = 0.25
+_NEAREST = 1.0 / 16.0
 """First node of the distance from a side, in cells."""
 
 
@@ -34,17 +35,33 @@ class SideCells:
         nx, ny = (round(length / step) for length, step in zip(sides.lengths, spacing, strict=True))
         self._pairs = _Pair(sides, 0, nx, ny), _Pair(sides, 1, ny, nx)
 
-    def displacement(self, pressure: Array, rows: Indices, columns: Indices) -> Array:
-        """Return displacements of cells by pressures on them, shape (r, c) [mm].
+    def among(self, rows: Indices, columns: Indices) -> SomeCells:
+        """Return the cells where some rows and columns of the grid cross.
 
         Args:
-            pressure: Pressures on some rows and columns of the grid, shape (r, c).
-            rows: Indices of these rows, ascending, shape (r,).
+            rows: Indices of the rows, ascending, shape (r,).
             columns: Indices of the columns, ascending, shape (c,).
         """
         across_x, across_y = self._pairs
-        found = across_x.displacement(pressure, rows, columns)
-        return np.asarray(found + across_y.displacement(pressure.T, columns, rows).T)
+        return SomeCells(across_x.among(rows, columns), across_y.among(columns, rows))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SomeCells:
+    """Cells under pressure, between the sides across x and those across y.
+
+    Args:
+        across_x: Sides across x.
+        across_y: Sides across y.
+    """
+
+    across_x: _Lines
+    across_y: _Lines
+
+    def displacement(self, pressure: Array) -> Array:
+        """Return the displacements of these cells by pressures on them, shape (r, c) [mm]."""
+        found = self.across_x.displacement(pressure)
+        return np.asarray(found + self.across_y.displacement(pressure.T).T)
 
 
 class _Pair:
@@ -64,22 +81,43 @@ class _Pair:
             seen = sides.compliance(axis, nodes, np.abs(waves + shift))
             self._compliance += step * shares[:, None, None] * seen
 
-    def displacement(self, pressure: Array, rows: Indices, cells: Indices) -> Array:
-        """Return displacements by pressures on some cells of some rows."""
-        near = self._rows if len(rows) == self._rows.shape[0] else self._rows[rows]
-        place = cells - cells[0]
-        lines = np.zeros((near.shape[1], place[-1] + 1))
-        lines[:, place] = near.T @ pressure
-        waves = fft.rfft(lines, self._period, axis=1)
-        lines = fft.irfft(self._displaced(waves), self._period, axis=1)
-        return np.asarray(near @ lines[:, place])
+    def among(self, rows: Indices, cells: Indices) -> _Lines:
+        """Return some cells of some rows."""
+        every = len(rows) == self._rows.shape[0]
+        near = self._rows if every else self._rows[rows]
+        return _Lines(self, near, csr_array(near.T), cells - cells[0])
 
-    def _displaced(self, waves: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Multiply the waves of loads at the nodes of both sides, shape (2 a, w)."""
+    def displaced(self, lines: Array) -> Array:
+        """Return displacements at the nodes of both sides by loads at them, shape (2 a, n)."""
+        waves = fft.rfft(lines, self._period, axis=1)
         by_wave = waves.reshape(2, self._nodes, -1).transpose(2, 1, 0)
         parts = np.ascontiguousarray(by_wave).view(np.float64)  # of both sides, real and imaginary
         found = np.matmul(self._compliance, parts).view(np.complex128)
-        return found.transpose(2, 1, 0).reshape(waves.shape)
+        back = fft.irfft(found.transpose(2, 1, 0).reshape(waves.shape), self._period, axis=1)
+        return np.asarray(back[:, : lines.shape[1]])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Lines:
+    """Some cells of some rows along two sides.
+
+    Args:
+        sides: The sides.
+        near: Means of the rows' cells from values at the nodes, shape (r, 2 a).
+        loads: Its transpose.
+        place: Places of the cells along the sides, shape (c,).
+    """
+
+    sides: _Pair
+    near: csr_array
+    loads: csr_array
+    place: Indices
+
+    def displacement(self, pressure: Array) -> Array:
+        """Return displacements by pressures, shape (r, c)."""
+        lines = np.zeros((self.near.shape[1], self.place[-1] + 1))
+        lines[:, self.place] = self.loads @ pressure
+        return np.asarray(self.near @ self.sides.displaced(lines)[:, self.place])
 
 
 @lru_cache(maxsize=8)

@@ -28,8 +28,8 @@ _HALVINGS = 2
 feel them on a finer scale. None misses 1.4 % of the force of Set 1, seed 1 at 8 µm; 1, 2, 3 miss
 0.5, 0.2 and 0.1 %."""
 _CORNER_HALVINGS = 1
-"""Halvings where it does, for the sake of the corners: a ball's quarter at one carries 2 % too much,
-without 7 %."""
+"""Halvings where it does, for the sake of corners: a ball cut by one carries 2 % too much, without
+7 %."""
 _REACH = 0.25
 """Reach of free sides in the micro model, of the shortest side of the block."""
 
