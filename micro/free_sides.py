@@ -19,8 +19,8 @@ from micro.quarter_space import quarter_space
 
 Array = NDArray[np.float64]
 
-_SHORTEST = 24.0  # waves on the narrowest rectangle
-_NEAREST = 1.0 / 256.0  # of the narrowest rectangle
+_SHORTEST = 24.0  # waves on the shortest rectangle along the side
+_NEAREST = 1.0 / 256.0  # of the narrowest rectangle across it: the first node
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +67,8 @@ class FreeSides:
         """
         space = quarter_space(self.poisson_ratio)
         numbers = np.pi * waves / self.lengths[1 - axis]
-        numbers = (numbers**4 + self.reach**-4.0) ** 0.25
+        larger, smaller = np.maximum(numbers, 1.0 / self.reach), np.minimum(numbers, 1 / self.reach)
+        numbers = larger * (1.0 + (smaller / larger) ** 4) ** 0.25
         return np.stack([space.compliance(distances, number) for number in numbers])
 
     def top(self, x: Array, y: Array, loads: Partition) -> Array:
@@ -88,9 +89,8 @@ class FreeSides:
     def _by_two(self, axis: int, across: Array, along: Array, rows: Array, columns: Array) -> Array:
         """Return what two opposite sides add, shape (across, along, rows, columns)."""
         length, period = self.lengths[axis], 2.0 * self.lengths[1 - axis]
-        narrowest = float(min(np.diff(rows).min(), np.diff(columns).min()))
-        waves = np.arange(int(np.ceil(_SHORTEST * period / narrowest)))
-        nodes = distance_nodes(_NEAREST * narrowest, length)
+        waves = np.arange(int(np.ceil(_SHORTEST * period / float(np.diff(columns).min()))))
+        nodes = distance_nodes(_NEAREST * float(np.diff(rows).min()), length)
         compliance = self.compliance(axis, nodes, waves)
         phase = _along(waves, period, along, columns)
         near = values_at(nodes, across).toarray(), means_over(nodes, rows).toarray()

@@ -105,7 +105,7 @@ def contact_correction(stage: Stage, comm: Any) -> Correction:
         Collective.
     """
     found = smooth_correction(stage, fine_loads(stage), comm)
-    sides = _free_sides(stage)
+    sides = free_sides(stage)
     if sides is None:
         return found
     beside = sides.top(found.x, found.y, found.loads)
@@ -118,15 +118,23 @@ def contact_model(stage: Stage) -> MicroModel:
     Args:
         stage: The scene's ingredients.
     """
-    model, sides = stage.model, _free_sides(stage)
+    model, sides = stage.model, free_sides(stage)
     if isinstance(model, HalfSpaceModel) and sides is not None:
         return replace(model, sides=sides)
     return model
 
 
-def _free_sides(stage: Stage) -> FreeSides | None:
-    """Return the free sides that contacts feel on their own scale, if the micro model can tell."""
-    if not (_has_free_sides(stage) and isinstance(stage.model, HalfSpaceModel)):
+def free_sides(stage: Stage) -> FreeSides | None:
+    """Return the free sides that a scene's half-space model takes into account.
+
+    None where there are none, the micro model is another one, or the block is a mesh.
+
+    Args:
+        stage: The scene's ingredients.
+    """
+    coupling = stage.scene.coupling
+    together = coupling.decomposed and coupling.kind != "isolated"
+    if not (together and _has_free_sides(stage) and isinstance(stage.model, HalfSpaceModel)):
         return None
     return FreeSides(
         lengths=stage.surface.lengths,
@@ -166,7 +174,7 @@ def fine_loads(stage: Stage) -> UnevenPartition:
         np.linspace(0.0, length, n * -(-_LOADS // n) + 1, dtype=np.float64) for length, n in sizes
     ]
     if _has_free_sides(stage):
-        halvings = _HALVINGS if _free_sides(stage) is None else _CORNER_HALVINGS
+        halvings = _HALVINGS if free_sides(stage) is None else _CORNER_HALVINGS
         even = [_graded(ticks, halvings) for ticks in even]
     return UnevenPartition(ticks_x=tuple(even[0]), ticks_y=tuple(even[1]))
 
