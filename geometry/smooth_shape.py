@@ -14,12 +14,15 @@ from geometry.meshes import BlockShape
 
 Array = NDArray[np.float64]
 
-ACROSS, IN_DEPTH = 2.0, 4.0
-"""Sizes of the middle cells relative to those at the faces, across and in depth.
+ACROSS, IN_DEPTH = 1.5, 2.0
+"""Size of a cell relative to the one nearer to a face, across and in depth.
 
-Of 1, 1.5, 2, 3 and 1, 4, 8 these served a cube under 8 × 8 loads best: what is left there
-concentrates at the top's edges, where loads end at free sides, and at those of the clamped bottom.
+What is left concentrates at the top's edges, where contacts feel free sides, and at those of the
+clamped bottom. Along a side, where cells are coarsest in the middle, they must not become much
+longer than the rectangles of load either.
 """
+LARGEST = 8.0
+"""Largest cell relative to the smallest along an axis."""
 
 MOST_UNKNOWNS = 150_000
 """Unknowns of the largest division: its factorisation takes half a minute and 3 GB."""
@@ -91,7 +94,8 @@ def smooth_shape(shape: BlockShape) -> SmoothShape:
 
 def _towards_ends(start: float, end: float, cells: int, growth: float) -> tuple[Segment, ...]:
     middle, half = 0.5 * (start + end), -(-cells // 4)
+    ratio = min(growth ** (half - 1), LARGEST)
     return (
-        Segment(start=start, end=middle, cells=half, growth=growth),
-        Segment(start=middle, end=end, cells=half, growth=1.0 / growth),
+        Segment(start=start, end=middle, cells=half, growth=ratio),
+        Segment(start=middle, end=end, cells=half, growth=1.0 / ratio),
     )

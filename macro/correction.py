@@ -7,7 +7,7 @@ solution for each rectangle of a grid of loads serves every load step.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -63,6 +63,15 @@ class Correction:
         """
         nodal = self.values @ (np.asarray(forces, float) / self.loads.areas)
         return Sag(RectBivariateSpline(self.x, self.y, nodal))
+
+    def less(self, known: Array) -> Correction:
+        """Return what is left where a part of the displacements is known from elsewhere.
+
+        Args:
+            known: Downward displacement of the nodes by unit pressure on each rectangle, of the
+                shape of ``values`` [mm/MPa].
+        """
+        return replace(self, values=self.values - known)
 
     def patch_compliance(self, patches: Partition) -> Array:
         """Return the mean of u_c over patch i by unit pressure on patch j, shape (N, N) [mm/MPa].

@@ -11,6 +11,7 @@ from micro.auto.candidates import Candidate, resampled
 from micro.auto.choice import Choice, choose
 from micro.boussinesq import HalfSpace
 from micro.cells.contacts import Contacts, find_contacts
+from micro.cells.free_sides import FreeSides
 from micro.cells.half_space_state import HalfSpaceState
 from micro.ellipse import (
     area_factor,
@@ -48,6 +49,7 @@ __all__ = [
     "Choice",
     "Contacts",
     "Field",
+    "FreeSides",
     "HalfSpace",
     "HalfSpaceModel",
     "HalfSpaceState",

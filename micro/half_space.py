@@ -15,6 +15,7 @@ from geometry import Partition, PatchGrid, Surface
 from geometry.errors import InputError
 from micro.cells.contact_pressure import Pressures
 from micro.cells.elastic_grid import ElasticGrids
+from micro.cells.free_sides import FreeSides
 from micro.cells.half_space_curve import CellSums
 from micro.cells.half_space_state import HalfSpaceState
 from micro.cells.pressing import Pressing
@@ -49,10 +50,13 @@ class HalfSpaceModel:
             given.
         highest: Height z_M that the approach counts from [mm], such as that of the surface that
             this one was resampled from; the surface's own when not given.
+        sides: Free sides of the surface's rectangle, which yield beyond the half-space; none when
+            not given.
 
     Raises:
         InputError: When the modulus or the tolerance is not positive, a periodic model is asked
-            of a surface that is not, or no cell may touch.
+            of a surface that is not, or with free sides, these are not the surface's, or no cell
+            may touch.
 
     Source:
         Polonsky & Keer 1999, doi 10.1016/S0043-1648(99)00113-1.
@@ -64,6 +68,7 @@ class HalfSpaceModel:
     tolerance: float = 1e-8
     within: PatchGrid | None = None
     highest: float | None = None
+    sides: FreeSides | None = None
 
     def __post_init__(self) -> None:
         for what in ("contact_modulus", "tolerance"):
@@ -75,11 +80,24 @@ class HalfSpaceModel:
             raise InputError(
                 "a periodic half-space needs a periodic surface", value=self.surface.source
             )
+        self._check_sides()
         if self._free is not None and self._free.all():
             raise InputError(
                 "no cell has its centre in the patches that may touch",
                 value=self.within,
                 allowed=f"patches within {self.surface.lengths} mm",
+            )
+
+    def _check_sides(self) -> None:
+        if self.sides is None:
+            return
+        if self.periodic:
+            raise InputError("a periodic half-space has no free sides", value=self.sides)
+        if not np.allclose(self.sides.lengths, self.surface.lengths, rtol=1e-9, atol=0.0):
+            raise InputError(
+                "the free sides are not those of the surface",
+                value=self.sides.lengths,
+                allowed=f"{self.surface.lengths} mm",
             )
 
     @property
@@ -288,7 +306,7 @@ class HalfSpaceModel:
 
     @cached_property
     def _pressing(self) -> Pressing:
-        grids = ElasticGrids(periodic=self.periodic)
+        grids = ElasticGrids(periodic=self.periodic, sides=self.sides)
         return Pressing(grids=grids, spacing=self.surface.spacing, tolerance=self.tolerance)
 
 

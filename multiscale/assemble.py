@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 from geometry.collective import on_root
 from geometry.errors import InputError
-from micro import HalfSpaceModel, MicroModel, resampled
+from micro import FreeSides, HalfSpaceModel, MicroModel, resampled
 from multiscale.coupling import AnalyticCoupling, EmbeddedCoupling
 from multiscale.couplings.blocks import (
     bending_block,
+    contact_correction,
+    contact_model,
     embedding,
-    fine_loads,
-    smooth_correction,
     yielding,
 )
 from multiscale.couplings.concurrent import TOLERANCE, ConcurrentCoupling
@@ -60,21 +60,21 @@ def make_table(stage: Stage, comm: Any) -> LawTable:
             allowed="isolated, consistent",
             file=stage.scene.file,
         )
-    model = _sharp(stage.model)
     if kind == "consistent":
+        sinking = bending_block(stage, comm)
         return consistent_laws(
-            model,
+            _sharp(stage.model if sinking is None else contact_model(stage)),
             stage.patches,
             mean_heights=stage.mean_heights,
             approach_end=on_root(comm, lambda: stage.approach_end),
             tolerance=stage.table_tolerance,
             most_rows=stage.table_rows,
             tilt=stage.furthest[1],
-            sinking=bending_block(stage, comm),
+            sinking=sinking,
             comm=comm,
         )
     return isolated_laws(
-        model,
+        _sharp(stage.model),
         stage.patches,
         mean_heights=stage.mean_heights,
         closure_ends=stage.closure_ends,
@@ -121,12 +121,14 @@ def _with_laws(stage: Stage, table: LawTable, comm: Any) -> tuple[Coupling, Inte
 
 
 def _concurrent(stage: Stage, comm: Any) -> Coupling:
+    model = _sharp(contact_model(stage))
+    sides = model.sides if isinstance(model, HalfSpaceModel) else None
     return ConcurrentCoupling(
-        _sharp(stage.model),
+        model,
         stage.patches,
         stage.mean_heights,
-        smooth_correction(stage, fine_loads(stage), comm),
-        coarse=None if stage.by_summits else _coarse_model(stage),
+        contact_correction(stage, comm),
+        coarse=None if stage.by_summits else _coarse_model(stage, sides),
         comm=comm,
     )
 
@@ -136,7 +138,7 @@ def _sharp(model: MicroModel) -> MicroModel:
     return replace(model, tolerance=_SHARP) if isinstance(model, HalfSpaceModel) else model
 
 
-def _coarse_model(stage: Stage) -> MicroModel | None:
+def _coarse_model(stage: Stage, sides: FreeSides | None) -> MicroModel | None:
     """Return a half-space of fewer cells; None where the surface itself has no more."""
     surface = stage.surface
     cells = min(surface.grid[0], _COARSE), min(surface.grid[1], _COARSE)
@@ -146,4 +148,5 @@ def _coarse_model(stage: Stage) -> MicroModel | None:
         surface=resampled(surface, cells),
         contact_modulus=stage.model.contact_modulus,
         highest=surface.highest,
+        sides=sides,
     )

@@ -26,7 +26,7 @@ BYTES_PER_STATE = 24
 EMBEDDED_CELLS = (40, 40, 25)
 """Cells of a block that carries the laws itself: those of Waddad et al. 2016."""
 
-DECOMPOSED_CELLS = (16, 16, 12)
+DECOMPOSED_CELLS = (20, 20, 12)
 """Cells of a block that only corrects the half-space: a cube's compliance to 0.05 %."""
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from micro.cells.contact_pressure import Pressures, contact_pressure
 from micro.cells.elastic_grid import ElasticGrids
+from micro.cells.reach import Box
 
 Array = NDArray[np.float64]
 
@@ -28,6 +29,7 @@ def nested_pressure(
     *,
     total: float | None = None,
     tolerance: float,
+    box: Box | None = None,
 ) -> Pressures:
     """Find the pressures under a rigid body from nothing but its shape.
 
@@ -37,6 +39,7 @@ def nested_pressure(
         spacing: Sides of a cell [mm].
         total: Sum of pressures / E* over the cells when the force is given.
         tolerance: Largest residual.
+        box: Place of the cells, where free sides matter; coarse grids go without.
 
     Returns:
         As `contact_pressure`; the iterations on coarse grids are not counted.
@@ -57,7 +60,7 @@ def nested_pressure(
         start = refined(rough.pressure, factors)[: required.shape[0], : required.shape[1]]
     else:
         start = np.full(required.shape, 0.0 if total is None else total / required.size)
-    grid = grids.at(required.shape, spacing)
+    grid = grids.at(required.shape, spacing, box)
     return contact_pressure(grid, required, start, total=total, tolerance=tolerance)
 
 

@@ -9,7 +9,10 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from micro.cells.convolution import Convolution
+from micro.cells.free_sides import FreeSides
 from micro.cells.kernels import padded_spectrum, periodic_spectrum
+from micro.cells.reach import Box
+from micro.cells.side_cells import SideCells, SomeCells, side_cells
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -53,11 +56,18 @@ class ElasticGrid:
         spacing: Sides (dx, dy) of a cell [mm].
         periodic: Whether pressures continue periodically; a half-space that is loaded on the grid
             alone otherwise.
+        sides: What free sides add, if there are any, and where the grid lies between them.
     """
 
     def __init__(
-        self, grid: tuple[int, int], spacing: tuple[float, float], *, periodic: bool
+        self,
+        grid: tuple[int, int],
+        spacing: tuple[float, float],
+        *,
+        periodic: bool,
+        sides: tuple[SideCells, Box] | None = None,
     ) -> None:
+        self._beside = None if sides is None else _Beside(*sides)
         self.grid, self.spacing, self.periodic = grid, spacing, periodic
         nx, ny = grid
         if periodic:
@@ -78,16 +88,45 @@ class ElasticGrid:
     def displacement(self, pressure: Array) -> Array:
         """Return the displacement by pressures on all cells, shape (nx, ny) [mm]."""
         self.products += 1
-        return self._compliance(pressure.copy())
+        found = self._compliance(pressure.copy())
+        if self._beside is not None:
+            found += self._beside.all.displacement(pressure)
+        return found
 
     def comply(self, cells: Cells, pressure: Array) -> Array:
         """Return roughly the displacements of some cells by pressures on them, shape (n,) [mm]."""
         self.products += 1
-        return _among(cells, pressure, self._compliance_of_cells)
+        found = _among(cells, pressure, self._compliance_of_cells)
+        if self._beside is not None:
+            found += self._beside.of_cells(cells, pressure)
+        return found
 
     def resist(self, cells: Cells, displacement: Array) -> Array:
         """Return very roughly the pressures on some cells that displace them so, shape (n,)."""
         return _among(cells, displacement, self._stiffness)
+
+
+class _Beside:
+    """What free sides add on a grid, and on those of its cells that were last asked for."""
+
+    def __init__(self, sides: SideCells, box: Box) -> None:
+        self._sides = sides
+        self._rows, self._columns = (np.arange(part.start, part.stop) for part in box)
+        self.all = sides.among(self._rows, self._columns)
+        self._last: tuple[Cells, SomeCells, Indices, tuple[int, int]] | None = None
+
+    def of_cells(self, cells: Cells, pressure: Array) -> Array:
+        """Return the displacements of some cells by pressures on them, shape (n,) [mm]."""
+        if self._last is None or self._last[0] is not cells:
+            row, column = np.divmod(cells.place, len(self._columns))
+            columns, column = np.unique(column, return_inverse=True)
+            some = self._sides.among(self._rows[cells.rows], self._columns[columns])
+            place = row * len(columns) + column.ravel()
+            self._last = cells, some, place, (len(cells.rows), len(columns))
+        _, some, place, shape = self._last
+        field = np.zeros(shape)
+        field.ravel()[place] = pressure
+        return np.asarray(some.displacement(field).ravel()[place])
 
 
 def _among(cells: Cells, values: Array, convolution: Convolution) -> Array:
@@ -119,26 +158,33 @@ class ElasticGrids:
 
     Args:
         periodic: Whether pressures continue periodically.
+        sides: Free sides, if there are any.
     """
 
-    def __init__(self, *, periodic: bool) -> None:
-        self.periodic = periodic
+    def __init__(self, *, periodic: bool, sides: FreeSides | None = None) -> None:
+        self.periodic, self.sides = periodic, sides
         self._known: dict[tuple[object, ...], ElasticGrid] = {}
 
-    def at(self, grid: tuple[int, ...], spacing: tuple[float, float]) -> ElasticGrid:
-        """Return the grid with these cells."""
+    def at(
+        self, grid: tuple[int, ...], spacing: tuple[float, float], box: Box | None = None
+    ) -> ElasticGrid:
+        """Return the grid with these cells; free sides act on it where its place is known."""
         nx, ny = grid
-        key = (nx, ny, *spacing)
+        key: tuple[object, ...] = (nx, ny, *spacing)
+        sides = None
+        if self.sides is not None and box is not None:
+            key = (*key, box.rows.start, box.columns.start)
+            sides = side_cells(self.sides, spacing), box
         if key not in self._known:
             if len(self._known) >= _MOST_GRIDS:
                 del self._known[next(iter(self._known))]
-            self._known[key] = ElasticGrid((nx, ny), spacing, periodic=self.periodic)
+            self._known[key] = ElasticGrid((nx, ny), spacing, periodic=self.periodic, sides=sides)
         return self._known[key]
 
     def __reduce__(self) -> tuple[object, ...]:
         """Travel without the work arrays."""
-        return _empty_grids, (self.periodic,)
+        return _empty_grids, (self.periodic, self.sides)
 
 
-def _empty_grids(periodic: bool) -> ElasticGrids:
-    return ElasticGrids(periodic=periodic)
+def _empty_grids(periodic: bool, sides: FreeSides | None) -> ElasticGrids:
+    return ElasticGrids(periodic=periodic, sides=sides)

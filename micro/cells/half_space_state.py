@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from micro.cells.contacts import Contacts, find_contacts
 from micro.cells.elastic_grid import ElasticGrids
+from micro.cells.reach import Box
 
 Array = NDArray[np.float64]
 
@@ -74,7 +75,8 @@ class HalfSpaceState:
 
         On a periodic surface it counts from its own mean.
         """
-        grid = self.grids.at(self.pressure.shape, self.spacing)
+        whole = Box.whole(self.pressure.shape)
+        grid = self.grids.at(self.pressure.shape, self.spacing, whole)
         return grid.displacement(np.divide(self.pressure, self.contact_modulus))
 
     @property

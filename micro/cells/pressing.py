@@ -78,10 +78,10 @@ class Pressing:
         first = None if start is None else start[box]
         if first is None or not first.any():
             found = nested_pressure(
-                self.grids, part, self.spacing, total=total, tolerance=self.tolerance
+                self.grids, part, self.spacing, total=total, tolerance=self.tolerance, box=box
             )
         else:
-            grid = self.grids.at(part.shape, self.spacing)
+            grid = self.grids.at(part.shape, self.spacing, box)
             found = contact_pressure(grid, part, first, total=total, tolerance=self.tolerance)
         pressure = np.zeros(required.shape)
         pressure[box] = found.pressure

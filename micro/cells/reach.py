@@ -25,6 +25,11 @@ class Box(NamedTuple):
         return self.rows.stop - self.rows.start, self.columns.stop - self.columns.start
 
     @classmethod
+    def whole(cls, grid: tuple[int, ...]) -> Box:
+        """Return the box of all cells."""
+        return cls(slice(0, grid[0]), slice(0, grid[1]))
+
+    @classmethod
     def around(cls, cells: NDArray[np.bool_]) -> Box:
         """Return a box around some cells, at least one.
 

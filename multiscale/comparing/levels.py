@@ -32,7 +32,7 @@ PATCHES = (1, 2, 4, 8, 16)
 CELLS_PER_PATCH = 2
 """Elements along a patch, at least, of blocks that carry laws themselves."""
 
-SMOOTH_CELLS = ((8, 8, 6), (16, 16, 12), (24, 24, 16))
+SMOOTH_CELLS = ((8, 8, 6), (20, 20, 12), (24, 24, 16))
 """Elements of blocks that only correct the half-space: coarse, as by default, fine."""
 
 FINE_LOADS = 32

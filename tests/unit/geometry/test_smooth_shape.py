@@ -24,13 +24,18 @@ def test_cells_shrink_towards_all_faces_alike():
     for ticks, ends, ratio in zip(
         block((16, 16, 8)).ticks,
         ((0.0, 1.0), (0.0, 2.0), (-0.5, 0.0)),
-        (2.0, 2.0, 4.0),
+        (1.5**3, 1.5**3, 2.0),
         strict=True,
     ):
         sizes = np.diff(ticks)
         assert (ticks[0], ticks[-1]) == ends
         np.testing.assert_allclose(sizes, sizes[::-1], rtol=1e-13)
         assert sizes.max() / sizes.min() == pytest.approx(ratio, rel=1e-13)
+
+
+def test_cells_shrink_no_further_than_to_an_eighth():
+    sizes = np.diff(block((40, 40, 20)).ticks[0])
+    assert sizes.max() / sizes.min() == pytest.approx(8.0, rel=1e-12)
 
 
 def test_margin_keeps_its_own_grading():

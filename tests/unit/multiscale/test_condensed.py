@@ -176,7 +176,7 @@ def test_plan_states_what_the_smooth_rest_costs():
     said = re.search(r"146247 unknowns, and takes about ([\d.]+) s and ([\d.]+) GB", str(notes))
     assert said is not None
     assert 0.5 * 2.8 < float(said[2]) < 2.0 * 2.8
-    assert any("16 × 16 × 12 cells give the compliance" in note for note in notes)
+    assert any("20 × 20 × 12 cells give the compliance" in note for note in notes)
 
 
 def test_too_fine_a_smooth_rest_is_refused_with_its_key():

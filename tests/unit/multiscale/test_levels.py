@@ -151,7 +151,7 @@ def test_scene_that_leaves_all_open_has_levels_that_stand(tmp_path):
 
 def test_heights_count_before_elements():
     # with 5 % of the force at stake, against a tenth of that
-    names = ["32 × 32, 16 × 16 × 12 elements", "128 × 128, 8 × 8 × 6 elements"]
+    names = ["32 × 32, 20 × 20 × 12 elements", "128 × 128, 8 × 8 × 6 elements"]
     picked = [level for level in made() if level.name.endswith(tuple(names))]
     ones = np.ones(2)
     curves = Curves(
