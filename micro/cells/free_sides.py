@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from geometry import Partition
 from geometry.errors import InputError
-from micro.distance_nodes import distance_nodes, means_over, values_at
+from micro.cells.distance_nodes import distance_nodes, means_over, values_at
 from micro.quarter_space import quarter_space
 
 Array = NDArray[np.float64]

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy import fft
 from scipy.sparse import csr_array, hstack
 
+from micro.cells.distance_nodes import distance_nodes, means_over
 from micro.cells.free_sides import FreeSides
-from micro.distance_nodes import distance_nodes, means_over
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
