@@ -96,6 +96,7 @@ def coarser_grids(lattice: Lattice, matrix: PETSc.Mat, free: PETSc.Vec) -> list[
     found = []
     for step in transfers(lattice, free):
         matrix = galerkin(matrix, step.weights, step.free, step.coarse_free)
+        step.weights.destroy()  # PETSc would keep what several ranks drop
         found.append(CoarserGrid(step.interpolation, matrix))
     return found
 

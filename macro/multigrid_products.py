@@ -60,6 +60,7 @@ def _weights_of(rows: BlockRows, weights: PETSc.Mat) -> tuple[sparse.csr_matrix,
     every = PETSc.IS().createStride(weights.getSize()[1], 0, 1, comm=PETSc.COMM_SELF)
     found = weights.createSubMatrices(at, every)[0]
     starts, columns, values = found.getValuesCSR()
+    found.destroy()
     coarse, places = np.unique(columns, return_inverse=True)
     table = sparse.csr_matrix((values, places, starts), shape=(len(wanted), len(coarse)))
     order = np.searchsorted(wanted, np.concatenate([np.arange(first, last), rows.ghosts]))
@@ -124,6 +125,8 @@ def _sum_of_parts(parts: list[sparse.bsr_matrix], coarse: Indices, weights: PETS
         vector.assemble()
     local, size = here[0].getSizes()
     near, far = (np.rint(vector.array_r).astype(PETSc.IntType) for vector in here)
+    for vector in here:
+        vector.destroy()
     room = (np.minimum(near, local), np.minimum(far, size - local))
     matrix = PETSc.Mat().create(comm)
     matrix.setSizes(((3 * local, 3 * size),) * 2)
