@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -24,8 +25,8 @@ Array = NDArray[np.float64]
 
 _LOADS = 16  # rectangles along a side, at least, that tell a smooth field the contacts' forces
 _MOST_LOADS = 32
-"""And at most, but for those at free sides; patches may be smaller. Set 1, seed 1 at 8 µm, which
-has contacts near a side, carries 3.070, 3.049 and 3.046 N with 16, 32 and 48."""
+"""And at most, where they would be more than its square. Set 1, seed 1 at 8 µm, which has contacts
+near a free side, carries 3.070, 3.049 and 3.046 N with 16, 32 and 48."""
 
 _HALVINGS = 2
 """Halvings of the outermost rectangles where the micro model knows of no sides: contacts near them
@@ -170,14 +171,16 @@ def yielding(stage: Stage, table: LawTable, comm: Any) -> Yielding:
 def fine_loads(stage: Stage) -> UnevenPartition:
     """Return rectangles that tell the block of a scene where its contacts are.
 
-    They divide the patches, unless these are smaller themselves, and are smallest at free sides,
-    above all if the micro model knows of none.
+    They divide the patches, unless these are too many, and are smallest at free sides, above all
+    if the micro model knows of none.
 
     Args:
         stage: The scene's ingredients.
     """
     patches = stage.patches
-    counts = [min(n * -(-_LOADS // n), _MOST_LOADS) for n in patches.grid]
+    counts = [n * -(-_LOADS // n) for n in patches.grid]
+    if math.prod(counts) > _MOST_LOADS**2:
+        counts = [min(count, _MOST_LOADS) for count in counts]
     even = [
         np.linspace(0.0, length, count + 1, dtype=np.float64)
         for length, count in zip(patches.lengths, counts, strict=True)
@@ -269,7 +272,7 @@ def scene_loads(stage: Stage) -> Partition:
     Args:
         stage: The scene's ingredients.
     """
-    few = max(stage.patches.grid) <= _MOST_LOADS
+    few = stage.patches.count <= _MOST_LOADS**2
     return stage.patches if few and stage.scene.coupling.kind == "isolated" else fine_loads(stage)
 
 
