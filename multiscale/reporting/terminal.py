@@ -29,15 +29,16 @@ def speaks(comm: Any) -> bool:
 
 
 def complain(comm: Any, error: PatchlawError) -> None:
-    """Print one error message on the error stream.
+    """Print one error message on the error stream, as one line whatever it quotes.
 
     Args:
         comm: MPI communicator, or None.
         error: What to say.
     """
     if speaks(comm):
+        line = escape(" ".join(str(error).splitlines()))
         # Long lines stay whole: a message may be searched for, or cut and pasted.
-        Console(stderr=True, soft_wrap=True).print(f"[bold red]patchlaw:[/] {escape(str(error))}")
+        Console(stderr=True, soft_wrap=True).print(f"[bold red]patchlaw:[/] {line}")
 
 
 def say(comm: Any, text: str) -> None:

@@ -11,8 +11,9 @@ from multiscale.cli import main
 COMMANDS = ("run", "run", "plan", "compare", "laws", "surface", "schema", "doctor", "warm")
 SCENE = "SCENE"  # stands for the scene file
 GOOD = (
-    "--out out", "--out out/deeper", "--set output.figures=false", "--set coupling.kind=isolated",
-    "--set load.steps=1 micro.model=islands", "--set block.cells=[4,4,3] load.tilt=free",
+    "--out out", "--out out/deeper", "--set output.figures=false", "--resume",
+    "--set load.steps=1 micro.model=islands", "--set load.tilt=free",
+    "--set coupling.kind=isolated block.cells=[4,4,3]",
     "--set output.report=false load.force=0.1",
 )  # fmt: skip
 ODD = (

@@ -172,6 +172,8 @@ def test_concurrent_run_from_scene_to_fields(capsys, tmp_path):
         (("run", "/dev/zero"), "/dev/zero: cannot be read: it is not a regular file"),
         (("run", PAPER, "--fast"), "unrecognized arguments: --fast (see: patchlaw --help)"),
         (("fly",), "invalid choice: 'fly'"),
+        (("run", PAPER, "two\nlines\r"), "unrecognized arguments: two lines"),
+        (("run", "no\nwhere.toml"), "no where.toml: cannot be read"),
         ((), "the following arguments are required: COMMAND"),
     ],
 )
