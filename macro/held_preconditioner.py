@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
+from scipy.sparse import csr_array
 
 from macro.projection import Projection
 
@@ -82,69 +83,69 @@ class _Surroundings:
 
     Attributes:
         near: Unknowns close to them, which they do not belong to, shape (n,).
-        around: What these have entries with, shape (m,).
+        around: Unknowns of all nodes that these have entries with, shape (m,).
     """
 
     def __init__(self, matrix: PETSc.Mat, dofs: Indices, layers: int) -> None:
         nodes = np.unique(dofs // 3)
         for _ in range(layers):
             nodes = _neighbours(matrix, nodes)
+        every = _unknowns(nodes) if layers else dofs
+        chosen = ~np.isin(every, dofs)
+        self.near = every[chosen]
+        if not len(self.near):
+            return
         beside = _neighbours(matrix, nodes)
-        every, self.around = _unknowns(nodes), _unknowns(beside)
-        self.near = near = np.setdiff1d(every, dofs)
-        whole = _part(matrix, nodes, beside)
-        self._rows = whole.createSubMatrix(_indices(np.searchsorted(every, near)))
-        whole.destroy()
-        within = np.searchsorted(self.around, near)
-        self._square = self._rows.createSubMatrix(_indices(np.arange(len(near))), _indices(within))
-        self._outer, self._inner = self._rows.createVecs()
-        self._sag = self._inner.duplicate()
+        self.around = _unknowns(beside)
+        self._rows = _part(matrix, nodes, beside)[chosen]
+        square = csr_array(self._rows[:, np.searchsorted(self.around, self.near)])
+        square.sort_indices()
+        pattern = (part.astype(PETSc.IntType) for part in (square.indptr, square.indices))
+        csr = (*pattern, square.data)
+        self._square = PETSc.Mat().createAIJ(square.shape, csr=csr, comm=PETSc.COMM_SELF)
+        self._load, self._sag = self._square.createVecs()
 
     def swept(self, load: Array) -> Array:
         """Return the displacements of `near` that sweeps find under their load, shape (n,)."""
-        self._inner.array[:] = load
-        self._square.SOR(self._inner, self._sag, sortype=_FROM_ZERO, its=_SWEEPS)
+        self._load.array[:] = load
+        self._square.SOR(self._load, self._sag, sortype=_FROM_ZERO, its=_SWEEPS)
         return self._sag.array_r.copy()
 
     def pushed(self, sag: Array) -> Array:
         """Return the forces on `around` by displacements of `near`, shape (m,)."""
-        self._inner.array[:] = sag
-        self._rows.multTranspose(self._inner, self._outer)
-        return self._outer.array_r
+        forces: Array = sag @ self._rows
+        return forces
 
     def forces(self, sag: Array) -> Array:
         """Return the forces on `near` by displacements of `around`, shape (n,)."""
-        self._outer.array[:] = sag
-        self._rows.mult(self._outer, self._inner)
-        return self._inner.array_r
+        forces: Array = self._rows @ sag
+        return forces
 
     def destroy(self) -> None:
-        """Give the matrices back, which would else wait for Python's collector."""
-        for part in (self._rows, self._square):
-            part.destroy()
+        """Give the matrix back, which would else wait for Python's collector."""
+        self._square.destroy()
 
 
 def _neighbours(matrix: PETSc.Mat, nodes: Indices) -> Indices:
-    """Return the nodes that some nodes have entries with, sorted."""
+    """Return the nodes that nodes have entries with, ascending."""
     if not len(nodes):
         return nodes
-    rows = _part(matrix, nodes)
-    found = np.unique(rows.getValuesCSR()[1] // 3).astype(np.intp)
-    rows.destroy()
-    return found
+    every = np.arange(matrix.getSize()[1] // 3)
+    return np.unique(_part(matrix, nodes, every).indices // 3).astype(np.intp)
 
 
-def _part(matrix: PETSc.Mat, rows: Indices, columns: Indices | None = None) -> PETSc.Mat:
-    """Return the entries of whole nodes with whole nodes, without blocks."""
-    wanted = None if columns is None else _indices(_unknowns(columns))
-    part = matrix.createSubMatrix(_indices(_unknowns(rows)), wanted)
-    return part.convert("aij") if part.getType() == "seqbaij" else part
+def _part(matrix: PETSc.Mat, rows: Indices, columns: Indices) -> csr_array:
+    """Return the part of a matrix that belongs to nodes; matrices of blocks give no less."""
+    part = matrix.createSubMatrix(_blocks(rows), _blocks(columns))
+    starts, places, entries = part.getValuesCSR()
+    size = part.getSize()
+    part.destroy()
+    return csr_array((entries, places, starts), shape=size)
+
+
+def _blocks(nodes: Indices) -> PETSc.IS:
+    return PETSc.IS().createBlock(3, nodes.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
 
 
 def _unknowns(nodes: Indices) -> Indices:
-    """Return the unknowns of nodes, three each."""
     return (3 * nodes[:, None] + np.arange(3)).ravel()
-
-
-def _indices(of: Indices) -> PETSc.IS:
-    return PETSc.IS().createGeneral(of.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
