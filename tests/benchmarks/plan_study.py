@@ -26,7 +26,8 @@ import numpy as np
 
 from geometry.patches import PatchGrid
 from micro import HalfSpaceModel
-from multiscale import Run, Scene, assemble, blocks
+from multiscale import Run, Scene
+from multiscale.couplings import blocks
 from multiscale.reporting.results import write_results
 
 FACTOR = 2.0
@@ -85,11 +86,11 @@ def fine_loads():
     def fine(stage):
         return PatchGrid(grid=FINE_LOADS, lengths=stage.patches.lengths)
 
-    blocks.fine_loads = assemble.fine_loads = fine
+    blocks.fine_loads = fine
     try:
         yield
     finally:
-        blocks.fine_loads = assemble.fine_loads = ordinary
+        blocks.fine_loads = ordinary
 
 
 def truth(data, stage):

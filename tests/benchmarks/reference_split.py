@@ -58,7 +58,7 @@ def graded(count):
 
 def rest_of(count):
     """Return what the block adds to the half-space with its sides, which serves every surface."""
-    shape = BlockShape(interface=(SIDE, SIDE), height=SIDE, cells=(20, 20, 12))
+    shape = BlockShape(interface=(SIDE, SIDE), height=SIDE, cells=(24, 24, 16))
     half_space = HalfSpace(MATERIAL.young_modulus, MATERIAL.poisson_ratio)
     found = make_correction(shape, MATERIAL, "free", graded(count), half_space, COMM)
     beside = SIDES.top(found.x, found.y, found.loads)
