@@ -27,6 +27,8 @@ parser.add_argument("--out", type=Path, default=Path("results/hard_cases"))
 choice = parser.parse_args()
 choice.out.mkdir(parents=True, exist_ok=True)
 blocks_and_loads.LAPS = 3 if choice.quick else 100
+if choice.quick:
+    blocks_and_loads.MODULI = (1e3,)
 assert surfaces.CELLS == 32
 
 # %% [markdown]
@@ -36,7 +38,7 @@ assert surfaces.CELLS == 32
 # %%
 rows, errors = [], []
 for case in sorted(CASES, key=lambda one: one.number):
-    if choice.quick and "64 × 64" in case.hard:
+    if choice.quick and ("64 × 64" in case.hard or "8 × 8 × 8" in case.hard):
         continue
     began = time.perf_counter()
     try:
