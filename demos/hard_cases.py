@@ -78,7 +78,7 @@ work.set(xlabel="Newton iterations per load step", yticks=place, yticklabels=nam
 right.barh(place, [case.bound for case, *_ in rows], left=1e-16, color="0.85", height=0.7)
 right.plot([max(error, 1e-16) for _, error, *_ in rows], place, "ko", markersize=4)
 right.set(xscale="log", xlim=(1e-16, 2.0), xlabel="off by (points), at most (bars)")
-work.invert_yaxis()
+work.set(ylim=(len(rows) - 0.4, -0.6))  # from above
 for axes in (work, right):
     axes.grid(axis="x", alpha=0.3)
 figure.savefig(choice.out / "hard_cases.png", dpi=130)
