@@ -27,6 +27,8 @@ parser.add_argument("--out", type=Path, default=Path("results/hard_cases"))
 choice = parser.parse_args()
 choice.out.mkdir(parents=True, exist_ok=True)
 blocks_and_loads.LAPS = 3 if choice.quick else 100
+if choice.quick:
+    blocks_and_loads.MODULI = (1e3,)
 assert surfaces.CELLS == 32
 
 # %% [markdown]
@@ -36,7 +38,7 @@ assert surfaces.CELLS == 32
 # %%
 rows, errors = [], []
 for case in sorted(CASES, key=lambda one: one.number):
-    if choice.quick and "64 × 64" in case.hard:
+    if choice.quick and ("64 × 64" in case.hard or "8 × 8 × 8" in case.hard):
         continue
     began = time.perf_counter()
     try:
@@ -76,7 +78,7 @@ work.set(xlabel="Newton iterations per load step", yticks=place, yticklabels=nam
 right.barh(place, [case.bound for case, *_ in rows], left=1e-16, color="0.85", height=0.7)
 right.plot([max(error, 1e-16) for _, error, *_ in rows], place, "ko", markersize=4)
 right.set(xscale="log", xlim=(1e-16, 2.0), xlabel="off by (points), at most (bars)")
-work.invert_yaxis()
+work.set(ylim=(len(rows) - 0.4, -0.6))  # from above
 for axes in (work, right):
     axes.grid(axis="x", alpha=0.3)
 figure.savefig(choice.out / "hard_cases.png", dpi=130)

@@ -18,7 +18,7 @@ from multiscale.law_tables.patch_laws import PatchLaws
 from multiscale.law_tables.repair import evened_law
 from multiscale.laws import PatchLaw
 
-LAPS = 10
+LAPS, MODULI = 10, (4e9, 1e3, 1e12)
 SOFT = {"patches__grid": [2, 2], "surface__grid": [16, 16]}
 
 
@@ -47,7 +47,7 @@ def other_units(kind: str, **changes: Any) -> tuple[Any, ...]:
     """State the scene in m, mm and µm; moduli 1 kPa and 1 TPa besides."""
     here, error = solved(kind, **changes), 0.0
     for unit, size in (("m", 1e3), ("um", 1e-3)):
-        for modulus in (4e9, 1e3, 1e12):
+        for modulus in MODULI:
             there = solved(
                 kind, surface__lengths=[f"1 {unit}"] * 2, block__height=f"1 {unit}",
                 load__approach=f"{8 * size} um", block__young_modulus=f"{modulus} Pa", **changes,
