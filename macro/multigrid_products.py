@@ -133,6 +133,8 @@ def _sum_of_parts(parts: list[sparse.bsr_matrix], coarse: Indices, weights: PETS
     matrix.setType("baij")
     matrix.setBlockSize(3)
     matrix.setPreallocationNNZ(room)
+    # ranks without rows do not set this by themselves, and assembly hangs where ranks differ in it
+    matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, True)
     matrix.setOption(PETSc.Mat.Option.ROW_ORIENTED, False)
     for starts, columns, values, rows in entries:
         pattern = (part.astype(PETSc.IntType) for part in (starts, columns))
