@@ -4,6 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[2]
@@ -15,6 +16,8 @@ ROOT = Path(__file__).parents[2]
     ids=" ".join,
 )
 def test_tool_has_no_complaint(command):
+    if command == ("mypy",) and np.lib.NumpyVersion(np.__version__) >= "2.0.0":
+        pytest.skip("types are checked against numpy 1.24; stubs of 2.2 lose float64 in quotients")
     result = subprocess.run(
         [sys.executable, "-m", *command], cwd=ROOT, capture_output=True, text=True, check=False
     )
