@@ -5,8 +5,8 @@ An iteration on P ranks with n unknowns each takes
     T = n w / M  +  e (λ + k o) + v n^(2/3) / β  +  r λ log₂ P  +  λ + c o + f / M
 
 that is memory traffic of w bytes per unknown; e exchanges with k neighbours, and the bytes sent in
-them; r reductions; and the coarsest grid, which its owners send to all ranks one by one, c = P − 1,
-and every rank solves with a factor of f bytes. λ + k o is LogGP's cost of k messages that overlap
+them; r reductions; and the coarsest grid, which its owners send to one rank that solves it with a
+factor of f bytes and sends it back, c messages. λ + k o is LogGP's cost of k messages that overlap
 (Alexandrov et al. 1995, doi 10.1145/215399.215427), λ log₂ P that of a reduction by recursive
 doubling (Thakur, Rabenseifner & Gropp 2005, doi 10.1177/1094342005051521). e grows with the number
 of grids, which an eightfold problem has one more of.
@@ -54,7 +54,7 @@ class Iteration:
         grids: Its grids but for the coarsest.
         owners: Ranks that the nodes of the coarsest grid can lie on.
         factor: f, bytes that the coarsest solve moves.
-        gathered: Ranks that the coarsest grid is gathered on and solved by each; 0: all.
+        gathered: Ranks that the coarsest grid is gathered on and solved by each.
     """
 
     traffic: float
@@ -66,7 +66,7 @@ class Iteration:
     grids: int
     owners: float
     factor: float
-    gathered: int = 0
+    gathered: int = 1
 
     def rounds(self, unknowns: float) -> float:
         """Return e for a block of some unknowns."""
@@ -75,8 +75,6 @@ class Iteration:
 
     def spread(self, ranks: int) -> float:
         """Return c, the messages of the busiest rank for the coarsest grid."""
-        if not self.gathered:
-            return ranks - 1.0
         return 2.0 * min(self.owners, ranks - 1.0) / self.gathered + self.gathered - 1.0
 
     def messages(self, unknowns: float, ranks: int) -> float:
