@@ -123,7 +123,10 @@ def test_slope_is_the_derivative(local):
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"loads": PatchGrid(grid=(3, 2), lengths=(2.0, 1.0))}, r"must divide .*grid lines on all"),
+        (
+            {"loads": PatchGrid(grid=(3, 2), lengths=(2.0, 1.0))},
+            r"the rectangles of the loads must divide the patches",
+        ),
         ({"forces": np.zeros((3, 8))}, "rows of a spread do not fit"),
         ({"approach": np.zeros((9, 3))}, "rows of a spread do not fit"),
         ({"correction": np.zeros((8, 7))}, "rows of a spread do not fit"),
