@@ -86,7 +86,7 @@ def test_large_flat_blocks_do_without_gmsh(monkeypatch):
 
 def test_builders_that_do_not_fit_are_refused():
     shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(1, 1, 1))
-    with pytest.raises(InputError, match="this builder of meshes is unknown.*auto, gmsh, lattice"):
+    with pytest.raises(InputError, match=r"this builder of meshes is unknown.*auto, gmsh, lattice"):
         block_mesh(shape, MPI.COMM_SELF, "netgen")
     refined = RefinedShape(
         interface=(1.0, 1.0), height=1.0, element="P1", fine=0.5, coarse=0.5, growth=1.0,
