@@ -74,12 +74,13 @@ class Iteration:
         return self.exchanges * (self.grids + more) + self.outside
 
     def spread(self, ranks: int) -> float:
-        """Return c, the messages of the busiest rank for the coarsest grid."""
+        """Return c, the messages that the busiest rank gets and sends for the coarsest grid."""
         return 2.0 * min(self.owners, ranks - 1.0) / self.gathered + self.gathered - 1.0
 
     def messages(self, unknowns: float, ranks: int) -> float:
         """Return the messages that the busiest rank sends."""
-        return self.rounds(unknowns) * min(ranks - 1, INSIDE) + self.spread(ranks)
+        back = 0.5 * self.spread(ranks)  # those that it gets are not counted
+        return self.rounds(unknowns) * min(ranks - 1, INSIDE) + back
 
     def sent(self, unknowns: float, ranks: int) -> float:
         """Return the bytes that the busiest rank sends to neighbours.
