@@ -17,14 +17,14 @@ from multiscale.reference.meshes import ReferenceMeshes
 IMPORT = Work(call=2_700_000)
 """Loading dolfinx, PETSc and gmsh, unless they are there."""
 
-_CYCLE = 9.5  # products with the stiffness that a cycle is worth
-_SET_UP = 310.0  # products that mesh, stiffness and multigrid are worth
+_CYCLE = 6.6  # products with the stiffness that a cycle is worth
+_SET_UP = 250.0  # products that mesh, stiffness and multigrid are worth
 _ENTRIES = {"Q1": 81.0, "P1": 45.0, "Q2": 190.0, "P2": 85.0}  # of the stiffness, per unknown
 _FACTOR = 30.0  # operations over unknowns²
 _FILL = 21.0  # entries of the factor over unknowns^(4/3)
 _FIELD = 200.0  # logarithms that the half-space's stresses at a point by a rectangle are worth
 _ASSEMBLY = 120.0  # products that the smooth rest's stiffness is worth
-_REFERENCE_CYCLES = {"Q1": 20, "Q2": 60, "P1": 40, "P2": 60}
+_REFERENCE_CYCLES = {"Q1": 15, "Q2": 60, "P1": 40, "P2": 60}
 """Multigrid cycles of all active sets of a load step: 15 to 22, 31 to 44 and 51 to 76 were counted
 with Q1, P1 and P2; Q2 is taken like P2."""
 
