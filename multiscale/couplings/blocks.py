@@ -69,7 +69,10 @@ def patch_compliance(stage: Stage, comm: Any) -> Array:
         Collective.
     """
     if stage.scene.coupling.decomposed:
-        correction = smooth_correction(stage, scene_loads(stage), comm)
+        if stage.scene.coupling.kind == "consistent":  # whose laws know of free sides themselves
+            correction = contact_correction(stage, comm)
+        else:
+            correction = smooth_correction(stage, scene_loads(stage), comm)
         return _half_space(stage) + correction.patch_compliance(stage.patches)
     from mpi4py import MPI
 
