@@ -23,9 +23,10 @@ from petsc4py import PETSc
 from geometry.meshes import BlockShape
 from geometry.refined_block import RefinedShape
 from macro.elasticity import Material
+from macro.factorisation import DIRECT_DEFAULTS
 from macro.multigrid import Lattice, coarser_grids
 from macro.multigrid_degrees import two_degree_solver
-from macro.solvers import DIRECT_DEFAULTS, PREFIX, linear_solver
+from macro.solvers import PREFIX, linear_solver
 
 COMPRESSIBLE = 0.45
 """Poisson's ratio up to which multigrid does without a lattice."""

@@ -23,6 +23,7 @@ from geometry.smooth_shape import SmoothShape, smooth_shape
 from macro.block import Block, Sides
 from macro.correction import Correction
 from macro.elasticity import Material
+from macro.factorisation import set_up
 from macro.mesh import block_mesh
 from macro.side_loads import sides as side_planes
 
@@ -175,7 +176,7 @@ def _solved(matrix: PETSc.Mat, right: Array) -> Array:
     factor = solver.getPC()
     factor.setType("cholesky")
     factor.setFactorSolverType("mumps")
-    solver.setUp()
+    set_up(solver)
     right = np.asfortranarray(right)
     solution = np.zeros_like(right, order="F")
     dense = [

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from petsc4py import PETSc
 
 from geometry.errors import InputError, NotConverged
+from macro.factorisation import set_up
 
 PREFIX = "patchlaw_"
 """Prefix of every PETSc option: ``-patchlaw_ksp_rtol 1e-6`` on the command line wins."""
@@ -45,12 +46,6 @@ GEOMETRIC_DEFAULTS: Mapping[str, object] = {
 messages from all to all. Two steps of smoothing before and after: one takes 1.7 to 1.9 times the
 iterations and three 0.7 to 0.8 of them, in the same time; Gauss–Seidel takes two to four times it.
 """
-
-DIRECT_DEFAULTS: Mapping[str, object] = {
-    "pc_type": "cholesky",
-    "pc_factor_mat_solver_type": "mumps",
-}
-"""A factorisation, distributed over the ranks."""
 
 
 @contextmanager
@@ -124,7 +119,7 @@ def linear_solver(
     usual = {**GEOMETRIC_DEFAULTS, **one_rank} if geometric else ALGEBRAIC_DEFAULTS
     with default_options(prefix, {**KRYLOV_DEFAULTS, **usual, **(preconditioner or {})}):
         solver.setFromOptions()
-        solver.setUp()  # multigrid reads the options of its levels here
+        set_up(solver)  # multigrid reads the options of its levels here
     return solver
 
 
