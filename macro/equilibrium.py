@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from macro.block import Block
+from macro.borrowed import Borrowed
 from macro.contact import Contact
 from macro.interface import Sampling
 
@@ -45,7 +46,7 @@ class Equilibrium:
         self._samples = sampling.operator.createVecRight()
         self._action = _TangentAction(stiffness, sampling)
         self.tangent = PETSc.Mat().createPython(
-            stiffness.getSizes(), self._action, comm=stiffness.comm
+            stiffness.getSizes(), Borrowed(self._action), comm=stiffness.comm
         )
         self.tangent.setUp()
 
@@ -77,7 +78,7 @@ class Equilibrium:
 class _TangentAction:
     """What PETSc calls to multiply by the tangent.
 
-    Apart from :class:`Equilibrium`, because a matrix whose context holds the matrix is never freed.
+    Apart from :class:`Equilibrium`, which holds the matrix that is multiplied by.
     """
 
     def __init__(self, stiffness: PETSc.Mat, sampling: Sampling) -> None:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.errors import NotConverged
+from macro.borrowed import Borrowed
 from macro.held_preconditioner import HeldPreconditioner
 from macro.projection import Projection
 from macro.solvers import PREFIX, reason_name
@@ -46,8 +47,9 @@ class FreeSolver:
 
     def __init__(self, matrix: PETSc.Mat, preconditioner: PETSc.PC, layers: int = 2) -> None:
         self._left = Projection(matrix.comm.tompi4py())
+        self._projected = _Projected(matrix, self._left)
         operator = PETSc.Mat().createPython(
-            matrix.getSizes(), _Projected(matrix, self._left), comm=matrix.comm
+            matrix.getSizes(), Borrowed(self._projected), comm=matrix.comm
         )
         operator.setUp()
         self._ksp = PETSc.KSP().create(matrix.comm)
@@ -57,7 +59,7 @@ class FreeSolver:
         self._ksp.setTolerances(max_it=1000)
         self._ksp.pc.setType("python")
         self._mended = HeldPreconditioner(matrix, preconditioner, self._left, layers)
-        self._ksp.pc.setPythonContext(self._mended)
+        self._ksp.pc.setPythonContext(Borrowed(self._mended))
 
     def hold(self, dofs: NDArray[np.intp], motions: Array | None = None) -> None:
         """Hold degrees of freedom but for common motions, and free all others.

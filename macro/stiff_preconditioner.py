@@ -8,6 +8,7 @@ from petsc4py import PETSc
 from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import splu
 
+from macro.borrowed import Borrowed
 from macro.held_preconditioner import HeldPreconditioner
 from macro.projection import Projection
 
@@ -47,7 +48,7 @@ class StiffPreconditioner:
         self.pc = PETSc.PC().create(matrix.comm)
         self.pc.setOperators(matrix)
         self.pc.setType("python")
-        self.pc.setPythonContext(self._split)
+        self.pc.setPythonContext(Borrowed(self._split))
 
     def update(self, slope: Array, dofs: NDArray[np.intp], motions: Array) -> None:
         """Move to other springs.

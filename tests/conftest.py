@@ -5,8 +5,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
+
+# as many workers as cores, so that threads would only be in each other's way; before numpy comes
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import numpy as np
 
 # a test computes what it tests, and leaves nothing in the home of who runs it
 os.environ["PATCHLAW_CACHE"] = "off"

@@ -19,7 +19,7 @@ from multiscale.reference.record import ReferenceRecord, reference_record
 from multiscale.stage import Stage
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import MeshQuality, ObstacleBlock, ObstacleState
+    from macro import Block, MeshQuality, ObstacleBlock, ObstacleState
 
 Array = NDArray[np.float64]
 
@@ -60,9 +60,14 @@ class ReferenceCoupling:
         return self._blocks[-1]
 
     @property
+    def blocks(self) -> list[Block]:
+        """The rough blocks, the finest last."""
+        return [pressed.block for pressed in self._blocks]
+
+    @property
     def unknowns(self) -> tuple[int, ...]:
         """Degrees of freedom of every block."""
-        return tuple(block.block.dofs for block in self._blocks)
+        return tuple(block.dofs for block in self.blocks)
 
     @property
     def latest(self) -> ObstacleState:
