@@ -11,13 +11,14 @@ from multiscale.coupling import AnalyticCoupling, EmbeddedCoupling
 from multiscale.couplings.concurrent import ConcurrentCoupling
 from multiscale.couplings.condensed import CondensedCoupling
 from multiscale.couplings.yielding import SpreadLoads, UniformLoads
-from multiscale.history import History, LoadStep, PatchState
+from multiscale.history import History
 from multiscale.law_tables.consistent import consistent_laws
 from multiscale.law_tables.isolated import isolated_laws
 from multiscale.law_tables.law_files import LawTable, read_laws, write_laws
 from multiscale.law_tables.patch_laws import PatchLaws
 from multiscale.law_tables.spread import ContactSpread
 from multiscale.laws import PatchLaw
+from multiscale.load_step import LoadStep, PatchState
 from multiscale.loading import Programme, load_steps
 from multiscale.reference.coupling import ReferenceCoupling
 from multiscale.reference.extrapolation import Estimate, extrapolated
@@ -25,7 +26,8 @@ from multiscale.reference.record import ReferenceRecord
 from multiscale.restart.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
 from multiscale.run import Run, run
 from multiscale.scene import Scene
-from multiscale.stage import Stage, make_stage
+from multiscale.stage import Stage
+from multiscale.staging import make_stage
 
 __all__ = [
     "AnalyticCoupling",

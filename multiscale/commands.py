@@ -25,7 +25,8 @@ from multiscale.restart.resuming import Keeper, is_finished, kept_choices
 from multiscale.run import Run
 from multiscale.scene import Scene
 from multiscale.scenes.quantities import parse_duration
-from multiscale.stage import Stage, make_stage
+from multiscale.stage import Stage
+from multiscale.staging import make_stage
 
 
 def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:

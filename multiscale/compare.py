@@ -19,7 +19,7 @@ from multiscale.comparing.rows import compared
 from multiscale.planning.choices import open_keys, provisional, settled_keys, with_settled
 from multiscale.reporting.outputs import write_json
 from multiscale.scene import Scene
-from multiscale.stage import make_stage
+from multiscale.staging import make_stage
 
 SETTLED = "settled.json"
 """File beside finished levels, of what the plan took for the keys that the scene leaves open."""

@@ -13,8 +13,8 @@ from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
 from micro import MicroModel, Response, RigidPlane
 from multiscale.couplings.balance import Balance
-from multiscale.history import LoadStep, PatchState
 from multiscale.law_tables.law_files import LawTable
+from multiscale.load_step import LoadStep, PatchState
 from multiscale.loading import BeyondLaws, described
 from multiscale.records import Arrays, packed, unpacked
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from geometry.control import Control
 from geometry.errors import NotConverged
-from multiscale.history import LoadStep
+from multiscale.load_step import LoadStep
 from multiscale.records import Arrays
 
 _MOST_HALVINGS = 8

@@ -17,9 +17,10 @@ from geometry.collective import on_root
 from multiscale.assemble import assemble, make_table
 from multiscale.coupling import EmbeddedCoupling
 from multiscale.couplings.blocks import final_field, load_together
-from multiscale.history import History, LoadStep
+from multiscale.history import History
 from multiscale.law_tables.law_files import LawTable, read_laws, write_laws
 from multiscale.law_tables.repair import repair_notes
+from multiscale.load_step import LoadStep
 from multiscale.loading import Coupling, Drive, Position, Restorable
 from multiscale.planning.choices import settled_keys
 from multiscale.planning.forecast import Forecast, forecast
@@ -29,7 +30,8 @@ from multiscale.reference.coupling import ReferenceCoupling, recorded, reference
 from multiscale.reporting.validity import range_notes
 from multiscale.restart.checkpoint import Checkpoint, digest
 from multiscale.scene import Scene
-from multiscale.stage import Stage, make_stage
+from multiscale.stage import Stage
+from multiscale.staging import make_stage
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import Interface

@@ -1,39 +1,25 @@
-"""Turns a scene into its cheap ingredients: surface, summits, patches, micro model, block shape."""
+"""A scene's cheap ingredients: surface, summits, patches, micro model, block shape."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.asperities import Asperities, find_asperities
-from geometry.errors import InputError
+from geometry.asperities import Asperities
 from geometry.meshes import BlockShape
-from geometry.patches import PatchGrid, patch_means
+from geometry.patches import PatchGrid
 from geometry.surface import Surface
-from micro import MODELS, AsperityModel, Choice, MicroModel, ScaledModel
+from micro import AsperityModel, Choice, MicroModel, ScaledModel
 from multiscale.coupling import tilted_approaches
-from multiscale.ingredients import make_shape, make_surface
 from multiscale.law_tables.refinement import MOST_ROWS
-from multiscale.planning.choices import SETTLED_LATE, cheapest, open_keys, provisional, with_settled
-from multiscale.planning.contact_estimate import Contacts, contacts
+from multiscale.planning.contact_estimate import Contacts, contacts, nearest
 from multiscale.planning.decision import Decision
-from multiscale.planning.micro_choice import (
-    chosen_model,
-    estimated_plane,
-    furthest_plane,
-    nearest,
-    stated_model,
-)
-from multiscale.planning.surface_choice import chosen_surface, micro_tolerance
-from multiscale.reference.meshes import ReferenceMeshes, reference_meshes
+from multiscale.reference.meshes import ReferenceMeshes
 from multiscale.scene import Scene
-from multiscale.stage_checks import check_load, check_patches, check_size, patch_grid
 
 Array = NDArray[np.float64]
 
@@ -212,86 +198,3 @@ class Stage:
         approach, tilt = self.furthest
         from_centre = np.column_stack((x, y)) - 0.5 * np.asarray(self.surface.lengths)
         return np.asarray(approach + from_centre @ np.asarray(tilt) - (self.surface.highest - z))
-
-
-def make_stage(scene: Scene, settled: Mapping[str, Any] | None = None) -> Stage:
-    """Make or read the surface, find its summits, settle what is open, check that all fits.
-
-    Args:
-        scene: The scene.
-        settled: What open keys became when the run began; see `settled_keys`.
-
-    Raises:
-        InputError: When something cannot be made or does not fit; names file, key and value.
-    """
-    began = time.perf_counter()
-    known = settled or {}
-    free = open_keys(scene) - set(known)
-    start = provisional(with_settled(scene, known), free)
-    check_size(start)
-    if "surface.grid" in free:
-        start, surface = chosen_surface(scene, start)
-    else:
-        surface = make_surface(start)
-    check_patches(start, surface)
-    check_load(start, surface)
-    patches = PatchGrid(grid=patch_grid(start), lengths=surface.lengths)
-    asperities = find_asperities(surface, periodic=False)  # the block's sides are free
-    if start.coupling.kind == "reference":
-        return _reference_stage(start, surface, patches, asperities, began)
-    _check_summits(start, asperities)
-    shape = make_shape(start, surface)
-    made = time.perf_counter()
-    seconds = {"surface": made - began}
-    choice, label = None, known.get("micro.model")
-    if start.micro.model == "auto":
-        choice = chosen_model(
-            start, surface, patches, micro_tolerance(scene, start, surface), label
-        )
-        seconds["micro choice"] = time.perf_counter() - made
-    model = choice.model if choice else stated_model(start, surface)
-    mean_heights = patch_means(surface, patches)
-    stage = Stage(
-        scene=start,
-        surface=surface,
-        asperities=asperities,
-        micro=model,
-        patches=patches,
-        mean_heights=mean_heights,
-        shape=shape,
-        furthest=furthest_plane(start.loading.programme, model, patches, mean_heights),
-        choice=choice,
-        seconds=seconds,
-    )
-    return cheapest(stage, scene, free) if free & SETTLED_LATE else stage
-
-
-def _check_summits(scene: Scene, asperities: Asperities) -> None:
-    by_summits = scene.micro.model in MODELS and scene.micro.border == "ignore"
-    if by_summits and not len(asperities):
-        raise InputError(
-            "the surface has no summit that could carry load",
-            key="micro.model",
-            value=scene.micro.model,
-            allowed="half-space, islands",
-            file=scene.file,
-        )
-
-
-def _reference_stage(
-    scene: Scene, surface: Surface, patches: PatchGrid, asperities: Asperities, began: float
-) -> Stage:
-    """Return the ingredients of a reference, which needs no micro model."""
-    furthest = estimated_plane(scene, surface)
-    return Stage(
-        scene=scene,
-        surface=surface,
-        asperities=asperities,
-        micro=None,
-        patches=patches,
-        mean_heights=patch_means(surface, patches),
-        shape=make_shape(scene, surface),
-        furthest=furthest,
-        meshes=reference_meshes(scene, surface, furthest),
-        seconds={"surface": time.perf_counter() - began},
-    )

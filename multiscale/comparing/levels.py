@@ -20,8 +20,8 @@ from multiscale.ingredients import make_surface
 from multiscale.planning.costs import predicted_cost
 from multiscale.planning.machine import Machine
 from multiscale.scene import Scene
-from multiscale.stage import make_stage
 from multiscale.stage_checks import EMBEDDED_CELLS, patch_grid
+from multiscale.staging import make_stage
 
 LAW_HEIGHTS = 128
 """Heights along a side, at most, of the half-space behind consistent laws."""

@@ -11,15 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.partition import Partition, UnevenPartition
-from micro import FreeSides, HalfSpace, HalfSpaceModel, influence_matrix
+from micro import FreeSides, HalfSpace, HalfSpaceModel, MicroModel, influence_matrix
 from multiscale.couplings.yielding import SpreadLoads, UniformLoads, Yielding
 from multiscale.law_tables.law_files import LawTable
 from multiscale.scene import Scene
+from multiscale.stage import Stage
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import Correction, Interface, Material
-    from micro import MicroModel
-    from multiscale.stage import Stage
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from micro import MicroModel, Response
 from multiscale.couplings.concurrent_newton import ConcurrentNewton, free, prescribed
 from multiscale.couplings.contact_stiffness import Secant
 from multiscale.couplings.sagging import SaggingContact, SmoothCorrection, Trial
-from multiscale.history import LoadStep
+from multiscale.load_step import LoadStep
 from multiscale.loading import described
 from multiscale.records import Arrays, packed, unpacked
 

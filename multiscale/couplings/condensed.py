@@ -9,9 +9,9 @@ from geometry.control import Control
 from multiscale.coupling import beyond_law, embedded_step
 from multiscale.couplings.dense_newton import DenseNewton, DenseState
 from multiscale.couplings.yielding import Yielding
-from multiscale.history import LoadStep, PatchState
 from multiscale.law_tables.law_files import LawTable
 from multiscale.law_tables.patch_laws import PatchLaws
+from multiscale.load_step import LoadStep, PatchState
 from multiscale.records import Arrays, packed, unpacked
 
 Array = NDArray[np.float64]

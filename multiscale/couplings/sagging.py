@@ -15,7 +15,7 @@ from geometry.partition import Partition
 from geometry.patches import PatchGrid
 from micro import MicroModel, Response, RigidPlane
 from multiscale.coupling import response_step
-from multiscale.history import LoadStep
+from multiscale.load_step import LoadStep
 
 Array = NDArray[np.float64]
 

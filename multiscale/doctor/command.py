@@ -10,7 +10,8 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 
-from multiscale.doctor.examination import Finding, examine, verdict
+from multiscale.doctor.examination import examine, verdict
+from multiscale.doctor.finding import Finding
 from multiscale.doctor.warm import checked_elements, warm
 from multiscale.reporting import terminal
 

@@ -3,31 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 from geometry.errors import InputError, PatchlawError
-
-State = Literal["ok", "warning", "fail"]
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """What one check found.
-
-    Args:
-        topic: What was looked at.
-        state: ``"ok"``; ``"warning"``: runs work but slowly, or may fail elsewhere; ``"fail"``:
-            runs cannot work.
-        text: What was found, in one line.
-        remedy: What to do; empty when all is well.
-    """
-
-    topic: str
-    state: State
-    text: str
-    remedy: str = ""
-
+from multiscale.doctor import forms, machine, packages
+from multiscale.doctor.finding import Finding
 
 Check = Callable[[Any], list[Finding]]
 
@@ -44,21 +24,17 @@ def examine(comm: Any) -> list[Finding]:
     Note:
         Collective.
     """
-    from multiscale.doctor import forms as doctor_forms
-    from multiscale.doctor import machine as doctor_machine
-    from multiscale.doctor import packages as doctor_packages
-
     checks: Sequence[tuple[str, Check]] = (
-        ("packages", doctor_packages.versions),
-        ("PETSc", doctor_packages.petsc),
-        ("BLAS", doctor_machine.blas),
-        ("launcher", doctor_machine.launcher),
-        ("ranks", doctor_machine.ranks),
-        ("threads", doctor_machine.threads),
-        ("memory", doctor_machine.memory),
-        ("form compiler", doctor_forms.compiler_works),
-        ("form cache", doctor_forms.cache),
-        ("test solve", doctor_forms.known_solve),
+        ("packages", packages.versions),
+        ("PETSc", packages.petsc),
+        ("BLAS", machine.blas),
+        ("launcher", machine.launcher),
+        ("ranks", machine.ranks),
+        ("threads", machine.threads),
+        ("memory", machine.memory),
+        ("form compiler", forms.compiler_works),
+        ("form cache", forms.cache),
+        ("test solve", forms.known_solve),
     )
     return [finding for topic, check in checks for finding in _made(topic, check, comm)]
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from multiscale.doctor.examination import Finding
+from multiscale.doctor.finding import Finding
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from multiscale.doctor.examination import Finding
+from multiscale.doctor.finding import Finding
 from multiscale.mpi_job import strangers
 
 _LAUNCHERS = {"Open MPI": "Open MPI", "HYDRA": "MPICH", "MPICH": "MPICH", "Intel": "Intel MPI"}

@@ -6,7 +6,7 @@ import importlib
 import platform
 from typing import Any
 
-from multiscale.doctor.examination import Finding, State
+from multiscale.doctor.finding import Finding, State
 
 _NEEDED = {
     "numpy": (1, 24),

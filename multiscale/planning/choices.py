@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -18,6 +18,7 @@ from multiscale.planning.expected_errors import expected_errors
 from multiscale.planning.machine import this_machine
 from multiscale.scene import Scene
 from multiscale.scenes.sections import CouplingSection
+from multiscale.stage import Stage
 from multiscale.stage_checks import (
     EMBEDDED_CELLS,
     PROVISIONAL_PATCHES,
@@ -25,9 +26,6 @@ from multiscale.stage_checks import (
     check_size,
     patch_grid,
 )
-
-if TYPE_CHECKING:  # which is made with what is chosen here
-    from multiscale.stage import Stage
 
 DEFAULT_ACCURACY = 0.02
 """Relative error of the force that is kept unless the scene says."""

@@ -70,3 +70,9 @@ def rough_half_space(surface: Surface, modulus: float) -> HalfSpaceModel:
     return HalfSpaceModel(
         surface=resampled(surface, cells), contact_modulus=modulus, highest=surface.highest
     )
+
+
+def nearest(plane: tuple[float, tuple[float, float]], surface: Surface) -> float:
+    """Return how near a tilted plane comes anywhere: its approach at the nearest corner [mm]."""
+    approach, tilt = plane
+    return approach + 0.5 * float(np.abs(np.multiply(surface.lengths, tilt)).sum())

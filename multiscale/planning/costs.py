@@ -5,7 +5,6 @@ from __future__ import annotations
 import resource
 import sys
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,9 +23,7 @@ from multiscale.planning.machine import Machine
 from multiscale.planning.newton_choice import CYCLES_PER_PATCH, full_cycles, newton_choice
 from multiscale.planning.press_work import law_work, press_work, presses, step_count
 from multiscale.planning.work import Work
-
-if TYPE_CHECKING:  # which is made with what is said here
-    from multiscale.stage import Stage
+from multiscale.stage import Stage
 
 PHASES = ("surface", "micro choice", "laws", "block", "load steps", "field", "output")
 """Phases of a run, in their order."""

@@ -10,8 +10,6 @@ of 0.3, 1 and 3 mm.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from geometry.statistics import roughness
@@ -21,11 +19,9 @@ from micro.auto.errors import contact_error, grid_error
 from micro.auto.measures import contact_measures
 from micro.regions.islands import IslandModel
 from multiscale.planning.contact_estimate import Contacts
+from multiscale.reference.meshes import ReferenceMeshes
 from multiscale.scene import Scene
-
-if TYPE_CHECKING:  # which is made with what is expected here
-    from multiscale.reference.meshes import ReferenceMeshes
-    from multiscale.stage import Stage
+from multiscale.stage import Stage
 
 _SLOPES = 0.56
 """Force that finite slopes take, over the mean square gradient: 2.6 % at an rms gradient of 0.215

@@ -16,7 +16,7 @@ from micro import (
 )
 from multiscale.coupling import AnalyticCoupling
 from multiscale.loading import Programme
-from multiscale.planning.contact_estimate import Contacts, contacts, rough_half_space
+from multiscale.planning.contact_estimate import Contacts, contacts, nearest, rough_half_space
 from multiscale.planning.machine import this_machine
 from multiscale.planning.press_work import kind_work, presses, reach
 from multiscale.scene import Scene
@@ -80,12 +80,6 @@ def estimated_plane(scene: Scene, surface: Surface) -> tuple[float, tuple[float,
     rough = rough_half_space(surface, _modulus(scene))
     whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
     return furthest_plane(scene.loading.programme, rough, whole, patch_means(surface, whole))
-
-
-def nearest(plane: tuple[float, tuple[float, float]], surface: Surface) -> float:
-    """Return how near a tilted plane comes anywhere: its approach at the nearest corner [mm]."""
-    approach, tilt = plane
-    return approach + 0.5 * float(np.abs(np.multiply(surface.lengths, tilt)).sum())
 
 
 def estimated_contacts(scene: Scene, surface: Surface) -> Contacts:

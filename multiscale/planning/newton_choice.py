@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:  # which is made with what is said here
-    from multiscale.law_tables.law_files import LawTable
-    from multiscale.stage import Stage
-
+from multiscale.law_tables.law_files import LawTable
+from multiscale.stage import Stage
 
 MOST_CYCLES_PER_STEP = 12
 """Multigrid cycles that a load step of the full Newton takes at most, starts from earlier steps

@@ -8,7 +8,6 @@ that they were measured on. They hold within a factor of 1.5.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,9 +16,7 @@ from micro import HalfSpaceModel, ScaledModel
 from multiscale.couplings.blocks import free_sides
 from multiscale.loading import Programme
 from multiscale.planning.work import Work
-
-if TYPE_CHECKING:  # which is made with what is said here
-    from multiscale.stage import Stage
+from multiscale.stage import Stage
 
 _LOADS = (0.25, 0.5, 0.75, 1.0)
 """Loads, relative to the largest, whose mean stands for those of a run."""

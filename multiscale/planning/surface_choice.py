@@ -10,8 +10,9 @@ from micro.auto.errors import grid_error
 from micro.auto.measures import contact_measures
 from multiscale.ingredients import make_surface
 from multiscale.planning.choices import SMOOTH_CELLS, accuracy_of, open_keys
+from multiscale.planning.contact_estimate import nearest
 from multiscale.planning.expected_errors import block_error, coupling_error
-from multiscale.planning.micro_choice import estimated_contacts, estimated_plane, nearest
+from multiscale.planning.micro_choice import estimated_contacts, estimated_plane
 from multiscale.scene import Scene, SpectrumSection
 from multiscale.stage_checks import block_cells, patch_grid
 

@@ -13,7 +13,7 @@ from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from multiscale.coupling import embedded_step
 from multiscale.couplings.blocks import block_material
-from multiscale.history import LoadStep, PatchState
+from multiscale.load_step import LoadStep, PatchState
 from multiscale.records import Arrays, packed, unpacked
 from multiscale.reference.record import ReferenceRecord, reference_record
 from multiscale.stage import Stage

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from multiscale.history import LoadStep
+from multiscale.load_step import LoadStep
 from multiscale.reference.extrapolation import Estimate, extrapolated
 
 Array = NDArray[np.float64]

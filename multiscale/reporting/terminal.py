@@ -14,7 +14,8 @@ from rich.table import Table
 
 from geometry.errors import PatchlawError
 from multiscale import plan
-from multiscale.history import History, LoadStep
+from multiscale.history import History
+from multiscale.load_step import LoadStep
 from multiscale.loading import Programme
 from multiscale.planning.forecast import Forecast, comparison
 from multiscale.reporting.report import curve_cells

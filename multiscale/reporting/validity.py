@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from multiscale.history import LoadStep
 from multiscale.law_tables.law_files import LawTable
+from multiscale.load_step import LoadStep
 
 
 def range_notes(steps: Sequence[LoadStep], table: LawTable | None) -> Iterator[str]:

@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 
 from geometry.errors import InputError
-from multiscale.history import LoadStep, PatchState
+from multiscale.load_step import LoadStep, PatchState
 from multiscale.loading import Position
 from multiscale.records import (
     Arrays,

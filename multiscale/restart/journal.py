@@ -12,7 +12,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from multiscale.history import LoadStep, PatchState
+from multiscale.load_step import LoadStep, PatchState
 from multiscale.loading import Position
 from multiscale.records import Arrays, as_text, packed, part, prefixed, text_array, unpacked
 from multiscale.reporting.outputs import written

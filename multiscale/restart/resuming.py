@@ -12,7 +12,7 @@ from typing import Any
 
 from geometry.collective import on_root
 from geometry.errors import InputError
-from multiscale.history import LoadStep
+from multiscale.load_step import LoadStep
 from multiscale.loading import Position
 from multiscale.records import Arrays
 from multiscale.reporting.outputs import remove_partial

@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -62,6 +63,19 @@ def test_sub_packages_go_down_only(package):
             if isinstance(node, ast.ImportFrom):
                 crossing = ".".join((node.module or "").split(".")[:2])
                 assert crossing not in later, f"{path.name} imports {crossing}"
+
+
+def test_no_module_needs_itself():
+    paths = [path.relative_to(ROOT) for package in BELOW for path in (ROOT / package).rglob("*.py")]
+    modules = {".".join(path.with_suffix("").parts): path for path in paths}
+    needs = {}
+    for module, path in modules.items():
+        if path.name != "__init__.py":  # these only hand on
+            nodes = ast.walk(ast.parse((ROOT / path).read_text(encoding="utf-8")))
+            wanted = [node for node in nodes if isinstance(node, ast.ImportFrom)]
+            names = {f"{node.module}.{alias.name}" for node in wanted for alias in node.names}
+            needs[module] = ({node.module for node in wanted} | names) & set(modules)
+    tuple(TopologicalSorter(needs).static_order())  # CycleError names a circle
 
 
 def test_only_one_module_knows_dolfinx_releases():

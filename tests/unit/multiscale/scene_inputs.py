@@ -13,7 +13,7 @@ from multiscale.plan import statements, warnings
 from multiscale.planning.forecast import forecast
 from multiscale.run import run
 from multiscale.scene import Scene
-from multiscale.stage import make_stage
+from multiscale.staging import make_stage
 
 BASE = {
     "surface": {

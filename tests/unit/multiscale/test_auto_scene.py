@@ -10,7 +10,7 @@ from multiscale.plan import statements, warnings
 from multiscale.reporting.provenance import provenance
 from multiscale.run import Run
 from multiscale.scene import Scene
-from multiscale.stage import make_stage
+from multiscale.staging import make_stage
 
 
 def scene(load=None, coupling="analytic", **micro):

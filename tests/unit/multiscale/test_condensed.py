@@ -11,7 +11,7 @@ from multiscale import Run, Scene, run
 from multiscale.couplings.blocks import patch_compliance
 from multiscale.plan import statements, warnings
 from multiscale.planning.newton_choice import newton_choice
-from multiscale.stage import make_stage
+from multiscale.staging import make_stage
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 SMALL = [

@@ -11,7 +11,8 @@ from multiscale.cli import main
 from multiscale.doctor import forms as doctor_forms
 from multiscale.doctor import machine as doctor_machine
 from multiscale.doctor import packages as doctor_packages
-from multiscale.doctor.examination import Finding, examine, verdict
+from multiscale.doctor.examination import examine, verdict
+from multiscale.doctor.finding import Finding
 
 OPEN_MPI = "Open MPI v4.1.4"
 

@@ -11,7 +11,7 @@ from scene_inputs import BASE, KEYS, damaged, odd_text, planned, put, ran, scene
 from geometry.errors import InputError
 from multiscale.scene import Scene
 from multiscale.scenes.scene_files import MOST_BYTES
-from multiscale.stage import make_stage
+from multiscale.staging import make_stage
 
 few = settings(
     derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)

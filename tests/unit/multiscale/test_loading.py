@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import NotConverged
-from multiscale.history import LoadStep, PatchState
+from multiscale.load_step import LoadStep, PatchState
 from multiscale.loading import BeyondLaws, Programme, load_steps
 
 

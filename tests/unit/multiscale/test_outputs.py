@@ -8,7 +8,8 @@ import pytest
 
 from geometry.errors import NotWritten
 from geometry.patches import PatchGrid
-from multiscale.history import COLUMNS, PATCH_COLUMNS, History, LoadStep, PatchState
+from multiscale.history import COLUMNS, PATCH_COLUMNS, History
+from multiscale.load_step import LoadStep, PatchState
 from multiscale.reporting.outputs import write_csv, write_tables, write_text, write_whole
 from multiscale.reporting.terminal import show_history
 

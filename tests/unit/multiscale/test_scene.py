@@ -11,7 +11,7 @@ import pytest
 
 from geometry.errors import InputError
 from multiscale.scene import Scene
-from multiscale.stage import make_stage
+from multiscale.staging import make_stage
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 

@@ -1,0 +1,95 @@
+"""One accepted load step, and what every patch carries in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PatchState:
+    """What every patch carries at one load step.
+
+    Attributes:
+        closure_mm: Mean closure of each patch, shape (N,) [mm].
+        pressure_MPa: Mean pressure on each patch, shape (N,) [MPa].
+        contact_area_fraction: Real over nominal contact area of each patch, shape (N,).
+    """
+
+    closure_mm: Array
+    pressure_MPa: Array
+    contact_area_fraction: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoadStep:
+    """One accepted load step; the fields up to `reason` are columns of ``history.csv``.
+
+    Attributes:
+        step: Number of the step, from 1.
+        approach_mm: Approach of the rigid plane from first touch [mm].
+        force_N: Normal force on the plane [N].
+        mean_pressure_MPa: Force over nominal contact area [MPa].
+        contact_area_fraction: Real over nominal contact area.
+        mean_separation_mm: Mean gap between the plane and the deformed surface [mm].
+        contacts: Number of asperities in contact.
+        newton_iterations: Newton steps spent, on halved steps too; without laws the iterations of
+            the micro model (analytic) or its presses (concurrent).
+        linear_iterations: Iterations of the linear solver spent.
+        wall_s: Wall time of the step [s].
+        reason: Name of the reason for which the iteration stopped.
+        patches: The state of every patch.
+        imbalance: Force on the plane minus reaction of the support, relative to the force; None
+            where no support takes part.
+        residuals: Norms of the residual over the Newton steps, relative to the interface load.
+        tilt: Slopes (tx, ty) of the approach about the middle of the interface [mm/mm].
+        moment_N_mm: First moments (Σ P (x − xc), Σ P (y − yc)) of the forces about the middle
+            [N mm].
+        warnings: Why the micro model, where it was solved itself, is outside its range of
+            validity; empty within it.
+        meshes: Approach [mm], force [N] and contact area fraction on every mesh of a reference,
+            the finest, which the step is of, last; empty with other couplings.
+    """
+
+    step: int
+    approach_mm: float
+    force_N: float
+    mean_pressure_MPa: float
+    contact_area_fraction: float
+    mean_separation_mm: float
+    contacts: int
+    newton_iterations: int
+    linear_iterations: int
+    wall_s: float
+    reason: str
+    patches: PatchState
+    imbalance: float | None = None
+    residuals: tuple[float, ...] = ()
+    tilt: tuple[float, float] = (0.0, 0.0)
+    moment_N_mm: tuple[float, float] = (0.0, 0.0)
+    warnings: tuple[str, ...] = ()
+    meshes: tuple[tuple[float, float, float], ...] = ()
+
+    @property
+    def tilt_x(self) -> float:
+        """Slope of the approach along x."""
+        return self.tilt[0]
+
+    @property
+    def tilt_y(self) -> float:
+        """Slope of the approach along y."""
+        return self.tilt[1]
+
+    @property
+    def moment_x_N_mm(self) -> float:
+        """First moment of the forces along x [N mm]."""
+        return self.moment_N_mm[0]
+
+    @property
+    def moment_y_N_mm(self) -> float:
+        """First moment of the forces along y [N mm]."""
+        return self.moment_N_mm[1]
