@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 _LOADS = 16  # rectangles along a side, at least, that tell a smooth field the contacts' forces
 _MOST_LOADS = 32
 """And at most, where they would be more than its square. Set 1, seed 1 at 8 µm, which has contacts
-near a free side, carries 3.070, 3.049 and 3.046 N with 16, 32 and 48."""
+near a free side, carries 3.0284 and 3.0281 N with 16 and 32 on a block of 24 × 24 × 16 cells."""
 
 _HALVINGS = 2
 """Halvings of the outermost rectangles where the micro model knows of no sides: contacts near them

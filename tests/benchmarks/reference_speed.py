@@ -3,8 +3,8 @@
 Run by hand on an idle machine:
 `mpirun -n 2 .venv/bin/python tests/benchmarks/reference_speed.py [--cells 160 160 24]` for the
 hexahedra of the paper's kind, and `… --tetrahedra [--edges 1.5 2 3 4]` for adaptive ones, whose
-errors are told against the extrapolation from the two finest. Ten minutes each; smaller with
-`--cells 48 48 12` or fewer edges. Memory is the peak of all ranks together.
+errors are told against the extrapolation from the two finest. The hexahedra take half a minute on
+two ranks; smaller with `--cells 48 48 12` or fewer edges. Memory is the peak of all ranks together.
 """
 
 import os

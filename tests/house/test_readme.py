@@ -11,6 +11,8 @@ from setuptools import find_packages
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
+DEMOS = ROOT / "demos"
+PAGES = sorted(DEMOS.rglob("*.md"))
 
 
 def test_example_runs():
@@ -34,6 +36,28 @@ def test_ci_runs_the_test_command():
 @pytest.mark.parametrize("path", sorted(set(re.findall(r"\]\(((?!http)[^)]+)\)", TEXT))))
 def test_linked_files_exist(path):
     assert (ROOT / path).is_file()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_pages_name_files_that_exist(page):
+    text = page.read_text(encoding="utf-8")
+    for link in re.findall(r"\]\(((?!http|#)[^)#]+)", text):
+        assert (page.parent / link).is_file(), link
+    for name in re.findall(r"\b(?:demos|tests)/[\w/]+\.\w+\b", text):
+        assert (ROOT / name).is_file(), name
+
+
+def test_every_demo_page_and_picture_is_shown():
+    pages = {page: page.read_text(encoding="utf-8") for page in PAGES}
+    index = pages[DEMOS / "README.md"]
+    for path in (*DEMOS.glob("*.py"), *DEMOS.glob("scenes/*.toml")):
+        assert str(path.relative_to(DEMOS)) in index, path
+    linked = {
+        (page.parent / link).resolve()
+        for page, text in {**pages, ROOT / "README.md": TEXT}.items()
+        for link in re.findall(r"\]\(((?!http|#)[^)#]+)", text)
+    }
+    assert {*PAGES, *DEMOS.glob("pictures/*")} <= linked
 
 
 def test_every_name_in_the_floor_plan_is_a_module():
