@@ -26,7 +26,7 @@ if __name__ == "__main__":
     kind = sys.argv[1]
     scene = Scene.load(PAPER, [*SMALL, f"coupling.kind={kind}", *SCENES[kind]])
     sizes = []
-    for _ in range(5):
+    for _ in range(4):
         run(scene, COMM if COMM.size > 1 else None)
         sizes.append(resident())
     added = COMM.allreduce(sizes[-1] - sizes[1], op=MPI.MAX)
