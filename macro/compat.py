@@ -15,6 +15,7 @@ from typing import Any
 
 import basix
 import numpy as np
+import ufl
 from dolfinx import cpp, fem, io, jit
 from dolfinx import mesh as dmesh
 from dolfinx.fem import petsc as fem_petsc
@@ -22,11 +23,6 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from macro.jit import TIMEOUT, explained
-
-try:
-    from dolfinx.io import gmsh as _gmsh_io
-except ImportError:
-    from dolfinx.io import gmshio as _gmsh_io
 
 _JIT = {"timeout": TIMEOUT}  # another process may be compiling the same form on a slow machine
 HAS_VTX = hasattr(io, "VTXWriter")
@@ -72,7 +68,11 @@ def mesh_from_gmsh(model: Any, comm: Any) -> tuple[Any, Any]:
     Note:
         Collective. Facet tags may include ghost facets (dolfinx 0.5).
     """
-    data = _gmsh_io.model_to_mesh(model, comm, 0, gdim=3)
+    try:  # here, for it brings gmsh, which lattices do without
+        from dolfinx.io import gmsh as reader
+    except ImportError:
+        from dolfinx.io import gmshio as reader
+    data = reader.model_to_mesh(model, comm, 0, gdim=3)
     return (data.mesh, data.facet_tags) if hasattr(data, "mesh") else (data[0], data[2])
 
 
@@ -96,16 +96,21 @@ def mesh_from_cells(
     Note:
         Collective. The coordinate element is that of `mesh_from_gmsh`: compiled forms serve both.
     """
-    gmsh_cell = {8: 5, 4: 4}[cells.shape[1]]
+    cell = {8: "hexahedron", 4: "tetrahedron"}[cells.shape[1]]
     owners = np.full(len(cells), comm.rank)
     if "ghost_mode" not in inspect.signature(dmesh.create_mesh).parameters:
         stay = _adjacency(np.arange(len(cells)), owners)
-        domain = _gmsh_io.ufl_mesh(gmsh_cell, 3, dtype=np.float64)
+        variant = basix.LagrangeVariant.equispaced
+        element = basix.ufl.element("Lagrange", cell, 1, variant, shape=(3,), dtype=np.float64)
+        domain = ufl.Mesh(element)
         return dmesh.create_mesh(comm, cells=cells, x=points, e=domain, partitioner=lambda *_: stay)
     # dolfinx 0.5 finds common vertices through ghosts, and drops these afterwards
     rows = np.concatenate([np.arange(len(cells)), beyond[0]])
     stay = _adjacency(rows, np.concatenate([owners, beyond[1]]))
-    domain = _gmsh_io.ufl_mesh(gmsh_cell, 3)
+    straight = ufl.FiniteElement(
+        "Lagrange", ufl.Cell(cell, geometric_dimension=3), 1, variant="equispaced"
+    )
+    domain = ufl.Mesh(ufl.VectorElement(straight))
     return dmesh.create_mesh(comm, cells, points, domain, dmesh.GhostMode.none, lambda *_: stay)
 
 

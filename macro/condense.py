@@ -82,7 +82,7 @@ def make_correction(
     mine = np.arange(comm.rank, loads.count, comm.size)
 
     def solved() -> Array:
-        block = Block(block_mesh(smooth, MPI.COMM_SELF), material, sides)
+        block = Block(block_mesh(smooth, MPI.COMM_SELF, "lattice"), material, sides)
         return _Solver(block, smooth, half_space, loads).top(mine)
 
     # one rank's factors may not fit in its memory
