@@ -16,7 +16,7 @@ from geometry.errors import InputError
 from micro.cells.contact_pressure import Pressures
 from micro.cells.elastic_grid import ElasticGrids
 from micro.cells.free_sides import FreeSides
-from micro.cells.half_space_curve import CellSums
+from micro.cells.half_space_curve import TIE, CellSums
 from micro.cells.half_space_state import HalfSpaceState
 from micro.cells.pressing import Pressing
 from micro.plane import RigidPlane
@@ -26,7 +26,6 @@ Array = NDArray[np.float64]
 
 _LEVEL = (0.0, 0.0)
 _FEWEST = 4  # heights along a side of a surface
-_TIE = 1e-9  # of a cell: a centre on a border belongs to the patch above, whatever rounding says
 _OUT_OF_REACH = 1e3
 """Sides of the surface by which cells are lowered that may not touch."""
 
@@ -284,7 +283,7 @@ class HalfSpaceModel:
             return None
         edges = self.within.borders_x, self.within.borders_y
         x, y = (
-            (centres >= border[0] - _TIE * side) & (centres < border[-1] - _TIE * side)
+            (centres >= border[0] - TIE * side) & (centres < border[-1] - TIE * side)
             for centres, border, side in zip(
                 (self.surface.x, self.surface.y), edges, self.surface.spacing, strict=True
             )
@@ -312,6 +311,6 @@ class HalfSpaceModel:
 
 def _whole_cells(interval: tuple[float, float], side: float, count: int) -> tuple[float, float]:
     """Return the whole cells, as many as a surface needs, that an interval lies in [mm]."""
-    first, last = floor(interval[0] / side + _TIE), ceil(interval[1] / side - _TIE)
+    first, last = floor(interval[0] / side + TIE), ceil(interval[1] / side - TIE)
     first = max(min(first, count - _FEWEST), 0) if last - first < _FEWEST else first
     return first * side, max(last, first + _FEWEST) * side
