@@ -120,7 +120,7 @@ class ScaledAsperities:
         if not which.size:
             return self.summits
         relief, cap = self.relief, self.catchment[which]
-        depth = np.maximum(indentation[which], _SMALLEST * np.ptp(relief.depth))
+        depth = np.maximum(indentation[which], _SMALLEST * relief.depth.max(initial=0.0))
         height = np.zeros(len(relief))
         height[cap] = depth
         moments = from_origin(relief.caps(height)[:, cap], relief.x[cap], relief.y[cap])

@@ -96,10 +96,10 @@ class ScaledModel:
         """Height z_M that the approach counts from [mm]."""
         return self.surface.highest
 
-    @property
+    @cached_property
     def first_touch(self) -> float:
         """Approach of a level plane at first contact [mm]; infinite without asperities."""
-        heights = self.asperities.z
+        heights = self._scaled(0.0).summits.z
         return float(self.datum - heights.max()) if heights.size else np.inf
 
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
@@ -109,7 +109,7 @@ class ScaledModel:
     @cached_property
     def asperities(self) -> Asperities:
         """The asperities, with the radii of their smallest contacts."""
-        return self._scaled(0.0).summits
+        return self._scaled(np.inf).summits
 
     def solve(
         self,

@@ -133,3 +133,18 @@ def test_floor_keeps_what_rises_above(surface, relief):
     whole, kept = relief.caps(height)[:, big], cut.caps(np.maximum(cut.z - floor, 0.0))[:, big]
     assert kept == pytest.approx(whole, rel=1e-9, abs=1e-12 * whole[0].max())
     assert np.sum(cut.open_passes(level)) == np.sum(relief.open_passes(level)) > 0
+
+
+@pytest.mark.parametrize("reach", [0.0, 1e-7, 1e-3])
+def test_a_floor_leaves_the_caps_above_it_as_they_are(surface, relief, reach):
+    top = relief.z.max()
+    cut = Relief.of(surface, floor=top - reach)
+    assert len(cut.depth) < len(relief.depth)
+    height = np.maximum(cut.z - (top - max(reach, 1e-9)), 0.0)
+    # differences of sums over few samples instead of all
+    np.testing.assert_allclose(cut.caps(height)[0], relief.caps(height)[0], rtol=1e-7)
+
+
+def test_nothing_reaches_a_floor_above_all(surface):
+    empty = Relief.of(surface, floor=1.0)
+    assert not empty.caps(np.zeros(len(empty))).any()

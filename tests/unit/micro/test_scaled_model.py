@@ -13,7 +13,18 @@ from geometry import (
     synthesise,
 )
 from geometry.errors import NotConverged
-from micro import BORDERS, CURVATURES, MODELS, ScaledModel, asperity_model, micro_model
+from micro import (
+    BORDERS,
+    CURVATURES,
+    MODELS,
+    IslandModel,
+    RigidPlane,
+    ScaledModel,
+    asperity_model,
+    micro_model,
+)
+from micro.regions import islands
+from micro.summits import scaled_model
 
 E_STAR = 4000.0
 PATCHES = PatchGrid(grid=(3, 2), lengths=(1.0, 1.0))
@@ -190,3 +201,23 @@ def test_refuses(surface):
         scaled(surface).solve(np.inf)
     with pytest.raises(InputError, match="a response needs at least one approach"):
         respond(scaled(surface), [])
+
+
+@pytest.mark.parametrize("make", [scaled, lambda s: IslandModel(surface=s, contact_modulus=E_STAR)])
+def test_large_surfaces_keep_less_but_find_the_same(surface, make, monkeypatch):
+    """Beyond so many samples only those that a plane can reach are sorted, anew for every plane."""
+    lean = RigidPlane.above(surface, 1e-4, (1e-3, 0.0))
+    means = patch_means(surface, PATCHES)
+
+    def found():
+        model = make(surface)
+        forces = [respond(model, [d]).force[0] for d in (-1e-3, 0.0, 1e-7, 1e-4, 4e-3)]
+        pressed = model.press(lean, patches=PATCHES, mean_heights=means).response
+        return model.first_touch, [*forces, pressed.force[0]]
+
+    touch, all_kept = found()
+    for module in (scaled_model, islands):
+        monkeypatch.setattr(module, "_MOST_KEPT", 0)
+    assert found()[0] == touch
+    # curvatures and lifts are settled to 1e-6; caps of 33 samples are differences of longer sums
+    np.testing.assert_allclose(found()[1], all_kept, rtol=1e-6)
