@@ -17,7 +17,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from geometry import Surface
-from geometry.ascent import constrained_summits
+from geometry.ascent import coincident, constrained_summits
 from micro.regions.catchments import Passes, catchments, passes_between, sampled
 
 Array = NDArray[np.float64]
@@ -65,7 +65,7 @@ class Relief:
         floor: float = -np.inf,
         ceiling: float = np.inf,
     ) -> Self:
-        """Divide what rises above a floor into catchments.
+        """Divide what rises above a floor into catchments, one for each summit.
 
         Args:
             surface: The surface; it ends at its border, also when it is periodic.
@@ -81,8 +81,12 @@ class Relief:
         top = np.stack(np.unravel_index(peak, heights.shape), axis=1)
         summit = constrained_summits(surface, (top + 0.5) * side, lean)
         z = np.sum([part.height_at(*summit.T) for part in parts], axis=0)
-        z = np.maximum(z, heights.flat[peak])
-        z = np.minimum(z, ceiling)
+        z = np.minimum(np.maximum(z, heights.flat[peak]), ceiling)
+        # samples on one oblique ridge are peaks of their own, but not of the interpolant
+        name = coincident(surface, summit)
+        order = np.lexsort((-z, name))
+        best = order[np.searchsorted(name[order], np.arange(name.max() + 1))]
+        owner, summit, z = name[owner], summit[best], z[best]
         owner = np.where(_needed(heights.ravel(), owner, z, floor), owner, -1)
         return cls._sorted(heights, owner, summit, z, side)
 

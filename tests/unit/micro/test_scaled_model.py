@@ -1,5 +1,7 @@
 """Asperities fitted at the scale of the contact: options, limits, states and curves."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -221,3 +223,16 @@ def test_large_surfaces_keep_less_but_find_the_same(surface, make, monkeypatch):
     assert found()[0] == touch
     # curvatures and lifts are settled to 1e-6; caps of 33 samples are differences of longer sums
     np.testing.assert_allclose(found()[1], all_kept, rtol=1e-6)
+
+
+@pytest.mark.parametrize("border", BORDERS)
+def test_mirrored_surfaces_carry_the_same(border):
+    """A ridge on which several samples are peaks must not be divided among them by chance."""
+    spectrum = Spectrum(hurst=0.8, waves=(1, 4), rms_slope=0.1, seed=12)
+    surface = synthesise(spectrum, grid=(43, 32), lengths=(1.0, 2.3))
+    approach = 1.5 * surface.heights.std()
+    forces = []
+    for heights in (surface.heights, surface.heights[::-1], surface.heights[:, ::-1]):
+        model = scaled(replace(surface, heights=heights), border=border)
+        forces.append(model.solve(approach).force.sum())
+    np.testing.assert_allclose(forces, forces[0], rtol=1e-6)  # curvatures are settled to that
