@@ -18,7 +18,7 @@ Indices = NDArray[np.intp]
 
 _MOST_STEPS = 200
 _SHORTEST = 1e-10  # step that ends a climb, in cells
-_ROUNDING = 4.0 * np.finfo(float).eps  # of a height: what is no gain
+_ROUNDING = 4.0 * np.finfo(float).eps  # of the largest height: what is no gain
 _COINCIDENT = 1e-3  # cells
 
 
@@ -53,13 +53,14 @@ def constrained_summits(
         moved = climb.moved(here, longest[on])
         before, after = climb.height(here), climb.height(moved)
         size = np.abs((moved - here) / climb.cell).max(axis=1)
-        gained = after - before > _ROUNDING * np.abs(before)
+        gained = after - before > climb.rounding
         # the last steps of Newton's method are right though the height does not show it
-        taken = gained | ((size < _COINCIDENT) & (before - after <= _ROUNDING * np.abs(before)))
+        taken = gained | ((size < _COINCIDENT) & (before - after <= climb.rounding))
         point[on[taken]] = moved[taken]
         longest[on] = np.where(taken, np.minimum(2.0 * longest[on], 1.0), 0.25 * size)
         on = on[(size > _SHORTEST) & (longest[on] > _SHORTEST)]
-    return np.where((climb.height(point) > climb.height(start))[:, None], point, start)
+    gained = climb.height(point) - climb.height(start) > climb.rounding
+    return np.where(gained[:, None], point, start)
 
 
 def coincident(surface: Surface, point: Array) -> Indices:
@@ -80,6 +81,7 @@ class _Climb:
     def __init__(self, parts: Sequence[Surface], bounded: bool) -> None:
         self._parts, self._bounded = parts, bounded
         self.cell, self._limit = np.array(parts[0].spacing), np.array(parts[0].lengths)
+        self.rounding = _ROUNDING * sum(float(np.abs(part.heights).max()) for part in parts)
 
     def height(self, point: Array, dx: int = 0, dy: int = 0) -> Array:
         """Return heights, or a derivative of them."""

@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _NEWTON_STEPS = 8
+_ROUNDING = 64.0 * np.finfo(float).eps  # of the largest height, in a second difference
 _SUMMIT_ARRAYS = ("x", "y", "z", "radius_major", "radius_minor", "angle")
 _BORDER_ARRAYS = ("border_x", "border_y", "border_z")
 
@@ -140,10 +141,11 @@ def find_asperities(surface: Surface, *, periodic: bool | None = None) -> Asperi
     start = (maxima.position + 0.5) * cell
     edge, inside = start[maxima.on_border], start[~maxima.on_border]
     summit, strayed = _refined(surface, inside)
-    concave = np.linalg.eigvalsh(_hessians(surface, summit))[:, 1] < 0.0
+    none = -_ROUNDING * np.abs(surface.heights).max() / cell.min() ** 2
+    concave = np.linalg.eigvalsh(_hessians(surface, summit))[:, 1] < none
     summit = _distinct(surface, summit[concave], strayed[concave], bounded=not periodic)
     curvature, direction = np.linalg.eigh(_hessians(surface, summit))
-    valid = curvature[:, 1] < 0.0
+    valid = curvature[:, 1] < none
     summit, curvature, direction = summit[valid], curvature[valid], direction[valid]
     if surface.periodic:
         summit = np.mod(summit, surface.lengths)
