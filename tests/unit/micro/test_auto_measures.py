@@ -31,6 +31,20 @@ def test_the_eccentricity_of_an_elliptic_cap():
     assert at.eccentricity == pytest.approx(np.sqrt(0.75), rel=0.01)
 
 
+@pytest.mark.parametrize("shape", [(640, 40), (40, 640)])
+def test_cells_that_are_not_square_change_no_contact(shape):
+    x, y = ((np.arange(n) + 0.5) / n for n in shape)
+    heights = -((x[:, None] - 0.5) ** 2) - (y - 0.5) ** 2
+    at = contact_measures(Surface(heights=heights, lengths=(1.0, 1.0)), 0.04, periodic=False)
+    assert at.eccentricity**2 < 0.03  # pixels of 1 : 16 err by 2 % in a moment
+    assert at.crowding == pytest.approx(np.sqrt(0.02), rel=0.02)
+    # 40 cells across the coarser way count; the ratio is that of contact radius and wavelength
+    assert at.cells_per_radius == pytest.approx(40 * np.sqrt(0.02), rel=0.02)
+    square = contact_measures(paraboloid(), 0.04, periodic=False)
+    ratio = at.cells_per_radius / at.cells_per_wave
+    assert ratio == pytest.approx(square.cells_per_radius / square.cells_per_wave, rel=0.05)
+
+
 def test_the_border_cuts_a_cap_unless_periodic():
     cut = paraboloid(centre=(0.0, 0.5))
     assert contact_measures(cut, 0.04, periodic=False).border_share == 1.0
