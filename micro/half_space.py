@@ -117,14 +117,17 @@ class HalfSpaceModel:
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
         """Return the model of the cells of one patch; see `MicroModel.of_patch`.
 
-        Model and patch count places from the corner of the first of these cells.
+        Model and patch count places from the corner of the first of these cells. The patch's own
+        half-space has no free sides.
         """
         own, bounds = patches.single(index), patches.bounds(index)
         cells = zip(bounds, self.surface.spacing, self.surface.grid, strict=True)
         x, y = (_whole_cells(*axis) for axis in cells)
         patch = replace(own, origin=(own.origin[0] - x[0], own.origin[1] - y[0]))
         piece = self.surface.cropped(x=x, y=y)
-        model = replace(self, surface=piece, within=patch, periodic=False, highest=self.datum)
+        model = replace(
+            self, surface=piece, within=patch, periodic=False, highest=self.datum, sides=None
+        )
         return model, patch
 
     def solve(

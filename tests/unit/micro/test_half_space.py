@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from geometry import InputError, NotConverged, PatchGrid, Spectrum, Surface, patch_means, synthesise
-from micro import HalfSpaceModel
+from micro import FreeSides, HalfSpaceModel
 
 E_STAR = 4000.0
 PATCHES = PatchGrid(grid=(3, 2), lengths=(1.0, 1.0))
@@ -222,3 +222,11 @@ def test_patches_whose_borders_halve_cells_stand_alone(grid, length):
         found = alone.respond([0.05 * length], patches=patch, mean_heights=[0.0])
         assert found.contacts[0] > 0
         assert found.patch_contacts[0].sum() == found.contacts[0]
+
+
+def test_a_patch_alone_has_no_free_sides(surface):
+    sides = FreeSides(lengths=surface.lengths, poisson_ratio=0.3, reach=0.5)
+    model = HalfSpaceModel(surface=surface, contact_modulus=E_STAR)
+    alone, expected = (replace(model, sides=each).of_patch(PATCHES, 1)[0] for each in (sides, None))
+    assert alone.sides is None
+    assert alone.solve(0.04).force == expected.solve(0.04).force > 0.0
