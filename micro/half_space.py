@@ -19,6 +19,7 @@ from micro.cells.free_sides import FreeSides
 from micro.cells.half_space_curve import TIE, CellSums
 from micro.cells.half_space_state import HalfSpaceState
 from micro.cells.pressing import Pressing
+from micro.curve import checked_approaches
 from micro.plane import RigidPlane
 from micro.response import Pressed, Response
 
@@ -200,7 +201,7 @@ class HalfSpaceModel:
         of patches is shared by area.
         """
         sums = self._sums(patches, mean_heights)
-        given = np.atleast_1d(np.asarray(approaches, float))
+        given = checked_approaches(approaches)
         order = np.argsort(given, kind="stable")
         path = self._along([self._plane(given[index], tilt) for index in order])
         rows = {int(index): sums.row(*step) for index, step in zip(order, path, strict=True)}
