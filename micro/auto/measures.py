@@ -74,7 +74,9 @@ def _cells_per_wave(surface: Surface) -> float:
     rough = roughness(surface)
     if not rough.m4 > 0.0:
         return float(max(surface.grid))
-    return float(2.0 * np.pi * np.sqrt(rough.m2 / rough.m4) / max(surface.spacing))
+    shortest = 2.0 * min(surface.spacing)  # differences over two cells see no slope there
+    length = max(2.0 * np.pi * float(np.sqrt(rough.m2 / rough.m4)), shortest)
+    return length / max(surface.spacing)
 
 
 def _mean_square_eccentricity(

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from geometry import Surface
+from micro.auto.errors import grid_error
 from micro.auto.measures import contact_measures
 
 
@@ -58,6 +59,13 @@ def test_the_cells_of_a_single_wave():
     )
     at = contact_measures(wave, 0.1, periodic=True)
     assert at.cells_per_wave == pytest.approx(24.0, rel=1e-9)
+
+
+def test_no_wave_is_shorter_than_two_cells():
+    squares = Surface(heights=np.indices((20, 20)).sum(axis=0) % 2 * 1e-2, lengths=(1.0, 1.0))
+    at = contact_measures(squares, 3e-3, periodic=False)
+    assert at.cells_per_wave == pytest.approx(2.0, rel=1e-12)
+    assert np.isfinite(grid_error(at, 1.0))
 
 
 def test_a_plane_between_the_samples_and_the_highest_point():
