@@ -45,8 +45,8 @@ class Asperities:
             among 8 neighbours cannot confirm them, so they are not asperities.
         border_y: Their ordinates, shape (m,) [mm].
         border_z: Their heights, shape (m,) [mm].
-        rejected: Number of maxima without two positive radii, or on the flank of another or of
-            the border; not asperities either.
+        rejected: Number of maxima without two positive radii, such as the flat ones of heights
+            measured in steps, or on the flank of another or of the border; not asperities either.
 
     Raises:
         InputError: When the arrays differ in length, a number is not finite, or not R' ≥ R'' > 0
