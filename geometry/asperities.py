@@ -7,14 +7,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from geometry.ascent import coincident, constrained_summits
 from geometry.checks import frozen_array, positive_lengths
 from geometry.errors import InputError
 from geometry.maxima import grid_maxima
 from geometry.surface import Surface
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 _NEWTON_STEPS = 8
+_ROUNDING = 64.0 * np.finfo(float).eps  # of the largest height, in a second difference
 _SUMMIT_ARRAYS = ("x", "y", "z", "radius_major", "radius_minor", "angle")
 _BORDER_ARRAYS = ("border_x", "border_y", "border_z")
 
@@ -42,7 +45,8 @@ class Asperities:
             among 8 neighbours cannot confirm them, so they are not asperities.
         border_y: Their ordinates, shape (m,) [mm].
         border_z: Their heights, shape (m,) [mm].
-        rejected: Number of maxima without two positive radii, not asperities either.
+        rejected: Number of maxima without two positive radii, such as the flat ones of heights
+            measured in steps, or on the flank of another or of the border; not asperities either.
 
     Raises:
         InputError: When the arrays differ in length, a number is not finite, or not R' ≥ R'' > 0
@@ -111,7 +115,9 @@ def find_asperities(surface: Surface, *, periodic: bool | None = None) -> Asperi
     A cell that is not lower than its 8 neighbours starts Newton's iteration on the smooth
     interpolant, which gives the summit between the samples. Central differences of the
     interpolant with a step of one cell around it give the Hessian; as the slope vanishes there,
-    its eigenvalues are the principal curvatures. A run of equal heights counts once.
+    its eigenvalues are the principal curvatures. A run of equal heights counts once, and so does
+    a ridge oblique to the grid, where several cells are higher than their neighbours but climb to
+    one summit; one whose climb ends on the border is none.
 
     Args:
         surface: The surface.
@@ -134,9 +140,12 @@ def find_asperities(surface: Surface, *, periodic: bool | None = None) -> Asperi
     cell = np.array(surface.spacing)
     start = (maxima.position + 0.5) * cell
     edge, inside = start[maxima.on_border], start[~maxima.on_border]
-    summit = _refined(surface, inside)
+    summit, strayed = _refined(surface, inside)
+    none = -_ROUNDING * np.abs(surface.heights).max() / cell.min() ** 2
+    concave = np.linalg.eigvalsh(_hessians(surface, summit))[:, 1] < none
+    summit = _distinct(surface, summit[concave], strayed[concave], bounded=not periodic)
     curvature, direction = np.linalg.eigh(_hessians(surface, summit))
-    valid = curvature[:, 1] < 0.0
+    valid = curvature[:, 1] < none
     summit, curvature, direction = summit[valid], curvature[valid], direction[valid]
     if surface.periodic:
         summit = np.mod(summit, surface.lengths)
@@ -153,12 +162,26 @@ def find_asperities(surface: Surface, *, periodic: bool | None = None) -> Asperi
         border_x=edge[:, 0],
         border_y=edge[:, 1],
         border_z=maxima.height[maxima.on_border],
-        rejected=int(np.count_nonzero(~valid)),
+        rejected=len(inside) - len(summit),
     )
 
 
-def _refined(surface: Surface, start: Array) -> Array:
-    """Return the interpolant's summits next to ``start``, itself where Newton leaves ±1 cell."""
+def _distinct(surface: Surface, point: Array, strayed: Mask, *, bounded: bool) -> Array:
+    """Return every summit once that points are, or climb to where Newton's method has left them."""
+    point = point.copy()
+    point[strayed] = constrained_summits(surface, point[strayed], bounded=bounded)
+    size = np.array(surface.lengths)
+    outside = strayed & bounded & np.any((point <= 0.0) | (point >= size), axis=1)
+    _, first = np.unique(
+        coincident(surface, point if bounded else np.mod(point, size)), return_index=True
+    )
+    once = np.zeros(len(point), dtype=bool)
+    once[first] = True
+    return np.asarray(point[once & ~outside])
+
+
+def _refined(surface: Surface, start: Array) -> tuple[Array, Mask]:
+    """Return the summits next to ``start``; itself, and so marked, where Newton leaves ±1 cell."""
     h, cell, point = surface.interpolant, np.array(surface.spacing), start.copy()
     strayed = np.zeros(len(start), dtype=bool)
     for _ in range(_NEWTON_STEPS):
@@ -177,7 +200,7 @@ def _refined(surface: Surface, start: Array) -> Array:
         moved = point - np.where(strayed[:, None], 0.0, step / safe[:, None])
         strayed |= np.any(np.abs(moved - start) > cell, axis=1)
         point = np.where(strayed[:, None], start, moved)
-    return point
+    return point, strayed
 
 
 def _hessians(surface: Surface, point: Array) -> Array:

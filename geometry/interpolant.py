@@ -36,7 +36,8 @@ class Interpolant:
         self.lengths, self.periodic = lengths, periodic
         self._spacing = (lengths[0] / heights.shape[0], lengths[1] / heights.shape[1])
         padding = _PADDING if periodic else 0
-        samples = np.pad(heights, padding, mode="wrap") if periodic else heights
+        self._lowest = float(heights.min())  # apart, so that its size adds no rounding to slopes
+        samples = np.pad(heights - self._lowest, padding, mode="wrap")
         centres, box = [], []
         for length, step, count in zip(lengths, self._spacing, heights.shape, strict=True):
             centres.append((np.arange(-padding, count + padding) + 0.5) * step)
@@ -60,7 +61,8 @@ class Interpolant:
             InputError: When a point lies outside and the samples are not periodic.
         """
         x, y = np.broadcast_arrays(self._inside(x, 0), self._inside(y, 1))
-        return np.asarray(self._derivative(dx, dy)(x, y, grid=False), dtype=np.float64)
+        values = self._derivative(dx, dy)(x, y, grid=False)
+        return np.asarray(values if dx or dy else values + self._lowest, dtype=np.float64)
 
     def maximum(self) -> tuple[float, float, float]:
         """Return (x, y, z) of the highest point over the closed rectangle [mm].
@@ -72,7 +74,9 @@ class Interpolant:
         x, y, z = self._starts()
         refined = [self._climb(*start) for start in zip(x, y, strict=True)]
         best = int(np.argmax(z))
-        return max([(float(x[best]), float(y[best]), float(z[best])), *refined], key=lambda p: p[2])
+        points = [(float(x[best]), float(y[best]), float(z[best])), *refined]
+        x_m, y_m, z_m = max(points, key=lambda point: point[2])
+        return x_m, y_m, z_m + self._lowest
 
     def _derivative(self, dx: int, dy: int) -> BivariateSpline:
         """Return a derivative as a spline of its own, made once: evaluation would remake it."""

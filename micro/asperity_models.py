@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from geometry import Asperities, Partition, PatchGrid
 from geometry.errors import InputError
-from micro.curve import PatchSums
+from micro.curve import PatchSums, checked_approaches
 from micro.hertz import HertzContact
 from micro.pairs.interaction import Interaction
 from micro.plane import RigidPlane
@@ -171,7 +171,7 @@ class AsperityModel:
         tilt: tuple[float, float] = _LEVEL,
     ) -> Response:
         """Solve along approaches, each from the solution before it; see `MicroModel.respond`."""
-        given = np.atleast_1d(np.asarray(approaches, float))
+        given = checked_approaches(approaches)
         sums = self.sums(patches, mean_heights)
         rows: dict[int, dict[str, Any]] = {}
         own: Array = np.zeros(len(self.asperities))
@@ -195,6 +195,12 @@ class AsperityModel:
     ) -> Pressed:
         """Solve under one plane; see `MicroModel.press`."""
         first = np.zeros(len(self.asperities)) if start is None else start
+        if np.shape(first) != (len(self.asperities),):
+            raise InputError(
+                "the solution to start from is of other asperities",
+                value=np.shape(first),
+                allowed=f"({len(self.asperities)},)",
+            )
         found = self.solution(plane.required(self.asperities), first)
         sums = self.sums(patches, mean_heights)
         rows = [sums.row(plane, found)]

@@ -16,9 +16,10 @@ from geometry.errors import InputError
 from micro.cells.contact_pressure import Pressures
 from micro.cells.elastic_grid import ElasticGrids
 from micro.cells.free_sides import FreeSides
-from micro.cells.half_space_curve import CellSums
+from micro.cells.half_space_curve import TIE, CellSums
 from micro.cells.half_space_state import HalfSpaceState
 from micro.cells.pressing import Pressing
+from micro.curve import checked_approaches
 from micro.plane import RigidPlane
 from micro.response import Pressed, Response
 
@@ -26,7 +27,6 @@ Array = NDArray[np.float64]
 
 _LEVEL = (0.0, 0.0)
 _FEWEST = 4  # heights along a side of a surface
-_TIE = 1e-9  # of a cell: a centre on a border belongs to the patch above, whatever rounding says
 _OUT_OF_REACH = 1e3
 """Sides of the surface by which cells are lowered that may not touch."""
 
@@ -118,14 +118,17 @@ class HalfSpaceModel:
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
         """Return the model of the cells of one patch; see `MicroModel.of_patch`.
 
-        Model and patch count places from the corner of the first of these cells.
+        Model and patch count places from the corner of the first of these cells. The patch's own
+        half-space has no free sides.
         """
         own, bounds = patches.single(index), patches.bounds(index)
         cells = zip(bounds, self.surface.spacing, self.surface.grid, strict=True)
         x, y = (_whole_cells(*axis) for axis in cells)
         patch = replace(own, origin=(own.origin[0] - x[0], own.origin[1] - y[0]))
         piece = self.surface.cropped(x=x, y=y)
-        model = replace(self, surface=piece, within=patch, periodic=False, highest=self.datum)
+        model = replace(
+            self, surface=piece, within=patch, periodic=False, highest=self.datum, sides=None
+        )
         return model, patch
 
     def solve(
@@ -198,7 +201,7 @@ class HalfSpaceModel:
         of patches is shared by area.
         """
         sums = self._sums(patches, mean_heights)
-        given = np.atleast_1d(np.asarray(approaches, float))
+        given = checked_approaches(approaches)
         order = np.argsort(given, kind="stable")
         path = self._along([self._plane(given[index], tilt) for index in order])
         rows = {int(index): sums.row(*step) for index, step in zip(order, path, strict=True)}
@@ -284,7 +287,7 @@ class HalfSpaceModel:
             return None
         edges = self.within.borders_x, self.within.borders_y
         x, y = (
-            (centres >= border[0] - _TIE * side) & (centres < border[-1] - _TIE * side)
+            (centres >= border[0] - TIE * side) & (centres < border[-1] - TIE * side)
             for centres, border, side in zip(
                 (self.surface.x, self.surface.y), edges, self.surface.spacing, strict=True
             )
@@ -312,6 +315,6 @@ class HalfSpaceModel:
 
 def _whole_cells(interval: tuple[float, float], side: float, count: int) -> tuple[float, float]:
     """Return the whole cells, as many as a surface needs, that an interval lies in [mm]."""
-    first, last = floor(interval[0] / side + _TIE), ceil(interval[1] / side - _TIE)
+    first, last = floor(interval[0] / side + TIE), ceil(interval[1] / side - TIE)
     first = max(min(first, count - _FEWEST), 0) if last - first < _FEWEST else first
     return first * side, max(last, first + _FEWEST) * side

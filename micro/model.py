@@ -33,6 +33,9 @@ class MicroModel(Protocol):
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
         """Return the model of one patch alone, on its own half-space.
 
+        It is meant for level planes: what a tilted one turns about is the middle of the rectangle
+        that is left, the patch's for some models and the whole for others.
+
         Args:
             patches: Patches of the surface.
             index: Flat index of the patch.

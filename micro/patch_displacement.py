@@ -3,9 +3,11 @@
 By reciprocity the mean over patch i of the displacement by a contact is the contact's force times
 the mean of L_i over its pressure, divided by π E* A_i, with L_i the Love integral of the patch.
 That mean is taken with a cubature for the semi-ellipsoidal pressure: 2 radii by 7 angles, exact to
-degree 6. L_i is smooth except on the patch's border, where its slope is logarithmic. So the mean
-over all patches is good to 1e-9; a contact of radius a across a border of a patch of side s
-misplaces up to 0.015 a/s of that patch's displacement between the two sides (a point force 0.17).
+degree 6. L_i is smooth except on the patch's border, where its slope is logarithmic. So a contact
+of radius a that lies across a border of a patch of side s misplaces up to 0.015 a/s of that patch's
+displacement between the two sides (0.035 a/s where it is larger than the patch; a point force
+0.17). The mean over all patches is good to 1e-9 for contacts away from the outer border; for one
+that touches it from inside to 4e-4 a/s, s now the whole, for one that reaches across to 0.02 a/s.
 Of more than 2000 contacts those that are small and far from any border count as point forces, for
 which the same bound holds.
 """

@@ -36,8 +36,8 @@ class Response:
     The separation is the average gap between the plane and the *displaced* surface:
     g_i = z_M − mean height − mean approach + mean displacement, per patch; for the models without
     interaction too, as their forces move the surface all the same. The paper's eq. 9 leaves the
-    displacement out. The mean over all patches is exact for the models' pressures, that of one
-    patch to the error stated in `micro.patch_displacement`.
+    displacement out. Means over patches and over all of them are those of the models' pressures, to
+    the errors stated in `micro.patch_displacement`.
 
     Args:
         model: Name of the micro model.

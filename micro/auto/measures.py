@@ -26,9 +26,9 @@ class ContactMeasures:
     Attributes:
         regions: Connected regions above the undeformed plane.
         contact_fraction: Half of the bearing area fraction: an estimate of the contact area.
-        cells_per_radius: Contact radius, of the mean contact, over the side of a cell.
-        cells_per_wave: Shortest wavelength over the side of a cell: that of a single wave with
-            the ratio of rms gradient and rms curvature of the surface.
+        cells_per_radius: Contact radius, of the mean contact, over the longer side of a cell.
+        cells_per_wave: Shortest wavelength over the longer side of a cell: that of a single wave
+            with the ratio of rms gradient and rms curvature of the surface.
         crowding: Contact radius times the root of the density of summits above the plane.
         eccentricity: Root of the mean e² of the regions' second moments, weighted with area.
         border_share: Share of the bearing area in regions that the border cuts.
@@ -55,16 +55,17 @@ def contact_measures(surface: Surface, approach: float, *, periodic: bool) -> Co
     names, regions = label(surface.heights > level, np.ones((3, 3)))
     area = np.bincount(names.ravel(), minlength=2)[1:]
     cells = max(int(area.sum()), _LEAST_REGION)
-    radius = np.sqrt(0.5 * cells / (np.pi * max(regions, 1)))
+    dx, dy = surface.spacing
+    radius = np.sqrt(0.5 * cells * dx * dy / (np.pi * max(regions, 1)))
     summits = grid_maxima(surface.heights, periodic=periodic)
     above = int(np.count_nonzero(summits.height > level))
     return ContactMeasures(
         regions=regions,
         contact_fraction=0.5 * cells / surface.heights.size,
-        cells_per_radius=float(radius),
+        cells_per_radius=float(radius / max(dx, dy)),
         cells_per_wave=_cells_per_wave(surface),
-        crowding=float(radius * np.sqrt(max(above, 1) / surface.heights.size)),
-        eccentricity=float(np.sqrt(_mean_square_eccentricity(names, area))),
+        crowding=float(radius * np.sqrt(max(above, 1) / surface.area)),
+        eccentricity=float(np.sqrt(_mean_square_eccentricity(names, area, dx / dy))),
         border_share=0.0 if periodic else _border_share(names, area),
     )
 
@@ -73,11 +74,15 @@ def _cells_per_wave(surface: Surface) -> float:
     rough = roughness(surface)
     if not rough.m4 > 0.0:
         return float(max(surface.grid))
-    return float(2.0 * np.pi * np.sqrt(rough.m2 / rough.m4) / min(surface.spacing))
+    shortest = 2.0 * min(surface.spacing)  # differences over two cells see no slope there
+    length = max(2.0 * np.pi * float(np.sqrt(rough.m2 / rough.m4)), shortest)
+    return length / max(surface.spacing)
 
 
-def _mean_square_eccentricity(names: NDArray[np.intp], area: NDArray[np.intp]) -> float:
-    """Return the mean of 1 − b²/a² of the regions, in cells, weighted with area."""
+def _mean_square_eccentricity(
+    names: NDArray[np.intp], area: NDArray[np.intp], aspect: float
+) -> float:
+    """Return the mean of 1 − b²/a² of the regions, of cells dx/dy, weighted with area."""
     i, j = np.nonzero(names)
     of = names[i, j] - 1
 
@@ -89,6 +94,7 @@ def _mean_square_eccentricity(names: NDArray[np.intp], area: NDArray[np.intp]) -
     ii, jj = i - mean(i.astype(float))[of], j - mean(j.astype(float))[of]
     # A cell is not a point: its own moment keeps small regions round.
     xx, yy, xy = mean(ii * ii) + 1 / 12, mean(jj * jj) + 1 / 12, mean(ii * jj)
+    xx, xy = aspect**2 * xx, aspect * xy
     half, middle = np.hypot(0.5 * (xx - yy), xy), 0.5 * (xx + yy)
     return float(np.average(2.0 * half / (middle + half), weights=area))
 

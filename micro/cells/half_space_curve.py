@@ -16,6 +16,9 @@ from micro.plane import RigidPlane
 
 Array = NDArray[np.float64]
 
+TIE = 1e-9
+"""Of a cell: a centre that is no further beyond a border lies on it, whatever rounding says."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CellSums:
@@ -50,7 +53,7 @@ class CellSums:
         separation = below - self.mean_heights + displacement
         area = true_area(state.in_contact, periodic=state.periodic)
         contacts = state.contacts
-        owner = self.patches.index_of(*contacts.peak.T)
+        owner = self.patches.index_of(*self._inside(contacts.peak).T)
         return {
             "approach": plane.approach,
             "force": state.force,
@@ -68,6 +71,13 @@ class CellSums:
             "patch_separation": separation,
             "warning": "",
         }
+
+    def _inside(self, centres: Array) -> Array:
+        """Move centres that lie beyond the outer borders by rounding alone onto these."""
+        x, y = self.patches.borders_x, self.patches.borders_y
+        nearest = np.clip(centres, (x[0], y[0]), (x[-1], y[-1]))
+        beyond = np.abs(centres - nearest) > TIE * np.array(self.surface.spacing)
+        return np.where(beyond, centres, nearest)
 
     def _moment(self, plane: RigidPlane, state: HalfSpaceState) -> tuple[float, float]:
         dx, dy = self.surface.spacing

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geometry import Partition, PatchGrid, Surface
-from micro.curve import checked_means, whole_patch
+from micro.curve import checked_approaches, checked_means, whole_patch
 from micro.hertz import checked_modulus
 from micro.plane import RigidPlane
 from micro.regions.island_passes import Settled, settle
@@ -116,7 +116,7 @@ class IslandModel:
         """
         planes = [
             RigidPlane.above(self.surface, approach, tilt)
-            for approach in np.atleast_1d(np.asarray(approaches, float))
+            for approach in checked_approaches(approaches)
         ]
         return self._response(planes, patches, mean_heights)
 
@@ -139,8 +139,6 @@ class IslandModel:
     ) -> Response:
         """Solve under planes that differ in their approach alone."""
         means = checked_means(mean_heights, patches)
-        if not planes:
-            return Response.of([], self.name, self.contact_modulus, patches)
         sums = IslandSums(
             relief=self._relief(max(planes, key=lambda plane: plane.approach)),
             lengths=self.surface.lengths,

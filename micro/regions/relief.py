@@ -17,7 +17,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from geometry import Surface
-from geometry.ascent import constrained_summits
+from geometry.ascent import coincident, constrained_summits
 from micro.regions.catchments import Passes, catchments, passes_between, sampled
 
 Array = NDArray[np.float64]
@@ -65,12 +65,13 @@ class Relief:
         floor: float = -np.inf,
         ceiling: float = np.inf,
     ) -> Self:
-        """Divide what rises above a floor into catchments.
+        """Divide what rises above a floor into catchments, one for each summit.
 
         Args:
             surface: The surface; it ends at its border, also when it is periodic.
             lean: What adds to its heights, on the same cells; it need not be periodic.
-            floor: Height below which nothing is kept [mm].
+            floor: Height below which no more is kept than the 33 highest samples of every peak
+                that reaches it, which give its caps their shape [mm].
             ceiling: Height that no peak exceeds, for peaks higher by rounding [mm].
         """
         parts = [surface] if lean is None else [surface, lean]
@@ -80,9 +81,13 @@ class Relief:
         top = np.stack(np.unravel_index(peak, heights.shape), axis=1)
         summit = constrained_summits(surface, (top + 0.5) * side, lean)
         z = np.sum([part.height_at(*summit.T) for part in parts], axis=0)
-        z = np.maximum(z, heights.flat[peak])
-        z = np.minimum(z, ceiling)
-        owner = np.where(heights.ravel() > floor, owner, -1)
+        z = np.minimum(np.maximum(z, heights.flat[peak]), ceiling)
+        # samples on one oblique ridge are peaks of their own, but not of the interpolant
+        name = coincident(surface, summit)
+        order = np.lexsort((-z, name))
+        best = order[np.searchsorted(name[order], np.arange(name.max() + 1))]
+        owner, summit, z = name[owner], summit[best], z[best]
+        owner = np.where(_needed(heights.ravel(), owner, z, floor), owner, -1)
         return cls._sorted(heights, owner, summit, z, side)
 
     @classmethod
@@ -178,7 +183,9 @@ class Relief:
         """Height of the cap with 32 samples, 0 where there are not so many."""
         last = self._start[:-1] + _FEW
         many = last < self._start[1:]
-        return np.where(many, self.depth[np.where(many, last, 0)], 0.0)
+        least: Array = np.zeros(len(self))
+        least[many] = self.depth[last[many]]
+        return least
 
     @cached_property
     def _cumulated(self) -> tuple[Array, Array]:
@@ -188,3 +195,16 @@ class Relief:
             for part in (self.moments, self.moments * self.depth)
         )
         return moments, deep
+
+
+def _needed(heights: Array, owner: Indices, z: Array, floor: float) -> NDArray[np.bool_]:
+    """Mark the samples above a floor and the highest ones of each peak that reaches it."""
+    kept = heights > floor
+    count = np.bincount(owner[kept], minlength=len(z))
+    wanting = (z >= floor) & (count <= _FEW)
+    rest = np.flatnonzero(wanting[owner] & ~kept)
+    rest = rest[np.lexsort((-heights[rest], owner[rest]))]
+    of = owner[rest]
+    rank = np.arange(len(rest)) - np.searchsorted(of, of)
+    kept[rest[rank + count[of] <= _FEW]] = True
+    return kept

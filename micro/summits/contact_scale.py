@@ -5,7 +5,8 @@ models of the paper lose force and area. A contact with indentation t has the ra
 cap of the surface of height t above a level has the radius sqrt(2 R t), 1.4 times that. So the
 paraboloid that fits the cap of height t in volume and second moments
 (`micro.regions.island_shapes`) gives the curvature over 1.4 contact radii; t and the fit are found
-in turn.
+in turn. So summits without a curvature, such as the flat ones of heights measured in steps, are
+asperities as well.
 
 A maximum on the border, cut by it, is an asperity of the same kind: the part of the cap that
 exists has its volume and moments, hence a paraboloid. A summit cut in half gets half the R, 3.2
@@ -58,8 +59,9 @@ class ScaledAsperities:
 
         Args:
             surface: The surface; its border ends it, also when it is periodic.
-            curvature: ``"summit"`` keeps the radii at the summits, ``"contact"`` fits them. Those
-                of the border's asperities are always fitted.
+            curvature: ``"summit"`` keeps the radii at the summits, ``"contact"`` fits them, and
+                takes summits that have none, such as flat ones, too. Those of the border's
+                asperities are always fitted.
             border: ``"ignore"`` or ``"include"`` the maxima within a cell of the border.
             floor: Height below which no fit is needed [mm].
         """
@@ -70,14 +72,18 @@ class ScaledAsperities:
         catchment = np.where(far < max(surface.spacing), nearest, -1)
         fitted = (catchment >= 0) & (curvature == "contact")
         scaled = cls(summits=inner, relief=relief, catchment=catchment, fitted=fitted)
-        return scaled._with_border(surface) if border == "include" else scaled
+        close = np.any(np.minimum(peaks, surface.lengths - peaks) < surface.spacing, axis=1)
+        whole = scaled._with(np.where(close, border == "include", curvature == "contact"))
+        if border == "ignore":
+            return whole
+        counted = replace(whole.summits, border_x=_NONE, border_y=_NONE, border_z=_NONE)
+        return replace(whole, summits=counted)
 
-    def _with_border(self, surface: Surface) -> ScaledAsperities:
+    def _with(self, wanted: NDArray[np.bool_]) -> ScaledAsperities:
+        """Add the wanted catchments that have no asperity, with the radii of their caps."""
         relief, taken = self.relief, np.zeros(len(self.relief), dtype=bool)
         taken[self.catchment[self.catchment >= 0]] = True
-        place, size = np.stack([relief.x, relief.y], axis=1), np.array(surface.lengths)
-        close = np.any(np.minimum(place, size - place) < surface.spacing, axis=1)
-        added = np.flatnonzero(close & ~taken)
+        added = np.flatnonzero(wanted & ~taken)
         new: dict[str, Any] = {
             name: np.append(getattr(self.summits, name), value)
             for name, value in (
@@ -91,7 +97,7 @@ class ScaledAsperities:
         }
         whole = replace(
             self,
-            summits=replace(self.summits, **new, border_x=_NONE, border_y=_NONE, border_z=_NONE),
+            summits=replace(self.summits, **new),
             catchment=np.append(self.catchment, added),
             fitted=np.append(self.fitted, np.ones(len(added), dtype=bool)),
         )
@@ -120,7 +126,7 @@ class ScaledAsperities:
         if not which.size:
             return self.summits
         relief, cap = self.relief, self.catchment[which]
-        depth = np.maximum(indentation[which], _SMALLEST * np.ptp(relief.depth))
+        depth = np.maximum(indentation[which], _SMALLEST * relief.depth.max(initial=0.0))
         height = np.zeros(len(relief))
         height[cap] = depth
         moments = from_origin(relief.caps(height)[:, cap], relief.x[cap], relief.y[cap])

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from geometry import Asperities, Partition, PatchGrid, Surface
 from geometry.errors import InputError, NotConverged
 from micro.asperity_models import MODELS, AsperityModel, asperity_model
-from micro.curve import checked_means
+from micro.curve import checked_approaches, checked_means
 from micro.plane import RigidPlane
 from micro.relaxation import Relaxation
 from micro.response import Pressed, Response
@@ -96,10 +96,10 @@ class ScaledModel:
         """Height z_M that the approach counts from [mm]."""
         return self.surface.highest
 
-    @property
+    @cached_property
     def first_touch(self) -> float:
         """Approach of a level plane at first contact [mm]; infinite without asperities."""
-        heights = self.asperities.z
+        heights = self._scaled(0.0).summits.z
         return float(self.datum - heights.max()) if heights.size else np.inf
 
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
@@ -109,7 +109,7 @@ class ScaledModel:
     @cached_property
     def asperities(self) -> Asperities:
         """The asperities, with the radii of their smallest contacts."""
-        return self._scaled(0.0).summits
+        return self._scaled(np.inf).summits
 
     def solve(
         self,
@@ -149,7 +149,7 @@ class ScaledModel:
         means = checked_means(mean_heights, patches)
         planes = [
             RigidPlane.above(self.surface, approach, tilt)
-            for approach in np.atleast_1d(np.asarray(approaches, float))
+            for approach in checked_approaches(approaches)
         ]
         scaled = self._scaled(_highest_approach(planes, self.surface))
         rows: dict[int, dict[str, Any]] = {}
@@ -159,8 +159,6 @@ class ScaledModel:
             own = fitted.solution.indentation
             sums = fitted.model.sums(patches, means, home=scaled.summits)
             rows[int(index)] = sums.row(planes[index], fitted.solution)
-        if not rows:
-            return Response.of([], self.name, self.contact_modulus, patches)
         return sums.response(self.name, [rows[index] for index in range(len(planes))])
 
     def press(

@@ -95,3 +95,16 @@ def test_maximum_of_noise_against_dense_sampling(seed, periodic):
 def test_maximum_of_a_flat_surface(value, shape):
     surface = Surface(heights=np.full(shape, value), lengths=(1.0, 1.0))
     assert surface.highest == pytest.approx(value, abs=1e-13)  # rounding of the spline's sums
+
+
+@pytest.mark.parametrize("periodic", [False, True])
+def test_what_heights_count_from_does_not_matter(periodic):
+    level = Interpolant(np.full((8, 9), 3.0), (1.0, 1.0), periodic=periodic)
+    t = np.linspace(0.0, 1.0, 12)
+    assert np.all(level(t[:, None], t) == 3.0) and level.maximum()[2] == 3.0
+    assert np.all(level(t, t, dx=1) == 0.0)
+    heights = np.round(np.random.default_rng(8).normal(size=(9, 8)), 3)
+    low, high = (Interpolant(heights + base, (1.0, 1.0), periodic=periodic) for base in (0.0, 1e6))
+    # the heights themselves are rounded to 1e-10 at 1e6, by 8 cells per mm in a slope
+    np.testing.assert_allclose(high(t, t, dx=1), low(t, t, dx=1), atol=1e-8)
+    np.testing.assert_allclose(high.maximum()[:2], low.maximum()[:2], atol=1e-8)

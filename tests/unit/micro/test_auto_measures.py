@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from geometry import Surface
+from micro.auto.errors import grid_error
 from micro.auto.measures import contact_measures
 
 
@@ -31,6 +32,20 @@ def test_the_eccentricity_of_an_elliptic_cap():
     assert at.eccentricity == pytest.approx(np.sqrt(0.75), rel=0.01)
 
 
+@pytest.mark.parametrize("shape", [(640, 40), (40, 640)])
+def test_cells_that_are_not_square_change_no_contact(shape):
+    x, y = ((np.arange(n) + 0.5) / n for n in shape)
+    heights = -((x[:, None] - 0.5) ** 2) - (y - 0.5) ** 2
+    at = contact_measures(Surface(heights=heights, lengths=(1.0, 1.0)), 0.04, periodic=False)
+    assert at.eccentricity**2 < 0.03  # pixels of 1 : 16 err by 2 % in a moment
+    assert at.crowding == pytest.approx(np.sqrt(0.02), rel=0.02)
+    # 40 cells across the coarser way count; the ratio is that of contact radius and wavelength
+    assert at.cells_per_radius == pytest.approx(40 * np.sqrt(0.02), rel=0.02)
+    square = contact_measures(paraboloid(), 0.04, periodic=False)
+    ratio = at.cells_per_radius / at.cells_per_wave
+    assert ratio == pytest.approx(square.cells_per_radius / square.cells_per_wave, rel=0.05)
+
+
 def test_the_border_cuts_a_cap_unless_periodic():
     cut = paraboloid(centre=(0.0, 0.5))
     assert contact_measures(cut, 0.04, periodic=False).border_share == 1.0
@@ -44,6 +59,13 @@ def test_the_cells_of_a_single_wave():
     )
     at = contact_measures(wave, 0.1, periodic=True)
     assert at.cells_per_wave == pytest.approx(24.0, rel=1e-9)
+
+
+def test_no_wave_is_shorter_than_two_cells():
+    squares = Surface(heights=np.indices((20, 20)).sum(axis=0) % 2 * 1e-2, lengths=(1.0, 1.0))
+    at = contact_measures(squares, 3e-3, periodic=False)
+    assert at.cells_per_wave == pytest.approx(2.0, rel=1e-12)
+    assert np.isfinite(grid_error(at, 1.0))
 
 
 def test_a_plane_between_the_samples_and_the_highest_point():

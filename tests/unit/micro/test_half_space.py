@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from geometry import InputError, NotConverged, PatchGrid, Spectrum, Surface, patch_means, synthesise
-from micro import HalfSpaceModel
+from micro import FreeSides, HalfSpaceModel
 
 E_STAR = 4000.0
 PATCHES = PatchGrid(grid=(3, 2), lengths=(1.0, 1.0))
@@ -206,3 +206,27 @@ def test_the_approach_counts_from_the_height_given(surface):
     np.testing.assert_allclose(far.patch_separation, near.patch_separation, atol=1e-9)
     alone, _ = above.of_patch(PATCHES, 1)
     assert alone.datum == above.datum
+
+
+@pytest.mark.parametrize("length", [0.3, 1.0, 7.3])
+@pytest.mark.parametrize("grid", [6, 10, 22])
+def test_patches_whose_borders_halve_cells_stand_alone(grid, length):
+    """Centres lie on borders there; where they count from the patch, rounding moves them off."""
+    heights = np.random.default_rng(0).standard_normal((grid, grid)) * 1e-3 * length
+    model = HalfSpaceModel(
+        surface=Surface(heights=heights, lengths=(length, length)), contact_modulus=1.0
+    )
+    patches = PatchGrid(grid=(4, 1), lengths=(length, length))
+    for index in range(patches.count):
+        alone, patch = model.of_patch(patches, index)
+        found = alone.respond([0.05 * length], patches=patch, mean_heights=[0.0])
+        assert found.contacts[0] > 0
+        assert found.patch_contacts[0].sum() == found.contacts[0]
+
+
+def test_a_patch_alone_has_no_free_sides(surface):
+    sides = FreeSides(lengths=surface.lengths, poisson_ratio=0.3, reach=0.5)
+    model = HalfSpaceModel(surface=surface, contact_modulus=E_STAR)
+    alone, expected = (replace(model, sides=each).of_patch(PATCHES, 1)[0] for each in (sides, None))
+    assert alone.sides is None
+    assert alone.solve(0.04).force == expected.solve(0.04).force > 0.0

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.special import roots_jacobi
 
 from geometry import PatchGrid
 from micro import HertzContact, love_integral
@@ -55,6 +56,22 @@ def test_contact_across_a_border():
     average = ball.displacement(x, y).reshape(4, n, 2, n).mean(axis=(1, 3)).ravel()
     assert got == pytest.approx(average, abs=0.015 * a / 0.25 * average.max())
     assert got.sum() == pytest.approx(average.sum(), rel=1e-5)  # the whole is exact
+
+
+@pytest.mark.parametrize(("offset", "bound"), [(3.0, 1e-9), (1.0, 4e-4 * 0.1), (0.5, 0.02 * 0.1)])
+def test_contact_at_the_outer_border(offset, bound):
+    """Of radius a, its centre so many a inside; against a rule of 60 radii and 1001 angles."""
+    whole, a = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)), 0.1
+    position = np.array([offset * a, 0.4])
+    none, one = np.zeros(1), np.ones(1)
+    got = patch_displacements(whole, position[None], np.full((1, 2), a), none, one, 1.0)
+    nodes, shares = roots_jacobi(60, 0.5, 0.0)
+    around = 2.0 * np.pi * np.arange(1001) / 1001
+    place = position + a * np.sqrt(0.5 * (1.0 + nodes))[:, None, None] * np.stack(
+        [np.cos(around), np.sin(around)], axis=-1
+    )
+    love = love_integral(place[..., 0] - 0.5, place[..., 1] - 0.5, 0.5, 0.5).mean(axis=1)
+    assert got[0] == pytest.approx(shares @ love / shares.sum() / np.pi, rel=bound)
 
 
 def test_patches_add_up():

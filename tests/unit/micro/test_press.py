@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geometry import PatchGrid, Spectrum, patch_means, synthesise
+from geometry import InputError, PatchGrid, Spectrum, patch_means, synthesise
 from micro import MODEL_NAMES, HalfSpaceModel, RigidPlane, micro_model
 
 SPECTRUM = Spectrum(hurst=0.9, waves=(2, 6), rms_slope=0.2, seed=5)
@@ -140,3 +140,29 @@ def test_moment_turns_with_the_surface(name):
     ]
     # the spline through periodic and through free heights differs at the border
     assert results[1] == pytest.approx(results[0] * [-1.0, 1.0], rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("approaches", "problem"),
+    [
+        ([], "at least one approach"),
+        ([[1e-3, 2e-3]], r"\(1, 2\): the approaches are no list"),
+        (["deep"], r"\['deep'\]: the approaches are no numbers"),
+        ([1e-3, np.nan], "nan: the approach must be finite"),
+    ],
+)
+def test_refuses_approaches_that_are_no_finite_list(model, approaches, problem):
+    with pytest.raises(InputError, match=problem):
+        model.respond(approaches, patches=PATCHES, mean_heights=MEANS)
+
+
+def test_refuses_mean_heights_that_are_no_numbers(model):
+    with pytest.raises(InputError, match="a mean height is not finite"):
+        model.respond([APPROACH], patches=PATCHES, mean_heights=np.full(PATCHES.count, np.nan))
+
+
+def test_refuses_to_start_from_other_asperities():
+    model = micro_model("elliptic", SURFACE, contact_modulus=4000.0)
+    plane = RigidPlane.above(SURFACE, APPROACH)
+    with pytest.raises(InputError, match=r"\(1,\): the solution to start from is of other"):
+        model.press(plane, patches=PATCHES, mean_heights=MEANS, start=np.zeros(1))

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.ndimage import label
+from scipy.spatial import cKDTree
 
 from geometry import Spectrum, Surface, synthesise
 from micro.regions.catchments import catchments, passes_between, sampled
@@ -133,3 +134,34 @@ def test_floor_keeps_what_rises_above(surface, relief):
     whole, kept = relief.caps(height)[:, big], cut.caps(np.maximum(cut.z - floor, 0.0))[:, big]
     assert kept == pytest.approx(whole, rel=1e-9, abs=1e-12 * whole[0].max())
     assert np.sum(cut.open_passes(level)) == np.sum(relief.open_passes(level)) > 0
+
+
+@pytest.mark.parametrize("reach", [0.0, 1e-7, 1e-3])
+def test_a_floor_leaves_the_caps_above_it_as_they_are(surface, relief, reach):
+    top = relief.z.max()
+    cut = Relief.of(surface, floor=top - reach)
+    assert len(cut.depth) < len(relief.depth)
+    height = np.maximum(cut.z - (top - max(reach, 1e-9)), 0.0)
+    # differences of sums over few samples instead of all
+    np.testing.assert_allclose(cut.caps(height)[0], relief.caps(height)[0], rtol=1e-7)
+
+
+def test_nothing_reaches_a_floor_above_all(surface):
+    empty = Relief.of(surface, floor=1.0)
+    assert not empty.caps(np.zeros(len(empty))).any()
+
+
+@pytest.mark.parametrize(("grid", "seed"), [((48, 480), 1), ((64, 256), 11), ((256, 256), 8)])
+def test_every_summit_has_one_catchment(grid, seed):
+    """Samples on ridges oblique to the grid climb nowhere, though the interpolant does."""
+    spectrum = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.2, seed=seed)
+    surface = synthesise(spectrum, grid=grid, lengths=(1.0, 1.0))
+    found = Relief.of(surface)
+    place, size = np.stack([found.x, found.y], axis=1), np.array(surface.lengths)
+    slope = surface.gradient_at(found.x, found.y)
+    held = ((place <= 0.0) & (slope < 0.0)) | ((place >= size) & (slope > 0.0))
+    assert np.abs(np.where(held, 0.0, slope)).max() < 1e-9  # of 0.2
+    distance = cKDTree(place / surface.spacing).query(place / surface.spacing, k=2)[0][:, 1]
+    assert distance.min() > 0.5
+    assert np.bincount(found.owner, minlength=len(found)).min() > 0
+    assert len(found.owner) == np.prod(found.grid)

@@ -1,5 +1,7 @@
 """Asperities fitted at the scale of the contact: options, limits, states and curves."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,18 @@ from geometry import (
     synthesise,
 )
 from geometry.errors import NotConverged
-from micro import BORDERS, CURVATURES, MODELS, ScaledModel, asperity_model, micro_model
+from micro import (
+    BORDERS,
+    CURVATURES,
+    MODELS,
+    IslandModel,
+    RigidPlane,
+    ScaledModel,
+    asperity_model,
+    micro_model,
+)
+from micro.regions import islands
+from micro.summits import scaled_model
 
 E_STAR = 4000.0
 PATCHES = PatchGrid(grid=(3, 2), lengths=(1.0, 1.0))
@@ -190,3 +203,36 @@ def test_refuses(surface):
         scaled(surface).solve(np.inf)
     with pytest.raises(InputError, match="a response needs at least one approach"):
         respond(scaled(surface), [])
+
+
+@pytest.mark.parametrize("make", [scaled, lambda s: IslandModel(surface=s, contact_modulus=E_STAR)])
+def test_large_surfaces_keep_less_but_find_the_same(surface, make, monkeypatch):
+    """Beyond so many samples only those that a plane can reach are sorted, anew for every plane."""
+    lean = RigidPlane.above(surface, 1e-4, (1e-3, 0.0))
+    means = patch_means(surface, PATCHES)
+
+    def found():
+        model = make(surface)
+        forces = [respond(model, [d]).force[0] for d in (-1e-3, 0.0, 1e-7, 1e-4, 4e-3)]
+        pressed = model.press(lean, patches=PATCHES, mean_heights=means).response
+        return model.first_touch, [*forces, pressed.force[0]]
+
+    touch, all_kept = found()
+    for module in (scaled_model, islands):
+        monkeypatch.setattr(module, "_MOST_KEPT", 0)
+    assert found()[0] == touch
+    # curvatures and lifts are settled to 1e-6; caps of 33 samples are differences of longer sums
+    np.testing.assert_allclose(found()[1], all_kept, rtol=1e-6)
+
+
+@pytest.mark.parametrize("border", BORDERS)
+def test_mirrored_surfaces_carry_the_same(border):
+    """A ridge on which several samples are peaks must not be divided among them by chance."""
+    spectrum = Spectrum(hurst=0.8, waves=(1, 4), rms_slope=0.1, seed=12)
+    surface = synthesise(spectrum, grid=(43, 32), lengths=(1.0, 2.3))
+    approach = 1.5 * surface.heights.std()
+    forces = []
+    for heights in (surface.heights, surface.heights[::-1], surface.heights[:, ::-1]):
+        model = scaled(replace(surface, heights=heights), border=border)
+        forces.append(model.solve(approach).force.sum())
+    np.testing.assert_allclose(forces, forces[0], rtol=1e-6)  # curvatures are settled to that
