@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from geometry.statistics import roughness
+from micro import AsperityModel
 from multiscale.planning.block_plan import block_statement, block_warnings
 from multiscale.planning.forecast import Forecast, forecast_statements
 from multiscale.planning.newton_choice import newton_choice
@@ -77,6 +78,11 @@ def _surface_warnings(stage: Stage) -> Iterator[str]:
             "maxima on the surface's border within the largest approach: "
             f"{stage.reached_at_border}; an 8-neighbour search cannot confirm them, and they carry "
             "no load here"
+        )
+    if isinstance(stage.micro, AsperityModel) and stage.asperities.rejected:
+        yield (
+            f"{stage.asperities.rejected} summits are flat, as heights in steps are: without radii "
+            "they carry no load here; take micro.curvature = 'contact', islands or half-space"
         )
 
 

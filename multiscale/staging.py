@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 from typing import Any
@@ -10,7 +11,7 @@ from geometry.asperities import Asperities, find_asperities
 from geometry.errors import InputError
 from geometry.patches import PatchGrid, patch_means
 from geometry.surface import Surface
-from micro import MODELS
+from micro import MicroModel
 from multiscale.ingredients import make_shape, make_surface
 from multiscale.planning.choices import SETTLED_LATE, cheapest, open_keys, provisional, with_settled
 from multiscale.planning.micro_choice import (
@@ -51,7 +52,6 @@ def make_stage(scene: Scene, settled: Mapping[str, Any] | None = None) -> Stage:
     asperities = find_asperities(surface, periodic=False)  # the block's sides are free
     if start.coupling.kind == "reference":
         return _reference_stage(start, surface, patches, asperities, began)
-    _check_summits(start, asperities)
     shape = make_shape(start, surface)
     made = time.perf_counter()
     seconds = {"surface": made - began}
@@ -62,6 +62,7 @@ def make_stage(scene: Scene, settled: Mapping[str, Any] | None = None) -> Stage:
         )
         seconds["micro choice"] = time.perf_counter() - made
     model = choice.model if choice else stated_model(start, surface)
+    _check_summits(start, model)
     mean_heights = patch_means(surface, patches)
     stage = Stage(
         scene=start,
@@ -78,9 +79,8 @@ def make_stage(scene: Scene, settled: Mapping[str, Any] | None = None) -> Stage:
     return cheapest(stage, scene, free) if free & SETTLED_LATE else stage
 
 
-def _check_summits(scene: Scene, asperities: Asperities) -> None:
-    by_summits = scene.micro.model in MODELS and scene.micro.border == "ignore"
-    if by_summits and not len(asperities):
+def _check_summits(scene: Scene, model: MicroModel) -> None:
+    if not math.isfinite(model.first_touch):
         raise InputError(
             "the surface has no summit that could carry load",
             key="micro.model",

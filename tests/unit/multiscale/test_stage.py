@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from multiscale import Scene, make_stage, run
-from multiscale.plan import statements
+from multiscale.plan import statements, warnings
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 
@@ -57,3 +57,29 @@ def test_laws_reach_a_contact_at_the_corner_of_the_block():
     """There the plane comes further than on the half-space; the laws know how the block bends."""
     history = run(scene(1, "consistent", force=5e-3, tilt=[0.01, 0.01]))
     assert history.force_N[-1] == pytest.approx(5e-3, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("micro", "told"),
+    [({}, True), ({"curvature": "contact"}, False), ({"model": "islands"}, False)],
+)
+def test_the_plan_tells_of_flat_summits_that_carry_nothing(tmp_path, micro, told):
+    x = np.linspace(-0.5, 0.5, 33)
+    waves = 0.01 * np.cos(4 * np.pi * x[:, None]) * np.cos(4 * np.pi * x)
+    steps = np.round(waves / 2e-3) * 2e-3  # heights in steps of 2 µm
+    steps[:16] = waves[:16]
+    np.save(tmp_path / "steps.npy", steps)
+    surface = {"file": str(tmp_path / "steps.npy"), "lengths": ["1 mm", "1 mm"]}
+    block = {"young_modulus": "4 GPa", "poisson_ratio": 0.15, "cells": [8, 8, 6]}
+    stepped = Scene.from_dict(
+        {
+            "surface": surface,
+            "block": block,
+            "patches": {"grid": [2, 2]},
+            "micro": {"model": "elliptic"} | micro,
+            "coupling": {"kind": "isolated"},
+            "load": {"approach": "4 um", "steps": 1},
+        }
+    )
+    said = [text for text in warnings(make_stage(stepped)) if "summits are flat" in text]
+    assert len(said) == told
