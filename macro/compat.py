@@ -21,6 +21,7 @@ from dolfinx.fem import petsc as fem_petsc
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from geometry.errors import InputError
 from macro.jit import TIMEOUT, explained
 
 try:
@@ -49,9 +50,20 @@ def _quiet_compiler() -> Iterator[None]:
 
 
 def form_cache() -> Path:
-    """Return the folder of the compiled forms."""
+    """Return the folder of the compiled forms.
+
+    Raises:
+        InputError: When dolfinx cannot read the settings that may name it.
+    """
     options = jit.get_options if hasattr(jit, "get_options") else jit.get_parameters
-    return Path(options()["cache_dir"])
+    try:
+        return Path(options()["cache_dir"])
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"dolfinx cannot read its dolfinx_jit settings ({error}); mend the file, or set "
+            "XDG_CONFIG_HOME to a folder without it",
+            key="form compiler",
+        ) from error
 
 
 @contextmanager
