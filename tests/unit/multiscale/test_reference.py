@@ -212,6 +212,18 @@ def test_files(capsys, tmp_path):
     assert "Discretisation error: ±" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
+def test_what_is_not_known_is_null_in_the_provenance(capsys, tmp_path):
+    words = ["run", str(PAPER), "--out", str(tmp_path), "--set", *COARSE, "reference.meshes=1"]
+    assert main([*words, "output.figures=false", "output.report=false", "load.steps=1"]) == 0
+
+    def refused(constant):
+        raise AssertionError(f"{constant} is no JSON")
+
+    text = (tmp_path / "provenance.json").read_text(encoding="utf-8")
+    facts = json.loads(text, parse_constant=refused)
+    assert facts["reference"]["force_rate"] == [None]
+
+
 def test_fields_are_those_of_the_rough_block(capsys, tmp_path):
     words = ["run", str(PAPER), "--out", str(tmp_path), "--set", *COARSE, "output.fields=true"]
     assert main([*words, "output.figures=false", "output.report=false"]) == 0
