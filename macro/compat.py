@@ -6,6 +6,7 @@ all releases share, and petsc4py.
 
 from __future__ import annotations
 
+import ctypes
 import inspect
 import logging
 from collections.abc import Iterator, Sequence
@@ -297,7 +298,13 @@ def write_xdmf(path: str, mesh: Any, functions: Sequence[Any]) -> None:
     Note:
         Collective.
     """
-    with io.XDMFFile(mesh.comm, path, "w") as file:
+    file = io.XDMFFile(mesh.comm, path, "w")
+    try:
         file.write_mesh(mesh)
         for function in functions:
             file.write_function(function)
+        file.close()
+    except RuntimeError:
+        # on a full disk it cannot be closed, and dropping it would try again and end the process
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(file))
+        raise

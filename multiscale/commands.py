@@ -17,8 +17,9 @@ from multiscale.law_tables.law_files import write_laws
 from multiscale.mpi_job import refuse_strangers
 from multiscale.planning.forecast import Forecast, forecast
 from multiscale.reporting import terminal
+from multiscale.reporting.field_files import write_fields
 from multiscale.reporting.outputs import write_whole
-from multiscale.reporting.results import write_fields, write_figure, write_results
+from multiscale.reporting.results import write_figure, write_results
 from multiscale.restart.folder_lock import locked
 from multiscale.restart.interruption import Interruption, Stopped
 from multiscale.restart.resuming import Keeper, is_finished, kept_choices

@@ -16,6 +16,7 @@ from geometry.errors import InputError, NotWritten
 from multiscale import Run, Scene
 from multiscale.cli import main
 from multiscale.planning import choices
+from multiscale.reporting.field_files import write_fields
 from multiscale.restart.checkpoint import read_checkpoint, write_checkpoint
 from multiscale.restart.folder_lock import FolderLock
 from multiscale.restart.journal import Journal, journalled
@@ -400,6 +401,47 @@ def test_run_on_a_full_disk_ends_with_5_and_goes_on(capsys, tmp_path, size, file
     assert ("goes on after load step 2" in capsys.readouterr().out) == bool(left)
     assert (out / "surface.png").exists()
     assert not list(out.glob("checkpoint*"))
+
+
+def test_fields_on_a_full_disk_end_with_5_and_leave_nothing_half_written(tmp_path):
+    out = tmp_path / "out"
+    on_block = ["coupling.kind=concurrent", "block.cells=[16, 16, 8]", "output.fields=true"]
+    done = subprocess.run(
+        [sys.executable, "-c", LIMITED, "150000", *WORDS, *on_block, "--out", str(out)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 5, done.stderr
+    assert f"patchlaw: {out}/fields.xdmf: cannot be written: " in done.stderr
+    assert {path.name for path in out.iterdir()} == {
+        "history.csv", "patches.csv", "provenance.json", "checkpoint.h5", "checkpoint.journal",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["fields.h5", "fields.xdmf"])
+def test_fields_cut_short_in_silence_are_told(tmp_path, monkeypatch, name):
+    def cut(path, *arguments):
+        write(path, *arguments)
+        os.truncate(path.with_name(name), path.with_name(name).stat().st_size // 2)
+
+    import macro
+
+    write = macro.write_fields
+    monkeypatch.setattr(macro, "write_fields", cut)
+    run = Run(scene({"coupling": {"kind": "concurrent"}, "block": {"cells": [6, 6, 4]}}))
+    next(run.load_steps())
+    with pytest.raises(NotWritten, match=rf"{name}: cannot be written: "):
+        write_fields(tmp_path, run)
+    assert not list(tmp_path.iterdir())
+
+
+def test_folders_under_names_of_results_are_nobody_elses_to_remove(tmp_path, capsys):
+    kept = tmp_path / "history.csv" / "kept"
+    kept.mkdir(parents=True)
+    assert main([*WORDS[:2], "--out", str(tmp_path), *WORDS[2:]]) == 5
+    assert "history.csv: cannot be written: Is a directory" in capsys.readouterr().err
+    assert kept.exists()
 
 
 def test_a_plan_stands_though_another_machine_would_choose_otherwise(tmp_path, monkeypatch):
