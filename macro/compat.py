@@ -23,12 +23,14 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.errors import InputError
+from geometry.lattice import sigint_kept
 from macro.jit import TIMEOUT, explained
 
-try:
-    from dolfinx.io import gmsh as _gmsh_io
-except ImportError:
-    from dolfinx.io import gmshio as _gmsh_io
+with sigint_kept():  # these import gmsh
+    try:
+        from dolfinx.io import gmsh as _gmsh_io
+    except ImportError:
+        from dolfinx.io import gmshio as _gmsh_io
 
 _JIT = {"timeout": TIMEOUT}  # another process may be compiling the same form on a slow machine
 HAS_VTX = hasattr(io, "VTXWriter")
