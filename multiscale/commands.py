@@ -140,17 +140,18 @@ def tabulate_scene(choice: argparse.Namespace, options: list[str], comm: Any) ->
         comm: MPI communicator; None for a process on its own.
     """
     scene, folder = scene_and_folder(choice, comm)
-    run = Run(scene, comm)
-    terminal.show_plan(comm, run.stage, run.forecast)
-    table = run.make_laws()
+    with locked(folder, comm):
+        run = Run(scene, comm)
+        terminal.show_plan(comm, run.stage, run.forecast)
+        table = run.make_laws()
 
-    def write() -> list[Path]:
-        from multiscale.figures import law_figure
+        def write() -> list[Path]:
+            from multiscale.figures import law_figure
 
-        laws = write_whole(folder / "laws.h5", lambda path: write_laws(path, table))
-        return [laws, write_figure(folder / "laws.png", law_figure(table))]
+            laws = write_whole(folder / "laws.h5", lambda path: write_laws(path, table))
+            return [laws, write_figure(folder / "laws.png", law_figure(table))]
 
-    terminal.show_files(comm, on_root(comm, write))
+        terminal.show_files(comm, on_root(comm, write))
     for note in run.history().notes:
         terminal.say(comm, f"note: {note}")
 
@@ -183,7 +184,8 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
         figure = surface_figure(stage.surface, stage.asperities, stage.patches)
         return [write_figure(folder / "surface.png", figure)]
 
-    terminal.show_files(comm, on_root(comm, write))
+    with locked(folder, comm):
+        terminal.show_files(comm, on_root(comm, write))
 
 
 def print_schema(choice: argparse.Namespace, options: list[str], comm: Any) -> None:

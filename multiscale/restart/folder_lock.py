@@ -6,7 +6,7 @@ import errno
 import fcntl
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -80,14 +80,13 @@ class FolderLock:
         """Lift the lock and leave nothing of it."""
         if self._file is None:
             return
-        if self._holds():
-            self._path.unlink(missing_ok=True)
+        with suppress(OSError):  # the folder may have become read-only; the lock is lifted anyway
+            if self._holds():
+                self._path.unlink(missing_ok=True)
         os.close(self._file)
         self._file = None
-        try:
+        with suppress(OSError):  # results are there, or the folder is gone
             self._path.parent.rmdir()
-        except OSError:  # results are there, or the folder is gone
-            pass
 
     def _lock(self) -> None:
         file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)

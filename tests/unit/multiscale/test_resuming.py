@@ -275,6 +275,43 @@ def test_two_runs_do_not_share_a_folder(tmp_path):
     assert not (tmp_path / "out").exists()  # neither wrote anything
 
 
+@pytest.mark.parametrize("command", ["laws", "surface", "run"])
+def test_no_command_writes_where_a_run_does(tmp_path, capsys, command):
+    out = tmp_path / "out"
+    lock = FolderLock(out)
+    lock.hold()
+    assert main([command, str(PAPER), "--out", str(out), "--set", "surface.grid=[32, 32]"]) == 2
+    assert "another run is writing to this folder" in capsys.readouterr().err
+    assert [path.name for path in out.iterdir()] == [".lock"]
+    lock.release()
+
+
+def test_folder_that_becomes_a_file_under_way_ends_with_5(tmp_path, ended):
+    path, _ = interrupted(tmp_path / "out", ended)
+    lock = FolderLock(path.parent)
+    lock.hold()
+    shutil.rmtree(path.parent)
+    path.parent.touch()
+    with pytest.raises(NotWritten, match="out: cannot be written to: ") as error:
+        Keeper(path.parent, ended, lock).write()
+    assert error.value.exit_code == 5
+    lock.release()
+
+
+def test_lock_is_lifted_where_its_file_must_stay(tmp_path, monkeypatch):
+    def refused(path, missing_ok=False):
+        raise PermissionError(13, "Permission denied", str(path))
+
+    lock, other = FolderLock(tmp_path), FolderLock(tmp_path)
+    lock.hold()
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", refused)
+        lock.release()
+    other.hold()
+    other.release()
+    assert not (tmp_path / ".lock").exists()
+
+
 def test_folder_of_a_file_cannot_be_locked(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="cannot be written to: Not a directory"):
