@@ -56,6 +56,7 @@ class FolderLock:
     def __init__(self, folder: Path) -> None:
         self._path = folder / _NAME
         self._file: int | None = None
+        self._made = False
 
     def hold(self) -> None:
         """Take the lock, also again when the folder was removed in the meantime.
@@ -67,6 +68,7 @@ class FolderLock:
             if self._holds():
                 return
             try:
+                self._made |= not self._path.parent.exists()
                 self._path.parent.mkdir(parents=True, exist_ok=True)
                 self._lock()
             except BlockingIOError:
@@ -85,8 +87,9 @@ class FolderLock:
                 self._path.unlink(missing_ok=True)
         os.close(self._file)
         self._file = None
-        with suppress(OSError):  # results are there, or the folder is gone
-            self._path.parent.rmdir()
+        if self._made:
+            with suppress(OSError):  # results are there, or the folder is gone
+                self._path.parent.rmdir()
 
     def _lock(self) -> None:
         file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)

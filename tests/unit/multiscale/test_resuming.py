@@ -298,6 +298,13 @@ def test_folder_that_becomes_a_file_under_way_ends_with_5(tmp_path, ended):
     lock.release()
 
 
+def test_empty_folder_that_was_there_stays(tmp_path):
+    lock = FolderLock(tmp_path)
+    lock.hold()
+    lock.release()
+    assert tmp_path.is_dir() and not list(tmp_path.iterdir())
+
+
 def test_lock_is_lifted_where_its_file_must_stay(tmp_path, monkeypatch):
     def refused(path, missing_ok=False):
         raise PermissionError(13, "Permission denied", str(path))
