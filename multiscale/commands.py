@@ -120,7 +120,7 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    scene, _ = scene_and_folder(choice, comm)
+    scene, _ = scene_and_folder(choice, comm, writes=False)
     load_together(scene, comm)
     stage, made = on_root(comm, lambda: _planned(scene))
     terminal.show_plan(comm, stage, made)
@@ -201,7 +201,7 @@ def print_schema(choice: argparse.Namespace, options: list[str], comm: Any) -> N
 
 
 def scene_and_folder(
-    choice: argparse.Namespace, comm: Any, *, ending: str = ""
+    choice: argparse.Namespace, comm: Any, *, ending: str = "", writes: bool = True
 ) -> tuple[Scene, Path]:
     """Read the scene on rank 0 and settle where results would go.
 
@@ -209,6 +209,7 @@ def scene_and_folder(
         choice: Parsed words of the command line.
         comm: MPI communicator; None for a process on its own.
         ending: What the folder's name has behind the scene's, unless the user names a folder.
+        writes: Whether anything will be written to it.
 
     Raises:
         InputError: When the scene or the folder cannot be used, or this process is one of several
@@ -219,7 +220,8 @@ def scene_and_folder(
     def read() -> tuple[Scene, Path]:
         scene = Scene.load(choice.scene, choice.set)
         folder = choice.out or Path("results") / f"{scene.name}{ending}"
-        _check_folder(folder)
+        if writes:
+            _check_folder(folder)
         return scene, folder
 
     return on_root(comm, read)

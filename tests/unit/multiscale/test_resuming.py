@@ -337,6 +337,7 @@ def test_read_only_folder_is_refused_before_anything_is_made(tmp_path, capsys, m
     assert f"--out = '{tmp_path}/out': {tmp_path} cannot be written to" in told.err
     assert not told.out
     assert not list(tmp_path.iterdir())
+    assert main(["plan", str(PAPER), "--set", "coupling.kind=analytic"]) == 0  # writes nothing
 
 
 def test_wrong_input_met_late_leaves_nothing(capsys, tmp_path, monkeypatch):
