@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import signal
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -62,6 +63,24 @@ Axes = tuple[Sequence[Segment], Sequence[Segment], Sequence[Segment]]
 
 
 @contextmanager
+def sigint_kept() -> Iterator[None]:
+    """Leave SIGINT to who has it: gmsh takes it, some releases already when they are imported.
+
+    Blocking the signal would not do: the threads of others let it end the process meanwhile.
+    """
+    original = signal.signal
+
+    def guarded(number: int, handler: Any) -> Any:
+        return signal.getsignal(number) if number == signal.SIGINT else original(number, handler)
+
+    signal.signal = guarded  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        signal.signal = original
+
+
+@contextmanager
 def gmsh_session(name: str) -> Iterator[Any]:
     """Give a silent gmsh with a new current model, and leave a caller's session as it was.
 
@@ -71,11 +90,12 @@ def gmsh_session(name: str) -> Iterator[Any]:
     Yields:
         The gmsh module.
     """
-    import gmsh  # here, so that everything without a mesh works without gmsh
+    with sigint_kept():
+        import gmsh  # here, so that everything without a mesh works without gmsh
 
-    owned = not _is_initialised(gmsh)
-    if owned:
-        gmsh.initialize(["", "-v", "0"], readConfigFiles=False)
+        owned = not _is_initialised(gmsh)
+        if owned:
+            gmsh.initialize(["", "-v", "0"], readConfigFiles=False)
     current = gmsh.model.getCurrent()
     kept = {option: gmsh.option.getNumber(option) for option in _OPTIONS}
     try:
@@ -85,7 +105,8 @@ def gmsh_session(name: str) -> Iterator[Any]:
         yield gmsh
     finally:
         if owned:
-            gmsh.finalize()
+            with sigint_kept():
+                gmsh.finalize()
         else:
             gmsh.model.setCurrent(name)
             gmsh.model.remove()

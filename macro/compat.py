@@ -6,6 +6,7 @@ all releases share, and petsc4py.
 
 from __future__ import annotations
 
+import ctypes
 import inspect
 import logging
 from collections.abc import Iterator, Sequence
@@ -22,6 +23,8 @@ from dolfinx.fem import petsc as fem_petsc
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from geometry.errors import InputError
+from geometry.lattice import sigint_kept
 from macro.jit import TIMEOUT, explained
 
 _JIT = {"timeout": TIMEOUT}  # another process may be compiling the same form on a slow machine
@@ -45,9 +48,20 @@ def _quiet_compiler() -> Iterator[None]:
 
 
 def form_cache() -> Path:
-    """Return the folder of the compiled forms."""
+    """Return the folder of the compiled forms.
+
+    Raises:
+        InputError: When dolfinx cannot read the settings that may name it.
+    """
     options = jit.get_options if hasattr(jit, "get_options") else jit.get_parameters
-    return Path(options()["cache_dir"])
+    try:
+        return Path(options()["cache_dir"])
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"dolfinx cannot read its dolfinx_jit settings ({error}); mend the file, or set "
+            "XDG_CONFIG_HOME to a folder without it",
+            key="form compiler",
+        ) from error
 
 
 @contextmanager
@@ -68,10 +82,11 @@ def mesh_from_gmsh(model: Any, comm: Any) -> tuple[Any, Any]:
     Note:
         Collective. Facet tags may include ghost facets (dolfinx 0.5).
     """
-    try:  # here, for it brings gmsh, which lattices do without
-        from dolfinx.io import gmsh as reader
-    except ImportError:
-        from dolfinx.io import gmshio as reader
+    with sigint_kept():  # here, for it brings gmsh, which lattices do without
+        try:
+            from dolfinx.io import gmsh as reader
+        except ImportError:
+            from dolfinx.io import gmshio as reader
     data = reader.model_to_mesh(model, comm, 0, gdim=3)
     return (data.mesh, data.facet_tags) if hasattr(data, "mesh") else (data[0], data[2])
 
@@ -290,7 +305,13 @@ def write_xdmf(path: str, mesh: Any, functions: Sequence[Any]) -> None:
     Note:
         Collective.
     """
-    with io.XDMFFile(mesh.comm, path, "w") as file:
+    file = io.XDMFFile(mesh.comm, path, "w")
+    try:
         file.write_mesh(mesh)
         for function in functions:
             file.write_function(function)
+        file.close()
+    except RuntimeError:
+        # on a full disk it cannot be closed, and dropping it would try again and end the process
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(file))
+        raise

@@ -81,7 +81,10 @@ def is_kept(kind: str, key: tuple[object, ...]) -> bool:
         key: All that it depends on, as for `cached`.
     """
     path = _place(kind, key)
-    return path is not None and path.is_file()
+    try:
+        return path is not None and path.is_file()
+    except OSError:  # a folder above it that this user may not enter
+        return False
 
 
 def _place(kind: str, key: tuple[object, ...]) -> Path | None:

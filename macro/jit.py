@@ -8,7 +8,7 @@ import shutil
 import sysconfig
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from geometry.errors import InputError
@@ -29,19 +29,22 @@ def left_locks(folder: Path, older_than: float = 2.0 * TIMEOUT) -> list[Path]:
     """
     latest = time.time() - older_than
     left = []
-    for source in folder.glob("libffcx_*.c"):
-        try:
-            if not source.with_suffix(".c.cached").exists() and source.stat().st_mtime < latest:
-                left.append(source)
-        except FileNotFoundError:  # another process tidies up as well
-            continue
+    with suppress(PermissionError):  # nobody who may not enter it compiles there
+        for source in folder.glob("libffcx_*.c"):
+            with suppress(FileNotFoundError):  # another process tidies up as well
+                marked = source.with_suffix(".c.cached").exists()
+                if not marked and source.stat().st_mtime < latest:
+                    left.append(source)
     return sorted(left)
 
 
 def writable(folder: Path) -> bool:
     """Tell whether a folder, or the nearest one above that exists, can be written to."""
-    nearest = next(path for path in (folder, *folder.absolute().parents) if path.exists())
-    return nearest.is_dir() and os.access(nearest, os.W_OK | os.X_OK)
+    try:
+        nearest = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+        return nearest.is_dir() and os.access(nearest, os.W_OK | os.X_OK)
+    except OSError:  # a folder on the way that this user may not enter
+        return False
 
 
 def compiler() -> str | None:

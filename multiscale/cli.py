@@ -44,7 +44,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Note:
         Collective over all processes of the MPI job.
     """
-    comm = world()
+    try:
+        comm = world()
+    except InputError as error:
+        terminal.complain(None, error)
+        return error.exit_code
+    except KeyboardInterrupt:
+        return 130
     meeting = None if comm is None else comm.Dup()  # none else must send anything through it
     words = list(sys.argv[1:] if arguments is None else arguments)
     cut = words.index("--") if "--" in words else len(words)

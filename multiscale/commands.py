@@ -17,8 +17,9 @@ from multiscale.law_tables.law_files import write_laws
 from multiscale.mpi_job import refuse_strangers
 from multiscale.planning.forecast import Forecast, forecast
 from multiscale.reporting import terminal
+from multiscale.reporting.field_files import write_fields
 from multiscale.reporting.outputs import write_whole
-from multiscale.reporting.results import write_fields, write_figure, write_results
+from multiscale.reporting.results import write_figure, write_results
 from multiscale.restart.folder_lock import locked
 from multiscale.restart.interruption import Interruption, Stopped
 from multiscale.restart.resuming import Keeper, is_finished, kept_choices
@@ -120,7 +121,7 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    scene, _ = scene_and_folder(choice, comm)
+    scene, _ = scene_and_folder(choice, comm, writes=False)
     load_together(scene, comm)
     stage, made = on_root(comm, lambda: _planned(scene))
     terminal.show_plan(comm, stage, made)
@@ -140,17 +141,18 @@ def tabulate_scene(choice: argparse.Namespace, options: list[str], comm: Any) ->
         comm: MPI communicator; None for a process on its own.
     """
     scene, folder = scene_and_folder(choice, comm)
-    run = Run(scene, comm)
-    terminal.show_plan(comm, run.stage, run.forecast)
-    table = run.make_laws()
+    with locked(folder, comm):
+        run = Run(scene, comm)
+        terminal.show_plan(comm, run.stage, run.forecast)
+        table = run.make_laws()
 
-    def write() -> list[Path]:
-        from multiscale.figures import law_figure
+        def write() -> list[Path]:
+            from multiscale.figures import law_figure
 
-        laws = write_whole(folder / "laws.h5", lambda path: write_laws(path, table))
-        return [laws, write_figure(folder / "laws.png", law_figure(table))]
+            laws = write_whole(folder / "laws.h5", lambda path: write_laws(path, table))
+            return [laws, write_figure(folder / "laws.png", law_figure(table))]
 
-    terminal.show_files(comm, on_root(comm, write))
+        terminal.show_files(comm, on_root(comm, write))
     for note in run.history().notes:
         terminal.say(comm, f"note: {note}")
 
@@ -183,7 +185,8 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
         figure = surface_figure(stage.surface, stage.asperities, stage.patches)
         return [write_figure(folder / "surface.png", figure)]
 
-    terminal.show_files(comm, on_root(comm, write))
+    with locked(folder, comm):
+        terminal.show_files(comm, on_root(comm, write))
 
 
 def print_schema(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -199,7 +202,7 @@ def print_schema(choice: argparse.Namespace, options: list[str], comm: Any) -> N
 
 
 def scene_and_folder(
-    choice: argparse.Namespace, comm: Any, *, ending: str = ""
+    choice: argparse.Namespace, comm: Any, *, ending: str = "", writes: bool = True
 ) -> tuple[Scene, Path]:
     """Read the scene on rank 0 and settle where results would go.
 
@@ -207,6 +210,7 @@ def scene_and_folder(
         choice: Parsed words of the command line.
         comm: MPI communicator; None for a process on its own.
         ending: What the folder's name has behind the scene's, unless the user names a folder.
+        writes: Whether anything will be written to it.
 
     Raises:
         InputError: When the scene or the folder cannot be used, or this process is one of several
@@ -217,7 +221,8 @@ def scene_and_folder(
     def read() -> tuple[Scene, Path]:
         scene = Scene.load(choice.scene, choice.set)
         folder = choice.out or Path("results") / f"{scene.name}{ending}"
-        _check_folder(folder)
+        if writes:
+            _check_folder(folder)
         return scene, folder
 
     return on_root(comm, read)

@@ -135,7 +135,9 @@ class EmbeddedCoupling:
             area = self._pressed.patch_means([law.area_fraction_at for law in laws])
             gaps = self._pressed.patch_means([law.separation_at for law in laws])
         except InputError as error:
-            raise beyond_law(control, str(error), self._table.made_by.get("coupling")) from error
+            made_for = self._table.made_by.get("coupling")
+            falls = not all(law.is_function for law in laws)
+            raise beyond_law(control, str(error), made_for, falls=falls) from error
         mean_closures = zip(laws, press.closure, strict=True)
         contacts = sum(int(law.contacts_at(c, extend=True)) for law, c in mean_closures)
         return embedded_step(
@@ -240,13 +242,16 @@ def tilted_approaches(patches: PatchGrid, approach: float, tilt: tuple[float, fl
     return approach + (patches.centres - centre) @ np.asarray(tilt)
 
 
-def beyond_law(control: Control, problem: str, coupling: str | None) -> BeyondLaws:
+def beyond_law(
+    control: Control, problem: str, coupling: str | None, *, falls: bool = False
+) -> BeyondLaws:
     """Return the error of a patch that left its law's range.
 
     Args:
         control: The load step.
         problem: Which patch, and how far its law goes.
         coupling: The coupling that the laws were made for.
+        falls: Whether closure falls somewhere in a law, and the mesh cannot follow.
     """
     alone = (
         "near full contact a patch taken alone has no pressure as a function of closure: take "
@@ -257,6 +262,11 @@ def beyond_law(control: Control, problem: str, coupling: str | None) -> BeyondLa
         "the block lets the plane come or turn further than the half-space that the laws were "
         "made for: take coupling.kind = 'concurrent', which needs none"
     )
+    if falls:
+        whole = (
+            "where the closure of a law falls the mesh cannot follow: take coupling.newton = "
+            "'condensed', which goes on, or coupling.kind = 'concurrent', which needs no law"
+        )
     return BeyondLaws(
         f"the patches at {described(control)}",
         reason=f"LAW_RANGE: {problem}",

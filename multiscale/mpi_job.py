@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 from typing import Any
 
 from geometry.errors import InputError
@@ -14,7 +15,19 @@ _SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM
 
 
 def world() -> Any:
-    """Return the communicator of an MPI job, or None for a process on its own."""
+    """Return the communicator of an MPI job, or None for a process on its own.
+
+    Raises:
+        InputError: When this user has no home, without which neither Open MPI nor dolfinx starts.
+    """
+    try:
+        Path.home()
+    except RuntimeError:
+        raise InputError(
+            "this user has no home folder, and MPI does not start without",
+            key="HOME",
+            allowed="set it to any folder",
+        ) from None
     from mpi4py import MPI
 
     return MPI.COMM_WORLD if MPI.COMM_WORLD.size > 1 else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from geometry.statistics import roughness
-from micro import AsperityModel
+from micro import MODELS, AsperityModel
 from multiscale.planning.block_plan import block_statement, block_warnings
 from multiscale.planning.forecast import Forecast, forecast_statements
 from multiscale.planning.newton_choice import newton_choice
@@ -17,6 +17,8 @@ from multiscale.planning.reference_plan import (
 )
 from multiscale.planning.surface_choice import heights_per_wave
 from multiscale.stage import Stage
+
+_INTERACTING = ("elliptic", "circular")
 
 
 def statements(stage: Stage, made: Forecast | None = None) -> Iterator[tuple[str, str]]:
@@ -51,6 +53,8 @@ def warnings(stage: Stage, made: Forecast | None = None) -> Iterator[str]:
         made: What is predicted; None leaves it out.
     """
     yield from _surface_warnings(stage)
+    if stage.scene.output.fields and not stage.embedded:
+        yield "output.fields: there is no block, and no fields are written"
     if stage.by_laws:
         yield from _patch_warnings(stage)
     if stage.meshes is not None:
@@ -141,8 +145,22 @@ def _model(stage: Stage) -> str:
     if stage.choice is not None:
         return f"auto: {stage.choice.sentence}"
     micro = stage.scene.micro
-    solver = f", solved by {micro.solver}" if micro.model in ("elliptic", "circular") else ""
-    return stage.model.name + solver
+    solver = f", solved by {micro.solver}" if micro.model in _INTERACTING else ""
+    idle = ", ".join(f"micro.{key}" for key in _idle_keys(stage))
+    return stage.model.name + solver + (f"; it has no use for {idle}" if idle else "")
+
+
+def _idle_keys(stage: Stage) -> Iterator[str]:
+    """Yield keys of ``[micro]`` that the scene states and its model does not ask for."""
+    micro = stage.scene.micro
+    asked = {
+        "solver": micro.model in _INTERACTING,
+        "curvature": micro.model in MODELS,
+        "border": micro.model in MODELS,
+    }
+    for key, used in asked.items():
+        if not used and getattr(micro, key) != type(micro).model_fields[key].default:
+            yield key
 
 
 def _coupling(stage: Stage) -> str:

@@ -160,9 +160,10 @@ def uncertainty(
     }
     for name in ("force", "approach", "area"):
         value, error = getattr(against, name), getattr(against, f"{name}_error")
-        if np.isfinite(error).all():
+        known = np.isfinite(error)  # not before meshes find the first contact
+        if known[-1]:
             top = float(np.abs(value).max())
-            found[f"{name}_max"] = largest(error, np.full(error.shape, top))
+            found[f"{name}_max"] = largest(error[known], np.full(np.count_nonzero(known), top))
             found[f"{name}_last"] = ratio(error[-1], value[-1], _NOTHING * top)
     return Measures(**found)
 

@@ -55,7 +55,7 @@ def cache(comm: Any) -> list[Finding]:
     from macro.compat import form_cache
 
     folder = form_cache()
-    finished = len(list(folder.glob("libffcx_*.c.cached")))
+    finished = _compiled(folder)
     writable = jit.writable(folder)
     slowest = max(_gathered(comm, _small_file_s(folder) if writable else 0.0))
     fewest = min(_gathered(comm, finished))
@@ -75,6 +75,13 @@ def cache(comm: Any) -> list[Finding]:
         remedy = "copy it to a local disk of each node and set XDG_CACHE_HOME (demos/hpc/README.md)"
         return [Finding("form cache", "warning", text, remedy)]
     return [Finding("form cache", "ok", text)]
+
+
+def _compiled(folder: Path) -> int:
+    try:
+        return len(list(folder.glob("libffcx_*.c.cached")))
+    except PermissionError:  # a folder on the way that this user may not enter
+        return 0
 
 
 def _small_file_s(folder: Path) -> float:

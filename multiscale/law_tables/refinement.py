@@ -121,7 +121,7 @@ def refined(
         solve: Returns rows at approaches (m,) for N patches: approach, closure, pressure, area
             fraction, contacts, relief, and 1 where the micro model warns that it is outside its
             range of validity; shape (m, N, 7).
-        make: Makes the N laws out of such rows, sorted by approach.
+        make: Makes the N laws out of such rows, in the order of the approaches asked for.
         start: Approach of the first row [mm].
         end: Approach of the last row [mm].
         compliance: Mean displacement of patch i of the half-space by unit pressure on patch j,
@@ -134,7 +134,7 @@ def refined(
         The N laws, with their errors, and the error of the force.
     """
     first = start + (end - start) * np.linspace(0.0, 1.0, _FIRST_ROWS) ** 2
-    rows = solve(first)
+    asked, rows = first, solve(first)
     laws = make(rows)
     if not rows[-1, :, 2].any():
         return list(laws), 0.0
@@ -148,8 +148,9 @@ def refined(
         split = split[np.argsort(intervals[split, 0])]  # rising, as the micro models like it
         middle = intervals[split].mean(axis=1)
         new = solve(middle)
-        rows = np.concatenate((rows, new))
-        rows = rows[np.argsort(rows[:, 0, 0])]
+        asked, rows = np.append(asked, middle), np.concatenate((rows, new))
+        order = np.argsort(asked)
+        asked, rows = asked[order], rows[order]
         before, laws = laws, make(rows)
         found = Errors.of(before, laws, new, compliance, least)
         halves = np.column_stack((intervals[split, 0], middle, middle, intervals[split, 1]))

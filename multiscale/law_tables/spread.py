@@ -41,7 +41,7 @@ class ContactSpread:
     Args:
         patches: The N patches.
         loads: M rectangles that divide them.
-        approach: Local approaches of every patch at K rows, rising, shape (K, N) [mm].
+        approach: Local approaches of every patch at K rows, never falling, shape (K, N) [mm].
         forces: Forces on the rectangles, shape (K, M) [N].
         correction: Mean of what the block sinks more than a half-space at rectangle m by unit
             force on rectangle n, shape (M, M) [mm/N].

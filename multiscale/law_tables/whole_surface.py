@@ -146,7 +146,7 @@ class WholeSurface:
         return float(x), float(y)
 
     def laws(self, rows: Array) -> list[PatchLaw]:
-        """Return the laws of all patches through rows (m, N, 7), sorted by approach."""
+        """Return the laws of all patches through rows (m, N, 7), the plane coming nearer."""
         reaches = self.model.datum - self.mean_heights
         return [_law(rows[:, index], float(reach)) for index, reach in enumerate(reaches)]
 
@@ -154,13 +154,13 @@ class WholeSurface:
         self, approach_end: float, tolerance: float, most_rows: int
     ) -> tuple[list[PatchLaw], float, ContactSpread | None]:
         """Return all laws up to an approach, the error of the force, and where the contacts are."""
-        seen: list[tuple[Array, Array]] = []
+        seen: list[tuple[Array, Array, Array]] = []
 
         def solve(approaches: Array) -> Array:
             if self.sinking is None:
                 return self.rows(approaches)
             rows, forces = self.rows_on(self.sinking, approaches)
-            seen.append((rows[:, :, 0], forces))
+            seen.append((approaches, rows[:, :, 0], forces))
             return rows
 
         if approach_end <= self.first_touch:
@@ -177,16 +177,16 @@ class WholeSurface:
             )
         return laws, error, self._spread(seen)
 
-    def _spread(self, seen: list[tuple[Array, Array]]) -> ContactSpread | None:
+    def _spread(self, seen: list[tuple[Array, Array, Array]]) -> ContactSpread | None:
         if self.sinking is None or not divides(self.sinking.loads, self.patches):
             return None
-        local, forces = (np.concatenate(parts) for parts in zip(*seen, strict=True))
-        order = np.argsort(local[:, 0], kind="stable")
+        asked, local, forces = (np.concatenate(parts) for parts in zip(*seen, strict=True))
+        order = np.argsort(asked, kind="stable")
         loads = self.sinking.loads
         return ContactSpread(
             patches=self.patches,
             loads=loads,
-            approach=local[order],
+            approach=np.maximum.accumulate(local[order], axis=0),  # see `_law`
             forces=forces[order],
             correction=np.divide(self.sinking.patch_compliance(loads), loads.areas),
         )
@@ -208,7 +208,13 @@ def _first_loaded(force: Callable[[float], float], way: float) -> float:
 
 
 def _law(rows: Array, reach: float) -> PatchLaw:
-    """Return the law of one patch out of all rows (m, 7), those before its touch included."""
+    """Return the law of one patch out of all rows (m, 7), those before its touch included.
+
+    Where contacts join, a block may begin to sag so much that a patch falls behind a plane that
+    comes nearer: rows that do not get beyond those before them are left out.
+    """
+    furthest = np.maximum.accumulate(rows[:, 0])
+    rows = rows[np.append(True, rows[1:, 0] > furthest[:-1])]
     loaded = np.flatnonzero(rows[:, 2] > 0.0)
     if not loaded.size:
         return law_of(rows[:0], float(rows[:, 1].max()), reach)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,7 +17,7 @@ from micro import (
     micro_model,
 )
 from multiscale.coupling import AnalyticCoupling
-from multiscale.loading import Programme
+from multiscale.loading import Programme, load_steps
 from multiscale.planning.contact_estimate import Contacts, contacts, nearest, rough_half_space
 from multiscale.planning.machine import this_machine
 from multiscale.planning.press_work import kind_work, presses, reach
@@ -90,11 +92,16 @@ def estimated_contacts(scene: Scene, surface: Surface) -> Contacts:
 def furthest_plane(
     programme: Programme, model: MicroModel, patches: PatchGrid, mean_heights: NDArray[np.float64]
 ) -> tuple[float, tuple[float, float]]:
-    """Return the largest approach and the slopes there, from the half-space where not given."""
+    """Return the largest approach and the slopes there, from the half-space where not given.
+
+    Raises:
+        NotConverged: When the plane is not found in smaller steps either.
+    """
     if programme.quantity == "approach" and programme.tilt is not None:
         return programme.largest, programme.tilt
     alone = AnalyticCoupling(model, patches, mean_heights)
-    step = alone.press(programme.control(programme.largest))
+    there = replace(programme, points=(programme.largest,), steps=1, force_change=None)
+    (step,) = load_steps(alone, there)
     return step.approach_mm, step.tilt
 
 

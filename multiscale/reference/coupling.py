@@ -166,19 +166,22 @@ def recorded(
 ) -> ReferenceRecord:
     """Return what the meshes of a reference say together.
 
+    Where they all miss contacts that must be there, that they agree is no error bar.
+
     Args:
         stage: The scene's ingredients.
         coupling: What made the load steps.
         steps: The load steps accepted so far.
     """
     assert stage.meshes is not None
-    return reference_record(
+    record = reference_record(
         steps,
         stage.meshes.sizes,
         coupling.unknowns,
         force_order=stage.meshes.force_order,
         area_order=stage.meshes.area_order,
     )
+    return record.without_bars(np.array([_misses(step, stage) for step in steps], dtype=bool))
 
 
 def reference_notes(
@@ -193,7 +196,7 @@ def reference_notes(
         stage: The scene's ingredients.
     """
     yield record.sentence
-    missed = [step.step for step in steps if not step.contacts and _below_highest(step, stage)]
+    missed = [step.step for step in steps if _misses(step, stage)]
     if missed:
         yield (
             f"no node of the finest mesh touches in {len(missed)} of {len(steps)} load steps, "
@@ -210,7 +213,9 @@ def reference_notes(
         )
 
 
-def _below_highest(step: LoadStep, stage: Stage) -> bool:
-    """Whether the plane of a load step lies below the highest point of the undeformed surface."""
+def _misses(step: LoadStep, stage: Stage) -> bool:
+    """Whether no node touches though the plane lies below the surface's highest point."""
+    if step.contacts:
+        return False
     arm = np.asarray(stage.surface.highest_point) - 0.5 * np.asarray(stage.surface.lengths)
     return step.approach_mm + float(arm @ np.asarray(step.tilt)) > 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,7 +115,22 @@ class ReferenceRecord:
             return "at size zero", ["no error bar"] * found.value.size
         heading = f"at size zero [{unit}]"
         pairs = zip(scale * found.value, scale * found.error, strict=True)
-        return heading, [f"{value:.5g} ± {error:.2g}" for value, error in pairs]
+        return heading, [
+            "no error bar" if np.isnan(error) else f"{value:.5g} ± {error:.2g}"
+            for value, error in pairs
+        ]
+
+    def without_bars(self, steps: NDArray[np.bool_]) -> ReferenceRecord:
+        """Return the record with the errors of force and area unknown at some load steps.
+
+        Args:
+            steps: At which, shape (steps,).
+        """
+        force, area = (
+            replace(one, error=np.where(steps, np.nan, one.error))
+            for one in (self.force, self.area)
+        )
+        return replace(self, force=force, area=area)
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -63,6 +64,21 @@ def remove_partial(folder: Path) -> None:
         folder: Where results are; nobody else may be writing there.
     """
     for path in folder.glob(".*.partial-*"):
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)
+
+
+def remove(path: Path) -> None:
+    """Remove a file, or a folder that ADIOS2 wrote, if it is there; no other folder is ours.
+
+    Args:
+        path: Its name.
+    """
+    if path.suffix == ".bp" and path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
         path.unlink(missing_ok=True)
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import os
 import platform
 import sys
+from collections.abc import Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
@@ -27,10 +29,10 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         options: PETSc options given by the user.
 
     Returns:
-        A dictionary that JSON can hold.
+        A dictionary that JSON can hold; what is not known, or infinite, is None.
     """
     history = run.history()
-    return {
+    content = {
         "patchlaw": version("patchlaw"),
         "written": datetime.now(UTC).isoformat(timespec="seconds"),
         "scene_file": run.scene.file,
@@ -61,6 +63,16 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "versions": _versions(),
         "machine": platform.platform(),
     }
+    return {name: _known(value) for name, value in content.items()}
+
+
+def _known(value: Any) -> Any:
+    """Return a value with None for what is not finite, which is no JSON."""
+    if isinstance(value, Mapping):
+        return {name: _known(part) for name, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_known(part) for part in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _predicted(run: Run) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Iterator
 from io import BytesIO
 from pathlib import Path
@@ -11,8 +10,8 @@ from typing import TYPE_CHECKING
 from geometry.collective import on_root, together
 from multiscale import plan
 from multiscale.law_tables.law_files import write_laws
-from multiscale.reference.coupling import ReferenceCoupling
 from multiscale.reporting.outputs import (
+    remove,
     write_bytes,
     write_json,
     write_tables,
@@ -90,15 +89,7 @@ def _remove_older(folder: Path) -> None:
     """Remove an earlier run's files, lest this run's tables stand beside another scene's laws."""
     for name in _FILES:
         with written(folder / name):
-            _remove(folder / name)
-
-
-def _remove(path: Path) -> None:
-    """Remove a file or a folder (ADIOS2 writes folders), if it is there."""
-    if path.is_dir():
-        shutil.rmtree(path)
-    else:
-        path.unlink(missing_ok=True)
+            remove(folder / name)
 
 
 def write_figure(path: Path, figure: Figure) -> Path:
@@ -157,53 +148,3 @@ def _figures(run: Run) -> Iterator[tuple[str, str, Callable[[], Figure]]]:
     )
     if table is not None:
         yield "laws", "The patch laws.", lambda: figures.law_figure(table)
-
-
-def write_fields(folder: Path, run: Run) -> list[Path]:
-    """Write displacement and pressure of the last load step as XDMF and VTX, for ParaView.
-
-    Args:
-        folder: Where to; made when missing.
-        run: The run.
-
-    Returns:
-        The files written; none when no block took part. Where the mesh was not pressed itself,
-        the displacements are those of the scene's block under the patches' mean pressures. A
-        reference has its finest rough block and the pressures of its nodes.
-
-    Note:
-        Collective: every rank writes its part.
-    """
-    if not run.stage.embedded or not run.steps:
-        return []
-
-    # The XDMF file names its HDF5 file, so both are written under their names in a folder aside.
-    aside = folder / ".fields.partial"
-
-    def empty() -> None:
-        shutil.rmtree(aside, ignore_errors=True)  # a crash may have left one
-        aside.mkdir(parents=True)
-
-    on_root(run.comm, empty)
-    _write_xdmf(aside / "fields.xdmf", run)
-
-    def move() -> list[Path]:
-        files = []
-        for path in sorted(aside.iterdir()):
-            _remove(folder / path.name)
-            files.append(path.replace(folder / path.name))
-        aside.rmdir()
-        return files
-
-    return on_root(run.comm, move)
-
-
-def _write_xdmf(path: Path, run: Run) -> None:
-    """Write the last load step's fields: of the rough block, or of the flat one with patches."""
-    import macro
-
-    if isinstance(run.coupling, ReferenceCoupling):
-        macro.write_rough_fields(path, run.coupling.finest, run.coupling.latest)
-        return
-    interface, displacement = run.last_field()
-    macro.write_fields(path, interface, displacement, run.steps[-1].patches.pressure_MPa)

@@ -6,7 +6,7 @@ import errno
 import fcntl
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +56,7 @@ class FolderLock:
     def __init__(self, folder: Path) -> None:
         self._path = folder / _NAME
         self._file: int | None = None
+        self._made = False
 
     def hold(self) -> None:
         """Take the lock, also again when the folder was removed in the meantime.
@@ -67,6 +68,7 @@ class FolderLock:
             if self._holds():
                 return
             try:
+                self._made |= not self._path.parent.exists()
                 self._path.parent.mkdir(parents=True, exist_ok=True)
                 self._lock()
             except BlockingIOError:
@@ -80,14 +82,14 @@ class FolderLock:
         """Lift the lock and leave nothing of it."""
         if self._file is None:
             return
-        if self._holds():
-            self._path.unlink(missing_ok=True)
+        with suppress(OSError):  # the folder may have become read-only; the lock is lifted anyway
+            if self._holds():
+                self._path.unlink(missing_ok=True)
         os.close(self._file)
         self._file = None
-        try:
-            self._path.parent.rmdir()
-        except OSError:  # results are there, or the folder is gone
-            pass
+        if self._made:
+            with suppress(OSError):  # results are there, or the folder is gone
+                self._path.parent.rmdir()
 
     def _lock(self) -> None:
         file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)

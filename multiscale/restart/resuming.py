@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from geometry.collective import on_root
-from geometry.errors import InputError
+from geometry.errors import InputError, NotWritten
 from multiscale.load_step import LoadStep
 from multiscale.loading import Position
 from multiscale.records import Arrays
@@ -115,7 +115,10 @@ class Keeper:
 
     def _write(self, state: Arrays) -> None:
         began = time.monotonic()
-        self._lock.hold()  # the folder may have been removed
+        try:
+            self._lock.hold()  # the folder may have been removed
+        except InputError as error:  # which was good when the run began
+            raise NotWritten(f"{self._path.parent}: {error.problem}") from None
         remove_partial(self._path.parent)
         write_checkpoint(self._path, self._run.checkpoint(self._name, state))
         self._journal.begin()

@@ -30,7 +30,7 @@ def read_scene_file(path: Path) -> dict[str, Any]:
             file=str(path),
         )
     try:
-        return parsed(content.decode())
+        return parsed(content.decode("utf-8-sig"))  # some editors put a mark before the text
     except UnicodeDecodeError as error:
         raise InputError(f"is not UTF-8 text: {error}", file=str(path)) from None
     except ValueError as error:

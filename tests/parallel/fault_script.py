@@ -1,6 +1,7 @@
 """Runs the command line with something going wrong on one rank; see `test_faults.py`."""
 
 import os
+import resource
 import signal
 import sys
 import time
@@ -46,9 +47,16 @@ def slow(self, control):
     return press(self, control)
 
 
+def full(folder, run):
+    """Let no file grow beyond what stands for a full disk on this rank."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, resource.RLIM_INFINITY))
+    return write_fields(folder, run)
+
+
 keep, press = commands.Keeper.keep, CondensedCoupling.press
+write_fields = commands.write_fields
 rank, what, place, *words = int(sys.argv[1]), *sys.argv[2:]
 if MPI.COMM_WORLD.rank == rank:
-    actions = {"bug": bug, "one-sided": one_sided, "signal": signalled, "slow": slow}
+    actions = {"bug": bug, "one-sided": one_sided, "signal": signalled, "slow": slow, "full": full}
     setattr(*PLACES[place], actions[what])
 sys.exit(main(words))

@@ -45,6 +45,16 @@ def test_error_that_one_rank_alone_meets_ends_all(mpirun, tmp_path):
     assert done.stderr.count("did not converge: DIVERGED after 1 iterations") == 1
 
 
+def test_full_disk_ends_all_with_5(mpirun, tmp_path):
+    """Files of dolfinx that cannot be closed end a process that drops them."""
+    out = tmp_path / "out"
+    fine = [word.replace("4, 4, 2", "16, 16, 8") for word in WORDS]
+    done = mpirun(2, SCRIPT, 1, "full", "output", *fine, out, timeout=100)
+    assert done.returncode == 5, done.stderr
+    assert done.stderr.count("cannot be written: Failed to ") == 1, done.stderr
+    assert not list(out.glob("*fields*"))
+
+
 def test_signal_to_one_rank_stops_all_and_any_number_goes_on(mpirun, tmp_path):
     out = tmp_path / "out"
     done = mpirun(2, SCRIPT, 1, "signal", "checkpoint", *WORDS, out, timeout=100)

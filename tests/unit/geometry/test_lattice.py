@@ -1,3 +1,5 @@
+import subprocess
+import sys
 import time
 
 import gmsh
@@ -45,6 +47,24 @@ def test_own_session_ends_after_an_error():
     with pytest.raises(ZeroDivisionError), flat_block(SHAPE):
         1 / 0  # noqa: B018
     assert not is_open()
+
+
+TAKEN = (
+    "import signal; seen = lambda number, frame: None; signal.signal(signal.SIGINT, seen);"
+    "from geometry import BlockShape, flat_block;"
+    "shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(1, 1, 1));"
+    "session = flat_block(shape); session.__enter__();"
+    "inside = signal.getsignal(signal.SIGINT); session.__exit__(None, None, None);"
+    "import macro; assert inside is signal.getsignal(signal.SIGINT) is seen"
+)
+
+
+def test_gmsh_leaves_sigint_to_who_has_it(root):
+    """Already its import takes it, so that this needs a process of its own."""
+    done = subprocess.run(
+        [sys.executable, "-c", TAKEN], cwd=root, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
 
 
 def test_meshes_can_be_built_again_and_again():

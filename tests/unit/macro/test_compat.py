@@ -8,6 +8,7 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from geometry.errors import InputError
 from macro import compat
 
 
@@ -50,6 +51,21 @@ def test_compiling_leaves_logging_as_it_was():
         root.setLevel(logging.DEBUG)
         assert not logging.getLogger("any").isEnabledFor(logging.INFO)
     assert (root.level, root.manager.disable, list(root.handlers)) == before
+
+
+@pytest.mark.parametrize(
+    "error", [PermissionError(13, "Permission denied", "settings.json"), ValueError("no JSON")]
+)
+def test_settings_that_dolfinx_cannot_read_are_told(monkeypatch, error):
+    def fail():
+        raise error
+
+    name = "get_options" if hasattr(compat.jit, "get_options") else "get_parameters"
+    monkeypatch.setattr(compat.jit, name, fail)
+    with pytest.raises(
+        InputError, match=r"cannot read its dolfinx_jit settings \(.*set XDG_CONFIG"
+    ):
+        compat.form_cache()
 
 
 class Doubling:

@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from geometry import PatchGrid
 from macro import compliance_cache
-from macro.compliance_cache import cache_directory, cached
+from macro.compliance_cache import cache_directory, cached, is_kept
 
 
 @pytest.fixture
@@ -103,6 +103,15 @@ def test_directory_that_cannot_be_made_does_not_stop_the_run(counted, monkeypatc
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("PATCHLAW_CACHE", str(tmp_path / "file" / "below"))
     assert "c" in cached("kind", (), counted[1], MPI.COMM_SELF)
+
+
+def test_home_that_may_not_be_entered_keeps_nothing(counted, monkeypatch):
+    def refused(path):
+        raise PermissionError(13, "Permission denied", str(path))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(compliance_cache.Path, "is_file", refused)
+        assert not is_kept("kind", ())
 
 
 def test_nobody_at_home_keeps_nothing(monkeypatch):

@@ -38,6 +38,16 @@ def test_writable_asks_the_nearest_folder_that_exists(tmp_path):
     assert not jit.writable(tmp_path / "file" / "below")
 
 
+def test_folder_that_may_not_be_entered_is_not_writable_and_has_no_locks(monkeypatch, folder):
+    monkeypatch.setattr(jit.Path, "exists", refused)
+    assert not jit.writable(folder)
+    assert jit.left_locks(folder) == []
+
+
+def refused(path):
+    raise PermissionError(13, "Permission denied", str(path))
+
+
 def test_compiler_follows_the_environment(monkeypatch):
     monkeypatch.setenv("CC", "/bin/false -O2")
     assert jit.compiler() == "/bin/false"

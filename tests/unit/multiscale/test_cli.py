@@ -83,6 +83,18 @@ def test_files_of_an_earlier_scene_do_not_stay(capsys, tmp_path):
         (["patches.grid=[1, 1]"], "the patches are not small against the block"),
         (["patches.grid=[4, 4]"], "maxima on the surface's border"),
         (["block.margin='3 mm'"], "3 mm beyond it in 8 cells"),
+        (
+            ["micro.model=half-space", "micro.curvature=contact", "micro.border=include"],
+            "half-space; it has no use for micro.curvature, micro.border",
+        ),
+        (
+            ["micro.model=circular-independent", "micro.solver=truncated-newton"],
+            "circular-independent; it has no use for micro.solver",
+        ),
+        (
+            ["coupling.kind=analytic", "output.fields=true"],
+            "output.fields: there is no block, and no fields are written",
+        ),
     ],
 )
 def test_plan_says_what_is_doubtful(capsys, overrides, text):

@@ -76,3 +76,32 @@ def test_surface_out_of_reach_stays_open(surface):
         end = 1e-9
     table = consistent_laws(model, patches, mean_heights=means, approach_end=end)
     assert sum(not law.is_open for law in table.laws) <= 1
+
+
+class Leaning:
+    """A block that yields all at once: above a force it leans to a side."""
+
+    def __init__(self, loads, enough, lean):
+        self.loads, self._enough, self._lean = loads, enough, lean
+
+    def sag(self, forces):
+        lean = self._lean if forces.sum() > self._enough else 0.0
+        return lambda x, y: lean * (x - 0.5)
+
+    def patch_compliance(self, patches):
+        return np.zeros((patches.count, patches.count))
+
+
+@pytest.mark.parametrize("lower", [0, 1])
+def test_patches_may_fall_behind_on_a_block_that_yields_all_at_once(surface, lower):
+    model = micro_model("circular", surface, contact_modulus=MODULUS)
+    patches = PatchGrid(grid=(2, 1), lengths=surface.lengths)
+    means = patch_means(surface, patches)
+    force = model.respond([0.5 * END], patches=patches, mean_heights=means).force[0]
+    loads = PatchGrid(grid=(4, 4), lengths=surface.lengths)
+    block = Leaning(loads, force, (-1e-3, 1e-3)[lower])
+    table = consistent_laws(
+        model, patches, mean_heights=means, approach_end=END, tolerance=1e-3, sinking=block
+    )
+    waits = (np.diff(table.spread.approach, axis=0) == 0.0).any(axis=0)
+    assert waits[lower] and not waits[1 - lower]  # its rows behind those before are left out

@@ -1,5 +1,6 @@
 """Load steps of the embedded coupling: what is read off the laws, and their ranges."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -80,6 +81,17 @@ def test_closure_beyond_a_law_is_refused_and_the_state_stays():
     with pytest.raises(BeyondLaws, match=r"LAW_RANGE: .*closure up to 0.5 mm"):
         coupling.press(Control(approach=0.8))
     np.testing.assert_array_equal(coupling.displacement, [0.4])
+
+
+@pytest.mark.parametrize(("falls", "remedy"), [(False, "kind = 'conc"), (True, "newton = 'conde")])
+def test_remedy_beyond_a_consistent_law_fits_what_is_wrong(falls, remedy):
+    closure = law(end=0.5).closure
+    bent = (
+        replace(law(end=0.5), closure=np.append(closure[:-1], closure[-3])) if falls else law(0.5)
+    )
+    table = LawTable(patches=PATCHES, laws=(law(), bent), made_by={"coupling": "consistent"})
+    with pytest.raises(BeyondLaws, match=f"LAW_RANGE: .*: take coupling.{remedy}"):
+        EmbeddedCoupling(EasyBlock(), table).press(Control(approach=0.8))
 
 
 def test_tilt_turns_about_the_middle():

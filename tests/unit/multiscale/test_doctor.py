@@ -134,6 +134,17 @@ def test_left_lock_fails_and_names_the_command(monkeypatch, tmp_path):
     assert (found.state, "patchlaw warm" in found.remedy) == ("fail", True)
 
 
+def test_cache_that_may_not_be_entered_is_a_warning(monkeypatch, tmp_path):
+    def refused(path, pattern=""):
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr("macro.compat.form_cache", lambda: tmp_path)
+    monkeypatch.setattr(doctor_forms.Path, "exists", refused)
+    monkeypatch.setattr(doctor_forms.Path, "glob", refused)
+    (found,) = doctor_forms.cache(None)
+    assert (found.state, "XDG_CACHE_HOME" in found.remedy) == ("warning", True)
+
+
 def test_compiler_that_fails_is_a_warning(monkeypatch):
     assert doctor_forms.compiler_works(None)[0].state == "ok"
     monkeypatch.setenv("CC", "/bin/false")

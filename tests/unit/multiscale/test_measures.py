@@ -105,6 +105,12 @@ def test_uncertainty_takes_error_bars_and_sums_refinements():
     assert found.pressure_l1 == pytest.approx(0.1 + 0.1, rel=ROUNDING)
 
 
+def test_steps_before_meshes_find_a_contact_leave_the_other_error_bars():
+    best = curves([0.0, 4.0], force_error=[np.nan, 0.04])
+    found = uncertainty(best, [], best.patches)
+    assert (found.force_max, found.force_last) == pytest.approx((0.01, 0.01))
+
+
 def test_nothing_is_known_without_error_bar_or_refinement():
     best = curves([2.0, 4.0])
     found = uncertainty(best, [], best.patches)

@@ -1,4 +1,6 @@
-"""Processes that a launcher started together and that do not know of each other are noticed."""
+"""What MPI cannot start without, and processes of one start that do not know of each other."""
+
+from pathlib import Path
 
 import pytest
 
@@ -48,3 +50,14 @@ def test_one_process_is_no_stranger():
             InputError, match="the launcher is not that of mpi4py's MPI; start with"
         ):
             refuse_strangers()
+
+
+def test_a_user_without_home_is_told_what_to_set(monkeypatch, capsys):
+    def homeless():
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(Path, "home", homeless)
+    assert main(["plan", PAPER]) == 2
+    told = capsys.readouterr().err
+    assert "HOME: this user has no home folder, and MPI does not start without" in told
+    assert "(allowed: set it to any folder)" in told

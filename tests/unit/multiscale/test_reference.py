@@ -159,13 +159,24 @@ def test_large_changes_of_the_force_are_halved_on_all_meshes():
     assert np.all(history.tilt_x == 0.001)
 
 
-def test_no_contact_is_no_error():
-    """Nodes miss the highest point of the surface, or a tilted plane is still above it."""
-    history = run(scene("load.approach='1e-9 um'", "load.steps=1"))
-    assert list(history.force_N) == [0.0]
-    assert list(history.contacts) == [0]
-    assert np.all(history.patch_pressure_MPa == 0.0)
-    assert history.reference.force.error[0] == 0.0
+def test_contact_that_all_meshes_miss_has_no_error_bar():
+    """Nodes miss the highest point of the surface: that no mesh finds a force is no agreement."""
+    history = run(scene("load.approach=['1e-9 um', '8 um']", "load.steps=1"))
+    assert history.force_N[0] == 0.0 < history.force_N[1]
+    assert history.contacts[0] == 0
+    assert np.all(history.patch_pressure_MPa[0] == 0.0)
+    record = history.reference
+    assert np.isnan([record.force.error[0], record.area.error[0]]).all()
+    assert record.force.error[1] > 0.0
+    assert record.cells[1][0] == "no error bar"
+    (row, _) = record.rows(history.steps)
+    assert np.isnan(row[record.columns.index("force_error_N")])
+
+
+def test_plane_above_the_surface_is_no_error():
+    history = run(scene("load.approach=['8 um', '0 um']", "load.steps=1"))
+    assert (history.force_N[1], history.reference.force.error[1]) == (0.0, 0.0)
+    assert history.reference.cells[1][1] == "0 ± 0"
 
 
 def test_unloading_comes_back():
@@ -199,6 +210,18 @@ def test_files(capsys, tmp_path):
     assert facts["unknowns"] == facts["reference"]["unknowns"][-1]
     assert 0.0 < facts["reference"]["mesh_quality"][-1]["thinnest"] <= 1.0
     assert "Discretisation error: ±" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_what_is_not_known_is_null_in_the_provenance(capsys, tmp_path):
+    words = ["run", str(PAPER), "--out", str(tmp_path), "--set", *COARSE, "reference.meshes=1"]
+    assert main([*words, "output.figures=false", "output.report=false", "load.steps=1"]) == 0
+
+    def refused(constant):
+        raise AssertionError(f"{constant} is no JSON")
+
+    text = (tmp_path / "provenance.json").read_text(encoding="utf-8")
+    facts = json.loads(text, parse_constant=refused)
+    assert facts["reference"]["force_rate"] == [None]
 
 
 def test_fields_are_those_of_the_rough_block(capsys, tmp_path):

@@ -16,6 +16,7 @@ from geometry.errors import InputError, NotWritten
 from multiscale import Run, Scene
 from multiscale.cli import main
 from multiscale.planning import choices
+from multiscale.reporting.field_files import write_fields
 from multiscale.restart.checkpoint import read_checkpoint, write_checkpoint
 from multiscale.restart.folder_lock import FolderLock
 from multiscale.restart.journal import Journal, journalled
@@ -274,6 +275,50 @@ def test_two_runs_do_not_share_a_folder(tmp_path):
     assert not (tmp_path / "out").exists()  # neither wrote anything
 
 
+@pytest.mark.parametrize("command", ["laws", "surface", "run"])
+def test_no_command_writes_where_a_run_does(tmp_path, capsys, command):
+    out = tmp_path / "out"
+    lock = FolderLock(out)
+    lock.hold()
+    assert main([command, str(PAPER), "--out", str(out), "--set", "surface.grid=[32, 32]"]) == 2
+    assert "another run is writing to this folder" in capsys.readouterr().err
+    assert [path.name for path in out.iterdir()] == [".lock"]
+    lock.release()
+
+
+def test_folder_that_becomes_a_file_under_way_ends_with_5(tmp_path, ended):
+    path, _ = interrupted(tmp_path / "out", ended)
+    lock = FolderLock(path.parent)
+    lock.hold()
+    shutil.rmtree(path.parent)
+    path.parent.touch()
+    with pytest.raises(NotWritten, match="out: cannot be written to: ") as error:
+        Keeper(path.parent, ended, lock).write()
+    assert error.value.exit_code == 5
+    lock.release()
+
+
+def test_empty_folder_that_was_there_stays(tmp_path):
+    lock = FolderLock(tmp_path)
+    lock.hold()
+    lock.release()
+    assert tmp_path.is_dir() and not list(tmp_path.iterdir())
+
+
+def test_lock_is_lifted_where_its_file_must_stay(tmp_path, monkeypatch):
+    def refused(path, missing_ok=False):
+        raise PermissionError(13, "Permission denied", str(path))
+
+    lock, other = FolderLock(tmp_path), FolderLock(tmp_path)
+    lock.hold()
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", refused)
+        lock.release()
+    other.hold()
+    other.release()
+    assert not (tmp_path / ".lock").exists()
+
+
 def test_folder_of_a_file_cannot_be_locked(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="cannot be written to: Not a directory"):
@@ -292,6 +337,7 @@ def test_read_only_folder_is_refused_before_anything_is_made(tmp_path, capsys, m
     assert f"--out = '{tmp_path}/out': {tmp_path} cannot be written to" in told.err
     assert not told.out
     assert not list(tmp_path.iterdir())
+    assert main(["plan", str(PAPER), "--set", "coupling.kind=analytic"]) == 0  # writes nothing
 
 
 def test_wrong_input_met_late_leaves_nothing(capsys, tmp_path, monkeypatch):
@@ -400,6 +446,47 @@ def test_run_on_a_full_disk_ends_with_5_and_goes_on(capsys, tmp_path, size, file
     assert ("goes on after load step 2" in capsys.readouterr().out) == bool(left)
     assert (out / "surface.png").exists()
     assert not list(out.glob("checkpoint*"))
+
+
+def test_fields_on_a_full_disk_end_with_5_and_leave_nothing_half_written(tmp_path):
+    out = tmp_path / "out"
+    on_block = ["coupling.kind=concurrent", "block.cells=[16, 16, 8]", "output.fields=true"]
+    done = subprocess.run(
+        [sys.executable, "-c", LIMITED, "150000", *WORDS, *on_block, "--out", str(out)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 5, done.stderr
+    assert f"patchlaw: {out}/fields.xdmf: cannot be written: " in done.stderr
+    assert {path.name for path in out.iterdir()} == {
+        "history.csv", "patches.csv", "provenance.json", "checkpoint.h5", "checkpoint.journal",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["fields.h5", "fields.xdmf"])
+def test_fields_cut_short_in_silence_are_told(tmp_path, monkeypatch, name):
+    def cut(path, *arguments):
+        write(path, *arguments)
+        os.truncate(path.with_name(name), path.with_name(name).stat().st_size // 2)
+
+    import macro
+
+    write = macro.write_fields
+    monkeypatch.setattr(macro, "write_fields", cut)
+    run = Run(scene({"coupling": {"kind": "concurrent"}, "block": {"cells": [6, 6, 4]}}))
+    next(run.load_steps())
+    with pytest.raises(NotWritten, match=rf"{name}: cannot be written: "):
+        write_fields(tmp_path, run)
+    assert not list(tmp_path.iterdir())
+
+
+def test_folders_under_names_of_results_are_nobody_elses_to_remove(tmp_path, capsys):
+    kept = tmp_path / "history.csv" / "kept"
+    kept.mkdir(parents=True)
+    assert main([*WORDS[:2], "--out", str(tmp_path), *WORDS[2:]]) == 5
+    assert "history.csv: cannot be written: Is a directory" in capsys.readouterr().err
+    assert kept.exists()
 
 
 def test_a_plan_stands_though_another_machine_would_choose_otherwise(tmp_path, monkeypatch):

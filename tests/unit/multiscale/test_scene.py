@@ -258,3 +258,9 @@ def test_spectrum_needs_an_extent():
     data["surface"]["lengths"] = None
     with pytest.raises(InputError, match="surface: a 'spectrum' needs 'grid' and 'lengths' beside"):
         Scene.from_dict(data)
+
+
+def test_byte_order_mark_of_some_editors_is_passed_over(tmp_path):
+    path = tmp_path / "marked.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + PAPER.read_bytes())
+    assert Scene.load(path).model_dump() == Scene.load(PAPER).model_dump()

@@ -5,7 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from geometry.errors import NotConverged
 from multiscale import Scene, make_stage, run
+from multiscale.coupling import AnalyticCoupling
 from multiscale.plan import statements, warnings
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
@@ -83,3 +85,27 @@ def test_the_plan_tells_of_flat_summits_that_carry_nothing(tmp_path, micro, told
     )
     said = [text for text in warnings(make_stage(stepped)) if "summits are flat" in text]
     assert len(said) == told
+
+
+class Shy(AnalyticCoupling):
+    """Presses no further than by a micrometre at once."""
+
+    reached = 0.0
+
+    def press(self, control):
+        if control.approach > self.reached + 1.01e-3:
+            raise NotConverged("it", reason="TOO_FAR", iterations=1, remedy="take smaller steps")
+        self.reached = control.approach
+        return super().press(control)
+
+
+def test_free_plane_that_is_not_found_at_once_is_found_in_smaller_steps(monkeypatch):
+    asked = scene(coupling="concurrent", approach=3e-3, tilt="free")
+    known = make_stage(asked).furthest
+    monkeypatch.setattr("multiscale.planning.micro_choice.AnalyticCoupling", Shy)
+    approach, tilt = make_stage(asked).furthest
+    assert approach == known[0]
+    np.testing.assert_allclose(tilt, known[1], rtol=1e-5)  # moments to 1e-8 of force times length
+    Shy.reached = -1.0
+    with pytest.raises(NotConverged, match=r"load step 1 \(approach .*: TOO_FAR .* halved 8 times"):
+        make_stage(asked)
