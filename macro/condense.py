@@ -169,7 +169,7 @@ def _in_parts(evaluate: Any, x: Array, y: Array, depth: Array, loads: Partition)
 
 
 def _solved(matrix: PETSc.Mat, right: Array) -> Array:
-    """Solve for many right-hand sides with one factorisation."""
+    """Solve for many right-hand sides with one factorisation, and give the matrix back."""
     solver = PETSc.KSP().create(matrix.comm)
     solver.setOperators(matrix)
     solver.setType("preonly")
@@ -184,7 +184,8 @@ def _solved(matrix: PETSc.Mat, right: Array) -> Array:
         for array in (right, solution)
     ]
     factor.getFactorMatrix().matSolve(*dense)
-    solver.destroy()  # its factors are large: not to wait for the collector
+    for part in (*dense, factor, solver, matrix):  # PETSc would keep what Python drops
+        part.destroy()
     return solution
 
 
