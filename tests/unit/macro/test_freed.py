@@ -44,17 +44,36 @@ def kept(capfd):
     return count
 
 
-@pytest.mark.parametrize("method", ["active-set", "augmented-lagrangian"])
-def test_a_rough_block_leaves_nothing_of_a_load_step(kept, method):
+def rough_block(method):
     spectrum = Spectrum(hurst=0.9, waves=(2, 4), rms_slope=0.1, seed=2)
     surface = synthesise(spectrum, grid=(32, 32), lengths=(1.0, 1.0))
     mesh, _ = rough_block_mesh(SHAPE, surface, MPI.COMM_SELF)
-    rough = ObstacleBlock(
+    return ObstacleBlock(
         Block(mesh, MATERIAL), surface.highest - surface.mean_height, method=method
     )
+
+
+@pytest.mark.parametrize("method", ["active-set", "augmented-lagrangian"])
+def test_a_rough_block_leaves_nothing_of_a_load_step(kept, method):
+    rough = rough_block(method)
     for approach in (6e-3, 9e-3):
         assert rough.press(Control(approach=approach)).nodes > 0
         assert kept(rough.block.stiffness.comm) + kept(PETSc.COMM_SELF) == 0
+
+
+@pytest.mark.parametrize("method", ["active-set", "augmented-lagrangian"])
+def test_fields_do_not_pile_up_within_a_load_step(kept, monkeypatch, method):
+    rough = rough_block(method)
+    comm, free, found = rough.block.stiffness.comm, compat.free_dropped, []
+
+    def counted(of):
+        found.append(kept(comm))
+        free(of)
+
+    rough.press(Control(approach=6e-3))
+    monkeypatch.setattr(compat, "free_dropped", counted)
+    assert rough.press(Control(approach=12e-3)).active_sets > 2
+    assert max(found) <= 10  # of one step of Newton's method
 
 
 def test_a_compliance_keeps_no_fields_of_its_patches(kept):
