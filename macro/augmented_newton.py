@@ -6,6 +6,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from geometry.control import Control
+from macro import compat
 from macro.augmented_law import AugmentedLaw
 from macro.equilibrium import Equilibrium
 from macro.interface import Interface
@@ -88,6 +89,7 @@ class FacetNewton:
                 name = reason_name(PETSc.KSP.ConvergedReason, self._ksp.reason)
                 raise not_found(control, name, spent)
             self._advance(displacement, residual, step, control)
+            compat.free_dropped(displacement.comm)  # a field of every step
         raise not_found(control, "NEWTON", _MOST_STEPS)
 
     def _linearise(self, displacement: PETSc.Vec) -> None:

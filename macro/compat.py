@@ -265,7 +265,7 @@ def assemble_vector(form: Any) -> PETSc.Vec:
 
 
 def free_dropped(comm: PETSc.Comm) -> None:
-    """Free the matrices and vectors that Python has dropped on all ranks.
+    """Free the matrices and vectors that Python has dropped on all ranks, and every rank's own.
 
     PETSc from 3.18 on keeps them until it is asked, because ranks drop them at different times;
     3.18 itself does so on a single rank too.
@@ -277,7 +277,8 @@ def free_dropped(comm: PETSc.Comm) -> None:
         Collective.
     """
     if hasattr(PETSc, "garbage_cleanup"):
-        PETSc.garbage_cleanup(comm)
+        for of in (comm, PETSc.COMM_SELF):
+            PETSc.garbage_cleanup(of)
 
 
 def write_vtx(path: str, function: Any) -> None:

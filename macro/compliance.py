@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from macro import compat
 from macro.interface import Interface
 
 Array = NDArray[np.float64]
@@ -34,5 +35,6 @@ def plain_compliance(interface: Interface) -> Array:
         displacement = block.solve(interface.load(pressures))
         work.array[:] = displacement.x.array[: block.owned_dofs]
         columns.append(interface.patch_displacements(work))
+        compat.free_dropped(work.comm)
     compliance = np.column_stack(columns)
     return np.asarray(0.5 * (compliance + compliance.T))

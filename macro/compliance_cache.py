@@ -60,7 +60,8 @@ def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], co
     Note:
         Collective.
     """
-    path = _place(kind, key) if comm.rank == 0 else None
+    place = _place(kind, key)  # on every rank, lest a key that will not do fails on one
+    path = place if comm.rank == 0 else None
     found: Arrays | None = comm.bcast(_read(path) if path else None, root=0)
     if found is not None:
         return found

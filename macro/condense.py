@@ -21,7 +21,6 @@ from geometry.meshes import BlockShape
 from geometry.partition import Partition
 from geometry.smooth_shape import SmoothShape, smooth_shape
 from macro.block import Block, Sides
-from macro.compat import free_dropped
 from macro.correction import Correction
 from macro.elasticity import Material
 from macro.factorisation import set_up
@@ -170,12 +169,13 @@ def _in_parts(evaluate: Any, x: Array, y: Array, depth: Array, loads: Partition)
 
 
 def _solved(matrix: PETSc.Mat, right: Array) -> Array:
-    """Solve for many right-hand sides with one factorisation; the matrix is gone then."""
+    """Solve for many right-hand sides with one factorisation, and give the matrix back."""
     solver = PETSc.KSP().create(matrix.comm)
     solver.setOperators(matrix)
     solver.setType("preonly")
-    solver.pc.setType("cholesky")
-    solver.pc.setFactorSolverType("mumps")
+    conditioner = solver.pc
+    conditioner.setType("cholesky")
+    conditioner.setFactorSolverType("mumps")
     set_up(solver)
     right = np.asfortranarray(right)
     solution = np.zeros_like(right, order="F")
@@ -183,11 +183,9 @@ def _solved(matrix: PETSc.Mat, right: Array) -> Array:
         PETSc.Mat().createDense(right.shape, array=array, comm=matrix.comm)
         for array in (right, solution)
     ]
-    solver.pc.getFactorMatrix().matSolve(*dense)
-    for large in (solver, *dense):  # not to wait for the collector
-        large.destroy()
-    free_dropped(matrix.comm)  # the preconditioner, which keeps the factor
-    matrix.destroy()
+    conditioner.getFactorMatrix().matSolve(*dense)
+    for part in (*dense, conditioner, solver, matrix):  # PETSc would keep what Python drops
+        part.destroy()
     return solution
 
 

@@ -26,8 +26,8 @@ class HeldPreconditioner:
 
         2 S − S A S + (1 − S A) P M P (1 − A S),
 
-    symmetric and positive definite like M. A stands for what ranks own of it, so that the sweeps
-    need no messages.
+    symmetric and positive definite like M. Unknowns that have entries with those of other ranks do
+    not count as close by: the products with A need no messages then, and are whole.
 
     Args:
         matrix: Symmetric positive definite matrix A.
@@ -45,6 +45,7 @@ class HeldPreconditioner:
         self._own = matrix.getDiagonalBlock()
         self._preconditioner, self._left, self._layers = preconditioner, left, layers
         self._work = matrix.createVecRight()
+        self._border = _border(matrix, self._own)
         self._held: Indices = np.empty(0, dtype=np.intp)
         self._close: _Surroundings | None = None
 
@@ -59,7 +60,7 @@ class HeldPreconditioner:
         if self._close is not None:
             self._close.destroy()
         self._held = dofs
-        close = _Surroundings(self._own, dofs, self._layers)
+        close = _Surroundings(self._own, dofs, self._layers, self._border)
         self._close = close if len(close.near) else None
 
     def apply(self, _pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
@@ -86,12 +87,12 @@ class _Surroundings:
         around: Unknowns of all nodes that these have entries with, shape (m,).
     """
 
-    def __init__(self, matrix: PETSc.Mat, dofs: Indices, layers: int) -> None:
+    def __init__(self, matrix: PETSc.Mat, dofs: Indices, layers: int, border: Indices) -> None:
         nodes = np.unique(dofs // 3)
         for _ in range(layers):
             nodes = _neighbours(matrix, nodes)
         every = _unknowns(nodes) if layers else dofs
-        chosen = ~np.isin(every, dofs)
+        chosen = ~(np.isin(every, dofs) | np.isin(every // 3, border))
         self.near = every[chosen]
         if not len(self.near):
             return
@@ -124,6 +125,21 @@ class _Surroundings:
     def destroy(self) -> None:
         """Give the matrix back, which would else wait for Python's collector."""
         self._square.destroy()
+
+
+def _border(matrix: PETSc.Mat, own: PETSc.Mat) -> Indices:
+    """Return this rank's nodes that have entries with those of other ranks.
+
+    There, and nowhere else, a product with random numbers is not that of the rank's own part.
+    """
+    numbers, whole = matrix.createVecs()
+    part, alone = own.createVecs()
+    part.array[:] = np.random.default_rng(1).standard_normal(part.local_size)
+    numbers.array[:] = part.array_r
+    matrix.mult(numbers, whole)
+    own.mult(part, alone)
+    differs = (whole.array_r != alone.array_r).reshape(-1, 3)
+    return np.flatnonzero(differs.any(axis=1))
 
 
 def _neighbours(matrix: PETSc.Mat, nodes: Indices) -> Indices:

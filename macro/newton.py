@@ -85,9 +85,10 @@ class NewtonSolver:
         self.snes.setFunction(self._residual, base.createVecLeft())
         self.snes.setJacobian(self._tangent, problem.tangent, base)
         self.snes.setConvergenceTest(self._converged)
-        self.snes.ksp.setPC(preconditioner.pc)
         with default_options(PREFIX, {**KRYLOV_DEFAULTS, **NONLINEAR_DEFAULTS}):
             self.snes.setFromOptions()
+        self.snes.ksp.pc.setType("python")
+        self.snes.ksp.pc.setPythonContext(_Borrowed(preconditioner.pc))
 
     def solve(self, solution: PETSc.Vec, *, what: str, remedy: str) -> NewtonReport:
         """Solve from a start that the solution replaces.
@@ -128,3 +129,18 @@ class NewtonSolver:
         self._residuals.append(norms[2] / scale if scale > 0.0 else norms[2])
         done = norms[2] <= snes.getTolerances()[0] * scale
         return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE) if done else 0
+
+
+class _Borrowed:
+    """Another solver's preconditioner.
+
+    PETSc's solvers multiply by the matrix that their preconditioner carries: where two share it,
+    the first solves with the matrix of the second from then on.
+    """
+
+    def __init__(self, preconditioner: PETSc.PC) -> None:
+        self._preconditioner = preconditioner
+
+    def apply(self, _pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write the preconditioner's y for x."""
+        self._preconditioner.apply(x, y)

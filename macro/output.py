@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from dolfinx import fem
 from numpy.typing import NDArray
+from petsc4py import PETSc
 
 from macro import compat
 from macro.interface import Interface
@@ -15,6 +16,8 @@ from macro.obstacle import ObstacleBlock
 from macro.obstacle_state import ObstacleState
 
 Array = NDArray[np.float64]
+
+_NONE = 1e-9  # of a basis function: rounding
 
 
 def write_fields(
@@ -53,8 +56,9 @@ def write_fields(
 def write_rough_fields(path: Path | str, obstacle: ObstacleBlock, state: ObstacleState) -> None:
     """Write displacements [mm] and contact pressures [MPa] of a rough block as XDMF.
 
-    The pressure of a node of the top is its contact force over its tributary area. Quadratic
-    functions on straight cells are written at the vertices.
+    The pressure of a vertex is the contact force there over the tributary area, to which nodes
+    between vertices give their parts; values between vertices are linear. Quadratic displacements
+    of straight cells are written at the vertices.
 
     Args:
         path: File to write, ending in ``.xdmf``; an HDF5 file goes beside it.
@@ -64,18 +68,47 @@ def write_rough_fields(path: Path | str, obstacle: ObstacleBlock, state: Obstacl
     Note:
         Collective.
     """
-    block, top = obstacle.block, obstacle.top
-    upright = np.zeros(block.owned_dofs)
-    upright[top.dofs] = state.pressing / top.area
-    mesh, degree = block.mesh.mesh, 1 if block.mesh.shape.hexahedral else block.degree
+    block, mesh = obstacle.block, obstacle.block.mesh.mesh
+    # files take functions of the degree that cells are bent by, numbered as the mesh is
+    degree = 2 if compat.cell_vertices(mesh).shape[1] == 10 else 1
     moved = _interpolated(
         compat.vector_space(mesh, degree), block.function(state.displacement), "displacement"
     )
-    # files take functions numbered as the mesh is, which parts of a vector need not be
     pressed = _interpolated(
-        compat.scalar_space(mesh, degree), block.function(upright).sub(2).collapse(), "pressure"
+        compat.scalar_space(mesh, degree), _vertex_pressures(obstacle, state), "pressure"
     )
     compat.write_xdmf(str(path), mesh, [moved, pressed])
+
+
+def _vertex_pressures(obstacle: ObstacleBlock, state: ObstacleState) -> Any:
+    """Return contact pressures, linear between vertices, zero away from the top [MPa].
+
+    The nodes of an element of degree 2 do not have pressures of their own: its vertices have no
+    area in triangles, and a ninth of the middle's in squares.
+    """
+    block, top = obstacle.block, obstacle.top
+    pressed = fem.Function(compat.scalar_space(block.mesh.mesh, 1))
+    vertices, cells = compat.cell_nodes(pressed.function_space), compat.cell_nodes(block.space)
+    cell_name = block.mesh.mesh.topology.cell_name()
+    shares = compat.lagrange_values(
+        cell_name, 1, compat.lagrange_points(cell_name, block.degree)
+    )  # of the vertices in the nodes of a cell
+    shares[shares < _NONE] = 0.0
+    place = np.empty(cells.max(initial=-1) + 1, dtype=np.intp)
+    place[cells.ravel()] = np.arange(cells.size)  # any cell of a node
+    cell, node = np.divmod(place[top.dofs // 3], cells.shape[1])
+    numbers = pressed.function_space.dofmap.index_map
+    rows = numbers.local_to_global(vertices[cell].ravel()).astype(PETSc.IntType)
+    force, area = (
+        PETSc.Vec().createMPI((numbers.size_local, None), comm=block.mesh.comm) for _ in range(2)
+    )
+    for vector, values in ((force, state.pressing), (area, top.area)):
+        vector.setValues(rows, (shares[node] * values[:, None]).ravel(), addv=True)
+        vector.assemble()
+    known = area.array_r > 0.0
+    pressed.x.array[: numbers.size_local][known] = force.array_r[known] / area.array_r[known]
+    pressed.x.scatter_forward()
+    return pressed
 
 
 def _interpolated(space: Any, function: Any, name: str) -> Any:

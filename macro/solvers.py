@@ -48,6 +48,12 @@ iterations and three 0.7 to 0.8 of them, in the same time; Gauss–Seidel takes 
 """
 
 
+def users_options() -> tuple[tuple[str, str], ...]:
+    """Return the user's PETSc options under `PREFIX`, by name, which results depend on."""
+    found = PETSc.Options(PREFIX).getAll()
+    return tuple(sorted((name, str(value)) for name, value in found.items()))
+
+
 @contextmanager
 def default_options(prefix: str, defaults: Mapping[str, object]) -> Iterator[None]:
     """Put defaults into PETSc's option database where the user left them open, then take them out.

@@ -77,11 +77,13 @@ def patch_compliance(stage: Stage, comm: Any) -> Array:
 
     from macro import plain_compliance
     from macro.compliance_cache import cached
+    from macro.solvers import users_options
 
     def compute() -> dict[str, Array]:
         return {"compliance": plain_compliance(embedding(stage, comm))}
 
-    key = (stage.shape, block_material(stage), stage.scene.block.sides, stage.patches)
+    sides = stage.scene.block.sides
+    key = (stage.shape, block_material(stage), sides, stage.patches, users_options())
     return cached("plain", key, compute, comm or MPI.COMM_SELF)["compliance"]
 
 

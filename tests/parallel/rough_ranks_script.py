@@ -83,6 +83,7 @@ def run(shape, surface, sides, method, controls):
     return {
         "numbers": numbers,
         "reaction": reaction,
+        "iterations": sum(state.linear_iterations for state in states),
         "top_nodes_of_ranks": COMM.allgather(len(block.top.dofs)),
     }
 

@@ -72,6 +72,16 @@ def test_key_of_unknown_kind_is_refused(counted):
         cached("kind", (np.ones(3),), counted[1], MPI.COMM_SELF)
 
 
+def test_key_of_unknown_kind_is_refused_before_any_rank_waits(counted):
+    class Second:
+        """A rank that would wait for the first in whatever it does together."""
+
+        rank, size = 1, 2
+
+    with pytest.raises(TypeError, match="ndarray in a key"):
+        cached("kind", (np.ones(3),), counted[1], Second())
+
+
 def test_what_was_not_used_for_longest_goes_first(counted, monkeypatch):
     calls, compute = counted
     for key in range(3):

@@ -100,6 +100,22 @@ def test_a_pressed_block_is_freed(interface):
     assert [reference() for reference in gone] == [None] * 3
 
 
+@pytest.mark.parametrize("law", [Spring(), Broken()])
+def test_the_block_alone_stays_what_it_is(interface, law):
+    pressed = PressedBlock(interface.block, interface, [law] * 4)
+    if isinstance(law, Broken):
+        with pytest.raises(NotConverged):
+            pressed.press(Control(approach=5e-3))
+    else:
+        pressed.press(Control(approach=5e-3))
+    block, load = interface.block, interface.load(np.arange(4.0))
+    found = block.stiffness.createVecRight()
+    found.array[:] = block.solve(load.copy()).x.array
+    missed = block.stiffness * found - load
+    # the linear solver's tolerance; the tangent of these springs is far from the stiffness
+    assert missed.norm() < 1.1e-10 * load.norm()
+
+
 def test_pressure_without_value_is_a_failure(interface):
     with pytest.raises(NotConverged, match="DIVERGED_F"):
         PressedBlock(interface.block, interface, [Broken()] * 4).press(Control(approach=1e-3))

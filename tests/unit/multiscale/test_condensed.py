@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from petsc4py import PETSc
 
 from geometry.errors import InputError, NotConverged
 from multiscale import Run, Scene, run
@@ -72,6 +73,20 @@ def test_way_down_is_the_way_up(way):
 def compliance(way, cells):
     words = [f"coupling.compliance={way}", "coupling.newton=condensed", f"block.cells={cells}"]
     return patch_compliance(make_stage(scene(*words)), None)
+
+
+def test_a_users_loose_solver_leaves_nothing_to_later_runs(monkeypatch, tmp_path):
+    monkeypatch.setenv("PATCHLAW_CACHE", str(tmp_path))
+    options = PETSc.Options("patchlaw_")
+    options["ksp_rtol"] = 0.1
+    try:
+        loose = compliance("finite-element", [4, 4, 2])
+    finally:
+        options.delValue("ksp_rtol")
+    found = compliance("finite-element", [4, 4, 2])
+    monkeypatch.setenv("PATCHLAW_CACHE", "off")
+    np.testing.assert_array_equal(found, compliance("finite-element", [4, 4, 2]))
+    assert np.abs(loose - found).max() > 1e-4 * found.max()  # so that it would show
 
 
 def test_both_compliances_of_a_coarse_block():

@@ -1,0 +1,102 @@
+"""PETSc keeps nothing of what load steps and corrections have dropped."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from geometry import Control, PatchGrid, Spectrum, synthesise
+from geometry.meshes import BlockShape
+from macro import (
+    Block,
+    Interface,
+    Material,
+    ObstacleBlock,
+    block_mesh,
+    compat,
+    condense,
+    plain_compliance,
+    rough_block_mesh,
+)
+from micro.boussinesq import HalfSpace
+
+MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
+SHAPE = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(8, 8, 3))
+
+
+@pytest.fixture
+def kept(capfd):
+    """Return a function that counts the objects that PETSc keeps for a communicator."""
+
+    def count(comm):
+        capfd.readouterr()
+        PETSc.garbage_view(comm)
+        lines = capfd.readouterr().out.splitlines()
+        return sum(line.startswith("| ") and "Object ID" not in line for line in lines)
+
+    if not hasattr(PETSc, "garbage_view"):
+        pytest.skip("this PETSc keeps nothing")
+    compat.free_dropped(PETSc.COMM_SELF)
+    PETSc.Vec().createSeq(1)  # dropped at once
+    if not count(PETSc.COMM_SELF):
+        pytest.skip("this PETSc keeps nothing on a single rank")
+    compat.free_dropped(PETSc.COMM_SELF)
+    return count
+
+
+def rough_block(method):
+    spectrum = Spectrum(hurst=0.9, waves=(2, 4), rms_slope=0.1, seed=2)
+    surface = synthesise(spectrum, grid=(32, 32), lengths=(1.0, 1.0))
+    mesh, _ = rough_block_mesh(SHAPE, surface, MPI.COMM_SELF)
+    return ObstacleBlock(
+        Block(mesh, MATERIAL), surface.highest - surface.mean_height, method=method
+    )
+
+
+@pytest.mark.parametrize("method", ["active-set", "augmented-lagrangian"])
+def test_a_rough_block_leaves_nothing_of_a_load_step(kept, method):
+    rough = rough_block(method)
+    for approach in (6e-3, 9e-3):
+        assert rough.press(Control(approach=approach)).nodes > 0
+        assert kept(rough.block.stiffness.comm) + kept(PETSc.COMM_SELF) == 0
+
+
+@pytest.mark.parametrize("method", ["active-set", "augmented-lagrangian"])
+def test_fields_do_not_pile_up_within_a_load_step(kept, monkeypatch, method):
+    rough = rough_block(method)
+    comm, free, found = rough.block.stiffness.comm, compat.free_dropped, []
+
+    def counted(of):
+        found.append(kept(comm))
+        free(of)
+
+    rough.press(Control(approach=6e-3))
+    monkeypatch.setattr(compat, "free_dropped", counted)
+    assert rough.press(Control(approach=12e-3)).active_sets > 2
+    assert max(found) <= 10  # of one step of Newton's method
+
+
+def test_a_compliance_keeps_no_fields_of_its_patches(kept):
+    block = Block(block_mesh(SHAPE, MPI.COMM_SELF), MATERIAL)
+    found = []
+    for grid in ((1, 1), (4, 4)):
+        interface = Interface(block, PatchGrid(grid=grid, lengths=(1.0, 1.0)))
+        plain_compliance(interface)
+        found.append(kept(block.stiffness.comm))
+    assert found[1] <= found[0]
+
+
+def test_a_correction_keeps_no_factors(kept, monkeypatch):
+    meshes = []
+
+    def remembered(*arguments):
+        meshes.append(block_mesh(*arguments))
+        return meshes[-1]
+
+    monkeypatch.setattr(condense, "block_mesh", remembered)
+    loads = PatchGrid(grid=(2, 1), lengths=(1.0, 1.0))
+    made = condense.make_correction(
+        SHAPE, MATERIAL, "free", loads, HalfSpace(4000.0, 0.15), MPI.COMM_SELF
+    )
+    assert np.all(np.isfinite(made.values))
+    assert kept(PETSc.Comm(meshes[0].comm)) == 0
