@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.errors import NotConverged
+from macro.borrowed import Borrowed
 from macro.solvers import KRYLOV_DEFAULTS, PREFIX, default_options, reason_name
 
 NONLINEAR_DEFAULTS: Mapping[str, object] = {
@@ -88,7 +89,8 @@ class NewtonSolver:
         with default_options(PREFIX, {**KRYLOV_DEFAULTS, **NONLINEAR_DEFAULTS}):
             self.snes.setFromOptions()
         self.snes.ksp.pc.setType("python")
-        self.snes.ksp.pc.setPythonContext(_Borrowed(preconditioner.pc))
+        self._preconditioner = _OfAnother(preconditioner.pc)
+        self.snes.ksp.pc.setPythonContext(Borrowed(self._preconditioner))
 
     def solve(self, solution: PETSc.Vec, *, what: str, remedy: str) -> NewtonReport:
         """Solve from a start that the solution replaces.
@@ -131,7 +133,7 @@ class NewtonSolver:
         return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE) if done else 0
 
 
-class _Borrowed:
+class _OfAnother:
     """Another solver's preconditioner.
 
     PETSc's solvers multiply by the matrix that their preconditioner carries: where two share it,
