@@ -120,7 +120,8 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    scene, _ = scene_and_folder(choice, comm)
+    refuse_strangers()
+    scene = on_root(comm, lambda: Scene.load(choice.scene, choice.set))
     load_together(scene, comm)
     stage, made = on_root(comm, lambda: _planned(scene))
     terminal.show_plan(comm, stage, made)
