@@ -14,7 +14,7 @@ from geometry.statistics import roughness
 from multiscale import plan
 from multiscale.couplings.blocks import load_together
 from multiscale.law_tables.law_files import write_laws
-from multiscale.mpi_job import refuse_strangers
+from multiscale.mpi_job import for_large, refuse_strangers
 from multiscale.planning.forecast import Forecast, forecast
 from multiscale.reporting import terminal
 from multiscale.reporting.outputs import write_whole
@@ -123,7 +123,7 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
     refuse_strangers()
     scene = on_root(comm, lambda: Scene.load(choice.scene, choice.set))
     load_together(scene, comm)
-    stage, made = on_root(comm, lambda: _planned(scene))
+    stage, made = on_root(for_large(comm), lambda: _planned(scene))
     terminal.show_plan(comm, stage, made)
 
 
@@ -165,7 +165,7 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
         comm: MPI communicator; None for a process on its own.
     """
     scene, folder = scene_and_folder(choice, comm)
-    stage = on_root(comm, lambda: make_stage(scene))
+    stage = on_root(for_large(comm), lambda: make_stage(scene))
     rough = roughness(stage.surface)
     pairs = [
         ("surface", plan.surface_statement(stage)),

@@ -1,3 +1,5 @@
+import pickle
+
 import numpy as np
 import pytest
 
@@ -95,3 +97,17 @@ def test_maximum_of_noise_against_dense_sampling(seed, periodic):
 def test_maximum_of_a_flat_surface(value, shape):
     surface = Surface(heights=np.full(shape, value), lengths=(1.0, 1.0))
     assert surface.highest == pytest.approx(value, abs=1e-13)  # rounding of the spline's sums
+
+
+def test_derivatives_are_not_pickled():
+    heights = np.random.default_rng(6).normal(size=(64, 64))
+    h = Interpolant(heights, (1.0, 1.0))
+    place = np.random.default_rng(7).uniform(size=(2, 50))
+    orders = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
+    values = [h(*place, dx=dx, dy=dy) for dx, dy in orders]
+    content = pickle.dumps(h)
+    assert len(content) < 8 * heights.size + 4_000  # the spline's coefficients, and its knots
+    again = pickle.loads(content)
+    for (dx, dy), value in zip(orders, values, strict=True):
+        np.testing.assert_array_equal(again(*place, dx=dx, dy=dy), value)
+    np.testing.assert_array_equal(h(*place, dx=1), values[1])  # what was pickled still has them
