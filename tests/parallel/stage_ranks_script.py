@@ -7,6 +7,7 @@ from mpi4py import MPI
 from mpi4py.util import pkl5
 
 from multiscale import Run, Scene
+from multiscale.nodes import nodes_of
 
 COMM = MPI.COMM_WORLD
 PAPER = Path(__file__).parents[2] / "demos" / "scenes" / "paper.toml"
@@ -32,6 +33,7 @@ if __name__ == "__main__":
         stage.asperities.count,
         stage.model.contact_modulus.hex(),
     )
+    nodes = nodes_of(COMM)
     everywhere = COMM.gather(told)
     if COMM.rank == 0:
-        print(*sorted(set(everywhere)), SENT, sep="\n")
+        print(*sorted(set(everywhere)), SENT, nodes.ranks, sep="\n")
