@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BivariateSpline, RectBivariateSpline
@@ -43,7 +45,11 @@ class Interpolant:
             centres.append((np.arange(-padding, count + padding) + 0.5) * step)
             box += [min(0.0, centres[-1][0]), max(length, centres[-1][-1])]
         self._spline = RectBivariateSpline(*centres, samples, bbox=box, kx=3, ky=3, s=0)
-        self._derivatives: dict[tuple[int, int], BivariateSpline] = {(0, 0): self._spline}
+        self._derivatives: dict[tuple[int, int], BivariateSpline] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the derivatives, each as large as the spline that they follow from."""
+        return self.__dict__ | {"_derivatives": {}}
 
     def __call__(self, x: ArrayLike, y: ArrayLike, *, dx: int = 0, dy: int = 0) -> Array:
         """Evaluate the spline or one of its derivatives.
@@ -80,6 +86,8 @@ class Interpolant:
 
     def _derivative(self, dx: int, dy: int) -> BivariateSpline:
         """Return a derivative as a spline of its own, made once: evaluation would remake it."""
+        if dx == dy == 0:
+            return self._spline
         if (dx, dy) not in self._derivatives:
             self._derivatives[dx, dy] = self._spline.partial_derivative(dx, dy)
         return self._derivatives[dx, dy]

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from mpi4py.util import pkl5
 from numpy.typing import NDArray
 
 Arrays = Mapping[str, NDArray[np.float64]]
@@ -62,7 +63,8 @@ def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], co
     """
     place = _place(kind, key)  # on every rank, lest a key that will not do fails on one
     path = place if comm.rank == 0 else None
-    found: Arrays | None = comm.bcast(_read(path) if path else None, root=0)
+    large = pkl5.Intracomm(comm)  # of 128 × 128 patches they are more than MPI counts in a message
+    found: Arrays | None = large.bcast(_read(path) if path else None, root=0)
     if found is not None:
         return found
     made = compute()
@@ -70,7 +72,7 @@ def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], co
         with suppress(OSError):
             _write(path, made)
             _clear(path.parent)
-    kept: Arrays = comm.bcast(made, root=0)
+    kept: Arrays = large.bcast(made, root=0)
     return kept
 
 

@@ -7,6 +7,7 @@ import sys
 import time
 import traceback
 from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -107,6 +108,7 @@ def _parser() -> argparse.ArgumentParser:
         description="Multiscale contact of rough surfaces.",
         epilog="PETSc options follow after --, such as: patchlaw run scene.toml -- -ksp_monitor",
     )
+    parser.add_argument("--version", action="version", version=_versions())
     subparsers = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=_Parser)
     for name, command in {
         "run": commands.run_scene,
@@ -120,7 +122,11 @@ def _parser() -> argparse.ArgumentParser:
         if name == "run":
             _add_interruption(sub)
         sub.add_argument("scene", type=Path, help="scene file (TOML)")
-        sub.add_argument("--out", type=Path, metavar="DIR", help="folder of the results")
+        ending = compare_command.ENDING if name == "compare" else ""
+        text = f"folder of the results (default: results/SCENE{ending}, by the file's name)"
+        if name == "plan":
+            text = "for the words of a run: a plan writes nothing"
+        sub.add_argument("--out", type=Path, metavar="DIR", help=text)
         sub.add_argument(
             "--set",
             nargs="+",
@@ -135,6 +141,17 @@ def _parser() -> argparse.ArgumentParser:
     schema.set_defaults(command=commands.print_schema)
     doctor_command.add_commands(subparsers)
     return parser
+
+
+def _versions() -> str:
+    """Return the versions of patchlaw and of the finite elements, which are not loaded for it."""
+    found = []
+    for name, distribution in (("patchlaw", "patchlaw"), ("dolfinx", "fenics-dolfinx")):
+        try:
+            found.append(f"{name} {version(distribution)}")
+        except PackageNotFoundError:
+            found.append(f"{name} not installed")
+    return ", ".join(found)
 
 
 def _add_interruption(parser: argparse.ArgumentParser) -> None:

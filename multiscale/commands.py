@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,10 @@ from geometry.statistics import roughness
 from multiscale import plan
 from multiscale.couplings.blocks import load_together
 from multiscale.law_tables.law_files import write_laws
-from multiscale.mpi_job import refuse_strangers
+from multiscale.mpi_job import for_large, refuse_strangers
+from multiscale.nodes import Nodes, nodes_of
 from multiscale.planning.forecast import Forecast, forecast
+from multiscale.planning.room import shortages
 from multiscale.reporting import terminal
 from multiscale.reporting.field_files import write_fields
 from multiscale.reporting.outputs import write_whole
@@ -123,12 +126,14 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
     """
     scene, _ = scene_and_folder(choice, comm, writes=False)
     load_together(scene, comm)
-    stage, made = on_root(comm, lambda: _planned(scene))
-    terminal.show_plan(comm, stage, made)
+    nodes = nodes_of(comm)
+    stage, made = on_root(for_large(comm), lambda: _planned(scene, nodes))
+    terminal.show_plan(comm, stage, made, list(shortages(stage, nodes)))
 
 
-def _planned(scene: Scene) -> tuple[Stage, Forecast]:
-    stage = make_stage(scene)
+def _planned(scene: Scene, nodes: Nodes) -> tuple[Stage, Forecast]:
+    """Plan a run, on more nodes like those here if it takes them."""
+    stage = make_stage(scene, nodes=replace(nodes, more=True))
     return stage, forecast(stage)
 
 
@@ -166,7 +171,8 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
         comm: MPI communicator; None for a process on its own.
     """
     scene, folder = scene_and_folder(choice, comm)
-    stage = on_root(comm, lambda: make_stage(scene))
+    nodes = replace(nodes_of(comm), more=True)  # a surface needs no room for its block
+    stage = on_root(for_large(comm), lambda: make_stage(scene, nodes=nodes))
     rough = roughness(stage.surface)
     pairs = [
         ("surface", plan.surface_statement(stage)),

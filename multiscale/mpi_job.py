@@ -33,6 +33,22 @@ def world() -> Any:
     return MPI.COMM_WORLD if MPI.COMM_WORLD.size > 1 else None
 
 
+def for_large(comm: Any) -> Any:
+    """Return a communicator for what may be larger than MPI can count, 2 GB in one message.
+
+    Large arrays travel beside the pickle, so that neither end holds them twice; small messages
+    take longer than through the communicator itself.
+
+    Args:
+        comm: MPI communicator; None for a process on its own.
+    """
+    if comm is None:
+        return None
+    from mpi4py.util import pkl5
+
+    return pkl5.Intracomm(comm)
+
+
 def strangers() -> tuple[str, int] | None:
     """Tell whether a launcher started several processes that do not know of each other.
 

@@ -22,6 +22,8 @@ from multiscale.law_tables.law_files import LawTable, read_laws, write_laws
 from multiscale.law_tables.repair import repair_notes
 from multiscale.load_step import LoadStep
 from multiscale.loading import Coupling, Drive, Position, Restorable
+from multiscale.mpi_job import for_large
+from multiscale.nodes import nodes_of
 from multiscale.planning.choices import settled_keys
 from multiscale.planning.forecast import Forecast, forecast
 from multiscale.planning.newton_choice import newton_choice
@@ -71,7 +73,8 @@ class Run:
         self.interface: Interface | None = None
         self.coupling: Coupling | None = None
         load_together(scene, comm)
-        self.stage: Stage = on_root(comm, lambda: make_stage(scene, settled))
+        nodes = nodes_of(comm)
+        self.stage: Stage = on_root(for_large(comm), lambda: make_stage(scene, settled, nodes))
         self.scene = self.stage.scene
         self.seconds = dict(self.stage.seconds)
 

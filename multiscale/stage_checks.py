@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterator, Sequence
 
 from geometry.errors import InputError
 from geometry.files import BYTES_PER_HEIGHT
 from geometry.surface import Surface
+from multiscale.nodes import Need, Nodes
 from multiscale.scene import Scene
 
 BYTES_PER_CELL = 5000
-"""Memory that mesh, stiffness and multigrid take per cell, roughly [B]."""
+"""Memory that mesh, stiffness and multigrid take per cell, roughly, over all ranks [B]."""
+
+BYTES_PER_SENT_HEIGHT = 17
+"""Memory of a height and its spline on every rank, once the surface is made [B]."""
 
 BYTES_PER_PAIR = 40
 """Memory that dense matrices take per pair of patches: compliance, tangent, factors [B]."""
 
-BYTES_PER_LAW = 15_000
-"""Memory that a law takes: 65 rows of 7 numbers, while more are put between them [B]."""
+BYTES_PER_LAW = 3_600
+"""Memory of a law with 65 rows of 7 numbers on every rank [B]."""
+
+BYTES_PER_NEW_LAW = 11_400
+"""Memory that it takes besides where it is made, while rows are put between others [B]."""
 
 BYTES_PER_STATE = 24
 """Memory of what a patch carries at one load step [B]."""
@@ -52,51 +58,70 @@ def patch_grid(scene: Scene) -> tuple[int, int]:
     return PROVISIONAL_PATCHES if grid == "auto" else grid
 
 
-def check_size(scene: Scene) -> None:
-    """Refuse what could never fit into this machine's memory, before anything is allocated.
+def check_size(scene: Scene, nodes: Nodes) -> None:
+    """Refuse what could never fit into the memory of the nodes, before anything is allocated.
 
     Keys that are left to the plan are passed over: it takes nothing that would be refused.
+
+    Args:
+        scene: The scene.
+        nodes: The nodes of the run.
 
     Raises:
         InputError: Names the key, its value and what is allowed.
     """
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    for key, value, what, needed in _sizes(scene):
-        if needed > memory:
+    for key, value, what, need in needs(scene):
+        if not nodes.fit(need):
             raise InputError(
-                f"{what}needs about {needed / 1e9:.3g} GB of memory",
+                f"{what}needs about {need.alone / 1e9:.3g} GB of memory",
                 key=key,
                 value=list(value) if isinstance(value, tuple) else value,
-                allowed=f"what fits into {memory / 1e9:.3g} GB",
+                allowed=f"what fits into {nodes.room(need)}",
                 file=scene.file,
             )
 
 
-def _sizes(scene: Scene) -> Iterator[tuple[str, object, str, float]]:
-    """Yield keys, their values, what of them takes memory, and how much [B]."""
+def needs(scene: Scene) -> Iterator[tuple[str, object, str, Need]]:
+    """Yield keys, their values, what of them takes memory, and how much.
+
+    Args:
+        scene: The scene.
+    """
     grid, patches = scene.surface.grid, scene.patches.grid
     if isinstance(grid, tuple):
-        yield "surface.grid", grid, "", math.prod(grid) * BYTES_PER_HEIGHT
+        kept = math.prod(grid) * BYTES_PER_SENT_HEIGHT
+        made = math.prod(grid) * BYTES_PER_HEIGHT - kept
+        yield "surface.grid", grid, "", Need(held=kept, once=made)
     meshed = scene.coupling.kind not in ("analytic", "reference")  # which checks its meshes itself
     if meshed and scene.block.cells != "auto":
         cells = block_cells(scene)
-        yield "block.cells", cells, "", math.prod(cells) * BYTES_PER_CELL
+        yield "block.cells", cells, "", _of_cells(scene, math.prod(cells))
     if meshed and scene.block.margin:
         more = 2 * scene.block.margin_cells
         nx, ny, nz = block_cells(scene)
-        needed = (nx + more) * (ny + more) * nz * BYTES_PER_CELL
-        yield "block.margin_cells", scene.block.margin_cells, "", needed
+        need = _of_cells(scene, (nx + more) * (ny + more) * nz)
+        yield "block.margin_cells", scene.block.margin_cells, "", need
     if not isinstance(patches, tuple):
         return
     count, steps = math.prod(patches), scene.loading.steps * len(scene.loading.programme.points)
-    yield "patches.grid", patches, "", count * BYTES_PER_HEIGHT
+    yield "patches.grid", patches, "", Need(held=count * BYTES_PER_HEIGHT)
     if meshed:
         what = "the interaction of all patches with each other "
-        yield "patches.grid", patches, what, count**2 * BYTES_PER_PAIR
+        yield "patches.grid", patches, what, Need(held=count**2 * BYTES_PER_PAIR)
     if scene.coupling.kind in ("isolated", "consistent"):
-        yield "patches.grid", patches, "a law for every patch ", count * BYTES_PER_LAW
+        law, new = count * BYTES_PER_LAW, count * BYTES_PER_NEW_LAW
+        dealt = scene.coupling.kind == "isolated"  # to the ranks; else all are made by rank 0
+        need = Need(held=law, shared=new) if dealt else Need(held=law, once=new)
+        yield "patches.grid", patches, "a law for every patch ", need
     what = f"the history of {count} patches "
-    yield "load.steps", scene.loading.steps, what, steps * (count * BYTES_PER_STATE + 1000)
+    need = Need(held=steps * (count * BYTES_PER_STATE + 1000))
+    yield "load.steps", scene.loading.steps, what, need
+
+
+def _of_cells(scene: Scene, cells: int) -> Need:
+    """Return what cells of a block take: the smooth rest of a decomposed one is every rank's."""
+    needed = cells * BYTES_PER_CELL
+    return Need(held=needed) if scene.coupling.decomposed else Need(shared=needed)
 
 
 def check_patches(scene: Scene, surface: Surface) -> None:

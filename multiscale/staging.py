@@ -13,6 +13,7 @@ from geometry.patches import PatchGrid, patch_means
 from geometry.surface import Surface
 from micro import MicroModel
 from multiscale.ingredients import make_shape, make_surface
+from multiscale.nodes import Nodes
 from multiscale.planning.choices import SETTLED_LATE, cheapest, open_keys, provisional, with_settled
 from multiscale.planning.micro_choice import (
     chosen_model,
@@ -20,6 +21,7 @@ from multiscale.planning.micro_choice import (
     furthest_plane,
     stated_model,
 )
+from multiscale.planning.room import check_smooth_rest
 from multiscale.planning.surface_choice import chosen_surface, micro_tolerance
 from multiscale.reference.meshes import reference_meshes
 from multiscale.scene import Scene
@@ -27,21 +29,24 @@ from multiscale.stage import Stage
 from multiscale.stage_checks import check_load, check_patches, check_size, patch_grid
 
 
-def make_stage(scene: Scene, settled: Mapping[str, Any] | None = None) -> Stage:
+def make_stage(
+    scene: Scene, settled: Mapping[str, Any] | None = None, nodes: Nodes | None = None
+) -> Stage:
     """Make or read the surface, find its summits, settle what is open, check that all fits.
 
     Args:
         scene: The scene.
         settled: What open keys became when the run began; see `settled_keys`.
+        nodes: The nodes of the run; None for this process alone.
 
     Raises:
         InputError: When something cannot be made or does not fit; names file, key and value.
     """
-    began = time.perf_counter()
+    began, nodes = time.perf_counter(), nodes or Nodes()
     known = settled or {}
     free = open_keys(scene) - set(known)
     start = provisional(with_settled(scene, known), free)
-    check_size(start)
+    check_size(start, nodes)
     if "surface.grid" in free:
         start, surface = chosen_surface(scene, start)
     else:
@@ -51,7 +56,7 @@ def make_stage(scene: Scene, settled: Mapping[str, Any] | None = None) -> Stage:
     patches = PatchGrid(grid=patch_grid(start), lengths=surface.lengths)
     asperities = find_asperities(surface, periodic=False)  # the block's sides are free
     if start.coupling.kind == "reference":
-        return _reference_stage(start, surface, patches, asperities, began)
+        return _reference_stage(start, surface, patches, asperities, nodes, began)
     shape = make_shape(start, surface)
     made = time.perf_counter()
     seconds = {"surface": made - began}
@@ -76,7 +81,10 @@ def make_stage(scene: Scene, settled: Mapping[str, Any] | None = None) -> Stage:
         choice=choice,
         seconds=seconds,
     )
-    return cheapest(stage, scene, free) if free & SETTLED_LATE else stage
+    if free & SETTLED_LATE:
+        return cheapest(stage, scene, free, nodes)
+    check_smooth_rest(stage, nodes)
+    return stage
 
 
 def _check_summits(scene: Scene, model: MicroModel) -> None:
@@ -91,7 +99,12 @@ def _check_summits(scene: Scene, model: MicroModel) -> None:
 
 
 def _reference_stage(
-    scene: Scene, surface: Surface, patches: PatchGrid, asperities: Asperities, began: float
+    scene: Scene,
+    surface: Surface,
+    patches: PatchGrid,
+    asperities: Asperities,
+    nodes: Nodes,
+    began: float,
 ) -> Stage:
     """Return the ingredients of a reference, which needs no micro model."""
     furthest = estimated_plane(scene, surface)
@@ -104,6 +117,6 @@ def _reference_stage(
         mean_heights=patch_means(surface, patches),
         shape=make_shape(scene, surface),
         furthest=furthest,
-        meshes=reference_meshes(scene, surface, furthest),
+        meshes=reference_meshes(scene, surface, furthest, nodes),
         seconds={"surface": time.perf_counter() - began},
     )

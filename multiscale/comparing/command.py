@@ -19,6 +19,9 @@ from multiscale.scenes.quantities import parse_duration
 KEPT = "levels"
 """Folder of finished levels within the results."""
 
+ENDING = "-compare"
+"""What the folder's name has behind the scene's."""
+
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the words that only this command knows."""
@@ -52,7 +55,7 @@ def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         )
     if options:
         raise InputError("levels take no PETSc options", key="--", value=" ".join(options))
-    scene, folder = scene_and_folder(choice, comm, ending="-compare")
+    scene, folder = scene_and_folder(choice, comm, ending=ENDING)
     with terminal.following(comm) as (begun, ended):
         try:
             found = compare(

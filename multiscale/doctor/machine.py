@@ -15,6 +15,7 @@ from typing import Any
 
 from multiscale.doctor.finding import Finding
 from multiscale.mpi_job import strangers
+from multiscale.nodes import group_memory
 
 _LAUNCHERS = {"Open MPI": "Open MPI", "HYDRA": "MPICH", "MPICH": "MPICH", "Intel": "Intel MPI"}
 
@@ -153,16 +154,11 @@ def memory(comm: Any) -> list[Finding]:
 
 
 def _free_bytes() -> float:
-    """Return the free memory of this host, or of its control group where that is less [B]."""
+    """Return the free memory of this host, or of a control group where that is less [B]."""
     lines = Path("/proc/meminfo").read_text(encoding="utf-8").splitlines()
     fields = {name: rest.split()[0] for name, _, rest in (line.partition(":") for line in lines)}
     free = 1024.0 * float(fields["MemAvailable"])
-    group = Path("/sys/fs/cgroup")
-    try:
-        limit, used = ((group / f"memory.{name}").read_text() for name in ("max", "current"))
-    except OSError:  # no control group, or of the first generation
-        return free
-    return free if limit.strip() == "max" else min(free, float(limit) - float(used))
+    return min([free, *(limit - used for limit, used in group_memory())])
 
 
 def _gathered(comm: Any, value: Any) -> list[Any]:

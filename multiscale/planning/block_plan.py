@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from geometry.meshes import alignment
 from geometry.smooth_shape import smooth_shape
 from multiscale.couplings.blocks import correction_known, scene_loads
-from multiscale.planning.block_work import smooth_bytes, smooth_work
+from multiscale.planning.block_work import smooth_need, smooth_work
 from multiscale.planning.machine import this_machine
 from multiscale.stage import Stage
 from multiscale.stage_checks import DECOMPOSED_CELLS
@@ -99,7 +99,7 @@ def _smooth_cost(stage: Stage) -> tuple[int, float, float]:
     """Return unknowns, seconds and bytes of the smooth rest."""
     loads = scene_loads(stage).shape
     seconds = smooth_work(stage.shape, loads).seconds(this_machine())
-    return smooth_shape(stage.shape).unknowns, seconds, smooth_bytes(stage.shape, loads)
+    return smooth_shape(stage.shape).unknowns, seconds, smooth_need(stage.shape, loads).alone
 
 
 def _times(cells: tuple[int, ...]) -> str:

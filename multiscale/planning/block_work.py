@@ -11,6 +11,7 @@ import sys
 
 from geometry.meshes import BlockShape
 from geometry.smooth_shape import smooth_shape
+from multiscale.nodes import Need
 from multiscale.planning.work import Work
 from multiscale.reference.meshes import ReferenceMeshes
 
@@ -52,8 +53,8 @@ def smooth_work(shape: BlockShape, loads: tuple[int, int]) -> Work:
     )
 
 
-def smooth_bytes(shape: BlockShape, loads: tuple[int, int]) -> float:
-    """Return the memory of that: the factors, and displacements and loads of all rectangles [B].
+def smooth_need(shape: BlockShape, loads: tuple[int, int]) -> Need:
+    """Return the memory of that: every rank's factors, and its displacements by its rectangles.
 
     Args:
         shape: The block.
@@ -61,7 +62,9 @@ def smooth_bytes(shape: BlockShape, loads: tuple[int, int]) -> float:
     """
     unknowns, count = smooth_shape(shape).unknowns, math.prod(loads)
     sides = 1.5 * _side_points(shape, loads) * count
-    return 16.0 * _FILL * unknowns ** (4 / 3) + 8.0 * (4.0 * unknowns * count + sides)
+    return Need(
+        held=16.0 * _FILL * unknowns ** (4 / 3), shared=8.0 * (4.0 * unknowns * count + sides)
+    )
 
 
 def mesh_unknowns(shape: BlockShape) -> int:

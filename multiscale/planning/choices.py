@@ -12,10 +12,12 @@ from pydantic import ValidationError
 from geometry.errors import InputError
 from geometry.patches import PatchGrid, patch_means
 from multiscale.ingredients import make_shape
+from multiscale.nodes import Nodes
 from multiscale.planning.costs import predicted_cost
 from multiscale.planning.decision import Alternative, decided
 from multiscale.planning.expected_errors import expected_errors
 from multiscale.planning.machine import this_machine
+from multiscale.planning.room import check_smooth_rest
 from multiscale.scene import Scene
 from multiscale.scenes.sections import CouplingSection
 from multiscale.stage import Stage
@@ -94,13 +96,14 @@ def provisional(scene: Scene, free: frozenset[str]) -> Scene:
     return _changed(scene, changes)
 
 
-def cheapest(stage: Stage, given: Scene, free: frozenset[str]) -> Stage:
+def cheapest(stage: Stage, given: Scene, free: frozenset[str], nodes: Nodes) -> Stage:
     """Return a stage whose open keys of coupling, patches and block are chosen.
 
     Args:
         stage: The ingredients with provisional values.
         given: The scene as it was given.
         free: Its open keys.
+        nodes: The nodes of the run.
 
     Raises:
         InputError: When no combination fits what the scene states.
@@ -108,7 +111,7 @@ def cheapest(stage: Stage, given: Scene, free: frozenset[str]) -> Stage:
     stages, refused = [], None
     for scene in _scenes(stage, given, free):
         try:
-            stages.append(_with(stage, scene))
+            stages.append(_with(stage, scene, nodes))
         except InputError as error:
             refused = refused or error
     if not stages:
@@ -172,14 +175,16 @@ def _alternative(stage: Stage) -> Alternative:
     )
 
 
-def _with(stage: Stage, scene: Scene) -> Stage:
+def _with(stage: Stage, scene: Scene, nodes: Nodes) -> Stage:
     """Return a stage of the same surface and micro model for another scene."""
-    check_size(scene)
+    check_size(scene, nodes)
     check_patches(scene, stage.surface)
     patches = PatchGrid(grid=patch_grid(scene), lengths=stage.surface.lengths)
     shape = make_shape(scene, stage.surface)
     means = patch_means(stage.surface, patches)
-    return replace(stage, scene=scene, patches=patches, mean_heights=means, shape=shape)
+    made = replace(stage, scene=scene, patches=patches, mean_heights=means, shape=shape)
+    check_smooth_rest(made, nodes)
+    return made
 
 
 def _scenes(stage: Stage, given: Scene, free: frozenset[str]) -> Iterator[Scene]:

@@ -16,7 +16,7 @@ from multiscale.planning.block_work import (
     mesh_bytes,
     mesh_work,
     reference_work,
-    smooth_bytes,
+    smooth_need,
     smooth_work,
 )
 from multiscale.planning.machine import Machine
@@ -162,7 +162,7 @@ def _memory(stage: Stage, smooth_kept: bool) -> float:
         elif not stage.scene.coupling.decomposed:
             block += mesh_bytes(shape)
         elif not smooth_kept:
-            block += smooth_bytes(shape, scene_loads(stage).shape)
+            block += smooth_need(shape, scene_loads(stage).shape).alone
     drawn = stage.scene.output.figures and "matplotlib" not in sys.modules
     return peak_memory() + max(micro, block) + kept + _PICTURES * drawn
 

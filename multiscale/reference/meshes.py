@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, TypeAlias
@@ -17,6 +17,7 @@ from geometry.reference_meshes import characteristic_size, reference_shapes
 from geometry.refined_block import RefinedShape
 from geometry.surface import Surface
 from geometry.typical_contact import contact_radius
+from multiscale.nodes import Need, Nodes
 from multiscale.scene import Scene
 
 Array = NDArray[np.float64]
@@ -25,6 +26,10 @@ Plane: TypeAlias = tuple[float, tuple[float, float]]
 
 BYTES_PER_UNKNOWN = {1: 2000, 2: 3500}
 """Memory that mesh, stiffness and multigrid take per unknown, by the element's degree [B]."""
+
+_GMSH = {1: 1900, 2: 250}
+"""Memory that rank 0 takes per unknown of tetrahedra from gmsh to their distribution, by the
+element's degree: 1 kB a cell [B]."""
 
 _NODES = {1: 1.1, 2: 8.4}
 """Nodes of unstructured tetrahedra per cube of their edge, by the element's degree."""
@@ -82,6 +87,11 @@ class ReferenceMeshes:
         """Memory that all meshes take together, roughly, over all ranks [B]."""
         return float(sum(self.unknowns)) * BYTES_PER_UNKNOWN[self.degree]
 
+    @property
+    def gathered(self) -> float:
+        """Memory that rank 0 takes to make the largest, 0 where all ranks do, roughly [B]."""
+        return 0.0 if self.hexahedral else float(max(self.unknowns)) * _GMSH[self.degree]
+
 
 def is_hexahedral(scene: Scene) -> bool:
     """Tell whether the reference of a scene is meshed by hexahedra."""
@@ -91,13 +101,16 @@ def is_hexahedral(scene: Scene) -> bool:
     return scene.block.cells is not None and section.fine is None
 
 
-def reference_meshes(scene: Scene, surface: Surface, furthest: Plane) -> ReferenceMeshes:
+def reference_meshes(
+    scene: Scene, surface: Surface, furthest: Plane, nodes: Nodes
+) -> ReferenceMeshes:
     """Return the meshes of a scene's reference.
 
     Args:
         scene: The scene.
         surface: Its surface.
         furthest: Largest approach at the middle [mm] and the plane's slopes there.
+        nodes: The nodes of the run.
 
     Raises:
         InputError: When they cannot be made or would not fit into memory; names file and key.
@@ -110,7 +123,8 @@ def reference_meshes(scene: Scene, surface: Surface, furthest: Plane) -> Referen
     reach = approach if given else (1.0 + _RESERVE) * approach
     try:
         if scene.reference.fine is not None and not hexahedral:
-            _check_memory(scene, key, _least_unknowns(surface, reach, tilt, scene.reference.fine))
+            least = _least_bytes(surface, reach, tilt, scene.reference.fine)
+            _check_memory(scene, key, nodes, least)
         shapes = reference_shapes(
             surface, reach, scene.block.height, count=scene.reference.meshes, tilt=tilt,
             **_asked(scene, hexahedral),
@@ -126,7 +140,7 @@ def reference_meshes(scene: Scene, surface: Surface, furthest: Plane) -> Referen
         unknowns=tuple(_unknowns(shape) for shape in shapes),
         key=key,
     )
-    _check_memory(scene, key, meshes.bytes)
+    _check_memory(scene, key, nodes, meshes.bytes, meshes.gathered)
     return meshes
 
 
@@ -173,22 +187,32 @@ def _check_block(scene: Scene) -> None:
             raise InputError(problem, key=key, value=value, allowed=allowed, file=scene.file)
 
 
-def _check_memory(scene: Scene, key: str, needed: float) -> None:
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    if needed > memory:
-        value = scene.block.cells if key == "block.cells" else scene.reference.fine
-        raise InputError(
-            f"the reference needs about {needed / 1e9:.3g} GB of memory",
-            key=key,
-            value=value,
-            allowed=f"what fits into {memory / 1e9:.3g} GB, or fewer reference.meshes",
-            file=scene.file,
-        )
+def reference_needs(shared: float, gathered: float = 0.0) -> Iterator[tuple[str, Need]]:
+    """Yield what of a reference takes memory, and how much.
+
+    Args:
+        shared: See `ReferenceMeshes.bytes`.
+        gathered: See `ReferenceMeshes.gathered`.
+    """
+    yield "the reference", Need(shared=shared)
+    yield "gmsh on rank 0, which meshes the reference,", Need(once=gathered)
 
 
-def _least_unknowns(
-    surface: Surface, reach: float, tilt: tuple[float, float], fine: float
-) -> float:
+def _check_memory(
+    scene: Scene, key: str, nodes: Nodes, shared: float, gathered: float = 0.0
+) -> None:
+    for what, need in reference_needs(shared, gathered):
+        if not nodes.fit(need):
+            raise InputError(
+                f"{what} needs about {need.alone / 1e9:.3g} GB of memory",
+                key=key,
+                value=scene.block.cells if key == "block.cells" else scene.reference.fine,
+                allowed=f"what fits into {nodes.room(need)}; or fewer reference.meshes",
+                file=scene.file,
+            )
+
+
+def _least_bytes(surface: Surface, reach: float, tilt: tuple[float, float], fine: float) -> float:
     """Return the memory that nodes of the top within reach take alone [B]."""
     x, y = np.meshgrid(surface.x, surface.y, indexing="ij")
     lean = tilt[0] * (x - 0.5 * surface.lengths[0]) + tilt[1] * (y - 0.5 * surface.lengths[1])

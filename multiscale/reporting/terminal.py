@@ -72,16 +72,18 @@ def show_pairs(comm: Any, pairs: Sequence[tuple[str, str]], warnings: Sequence[s
         console.print(f"[yellow]note:[/] {escape(warning)}")
 
 
-def show_plan(comm: Any, stage: Stage, made: Forecast) -> None:
+def show_plan(comm: Any, stage: Stage, made: Forecast, lacking: Sequence[str] = ()) -> None:
     """Print what a run will do, and why.
 
     Args:
         comm: MPI communicator, or None.
         stage: The scene's ingredients.
         made: What is predicted of it.
+        lacking: What a run would need more nodes for.
     """
     if speaks(comm):
-        show_pairs(comm, list(plan.statements(stage, made)), list(plan.warnings(stage, made)))
+        notes = [*plan.warnings(stage, made), *lacking]
+        show_pairs(comm, list(plan.statements(stage, made)), notes)
 
 
 def show_comparison(comm: Any, made: Forecast, seconds: Mapping[str, float]) -> None:

@@ -1,3 +1,5 @@
+import pickle
+
 import numpy as np
 import pytest
 
@@ -108,3 +110,17 @@ def test_what_heights_count_from_does_not_matter(periodic):
     # the heights themselves are rounded to 1e-10 at 1e6, by 8 cells per mm in a slope
     np.testing.assert_allclose(high(t, t, dx=1), low(t, t, dx=1), atol=1e-8)
     np.testing.assert_allclose(high.maximum()[:2], low.maximum()[:2], atol=1e-8)
+
+
+def test_derivatives_are_not_pickled():
+    heights = np.random.default_rng(6).normal(size=(64, 64))
+    h = Interpolant(heights, (1.0, 1.0))
+    place = np.random.default_rng(7).uniform(size=(2, 50))
+    orders = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
+    values = [h(*place, dx=dx, dy=dy) for dx, dy in orders]
+    content = pickle.dumps(h)
+    assert len(content) < 8 * heights.size + 4_000  # the spline's coefficients, and its knots
+    again = pickle.loads(content)
+    for (dx, dy), value in zip(orders, values, strict=True):
+        np.testing.assert_array_equal(again(*place, dx=dx, dy=dy), value)
+    np.testing.assert_array_equal(h(*place, dx=1), values[1])  # what was pickled still has them

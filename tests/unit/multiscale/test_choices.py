@@ -210,9 +210,9 @@ def test_sizes_that_fit_no_memory_are_refused_before_anything_is_made(
     def never(scene):
         raise AssertionError("a surface was made")
 
-    monkeypatch.setattr("multiscale.stage.make_surface", never)
+    monkeypatch.setattr("multiscale.staging.make_surface", never)
     pages = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 4_000_000}  # 16 GB
-    monkeypatch.setattr("multiscale.stage_checks.os.sysconf", pages.__getitem__)
+    monkeypatch.setattr("multiscale.nodes.os.sysconf", pages.__getitem__)
     with pytest.raises(InputError, match=problem):
         make_stage(scene(**sections))
 
@@ -235,7 +235,7 @@ def test_the_plan_says_how_fine_the_heights_are():
 def test_nothing_to_choose(monkeypatch):
     monkeypatch.setattr("multiscale.planning.choices._scenes", lambda *given: [])
     with pytest.raises(InputError, match=r"coupling\.kind: leaves nothing to choose"):
-        cheapest(None, None, frozenset())
+        cheapest(None, None, frozenset(), None)
 
 
 def test_a_bound_beyond_the_force_itself_is_no_number():

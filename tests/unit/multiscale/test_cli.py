@@ -2,6 +2,10 @@
 
 import csv
 import json
+import re
+import subprocess
+import sys
+from importlib import metadata
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +23,10 @@ def call(capsys, *words):
     code = main(list(words))
     shown = capsys.readouterr()
     return code, shown.out, shown.err
+
+
+def missing(distribution):
+    raise metadata.PackageNotFoundError(distribution)
 
 
 @pytest.fixture
@@ -125,6 +133,47 @@ def test_plan_runs_and_writes_nothing(capsys, tmp_path, monkeypatch):
     for word in ("circular", "isolated", "4 × 4 patches", "40 × 40 × 25 hexahedra"):
         assert word in " ".join(shown.split())
     assert not list(tmp_path.iterdir())
+    (tmp_path / "results").touch()  # where nothing can be written does not matter
+    assert call(capsys, "plan", PAPER, "--set", *SMALL)[0] == 0
+    assert call(capsys, "plan", PAPER, "--out", "results/x", "--set", *SMALL)[0] == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["results"]
+
+
+@pytest.mark.parametrize(
+    ("command", "folder"),
+    [("run", "results/SCENE"), ("compare", "results/SCENE-compare"), ("laws", "results/SCENE")],
+)
+def test_help_names_the_folder(capsys, command, folder):
+    with pytest.raises(SystemExit) as ended:
+        main([command, "--help"])
+    assert ended.value.code == 0
+    assert f"(default: {folder}, by the" in " ".join(capsys.readouterr().out.split())
+
+
+def test_version(capsys, monkeypatch):
+    with pytest.raises(SystemExit) as ended:
+        main(["--version"])
+    assert ended.value.code == 0
+    patchlaw, dolfinx = capsys.readouterr().out.strip().split(", ")
+    assert patchlaw == f"patchlaw {metadata.version('patchlaw')}"
+    assert re.fullmatch(r"dolfinx \d+\.\d+.*", dolfinx)
+    monkeypatch.setattr("multiscale.cli.version", missing)
+    with pytest.raises(SystemExit):
+        main(["--version"])
+    assert capsys.readouterr().out == "patchlaw not installed, dolfinx not installed\n"
+
+
+def test_version_loads_no_finite_elements():
+    code = (
+        "import sys; from multiscale.cli import main\n"
+        "try: main(['--version'])\n"
+        "finally: print('dolfinx' in sys.modules)"
+    )
+    root = Path(__file__).parents[3]
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout.splitlines()[-1]) == (0, "False"), done.stderr
 
 
 @pytest.mark.parametrize(("command", "file"), [("laws", "laws.h5"), ("surface", "surface.png")])

@@ -14,7 +14,7 @@ from macro.side_loads import sides
 from micro import HalfSpaceModel
 from multiscale import Run, Scene, make_stage
 from multiscale.loading import Programme
-from multiscale.planning.block_work import _side_points, mesh_unknowns, reference_work, smooth_bytes
+from multiscale.planning.block_work import _side_points, mesh_unknowns, reference_work, smooth_need
 from multiscale.planning.costs import predicted_cost
 from multiscale.planning.machine import Machine, this_machine
 from multiscale.planning.press_work import presses, step_count
@@ -134,7 +134,7 @@ def test_work_grows_with_what_is_asked():
     )
     assert reference_work(fine, 8, turning=True)[1].product > pressed.product
     shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(16, 16, 12))
-    assert smooth_bytes(shape, (32, 32)) > smooth_bytes(shape, (16, 16)) > 1e8
+    assert smooth_need(shape, (32, 32)).alone > smooth_need(shape, (16, 16)).alone > 1e8
 
 
 def test_a_block_that_is_kept_costs_no_factorisation(tmp_path, monkeypatch):

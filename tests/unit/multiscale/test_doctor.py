@@ -107,6 +107,11 @@ def test_memory_is_shared_by_the_ranks_of_a_host(monkeypatch):
     assert doctor_machine.memory(Ranks)[0].state == "warning"
 
 
+def test_memory_of_a_control_group_is_what_is_left_of_it(monkeypatch):
+    monkeypatch.setattr(doctor_machine, "group_memory", lambda: [(9e18, 1e9), (3e9, 2.5e9)])
+    assert doctor_machine.memory(None)[0].text == "0.5 GB free per rank"
+
+
 def test_reference_blas_is_told(monkeypatch):
     monkeypatch.setattr(doctor_machine, "_loaded", list)
     (found,) = doctor_machine.blas(None)

@@ -83,7 +83,7 @@ def test_sizes_are_refused_before_anything_is_allocated(tmp_path, key, value, te
 
 
 def test_a_law_for_every_patch_takes_memory(tmp_path, monkeypatch):
-    monkeypatch.setattr("multiscale.stage_checks.os.sysconf", lambda name: 1200)  # of 1.4 MB
+    monkeypatch.setattr("multiscale.nodes.os.sysconf", lambda name: 1200)  # of 1.4 MB
     path = tmp_path / "scene.toml"
     data = put(put(BASE, "coupling.kind", "isolated"), "block.cells", [4, 4, 2])
     path.write_text(toml(put(data, "patches.grid", [12, 12])), encoding="utf-8")

@@ -40,9 +40,10 @@ def loaded(tmp_path: Path, command: str, given: dict) -> set[str]:
     lines = [f"{name} = {_toml(section)}" for name, section in given.items()]
     scene = tmp_path / "scene.toml"
     scene.write_text("\n".join(lines))
+    words = [command, str(scene), *(["--out", str(tmp_path / "out")] if command == "run" else [])]
     code = (
         "import json, sys\nfrom multiscale.cli import main\n"
-        f"code = main(['{command}', {str(scene)!r}, '--out', {str(tmp_path / 'out')!r}])\n"
+        f"code = main({words!r})\n"
         "print(json.dumps([code, sorted(sys.modules)]))"
     )
     done = subprocess.run(

@@ -1,0 +1,187 @@
+"""What ranks share is divided over nodes, what every rank holds is counted for all on a node."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from mpi4py import MPI
+
+from geometry.errors import InputError
+from multiscale import Scene, make_stage, nodes
+from multiscale.nodes import Need, Nodes, group_memory, node_memory, nodes_of
+from multiscale.planning.room import check_smooth_rest, shortages
+from multiscale.stage_checks import check_size, needs
+
+PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
+LARGE = ("block.cells=[500, 500, 200]",)  # 5·10⁷ cells, 250 GB
+GB = 1e9
+
+
+def scene(*words):
+    return Scene.load(PAPER, ["surface.grid=[64, 64]", *words])
+
+
+def of(count, *, ranks=1, memory=64.0):
+    return Nodes(ranks=(ranks,) * count, memory=memory * GB)
+
+
+class Job:
+    """A communicator's rank among others, which sit on hosts as told."""
+
+    def __init__(self, hosts, memories=None):
+        self.hosts, self.size = hosts, len(hosts)
+        self.memories = memories or [64.0 * GB] * len(hosts)
+        self.freed = 0
+
+    def Split_type(self, kind):
+        assert kind == MPI.COMM_TYPE_SHARED
+        return self
+
+    def Free(self):
+        self.freed += 1
+
+    rank = 0  # of its node, as Split_type returns
+
+    def allgather(self, value):
+        first = [host not in self.hosts[:place] for place, host in enumerate(self.hosts)]
+        return [
+            (self.hosts.count(host) if begins else 0, memory)
+            for host, begins, memory in zip(self.hosts, first, self.memories, strict=True)
+        ]
+
+
+def test_nodes_of_a_job():
+    job = Job("aabbbc", [64 * GB, 64 * GB, 32 * GB, 48 * GB, 48 * GB, 64 * GB])
+    assert nodes_of(job) == Nodes(ranks=(2, 3, 1), memory=32 * GB)
+    assert job.freed == 1  # communicators are few
+    assert nodes_of(None) == nodes_of(Job("a")) == Nodes() == Nodes(memory=node_memory())
+
+
+def test_a_block_of_many_nodes_is_let_through_there():
+    given = scene(*LARGE)
+    check_size(given, of(8))
+    check_size(given, of(8, ranks=64))
+    check_size(given, of(4))
+    text = (
+        "block.cells = [500, 500, 200]: needs about 250 GB of memory (allowed: what fits into "
+        "one node of 64 GB; 4 such nodes would do, filled evenly by mpirun over several hosts)"
+    )
+    with pytest.raises(InputError, match=re.escape(text)):
+        check_size(given, of(1))
+    with pytest.raises(InputError, match=r"3 nodes of 64 GB with 64 ranks; 4 such nodes would do"):
+        check_size(given, of(3, ranks=64))
+    # two nodes of 16, where the fullest would have 15/16 of the block
+    with pytest.raises(InputError, match=r"2 nodes of 200 GB with 15 ranks; 2 such nodes would do"):
+        check_size(given, Nodes(ranks=(15, 1), memory=200 * GB))
+    check_size(given, Nodes(ranks=(8, 8), memory=200 * GB))
+
+
+def test_what_every_rank_holds_is_counted_for_all_on_a_node():
+    given = scene("patches.grid=[128, 128]", "surface.grid=[256, 256]", "block.cells=[8, 8, 4]")
+    check_size(given, of(1))
+    check_size(given, of(100, ranks=5))  # 5 × 10.7 GB
+    text = (
+        "patches.grid = [128, 128]: the interaction of all patches with each other needs about "
+        "10.7 GB of memory (allowed: what fits into 100 nodes of 64 GB with 6 ranks; 5 ranks on "
+        "a node would do, for each holds it all)"
+    )
+    with pytest.raises(InputError, match=re.escape(text)):
+        check_size(given, of(100, ranks=6))
+    with pytest.raises(InputError, match=r"what fits into one node of 8 GB\)"):  # nothing helps
+        check_size(given, of(1, memory=8.0))
+    with pytest.raises(InputError, match="1 rank on a node would do"):
+        check_size(given, of(2, ranks=2, memory=16.0))
+
+
+def test_a_surface_is_made_once_and_held_by_all():
+    large = scene("surface.grid=[20000, 20000]")  # 40 GB while it is made, 6.8 GB from then on
+    check_size(large, of(1))
+    check_size(large, of(2, ranks=4))
+    for crowded in (of(1, memory=39.0), of(2, ranks=5)):
+        with pytest.raises(InputError, match=r"\[20000, 20000\]: needs about 40 GB"):
+            check_size(large, crowded)
+
+
+def test_isolated_laws_are_dealt_to_the_ranks():
+    # 40 000 laws of 3.6 kB, 0.144 GB on every rank, and 0.456 GB while they are made
+    words = ("patches.grid=[200, 200]", "surface.grid=[800, 800]")
+    laws = {
+        kind: next(
+            need
+            for _, _, what, need in needs(scene(*words, f"coupling.kind={kind}"))
+            if what == "a law for every patch "
+        )
+        for kind in ("isolated", "consistent")
+    }
+    assert laws["isolated"] == Need(held=40_000 * 3_600, shared=40_000 * 11_400)
+    assert laws["consistent"] == Need(held=40_000 * 3_600, once=40_000 * 11_400)
+
+
+def test_a_plan_says_what_nodes_a_run_needs():
+    one = of(1)
+    stage = make_stage(scene(*LARGE), nodes=replace(one, more=True))
+    (told,) = shortages(stage, one)
+    assert told == (
+        "block.cells = (500, 500, 200): needs about 250 GB of memory; there is one node of 64 GB; "
+        "4 such nodes would do, filled evenly by mpirun over several hosts"
+    )
+    assert not list(shortages(stage, of(4)))
+    with pytest.raises(InputError, match="one node of 30 GB"):  # of which no number helps
+        words = ("patches.grid=[64, 64]", "surface.grid=[20000, 20000]")
+        make_stage(scene(*words), nodes=replace(of(1, memory=30.0), more=True))
+
+
+def test_the_reference_is_shared_but_for_gmsh():
+    hexahedra = ("coupling.kind=reference", "block.cells=[400, 400, 100]", "reference.meshes=1")
+    with pytest.raises(InputError, match=r"the reference needs about .* such nodes would do"):
+        make_stage(scene(*hexahedra), nodes=of(1))
+    stage = make_stage(scene(*hexahedra), nodes=of(8))
+    assert stage.meshes.gathered == 0.0
+    assert "the reference needs about" in next(iter(shortages(stage, of(1))))
+    tetrahedra = ("coupling.kind=reference", "reference.mesh=tetrahedra", "reference.meshes=1")
+    stage = make_stage(scene(*tetrahedra))
+    least = stage.meshes.gathered
+    assert 0.0 < least < 0.2 * stage.meshes.bytes
+    many = Nodes(ranks=(1,) * 1000, memory=0.9 * least)
+    text = r"gmsh on rank 0, which meshes the reference, needs about .*1000 nodes of .* GB; or few"
+    with pytest.raises(InputError, match=text):
+        make_stage(scene(*tetrahedra), nodes=many)
+
+
+def test_the_smooth_rest_is_every_ranks():
+    words = ("coupling.kind=concurrent", "micro.model=half-space", "block.cells=[40, 40, 25]")
+    stage = make_stage(scene(*words))
+    check_smooth_rest(stage, of(1, ranks=20))
+    text = r"block.cells = \[40, 40, 25\]: the smooth rest of the block needs .* ranks on a node wo"
+    with pytest.raises(InputError, match=text):
+        check_smooth_rest(stage, of(10, ranks=64))
+    assert "smooth rest of the block needs" in next(iter(shortages(stage, of(1, memory=1.0))))
+    assert not list(shortages(make_stage(scene("coupling.kind=analytic")), of(1, memory=1.0)))
+
+
+@pytest.mark.parametrize(
+    ("group", "folder", "names", "told", "found"),
+    [
+        ("0::/job/step", "job", ("memory.max", "memory.current"), ("3000", "1000"), [(3e3, 1e3)]),
+        ("0::/job/step", "", ("memory.max", "memory.current"), ("max", "1000"), []),
+        (
+            "4:cpu,memory:/job", "memory/job",
+            ("memory.limit_in_bytes", "memory.usage_in_bytes"), ("5000", "10"), [(5e3, 10.0)],
+        ),
+        ("1:cpu:/job", "job", ("memory.max", "memory.current"), ("3000", "1000"), []),
+    ],
+)  # fmt: skip
+def test_control_groups_limit_a_node(monkeypatch, tmp_path, group, folder, names, told, found):
+    place = tmp_path / "groups" / folder
+    place.mkdir(parents=True)
+    for name, text in zip(names, told, strict=True):
+        (place / name).write_text(f"{text}\n", encoding="utf-8")
+    (tmp_path / "mine").write_text(f"{group}\n", encoding="utf-8")
+    monkeypatch.setattr(nodes, "_GROUPS", tmp_path / "groups")
+    monkeypatch.setattr(nodes, "_OWN", tmp_path / "mine")
+    assert list(group_memory()) == found
+    assert node_memory() == (found[0][0] if found else Nodes().memory)
+    monkeypatch.setattr(nodes, "_OWN", tmp_path / "nowhere")
+    assert list(group_memory()) == []
+    assert node_memory() > 1e8
