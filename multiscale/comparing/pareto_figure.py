@@ -66,6 +66,7 @@ def pareto_figure(comparison: Comparison) -> Figure:
     _draw_legend(below, comparison)
     figure.supxlabel(_names(comparison, [error for error, _ in panels]), fontsize=8.5)
     figure.draw_without_rendering()  # only now is it known where points lie
+    figure.set_layout_engine("none")  # and there they stay
     for axes, (error, _), told in zip(drawn, panels, points, strict=True):
         _number(axes, told, comparison.frontier(error))
     return figure
