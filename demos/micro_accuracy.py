@@ -105,17 +105,17 @@ panels = figure.subplots(1, 3)
 for (index, what), key in product(enumerate(("force", "contact area")), DRAWN):
     axes, area, error = panels[index], 100 * fractions.ravel(), 100 * errors[key][:, index].ravel()
     far, look = np.abs(error) > 60, {"color": COLOURS.get(key, "black"), "ms": 4}
-    axes.plot(area[~far], error[~far], ".", label=key, **look)
+    axes.semilogx(area[~far], error[~far], ".", label=key, **look)
     axes.plot(area[far], 60 * np.sign(error[far]), "x", **look)
     axes.set_title(f"reference: {own[index]:.2%} (rms), rate {rate[index]:.1f}", fontsize="medium")
-    axes.set(xscale="log", xlabel="contact area fraction [%]", ylabel=f"error of the {what} [%]")
-panels[0].legend(frameon=False, fontsize="small", title="crosses: beyond 60 %")
+    axes.set(ylim=(-80, 65), xlabel="contact area fraction [%]", ylabel=f"error of the {what} [%]")
+panels[0].legend(frameon=False, fontsize="small", title="crosses: beyond 60 %", loc="lower left")
 for (key, colour), mark in zip(COLOURS.items(), "o^vs><DdpPh", strict=True):
     panels[2].plot(cost[key], 100 * size[key][0], mark, c=colour, mfc="none", ms=8, label=key)
 grids = {shown[key]: (cost[key], 100 * size[key][0]) for key in MODELS if key not in COLOURS}
 panels[2].loglog(*zip(*grids.values(), strict=True), "k.-", lw=0.8, label="half-space")
 for key, at in grids.items():
-    panels[2].text(*at, key.replace("half-space, ", "  "))
+    panels[2].text(*at, key.replace("half-space, ", "") + " ", ha="right", va="top")
 panels[2].legend(frameon=False, fontsize="small", loc="upper left", bbox_to_anchor=(1.01, 1.0))
 panels[2].set(xlabel="time per approach [ms]", ylabel="rms error of the force [%]")
 for axes in panels:
