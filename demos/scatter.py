@@ -9,7 +9,7 @@
 #     (finite elements, less the half-space             solution with the block's free sides
 #     and its free sides)                               → 16 laws → 8 load steps }
 #
-# Run time: ten minutes on one core, half of it under `mpirun -n 2`; the surfaces are dealt to the
+# Run time: seven minutes on one core, half of it under `mpirun -n 2`; the surfaces are dealt to the
 # ranks. `--quick` for 12 surfaces, `--out DIR` for the folder of the figure.
 
 # %%
