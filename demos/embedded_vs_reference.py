@@ -95,26 +95,25 @@ approach, value = 1e3 * reference.approach_mm, record.force.value
 bar, band = 100 * record.force.error / value, {"color": "0.75", "lw": 0}
 curve.fill_between(approach, value * (1 - bar / 100), value * (1 + bar / 100), **band)
 curve.plot(approach, value, "k", lw=2.5, label=f"reference, {record.label}")
-apart.fill_between(approach, -bar, bar, label="its error bar", **band)
+apart.fill_between(approach, -bar, bar, **band)
 COLOURS = {"half-space": "#0b3c5d", "half-space,": "#edae49", "concurrent": "#1b998b"}
 COLOURS |= {"consistent,": "#6a4c93", "isolated,": "#d1495b"}
 for (name, history), mark in zip(models.items(), "*sdv^osdvsdv", strict=False):
     look = {"color": COLOURS[name.split()[0]], "marker": mark, "label": name}
-    look |= {"ls": ":", "mfc": "none"}
+    look |= {"ls": ":", "mfc": "none", "ms": 10.0 if name == "concurrent" else 6.0}
     curve.plot(approach, history.mean_pressure_MPa, **look)
     apart.plot(approach, 100 * (history.force_N / value - 1.0), **look)
-curve.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]", ylim=(0.0, 1.6 * value[-1]))
+curve.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]", ylim=(0.0, None))
 curve.legend(frameon=False, fontsize=8)
-apart.set(xlabel="approach [µm]", ylabel="force against the reference [%]", ylim=(-20.0, 50.0))
-split.barh(list(parts), [100 * part for part in parts.values()], color="#0b3c5d")
-split.set(xlabel="part of the difference at 8 µm [%]")
+apart.set(xlabel="approach [µm]", ylabel="force against the reference, grey its error bar [%]")
+bars = split.barh(list(parts), [100 * part for part in parts.values()], color="#0b3c5d")
+split.bar_label(bars, fmt="%+.2f", padding=3, fontsize=9)
+split.set(xlabel="part of the difference at 8 µm [%]", xmargin=0.2)
 split.invert_yaxis()
 for axes in (curve, apart, split):
     axes.grid(alpha=0.3)
-maps = {"reference": reference} | {
-    name: models[name]
-    for name in ("half-space", "concurrent", coupled[len(GRIDS) - 1], coupled[-1])
-}
+seen = ("half-space", "concurrent", coupled[len(GRIDS) - 1], coupled[-1])
+maps = {"reference": reference} | {name: models[name] for name in seen}
 BORDERS = reference.patches.borders_x, reference.patches.borders_y
 SHADES = PowerNorm(0.5, vmin=0.0, vmax=reference.patch_pressure_MPa[-1].max())
 panels = lower.subplots(1, len(maps), sharey=True)
@@ -124,6 +123,7 @@ for axes, (name, history) in zip(panels, maps.items(), strict=True):
     pressure[pressure == 0.0] = np.nan  # open patches stay white
     image = axes.pcolormesh(*BORDERS, pressure, cmap="magma_r", norm=SHADES)
     axes.set(title=name, xlabel="x [mm]", aspect="equal", xticks=(0.0, 0.5, 1.0))
+panels[0].set_ylabel("y [mm]")
 lower.colorbar(image, ax=panels, label="patch pressure at 8 µm [MPa]", extend="max", shrink=0.75)
 figure.savefig(choice.out / "embedded_vs_reference.png", dpi=110)
 assert abs(parts["left: concurrent"]) < (0.05 if choice.quick else 0.02)
