@@ -47,6 +47,7 @@ class Asperities:
         border_z: Their heights, shape (m,) [mm].
         rejected: Number of maxima without two positive radii, such as the flat ones of heights
             measured in steps, or on the flank of another or of the border; not asperities either.
+        flat: Number of those that are flat.
 
     Raises:
         InputError: When the arrays differ in length, a number is not finite, or not R' ≥ R'' > 0
@@ -66,6 +67,7 @@ class Asperities:
     border_y: Array = field(default_factory=_none)
     border_z: Array = field(default_factory=_none)
     rejected: int = 0
+    flat: int = 0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "lengths", positive_lengths(self.lengths, "the asperities"))
@@ -142,13 +144,15 @@ def find_asperities(surface: Surface, *, periodic: bool | None = None) -> Asperi
     edge, inside = start[maxima.on_border], start[~maxima.on_border]
     summit, strayed = _refined(surface, inside)
     none = -_ROUNDING * np.abs(surface.heights).max() / cell.min() ** 2
-    concave = np.linalg.eigvalsh(_hessians(surface, summit))[:, 1] < none
+    most = np.linalg.eigvalsh(_hessians(surface, summit))[:, 1]
+    concave = most < none
     summit = _distinct(surface, summit[concave], strayed[concave], bounded=not periodic)
     curvature, direction = np.linalg.eigh(_hessians(surface, summit))
     valid = curvature[:, 1] < none
     summit, curvature, direction = summit[valid], curvature[valid], direction[valid]
     if surface.periodic:
         summit = np.mod(summit, surface.lengths)
+        summit[summit >= surface.lengths] = 0.0  # what lies below zero by rounding alone
     return Asperities(
         x=summit[:, 0],
         y=summit[:, 1],
@@ -163,6 +167,7 @@ def find_asperities(surface: Surface, *, periodic: bool | None = None) -> Asperi
         border_y=edge[:, 1],
         border_z=maxima.height[maxima.on_border],
         rejected=len(inside) - len(summit),
+        flat=int(np.count_nonzero(~concave & (most <= -none))),
     )
 
 

@@ -83,9 +83,9 @@ def _surface_warnings(stage: Stage) -> Iterator[str]:
             f"{stage.reached_at_border}; an 8-neighbour search cannot confirm them, and they carry "
             "no load here"
         )
-    if isinstance(stage.micro, AsperityModel) and stage.asperities.rejected:
+    if isinstance(stage.micro, AsperityModel) and stage.asperities.flat:
         yield (
-            f"{stage.asperities.rejected} summits are flat, as heights in steps are: without radii "
+            f"{stage.asperities.flat} summits are flat, as heights in steps are: without radii "
             "they carry no load here; take micro.curvature = 'contact', islands or half-space"
         )
 

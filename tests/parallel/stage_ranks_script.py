@@ -1,28 +1,26 @@
-"""Send the stage of a scene to all ranks; print what every rank got, and how it was sent."""
+"""Send the stage of a scene to all ranks; print what every rank got, and what is to be sent."""
 
 import hashlib
+import pickle
 from pathlib import Path
 
 from mpi4py import MPI
-from mpi4py.util import pkl5
 
 from multiscale import Run, Scene
 from multiscale.nodes import nodes_of
 
 COMM = MPI.COMM_WORLD
 PAPER = Path(__file__).parents[2] / "demos" / "scenes" / "paper.toml"
-SENT = []
 
 
-def watched(value, dumps=pkl5.pickle.dumps):
-    """Pickle a value for a message; keep the bytes of the pickle and of the arrays beside it."""
-    words, arrays = dumps(value)
-    SENT.append((len(words), *sorted(len(array) for array in arrays)))
-    return words, arrays
+def parts(value):
+    """Return the bytes of a value's pickle and those of the arrays that travel beside it."""
+    arrays = []
+    words = pickle.dumps(value, 5, buffer_callback=lambda array: arrays.append(array.raw().nbytes))
+    return [len(words), *sorted(size for size in arrays if size > 10_000)]
 
 
 if __name__ == "__main__":
-    pkl5.pickle.dumps = watched
     scene = Scene.load(PAPER, ["surface.grid=[200, 256]", "coupling.kind=analytic"])
     stage = Run(scene, COMM if COMM.size > 1 else None).stage
     surface = stage.surface
@@ -36,4 +34,4 @@ if __name__ == "__main__":
     nodes = nodes_of(COMM)
     everywhere = COMM.gather(told)
     if COMM.rank == 0:
-        print(*sorted(set(everywhere)), SENT, nodes.ranks, sep="\n")
+        print(*sorted(set(everywhere)), parts(stage), nodes.ranks, sep="\n")
