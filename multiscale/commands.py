@@ -234,10 +234,19 @@ def scene_and_folder(
     return on_root(comm, read)
 
 
+def _exists(path: Path) -> bool:
+    """Tell whether there is such a path; newer Pythons' own takes names that cannot be for none."""
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    return True
+
+
 def _check_folder(folder: Path) -> None:
     """Refuse a folder that could not be written to, before anything is computed."""
     try:
-        nearest = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+        nearest = next(path for path in (folder, *folder.absolute().parents) if _exists(path))
     except OSError as error:  # a name longer than any
         problem = f"cannot be used: {error.strerror}"
         raise InputError(problem, key="--out", value=str(folder)) from None
