@@ -1,6 +1,6 @@
 """Newton's method for many asperities, its linear systems solved by iteration.
 
-The equation is that of `micro.summits.active_set`. Its Jacobian is not made: its products, distant
+The Jacobian of the normal map (`micro.summits.normal_map`) is not made: its products, distant
 contacts as point forces, are all that GMRES needs, and each system is solved only as far as the
 step pays.
 """
@@ -13,8 +13,8 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from geometry.errors import NotConverged
 from micro.pairs.split_interaction import SplitLift
-from micro.summits.contact_problem import TOLERANCE, ContactProblem, Solution, solution
-from micro.summits.line_search import damped_step
+from micro.summits.contact_problem import ContactProblem, Solution
+from micro.summits.normal_map import newton_on_normal_map
 
 Array = NDArray[np.float64]
 
@@ -36,23 +36,12 @@ def newton_krylov(problem: ContactProblem[SplitLift], start: Array) -> Solution:
     Source:
         Dembo, Eisenstat & Steihaug, SIAM J. Numer. Anal. 19 (1982) 400, doi 10.1137/0719025.
     """
-
-    def evaluate(z: Array) -> tuple[SplitLift, Array]:
-        lift = problem.interaction.lift(z)
-        return lift, z + lift.displacement - problem.required
-
-    z = start
-    lift, error = evaluate(z)
-    for iteration in range(_MOST_ITERATIONS):
-        if problem.residual(z, lift) <= TOLERANCE:
-            return solution(problem, z, lift, iteration)
-        step = _inexact_step(lift, error)
-        z, lift, error = damped_step(evaluate, z, step, float(np.linalg.norm(error)))
-    raise NotConverged(
-        "Newton's method with iterated linear systems",
-        reason="MAX_ITERATIONS",
-        iterations=_MOST_ITERATIONS,
-        remedy="lower load.approach",
+    return newton_on_normal_map(
+        problem,
+        start,
+        step=_inexact_step,
+        failure=_failure,
+        most=_MOST_ITERATIONS,
     )
 
 
@@ -73,3 +62,12 @@ def _inexact_step(lift: SplitLift, error: Array) -> Array:
         step[active] = inside
     lifted = lift.product(step)
     return np.where(np.isin(np.arange(len(error)), active), step, -error - lifted)
+
+
+def _failure(reason: str, iterations: int) -> NotConverged:
+    return NotConverged(
+        "Newton's method with iterated linear systems",
+        reason=reason,
+        iterations=iterations,
+        remedy="lower load.approach",
+    )
