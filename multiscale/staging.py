@@ -57,34 +57,54 @@ def make_stage(
     asperities = find_asperities(surface, periodic=False)  # the block's sides are free
     if start.coupling.kind == "reference":
         return _reference_stage(start, surface, patches, asperities, nodes, began)
-    shape = make_shape(start, surface)
-    made = time.perf_counter()
-    seconds = {"surface": made - began}
-    choice, label = None, known.get("micro.model")
+    label = known.get("micro.model")
+    stage = _micro_stage(scene, start, surface, patches, asperities, label, began)
+    if free & SETTLED_LATE:
+        return cheapest(stage, scene, free, nodes)
+    check_smooth_rest(stage, nodes)
+    return stage
+
+
+def _micro_stage(
+    scene: Scene,
+    start: Scene,
+    surface: Surface,
+    patches: PatchGrid,
+    asperities: Asperities,
+    label: str | None,
+    began: float,
+) -> Stage:
+    """Return the ingredients with the micro model that a scene names, or leaves to be chosen.
+
+    Args:
+        scene: The scene as it was given.
+        start: What it has become so far.
+        surface: Its surface.
+        patches: Its patches.
+        asperities: The surface's summits.
+        label: What was chosen when the run began; None when it begins now.
+        began: When this began.
+    """
+    seconds, choice = {"surface": time.perf_counter() - began}, None
     if start.micro.model == "auto":
-        choice = chosen_model(
-            start, surface, patches, micro_tolerance(scene, start, surface), label
-        )
+        made, tolerance = time.perf_counter(), micro_tolerance(scene, start, surface)
+        choice = chosen_model(start, surface, patches, tolerance, label)
         seconds["micro choice"] = time.perf_counter() - made
     model = choice.model if choice else stated_model(start, surface)
     _check_summits(start, model)
     mean_heights = patch_means(surface, patches)
-    stage = Stage(
+    return Stage(
         scene=start,
         surface=surface,
         asperities=asperities,
         micro=model,
         patches=patches,
         mean_heights=mean_heights,
-        shape=shape,
+        shape=make_shape(start, surface),
         furthest=furthest_plane(start.loading.programme, model, patches, mean_heights),
         choice=choice,
         seconds=seconds,
     )
-    if free & SETTLED_LATE:
-        return cheapest(stage, scene, free, nodes)
-    check_smooth_rest(stage, nodes)
-    return stage
 
 
 def _check_summits(scene: Scene, model: MicroModel) -> None:
