@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import ceil, floor
 from typing import Any, Self
 
 import numpy as np
@@ -16,8 +15,9 @@ from geometry.errors import InputError
 from micro.cells.contact_pressure import Pressures
 from micro.cells.elastic_grid import ElasticGrids
 from micro.cells.free_sides import FreeSides
-from micro.cells.half_space_curve import TIE, CellSums
+from micro.cells.half_space_curve import CellSums
 from micro.cells.half_space_state import HalfSpaceState
+from micro.cells.patch_cells import cells_outside, whole_cells
 from micro.cells.pressing import Pressing
 from micro.curve import checked_approaches
 from micro.plane import RigidPlane
@@ -26,7 +26,6 @@ from micro.response import Pressed, Response
 Array = NDArray[np.float64]
 
 _LEVEL = (0.0, 0.0)
-_FEWEST = 4  # heights along a side of a surface
 _OUT_OF_REACH = 1e3
 """Sides of the surface by which cells are lowered that may not touch."""
 
@@ -123,7 +122,7 @@ class HalfSpaceModel:
         """
         own, bounds = patches.single(index), patches.bounds(index)
         cells = zip(bounds, self.surface.spacing, self.surface.grid, strict=True)
-        x, y = (_whole_cells(*axis) for axis in cells)
+        x, y = (whole_cells(*axis) for axis in cells)
         patch = replace(own, origin=(own.origin[0] - x[0], own.origin[1] - y[0]))
         piece = self.surface.cropped(x=x, y=y)
         model = replace(
@@ -285,14 +284,7 @@ class HalfSpaceModel:
         """Cells that may not touch, shape (nx, ny)."""
         if self.within is None:
             return None
-        edges = self.within.borders_x, self.within.borders_y
-        x, y = (
-            (centres >= border[0] - TIE * side) & (centres < border[-1] - TIE * side)
-            for centres, border, side in zip(
-                (self.surface.x, self.surface.y), edges, self.surface.spacing, strict=True
-            )
-        )
-        return ~(x[:, None] & y)
+        return cells_outside(self.surface, self.within)
 
     def _state(self, plane: RigidPlane, required: Array, found: Pressures) -> HalfSpaceState:
         return HalfSpaceState(
@@ -311,10 +303,3 @@ class HalfSpaceModel:
     def _pressing(self) -> Pressing:
         grids = ElasticGrids(periodic=self.periodic, sides=self.sides)
         return Pressing(grids=grids, spacing=self.surface.spacing, tolerance=self.tolerance)
-
-
-def _whole_cells(interval: tuple[float, float], side: float, count: int) -> tuple[float, float]:
-    """Return the whole cells, as many as a surface needs, that an interval lies in [mm]."""
-    first, last = floor(interval[0] / side + TIE), ceil(interval[1] / side - TIE)
-    first = max(min(first, count - _FEWEST), 0) if last - first < _FEWEST else first
-    return first * side, max(last, first + _FEWEST) * side
