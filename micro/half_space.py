@@ -10,13 +10,14 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry import Partition, PatchGrid, Surface
+from geometry import Control, Partition, PatchGrid, Surface
 from geometry.errors import InputError
 from micro.cells.contact_pressure import Pressures
-from micro.cells.elastic_grid import ElasticGrids
+from micro.cells.elastic_grid import BodyTerm, ElasticGrids, SurfaceTerm
 from micro.cells.free_sides import FreeSides
 from micro.cells.half_space_curve import CellSums
 from micro.cells.half_space_state import HalfSpaceState
+from micro.cells.motions import Motions
 from micro.cells.patch_cells import cells_outside, whole_cells
 from micro.cells.pressing import Pressing
 from micro.curve import checked_approaches
@@ -51,6 +52,10 @@ class HalfSpaceModel:
             this one was resampled from; the surface's own when not given.
         sides: Free sides of the surface's rectangle, which yield beyond the half-space; none when
             not given.
+        body: What a finite body adds to the half-space and its sides; a half-space when not given.
+        slopes: What the finite slopes of the surface add; the theory of small slopes when not
+            given.
+        upper: Upper bound of the pressures [MPa]; none when not given.
 
     Raises:
         InputError: When the modulus or the tolerance is not positive, a periodic model is asked
@@ -68,6 +73,9 @@ class HalfSpaceModel:
     within: PatchGrid | None = None
     highest: float | None = None
     sides: FreeSides | None = None
+    body: BodyTerm | None = None
+    slopes: SurfaceTerm | None = None
+    upper: float = np.inf
 
     def __post_init__(self) -> None:
         for what in ("contact_modulus", "tolerance"):
@@ -112,7 +120,7 @@ class HalfSpaceModel:
     @property
     def first_touch(self) -> float:
         """Approach of a level plane at first contact of a cell's centre [mm]."""
-        return -float(self._required(self._plane(0.0, _LEVEL)).max())
+        return -float(self._allowed(self._required(self._plane(0.0, _LEVEL))).max())
 
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
         """Return the model of the cells of one patch; see `MicroModel.of_patch`.
@@ -149,21 +157,20 @@ class HalfSpaceModel:
                 pressed to full contact or by a tilted plane.
             NotConverged: When the contact conditions cannot be met to the tolerance.
         """
-        first = None if start is None else self._started(start.pressure)
-        return self._pressed(self._plane(approach, tilt), first)
+        return self.equilibrium(Control(approach=approach, tilt=tilt), start=start)
 
     def solve_force(
         self,
         force: float,
         *,
-        tilt: tuple[float, float] = _LEVEL,
+        tilt: tuple[float, float] | None = _LEVEL,
         start: HalfSpaceState | None = None,
     ) -> HalfSpaceState:
         """Solve the contact under a given normal force.
 
         Args:
             force: Normal force, ≥ 0 [N]; beyond full contact of a periodic surface too.
-            tilt: Slopes (tx, ty) of the plane, kept while it finds its height.
+            tilt: Slopes (tx, ty) of the plane, kept while it finds its height; None lets it turn.
             start: A solution nearby to start from; by default coarse grids give the start.
 
         Returns:
@@ -173,18 +180,70 @@ class HalfSpaceModel:
             InputError: When the force is negative or not finite, or as for `solve`.
             NotConverged: When the contact conditions cannot be met to the tolerance.
         """
-        if not (np.isfinite(force) and force >= 0.0):
-            raise InputError("the force must not be negative", value=force, allowed="≥ 0 N")
-        level = self._required(self._plane(0.0, tilt))
-        if force == 0.0:
+        return self.equilibrium(Control(force=force, tilt=tilt), start=start)
+
+    def equilibrium(self, control: Control, *, start: HalfSpaceState | None = None) -> HalfSpaceState:
+        """Solve the contact and the motions of the plane that are free, as one problem.
+
+        Args:
+            control: What is prescribed of the plane: approach or force, tilt or no moment.
+            start: A solution nearby to start from; by default coarse grids give the start.
+
+        Returns:
+            The solution. Without force it is that of first touch of a cell, under the tilt of the
+            start where the tilt is free.
+
+        Raises:
+            InputError: When a periodic surface is pressed to full contact or by a tilted plane.
+            NotConverged: When the contact conditions cannot be met to the tolerance.
+        """
+        pressure = None if start is None else self._started(start.pressure)
+        tilt = _LEVEL if start is None else start.plane.tilt
+        near = None if start is None else start.plane.approach
+        return self._solved(control, pressure, tilt, near)
+
+    def _solved(
+        self,
+        control: Control,
+        start: Array | None,
+        tilt: tuple[float, float],
+        near: float | None,
+    ) -> HalfSpaceState:
+        tilt = tilt if control.tilt is None else control.tilt
+        if control.force == 0.0:
+            level = self._allowed(self._required(self._plane(0.0, tilt)))
             return self._pressed(self._plane(-float(level.max()), tilt), None)
-        dx, dy = self.surface.spacing
+        if control.tilt is None:
+            return self._turned(control, start)
+        if control.approach is not None:
+            return self._pressed(self._plane(control.approach, tilt), start)
+        level = self._allowed(self._required(self._plane(0.0, tilt)))
         known = None
-        if start is not None and start.force > 0.0:
-            known = Pressures(self._started(start.pressure), start.approach, 0.0, 0, 0)
-        total = force / (self.contact_modulus * dx * dy)
-        found = self._pressing.by_force(level, total, known)
-        return self._state(self._plane(found.approach, tilt), level + found.approach, found)
+        if start is not None and start.any() and near is not None:
+            known = Pressures(start, np.array([near]), 0.0, 0, 0)
+        found = self._pressing.by_force(level, self._total(control), known)
+        return self._state(self._plane(float(found.motion[0]), tilt), found)
+
+    def _turned(self, control: Control, start: Array | None) -> HalfSpaceState:
+        """Solve with a plane that may turn about the middle."""
+        if self.periodic:
+            raise InputError("a plane cannot turn on a periodic surface", value="tilt free")
+        half = 0.5 * float(np.hypot(*self.surface.lengths))
+        x, y = (
+            (centres - 0.5 * length) / half
+            for centres, length in zip(
+                (self.surface.x, self.surface.y), self.surface.lengths, strict=True
+            )
+        )
+        required = self._allowed(self._required(self._plane(control.approach or 0.0, _LEVEL)))
+        total = None if control.force is None else self._total(control)
+        found = self._pressing.by_turning(required, Motions.turning(x, y, total), start)
+        approach = control.approach if control.force is None else float(found.motion[0])
+        return self._state(self._plane(float(approach or 0.0), _slopes(found.motion[-2:], half)), found)
+
+    def _total(self, control: Control) -> float:
+        dx, dy = self.surface.spacing
+        return (control.force or 0.0) / (self.contact_modulus * dx * dy)
 
     def respond(
         self,
@@ -209,18 +268,21 @@ class HalfSpaceModel:
 
     def press(
         self,
-        plane: RigidPlane,
+        control: Control,
         *,
         patches: Partition,
         mean_heights: ArrayLike,
         start: Any = None,
     ) -> Pressed:
-        """Solve under one plane; see `MicroModel.press`."""
+        """Solve one load step; see `MicroModel.press`."""
         sums = self._sums(patches, mean_heights)
-        self._check_tilt(plane.tilt)
-        state = self._pressed(plane, None if start is None else self._started(start))
-        rows = [sums.row(plane, state)]
-        return Pressed(Response.of(rows, self.name, self.contact_modulus, patches), state.pressure)
+        pressure, tilt, near = None, _LEVEL, None
+        if start is not None:
+            pressure, tilt, near = self._started(start[0]), start[1].tilt, start[1].approach
+        state = self._solved(control, pressure, tilt, near)
+        rows = [sums.row(state.plane, state)]
+        response = Response.of(rows, self.name, self.contact_modulus, patches)
+        return Pressed(response, state.plane, (state.pressure, state.plane))
 
     def _sums(self, patches: Partition, mean_heights: ArrayLike) -> CellSums:
         means = np.asarray(mean_heights, float)
@@ -259,7 +321,7 @@ class HalfSpaceModel:
                 value=plane.approach,
                 allowed=f"< {plane.approach - required.mean():.6g} mm; beyond it give the force",
             )
-        return self._state(plane, required, self._pressing.by_approach(required, start))
+        return self._state(plane, self._pressing.by_approach(self._allowed(required), start))
 
     def _plane(self, approach: float, tilt: tuple[float, float]) -> RigidPlane:
         self._check_tilt(tilt)
@@ -275,9 +337,14 @@ class HalfSpaceModel:
         surface = self.surface
         below = self.datum - surface.heights
         required = plane.at(surface.x[:, None], surface.y) - below
-        if self._free is not None:
-            required[self._free] -= _OUT_OF_REACH * max(surface.lengths)
-        return required
+        return np.asarray(required)
+
+    def _allowed(self, required: Array) -> Array:
+        """Return the displacements asked for, none where cells may not touch."""
+        if self._free is None:
+            return required
+        low = float(required.min()) - _OUT_OF_REACH * max(self.surface.lengths)
+        return np.where(self._free, low, required)
 
     @cached_property
     def _free(self) -> NDArray[np.bool_] | None:
@@ -286,11 +353,12 @@ class HalfSpaceModel:
             return None
         return cells_outside(self.surface, self.within)
 
-    def _state(self, plane: RigidPlane, required: Array, found: Pressures) -> HalfSpaceState:
+    def _state(self, plane: RigidPlane, found: Pressures) -> HalfSpaceState:
         return HalfSpaceState(
-            approach=plane.approach,
-            required=required,
+            plane=plane,
+            required=self._required(plane),
             pressure=found.pressure * self.contact_modulus,
+            may_touch=None if self._free is None else ~self._free,
             contact_modulus=self.contact_modulus,
             spacing=self.surface.spacing,
             periodic=self.periodic,
@@ -301,5 +369,20 @@ class HalfSpaceModel:
 
     @cached_property
     def _pressing(self) -> Pressing:
-        grids = ElasticGrids(periodic=self.periodic, sides=self.sides)
-        return Pressing(grids=grids, spacing=self.surface.spacing, tolerance=self.tolerance)
+        grids = ElasticGrids(
+            periodic=self.periodic,
+            modulus=self.contact_modulus,
+            sides=self.sides,
+            body=self.body,
+            slopes=self.slopes,
+        )
+        return Pressing(
+            grids=grids,
+            spacing=self.surface.spacing,
+            tolerance=self.tolerance,
+            upper=self.upper / self.contact_modulus,
+        )
+
+
+def _slopes(turn: Array, half: float) -> tuple[float, float]:
+    return float(turn[0]) / half, float(turn[1]) / half

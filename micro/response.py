@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from geometry import Partition
 from geometry.errors import InputError
+from micro.plane import RigidPlane
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -21,11 +22,13 @@ class Pressed(NamedTuple):
 
     Attributes:
         response: The response, of one row.
+        plane: The plane in equilibrium.
         start: What the same model starts the next plane from, when that lies nearby: an array, or
             None of a model that starts from nothing.
     """
 
     response: Response
+    plane: RigidPlane
     start: Any
 
 

@@ -10,8 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.errors import NotConverged
 from micro.cells.contact_pressure import Pressures, contact_pressure
-from micro.cells.elastic_grid import ElasticGrids
+from micro.cells.elastic_grid import ElasticGrid, ElasticGrids
+from micro.cells.motions import Motions
 from micro.cells.reach import Box
 
 Array = NDArray[np.float64]
@@ -27,19 +29,21 @@ def nested_pressure(
     required: Array,
     spacing: tuple[float, float],
     *,
-    total: float | None = None,
+    motions: Motions | None = None,
+    upper: float = np.inf,
     tolerance: float,
-    box: Box | None = None,
+    box: Box,
 ) -> Pressures:
     """Find the pressures under a rigid body from nothing but its shape.
 
     Args:
-        grids: Elastic half-spaces.
+        grids: Elastic bodies.
         required: Displacement that the body asks for, shape (nx, ny) [mm].
         spacing: Sides of a cell [mm].
-        total: Sum of pressures / E* over the cells when the force is given.
+        motions: Free motions of the body and their loads; none when not given.
+        upper: Upper bound of the pressures / E*.
         tolerance: Largest residual.
-        box: Place of the cells, where free sides matter; coarse grids go without.
+        box: Place of the cells.
 
     Returns:
         As `contact_pressure`; the iterations on coarse grids are not counted.
@@ -47,21 +51,65 @@ def nested_pressure(
     Raises:
         NotConverged: When the residual stays above the tolerance on one of the grids.
     """
+    start = coarse_start(grids, required, spacing, motions, upper, _corner(box, spacing))
+    grid = grids.at(required.shape, spacing, box)
+    return contact_pressure(
+        grid, required, start, motions=motions, upper=upper, tolerance=tolerance
+    )
+
+
+def coarse_pressure(
+    grids: ElasticGrids,
+    required: Array,
+    spacing: tuple[float, float],
+    *,
+    motions: Motions | None = None,
+    upper: float = np.inf,
+    tolerance: float,
+    corner: tuple[float, float],
+) -> Pressures:
+    """Find the pressures on a coarse grid whose first cell has a given corner [mm].
+
+    See `nested_pressure`.
+    """
+    start = coarse_start(grids, required, spacing, motions, upper, corner)
+    grid: ElasticGrid = grids.coarse(required.shape, spacing, corner)
+    return contact_pressure(
+        grid, required, start, motions=motions, upper=upper, tolerance=tolerance
+    )
+
+
+def coarse_start(
+    grids: ElasticGrids,
+    required: Array,
+    spacing: tuple[float, float],
+    motions: Motions | None,
+    upper: float,
+    corner: tuple[float, float],
+) -> Array:
+    """Return pressures to start from, by a grid half as fine; even ones on a small grid."""
     halved = [n > _FEW_CELLS for n in required.shape]
-    if any(halved):
-        factors = [1 + h for h in halved]
-        rough = nested_pressure(
+    total = 0.0 if motions is None else float(np.abs(motions.loads).max())
+    if not any(halved):
+        return np.full(required.shape, total / required.size)
+    factors = [1 + h for h in halved]
+    try:
+        rough = coarse_pressure(
             grids,
             coarsened(required, factors),
             (spacing[0] * factors[0], spacing[1] * factors[1]),
-            total=None if total is None else total / (factors[0] * factors[1]),
-            tolerance=max(_ROUGH, tolerance),
+            motions=None if motions is None else motions.coarsened(factors),
+            upper=upper,
+            tolerance=_ROUGH,
+            corner=corner,
         )
-        start = refined(rough.pressure, factors)[: required.shape[0], : required.shape[1]]
-    else:
-        start = np.full(required.shape, 0.0 if total is None else total / required.size)
-    grid = grids.at(required.shape, spacing, box)
-    return contact_pressure(grid, required, start, total=total, tolerance=tolerance)
+    except NotConverged:  # a start is a matter of time alone
+        return np.full(required.shape, total / required.size)
+    return refined(rough.pressure, factors)[: required.shape[0], : required.shape[1]]
+
+
+def _corner(box: Box, spacing: tuple[float, float]) -> tuple[float, float]:
+    return box.rows.start * spacing[0], box.columns.start * spacing[1]
 
 
 def coarsened(field: Array, factors: list[int]) -> Array:

@@ -1,7 +1,9 @@
-"""Pressures of a rigid body on the half-space: p ≥ 0, gap ≥ 0, p · gap = 0 on every cell.
+"""Pressures of a rigid body on an elastic one: p ≥ 0, gap ≥ 0, p · gap = 0 on every cell.
 
 Passes of a primal-dual active set: cells with a pressure or a negative gap are taken as the
 contact, its linear system is solved roughly by conjugate gradients, tensile pressures are dropped.
+Pressures may be bounded from above: where p = H the gap may be negative, as material yields.
+Motions of the body that are free are unknowns of the same problem (`micro.cells.motions`).
 """
 
 from __future__ import annotations
@@ -12,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import NotConverged
+from micro.cells.clear_plane import clearance
 from micro.cells.conjugate_gradients import ContactCells
 from micro.cells.elastic_grid import Cells, ElasticGrid
+from micro.cells.motions import Motions
 
 Array = NDArray[np.float64]
 
@@ -23,6 +27,12 @@ _MOST_ITERATIONS = 100
 _TRUSTING_PASSES = 20
 """Passes in which a step may raise the energy when it lowers the residual."""
 _MOST_HALVINGS = 12
+_HELD = 1e-8
+"""Weight of cells that touch without pressure, of the largest pressure, in the body's motions."""
+_ROUNDING = 4.0 * float(np.finfo(float).eps)
+"""Part of the largest distance of a plane free to turn that its gaps are known to."""
+_LEAST_EVEN, _MOST_EVEN = 1e-3, 1e6
+"""Shares of even pressure that are tried with a start which cannot meet the loads."""
 _FORCING = (0.2, 0.01)
 """Parts of the present error that a pass leaves of the gaps in a new set and in a set kept."""
 
@@ -32,7 +42,7 @@ class Pressures(NamedTuple):
 
     Attributes:
         pressure: Pressures / E*, shape (nx, ny).
-        approach: Approach of the body counted from where ``required`` was 0 [mm]; 0 when given.
+        motion: Free motions of the body counted from where ``required`` was, shape (k,) [mm].
         residual: Largest violation of the contact conditions over the largest displacement that
             the body asks for.
         iterations: Products of the compliance with pressures.
@@ -40,7 +50,7 @@ class Pressures(NamedTuple):
     """
 
     pressure: Array
-    approach: float
+    motion: Array
     residual: float
     iterations: int
     passes: int
@@ -51,39 +61,41 @@ def contact_pressure(
     required: Array,
     start: Array,
     *,
-    total: float | None = None,
+    motions: Motions | None = None,
+    upper: float = np.inf,
     tolerance: float,
 ) -> Pressures:
     """Find the pressures under a rigid body.
 
     The residual ε bounds the error of the force: the solution is exact for a body whose heights
-    differ by no more than ε δ, so the force lies between those at (1 − ε) δ and (1 + ε) δ. A given
-    force is met to round-off.
+    differ by no more than ε δ, so the force lies between those at (1 − ε) δ and (1 + ε) δ. Given
+    loads are met to round-off.
 
     Args:
-        grid: The elastic half-space.
+        grid: The elastic body.
         required: Displacement d that the body asks for, shape (nx, ny) [mm]; negative where it
-            is above the surface. With a given force up to a constant.
-        start: Pressures / E* to start from, shape (nx, ny), not negative; positive somewhere when
-            the force is given.
-        total: Sum of pressures / E* over the cells when the force is given.
+            is above the surface. Up to free motions of the body.
+        start: Pressures / E* to start from, shape (nx, ny), not negative.
+        motions: Motions of the body that are free, with their loads; none when not given.
+        upper: Upper bound of the pressures / E*.
         tolerance: Largest residual.
 
     Raises:
-        NotConverged: When the residual stays above the tolerance.
+        NotConverged: When the residual stays above the tolerance, or no pressures within their
+            bounds meet the loads.
 
     Source:
         Hintermüller, Ito & Kunisch 2002, doi 10.1137/S1052623401383558; Polonsky & Keer 1999,
         doi 10.1016/S0043-1648(99)00113-1.
     """
     used = grid.products
-    search = _Search(grid, required, total)
-    search.accept(start if total is None else start * (total / start.sum()))
+    search = _Search(grid, required, motions, upper)
+    search.begin(start)
     for passes in range(_MOST_PASSES):
-        if search.residual <= tolerance:
+        if search.residual <= max(tolerance, search.rounding):
             return Pressures(
                 search.pressure,
-                search.approach,
+                search.motion,
                 search.residual,
                 grid.products - used,
                 passes,
@@ -100,25 +112,85 @@ def contact_pressure(
 class _Search:
     """Pressures, gaps and errors while the set of cells in contact is sought."""
 
-    def __init__(self, grid: ElasticGrid, required: Array, total: float | None) -> None:
-        self.grid, self.required, self.total = grid, required, total
-        self.highest = float(required.max())
+    def __init__(
+        self, grid: ElasticGrid, required: Array, motions: Motions | None, upper: float
+    ) -> None:
+        self.grid, self.required, self.motions, self.upper = grid, required, motions, upper
+        self.motion = np.zeros(0 if motions is None else len(motions.loads))
+        self.unloaded = motions is not None and not motions.loads.any()
+        self.careful = False
+        self.held: NDArray[np.intp] = np.zeros(0, np.intp)
         self.mask: NDArray[np.bool_] = np.zeros(required.shape, bool)
 
+    def begin(self, start: Array) -> None:
+        """Evaluate the start; where it cannot meet the loads, with a share of even pressure."""
+        if self.unloaded:
+            self._begin_unloaded(start)
+            return
+        share = 0.0
+        while True:
+            even = share * (float(start.max()) or 1.0)
+            pressure = self._admissible(start + even if share else start)
+            if pressure is not None:
+                self.accept(pressure)
+                return
+            if share > _MOST_EVEN:
+                raise NotConverged(
+                    "the pressures to start from",
+                    reason="no pressures within their bounds meet the loads on these cells",
+                    iterations=0,
+                    remedy="give a smaller force",
+                )
+            share = 10.0 * share or _LEAST_EVEN
+
+    def _begin_unloaded(self, start: Array) -> None:
+        """Start a body that turns without load where pressures already lower the energy.
+
+        Without pressure the energy is 0, a point that a body which cannot turn clear must not come
+        to: no single contact can carry it from there.
+        """
+        assert self.motions is not None
+        pressure = self._admissible(start)
+        if pressure is None or float(np.vdot(pressure, self.required)) <= 0.0:
+            found = clearance(self.required, self.motions)
+            if found.overlap <= 0.0:
+                self.motion = found.motion
+                self.accept(np.zeros(start.shape))
+                return
+            pressure = found.support
+        work = float(np.vdot(pressure, self.grid.displacement(pressure)))
+        balanced = self._admissible(
+            pressure * (float(np.vdot(pressure, self.required)) / work)
+        )
+        self.accept(pressure if balanced is None else balanced)
+
     def accept(self, pressure: Array) -> None:
-        """Evaluate pressures, all ≥ 0 and with the total asked for."""
-        self.pressure, self.touching = pressure, pressure > 0.0
+        """Evaluate pressures within their bounds that meet the loads."""
+        self.pressure = pressure
         gap = self.grid.displacement(pressure)
         work = float(np.vdot(pressure, gap))
         asked = float(np.vdot(pressure, self.required))
         self.energy = work - 2.0 * asked  # twice the elastic less the external one
-        self.approach = 0.0 if self.total is None else (work - asked) / self.total
         gap -= self.required
-        gap -= self.approach
+        highest = self.required
+        if self.motions is not None:
+            if pressure.any():
+                weights = pressure
+                if self.held.size:
+                    weights = pressure.copy()
+                    weights.ravel()[self.held] += _HELD * float(pressure.max())
+                self.motion = self.motions.best(weights, gap)
+            nearer = self.motions.nearer(self.motion)
+            gap -= nearer
+            highest = self.required + nearer
         self.gap = gap  # within the memory of the displacement
-        self.scale = self.highest + self.approach
-        worst = max(-float(gap.min()), float(gap[self.touching].max(initial=0.0)))
+        self.scale = float(highest.max())
+        lowest = gap.min() if self.upper == np.inf else gap[pressure < self.upper].min(initial=0.0)
+        worst = max(-float(lowest), float(gap[pressure > 0.0].max(initial=0.0)))
         self.residual = max(0.0, worst) / self.scale if self.scale > 0.0 else 0.0
+        self.rounding = 0.0
+        if self.motions is not None and self.motions.turns and self.scale > 0.0:
+            self.rounding = _ROUNDING * float(np.abs(highest).max()) / self.scale
 
     def step(self, tolerance: float, *, cautious: bool) -> None:
         """Solve on the present set and accept what it gives, shortened while that is no gain.
@@ -127,28 +199,83 @@ class _Search:
         others. It is needed where cells of very different sides meet the periodic kernel, whose
         inverse is then far from an M-matrix, for which the sets are known to converge.
         """
-        mask = self.touching | (self.gap < 0.0)
+        mask = (self.pressure > 0.0) | (self.gap < 0.0)
+        if self.upper < np.inf:
+            mask &= (self.pressure < self.upper) | (self.gap > 0.0)
+        mask.ravel()[self.held] = True
         kept = np.array_equal(mask, self.mask)
         if not kept:
-            given = self.total is not None
-            self.mask = mask
-            self.contact = ContactCells.among(self.grid, Cells.where(mask), force_given=given)
+            self.mask, self.contact = mask, self._among(np.flatnonzero(mask))
         cells = self.contact.cells.flat
-        change = self.contact.close(
-            self.gap.ravel()[cells],
-            stop=max(_FORCING[kept] * self.residual, 0.25 * tolerance) * self.scale,
-            limit=_MOST_ITERATIONS,
-        )
+        stop = max(_FORCING[kept] * self.residual, 0.25 * tolerance) * self.scale
+        if self.careful:
+            self.accept(self._cell_by_cell(self.pressure, cells, stop))
+            return
+        change = self.contact.close(self.gap.ravel()[cells], stop=stop, limit=_MOST_ITERATIONS)
         old, residual, energy = self.pressure, self.residual, self.energy
+        cautious = cautious or self.unloaded
         for halving in range(_MOST_HALVINGS):
-            self.accept(self._moved(old, cells, 0.5**halving * change))
+            moved = self._moved(old, cells, 0.5**halving * change)
+            if moved is None:
+                continue
+            self.accept(moved)
             gain = self.energy < energy or (self.residual < residual and not cautious)
-            if gain or self.residual <= tolerance:
+            if gain or self.residual <= max(tolerance, self.rounding):
                 return
+        if self.motions is not None and self.motions.turns:
+            self.careful = True
+            self.accept(old)
+            self.accept(self._cell_by_cell(old, cells, stop))
 
-    def _moved(self, old: Array, cells: NDArray[np.intp], change: Array) -> Array:
+    def _cell_by_cell(self, old: Array, cells: NDArray[np.intp], stop: float) -> Array:
+        """Close the gaps of some cells, dropping one at a time that would come under tension.
+
+        Each move keeps the loads and lowers the energy, however few cells carry the body: what
+        drops many at once may leave it on a single contact, which cannot hold it. Cells that touch
+        without pressure tell how a body turns that lies on two contacts and the middle between.
+        """
+        pressure, gap = old.ravel()[cells], self.gap.ravel()[cells]
+        for _ in range(len(cells)):
+            contact = self._among(cells)
+            change = contact.close(gap, stop=stop, limit=_MOST_ITERATIONS)
+            falling = change < 0.0
+            stuck = falling & (pressure <= 0.0)
+            if stuck.any():
+                first = int(np.argmin(np.where(stuck, change, 0.0)))
+                part = 0.0
+            else:
+                ways = np.divide(
+                    pressure, -change, out=np.full_like(change, np.inf), where=falling
+                )
+                first = int(np.argmin(ways))
+                part = min(1.0, float(ways[first]))
+                pressure = np.maximum(pressure + part * change, 0.0)
+                gap = gap + part * self.grid.comply(contact.cells, change)
+                if part == 1.0:
+                    break
+            pressure[first] = 0.0
+            left = np.arange(len(cells)) != first
+            cells, pressure, gap = cells[left], pressure[left], gap[left]
         new = np.zeros(old.shape)
+        new.ravel()[cells] = pressure
+        self.held = cells[pressure <= 0.0]
+        found = self._admissible(new)
+        return old if found is None else found
+
+    def _among(self, flat: NDArray[np.intp]) -> ContactCells:
+        cells = Cells.of(flat, self.required.shape)
+        levers = np.empty((0, flat.size))
+        if self.motions is not None:
+            levers = self.motions.among(flat)
+        return ContactCells.among(self.grid, cells, levers)
+
+    def _moved(self, old: Array, cells: NDArray[np.intp], change: Array) -> Array | None:
+        new = np.zeros(old.shape) if self.upper == np.inf else np.where(old < self.upper, 0.0, old)
         new.ravel()[cells] = np.maximum(old.ravel()[cells] + change, 0.0)
-        if self.total is not None:
-            new *= self.total / new.sum()
-        return new
+        return self._admissible(new)
+
+    def _admissible(self, pressure: Array) -> Array | None:
+        """Return pressures within their bounds that meet the loads; None where there are none."""
+        if self.motions is not None:
+            return self.motions.balanced(pressure, self.upper)
+        return pressure if self.upper == np.inf else np.minimum(pressure, self.upper)

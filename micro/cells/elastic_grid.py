@@ -1,8 +1,13 @@
-"""The elastic half-space seen through a grid of cells: pressures to displacements and back."""
+"""The elastic body seen through a grid of cells: pressures to displacements and back.
+
+The compliance is a sum of symmetric terms: the half-space, and what free sides, the rest of a
+finite body and finite slopes add to it.
+"""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Self
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +22,8 @@ from micro.cells.side_cells import SideCells, SomeCells, side_cells
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-_MOST_GRIDS = 16
-"""Grids kept: two or three sizes of box with their coarse grids."""
+_MOST_GRIDS = 24
+"""Half-spaces kept, those used last: three sizes of box with their coarse grids."""
 
 
 class Cells(NamedTuple):
@@ -28,47 +33,60 @@ class Cells(NamedTuple):
         flat: Their flat indices, rising, shape (n,).
         rows: The rows that they lie in, shape (r,).
         place: Their flat indices in an array of these rows alone, shape (n,).
+        columns: Number of columns of the grid.
     """
 
     flat: Indices
     rows: Indices
     place: Indices
+    columns: int
 
     @classmethod
-    def where(cls, mask: NDArray[np.bool_]) -> Self:
-        """Return the cells that a mask of shape (nx, ny) marks."""
-        rows = np.flatnonzero(mask.any(axis=1))
-        return cls(np.flatnonzero(mask), rows, np.flatnonzero(mask[rows]))
+    def of(cls, flat: Indices, grid: tuple[int, ...]) -> Self:
+        """Return cells of a grid (nx, ny) by their flat indices, rising."""
+        row = flat // grid[1]
+        rows, at = np.unique(row, return_inverse=True)
+        return cls(flat, rows, at.ravel() * grid[1] + flat % grid[1], grid[1])
 
 
-class ElasticGrid:
-    """Compliance of nx × ny cells under pressures that are uniform on each, for E* = 1.
+class GridTerm(Protocol):
+    """A symmetric part of the compliance of nx × ny cells, beside the half-space's; for E* = 1."""
 
-    Displacements are evaluated in double precision. Corrections, which only have to reduce an
-    error that is then evaluated anew, are made of products in single precision: with the
-    compliance, and with an approximate inverse. That is the inverse of the kernel on a period as
-    large as the grid; cut down to the cells in contact it preconditions conjugate gradients, as
-    the inverse by transforms of Zhao, Vollebregt & Oosterlee 2014 (Numer. Linear Algebra Appl.
-    21, 256-274) smooths their multigrid.
+    def displacement(self, pressure: Array) -> Array:
+        """Return the displacement by pressures on all cells, shape (nx, ny) [mm]."""
+        ...
+
+    def of_cells(self, cells: Cells, pressure: Array) -> Array | None:
+        """Return the displacements of some cells by pressures on them, shape (n,) [mm].
+
+        None of a term so small that it need not be seen by the conjugate gradients, only by the
+        gaps that they start from.
+        """
+        ...
+
+
+class HalfSpaceGrid:
+    """Compliance of nx × ny cells of a half-space, and its approximate inverse, for E* = 1.
+
+    The inverse is that of the kernel on a period as large as the grid; cut down to the cells in
+    contact it preconditions conjugate gradients, as the inverse by transforms of Zhao, Vollebregt &
+    Oosterlee 2014 (Numer. Linear Algebra Appl. 21, 256-274) smooths their multigrid.
 
     Args:
         grid: Numbers of cells (nx, ny).
         spacing: Sides (dx, dy) of a cell [mm].
         periodic: Whether pressures continue periodically; a half-space that is loaded on the grid
             alone otherwise.
-        sides: What free sides add, if there are any, and where the grid lies between them.
+
+    Attributes:
+        compliance: Product in double precision.
+        rough_compliance: The same in single precision.
+        stiffness: Product with the approximate inverse, in single precision.
     """
 
     def __init__(
-        self,
-        grid: tuple[int, int],
-        spacing: tuple[float, float],
-        *,
-        periodic: bool,
-        sides: tuple[SideCells, Box] | None = None,
+        self, grid: tuple[int, int], spacing: tuple[float, float], *, periodic: bool
     ) -> None:
-        self._beside = None if sides is None else _Beside(*sides)
-        self.grid, self.spacing, self.periodic = grid, spacing, periodic
         nx, ny = grid
         if periodic:
             padded, spectrum = grid, periodic_spectrum(grid, spacing)
@@ -80,40 +98,61 @@ class ElasticGrid:
         inverse = _inverse(spectrum if periodic else periodic_spectrum(period, spacing))
         work = np.empty(spectrum.shape, complex)  # one for all: they take turns
         single = work.ravel().view(np.complex64)
-        self._compliance = Convolution(spectrum, grid, padded, work)
-        self._compliance_of_cells = Convolution(rough, grid, padded, _part(single, rough.shape))
-        self._stiffness = Convolution(inverse, grid, period, _part(single, inverse.shape))
+        self.compliance = Convolution(spectrum, grid, padded, work)
+        self.rough_compliance = Convolution(rough, grid, padded, _part(single, rough.shape))
+        self.stiffness = Convolution(inverse, grid, period, _part(single, inverse.shape))
+
+
+class ElasticGrid:
+    """Compliance of nx × ny cells under pressures that are uniform on each, for E* = 1.
+
+    Displacements are evaluated in double precision. Corrections, which only have to reduce an
+    error that is then evaluated anew, are made of products in single precision.
+
+    Args:
+        half_space: The half-space.
+        terms: What else adds to the compliance.
+    """
+
+    def __init__(self, half_space: HalfSpaceGrid, terms: Sequence[GridTerm] = ()) -> None:
+        self._half_space, self._terms = half_space, tuple(terms)
         self.products = 0
 
     def displacement(self, pressure: Array) -> Array:
         """Return the displacement by pressures on all cells, shape (nx, ny) [mm]."""
         self.products += 1
-        found = self._compliance(pressure.copy())
-        if self._beside is not None:
-            found += self._beside.all.displacement(pressure)
+        found = self._half_space.compliance(pressure.copy())
+        for term in self._terms:
+            found += term.displacement(pressure)
         return found
 
     def comply(self, cells: Cells, pressure: Array) -> Array:
         """Return roughly the displacements of some cells by pressures on them, shape (n,) [mm]."""
         self.products += 1
-        found = _among(cells, pressure, self._compliance_of_cells)
-        if self._beside is not None:
-            found += self._beside.of_cells(cells, pressure)
+        found = _among(cells, pressure, self._half_space.rough_compliance)
+        for term in self._terms:
+            part = term.of_cells(cells, pressure)
+            if part is not None:
+                found += part
         return found
 
     def resist(self, cells: Cells, displacement: Array) -> Array:
         """Return very roughly the pressures on some cells that displace them so, shape (n,)."""
-        return _among(cells, displacement, self._stiffness)
+        return _among(cells, displacement, self._half_space.stiffness)
 
 
-class _Beside:
+class _SideTerm:
     """What free sides add on a grid, and on those of its cells that were last asked for."""
 
     def __init__(self, sides: SideCells, box: Box) -> None:
         self._sides = sides
         self._rows, self._columns = (np.arange(part.start, part.stop) for part in box)
-        self.all = sides.among(self._rows, self._columns)
+        self._all = sides.among(self._rows, self._columns)
         self._last: tuple[Cells, SomeCells, Indices, tuple[int, int]] | None = None
+
+    def displacement(self, pressure: Array) -> Array:
+        """Return the displacement by pressures on all cells, shape (nx, ny) [mm]."""
+        return self._all.displacement(pressure)
 
     def of_cells(self, cells: Cells, pressure: Array) -> Array:
         """Return the displacements of some cells by pressures on them, shape (n,) [mm]."""
@@ -127,6 +166,70 @@ class _Beside:
         field = np.zeros(shape)
         field.ravel()[place] = pressure
         return np.asarray(some.displacement(field).ravel()[place])
+
+
+class BodyOnCells(Protocol):
+    """What the rest of a finite body adds on some cells."""
+
+    def displacement(self, pressure: Array, rows: Indices | None = None) -> Array:
+        """Return displacements by pressures on the cells of some rows, shape (r, ny) [mm]."""
+        ...
+
+
+class BodyTerm(Protocol):
+    """What a finite body adds to the half-space: a smooth field, linear in the pressures."""
+
+    def on(self, borders_x: Array, borders_y: Array, /) -> BodyOnCells:
+        """Return it on cells between borders, shapes (nx + 1,), (ny + 1,) [mm]."""
+        ...
+
+
+class SurfaceTerm(Protocol):
+    """A small part of the compliance that is evaluated on the whole surface."""
+
+    @property
+    def grid(self) -> tuple[int, int]:
+        """Numbers of cells of the surface."""
+        ...
+
+    def displacement(self, pressure: Array) -> Array:
+        """Return the displacements of all cells by pressures on them, [MPa] to [mm]."""
+        ...
+
+
+class _BodyOnGrid:
+    """The rest of a body on a grid, for E* = 1."""
+
+    def __init__(self, body: BodyOnCells, modulus: float) -> None:
+        self._body, self._modulus = body, modulus
+
+    def displacement(self, pressure: Array) -> Array:
+        """Return the displacement by pressures on all cells, shape (nx, ny) [mm]."""
+        return self._modulus * self._body.displacement(pressure)
+
+    def of_cells(self, cells: Cells, pressure: Array) -> Array:
+        """Return the displacements of some cells by pressures on them, shape (n,) [mm]."""
+        field = np.zeros((len(cells.rows), cells.columns))
+        field.ravel()[cells.place] = pressure
+        found = self._body.displacement(field, cells.rows)
+        return np.asarray(self._modulus * found.ravel()[cells.place])
+
+
+class _SlopeTerm:
+    """A part that is evaluated on the whole surface, on a box of its cells and for E* = 1."""
+
+    def __init__(self, term: SurfaceTerm, box: Box, modulus: float) -> None:
+        self._term, self._box, self._modulus = term, box, modulus
+
+    def displacement(self, pressure: Array) -> Array:
+        """Return the displacement by pressures on all cells of the box, shape (nx, ny) [mm]."""
+        whole = np.zeros(self._term.grid)
+        whole[self._box] = pressure * self._modulus
+        return np.asarray(self._term.displacement(whole)[self._box])
+
+    def of_cells(self, cells: Cells, pressure: Array) -> None:
+        """Leave the conjugate gradients alone: it is a few per cent of the displacements."""
+        return None
 
 
 def _among(cells: Cells, values: Array, convolution: Convolution) -> Array:
@@ -154,37 +257,105 @@ def _inverse(spectrum: Array) -> NDArray[np.float32]:
 
 
 class ElasticGrids:
-    """The grids of one model, kept for the next solution with their kernels and work arrays.
+    """The grids of one model, whose half-spaces are kept with their kernels and work arrays.
 
     Args:
         periodic: Whether pressures continue periodically.
+        modulus: Contact modulus E* of the model [MPa].
         sides: Free sides, if there are any.
+        body: What the rest of a finite body adds, if there is one.
+        slopes: What finite slopes add, if they are to be seen.
     """
 
-    def __init__(self, *, periodic: bool, sides: FreeSides | None = None) -> None:
-        self.periodic, self.sides = periodic, sides
-        self._known: dict[tuple[object, ...], ElasticGrid] = {}
+    def __init__(
+        self,
+        *,
+        periodic: bool,
+        modulus: float = 1.0,
+        sides: FreeSides | None = None,
+        body: BodyTerm | None = None,
+        slopes: SurfaceTerm | None = None,
+    ) -> None:
+        self.periodic, self.modulus = periodic, modulus
+        self.sides, self.body, self.slopes = sides, body, slopes
+        self._known: dict[tuple[object, ...], HalfSpaceGrid] = {}
 
     def at(
         self, grid: tuple[int, ...], spacing: tuple[float, float], box: Box | None = None
     ) -> ElasticGrid:
-        """Return the grid with these cells; free sides act on it where its place is known."""
+        """Return the finest grid of some cells.
+
+        Args:
+            grid: Numbers of cells (nx, ny).
+            spacing: Sides of a cell [mm].
+            box: Their place; None where the cells are not those of the surface.
+        """
+        terms: list[GridTerm] = []
+        if box is not None:
+            if self.sides is not None:
+                terms.append(_SideTerm(side_cells(self.sides, spacing), box))
+            if self.slopes is not None:
+                terms.append(_SlopeTerm(self.slopes, box, self.modulus))
+            origin = box.rows.start * spacing[0], box.columns.start * spacing[1]
+            terms += self._of_body(grid, spacing, origin)
+        return ElasticGrid(self._half_space(grid, spacing), terms)
+
+    def coarse(
+        self, grid: tuple[int, ...], spacing: tuple[float, float], origin: tuple[float, float]
+    ) -> ElasticGrid:
+        """Return a coarse grid, on which neither sides nor slopes are seen.
+
+        Args:
+            grid: Numbers of cells (nx, ny).
+            spacing: Sides of a cell [mm].
+            origin: Corner of the first cell [mm].
+        """
+        return ElasticGrid(self._half_space(grid, spacing), self._of_body(grid, spacing, origin))
+
+    def risen(self, pressure: Array, spacing: tuple[float, float]) -> Array:
+        """Return what the body alone adds to the displacements of all cells, shape (nx, ny) [mm].
+
+        Args:
+            pressure: Pressures / E* of all cells of the surface, shape (nx, ny).
+            spacing: Sides of a cell [mm].
+        """
+        found = np.zeros(pressure.shape)
+        for term in self._of_body(pressure.shape, spacing, (0.0, 0.0)):
+            found += term.displacement(pressure)
+        return found
+
+    def _of_body(
+        self, grid: tuple[int, ...], spacing: tuple[float, float], origin: tuple[float, float]
+    ) -> list[GridTerm]:
+        if self.body is None:
+            return []
+        x, y = (
+            start + step * np.arange(n + 1)
+            for start, step, n in zip(origin, spacing, grid, strict=True)
+        )
+        return [_BodyOnGrid(self.body.on(x, y), self.modulus)]
+
+    def _half_space(self, grid: tuple[int, ...], spacing: tuple[float, float]) -> HalfSpaceGrid:
         nx, ny = grid
-        key: tuple[object, ...] = (nx, ny, *spacing)
-        sides = None
-        if self.sides is not None and box is not None:
-            key = (*key, box.rows.start, box.columns.start)
-            sides = side_cells(self.sides, spacing), box
-        if key not in self._known:
+        key = (nx, ny, *spacing)
+        known = self._known.pop(key, None)
+        if known is None:
+            known = HalfSpaceGrid((nx, ny), spacing, periodic=self.periodic)
             if len(self._known) >= _MOST_GRIDS:
                 del self._known[next(iter(self._known))]
-            self._known[key] = ElasticGrid((nx, ny), spacing, periodic=self.periodic, sides=sides)
-        return self._known[key]
+        self._known[key] = known  # the last one is the one used last
+        return known
 
     def __reduce__(self) -> tuple[object, ...]:
         """Travel without the work arrays."""
-        return _empty_grids, (self.periodic, self.sides)
+        return _empty_grids, (self.periodic, self.modulus, self.sides, self.body, self.slopes)
 
 
-def _empty_grids(periodic: bool, sides: FreeSides | None) -> ElasticGrids:
-    return ElasticGrids(periodic=periodic, sides=sides)
+def _empty_grids(
+    periodic: bool,
+    modulus: float,
+    sides: FreeSides | None,
+    body: BodyTerm | None,
+    slopes: SurfaceTerm | None,
+) -> ElasticGrids:
+    return ElasticGrids(periodic=periodic, modulus=modulus, sides=sides, body=body, slopes=slopes)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from micro.cells.contacts import Contacts, find_contacts
 from micro.cells.elastic_grid import ElasticGrids
 from micro.cells.reach import Box
+from micro.plane import RigidPlane
 
 Array = NDArray[np.float64]
 
@@ -20,10 +21,11 @@ class HalfSpaceState:
     """Contact of all cells at one approach; maps are evaluated when first asked for.
 
     Args:
-        approach: Rigid approach δ at the centre, counted from first touch [mm].
+        plane: The rigid plane: approach at the centre from first touch, and slopes.
         required: Displacement that the plane asks of each cell, δ(x, y) − (z_M − z), negative
             where they are apart, shape (nx, ny) [mm].
         pressure: Contact pressure, shape (nx, ny) [MPa].
+        may_touch: Cells that may touch, shape (nx, ny); all when not given.
         contact_modulus: E* [MPa].
         spacing: Sides (dx, dy) of a cell [mm].
         periodic: Whether surface and pressures continue periodically.
@@ -31,18 +33,24 @@ class HalfSpaceState:
             largest displacement asked for. It bounds the error of the force: this is exact for
             a surface whose heights differ by ``residual`` δ at most.
         iterations: Products of the compliance with pressures.
-        grids: Elastic half-space of the model.
+        grids: Elastic body of the model.
     """
 
-    approach: float
+    plane: RigidPlane
     required: Array
     pressure: Array
+    may_touch: NDArray[np.bool_] | None
     contact_modulus: float
     spacing: tuple[float, float]
     periodic: bool
     residual: float
     iterations: int
     grids: ElasticGrids = field(repr=False)
+
+    @property
+    def approach(self) -> float:
+        """Rigid approach δ at the centre, counted from first touch [mm]."""
+        return self.plane.approach
 
     @property
     def force(self) -> float:
@@ -81,5 +89,8 @@ class HalfSpaceState:
 
     @property
     def gap(self) -> Array:
-        """Distance of the displaced surface from the plane, shape (nx, ny) [mm]."""
+        """Distance of the displaced surface from the plane, shape (nx, ny) [mm].
+
+        Where cells may not touch, the plane may have gone through them.
+        """
         return self.displacement - self.required

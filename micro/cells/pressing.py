@@ -1,4 +1,4 @@
-"""Pressing a rigid body into the half-space, on the cells that it can touch."""
+"""Pressing a rigid body into an elastic one, on the cells that it can touch."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from micro.cells.coarse_start import coarsened, nested_pressure
+from micro.cells.coarse_start import coarse_pressure, coarsened, nested_pressure
 from micro.cells.contact_pressure import Pressures, contact_pressure
 from micro.cells.elastic_grid import ElasticGrids
+from micro.cells.motions import Motions
 from micro.cells.reach import Box
 
 Array = NDArray[np.float64]
@@ -22,67 +23,133 @@ _FEW_CELLS = 32
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Pressing:
-    """A rigid body on nx × ny cells of the half-space.
+    """A rigid body on nx × ny cells of an elastic one.
 
-    Displacements by pressures are not negative, so that without periodicity a body touches no
-    cell but those that it would penetrate: a box around them is all that enters the solution.
+    On a half-space displacements by pressures are not negative, so that without periodicity a body
+    touches no cell but those that it would penetrate: a box around them is all that enters the
+    solution. A finite body may lift others into contact: they are looked for at the end.
 
     Args:
-        grids: The elastic half-space.
-        spacing: Sides (dx, dy) of a cell [mm].
+        grids: The elastic body.
+        spacing: Sides of a cell [mm].
         tolerance: Largest residual.
+        upper: Upper bound of the pressures / E*.
     """
 
     grids: ElasticGrids
     spacing: tuple[float, float]
     tolerance: float
+    upper: float = np.inf
 
     def by_approach(self, required: Array, start: Array | None) -> Pressures:
         """Solve with given displacements d, as `contact_pressure`; pressures on all cells."""
         if required.max() <= 0.0:
-            return Pressures(np.zeros(required.shape), 0.0, 0.0, 0, 0)
-        return self._on(self._box(required), required, start, None)
+            return Pressures(np.zeros(required.shape), np.zeros(0), 0.0, 0, 0)
+        return self._grown(self._box(required), required, start, None)
 
     def by_force(self, required: Array, total: float, start: Pressures | None) -> Pressures:
-        """Solve with a given sum of pressures / E*; ``required`` holds up to a constant."""
+        """Solve with a given sum of pressures / E*; ``required`` holds up to a constant.
+
+        Args:
+            required: Displacement that the body asks for, shape (nx, ny) [mm].
+            total: Sum of pressures / E* over the cells.
+            start: A solution nearby, its motion the approach.
+        """
         top = float(required.max())
         level = required - top  # from here on the approach counts from first touch of a cell
+        motions = Motions.approach(required.shape, total)
         first, reach = None, np.inf
         if start is not None:
-            first, reach = start.pressure, _MARGIN * (start.approach + top)
+            first, reach = start.pressure, _MARGIN * (float(start.motion[0]) + top)
         elif not self.grids.periodic:
-            reach = _MARGIN * self._estimate(level, total)
+            reach = _MARGIN * self._estimate(level, motions)
         while True:
             box = self._box(level + max(reach, float(np.finfo(float).tiny)))
-            found = self._on(box, level, first, total)
-            if found.approach <= reach or box.shape == required.shape:
-                return found._replace(approach=found.approach - top)
-            first, reach = found.pressure, _MARGIN * found.approach
+            found = self._grown(box, level, first, motions)
+            approach = float(found.motion[0])
+            if approach <= reach or box.shape == required.shape:
+                return found._replace(motion=found.motion - top)
+            first, reach = found.pressure, _MARGIN * approach
 
-    def _estimate(self, required: Array, total: float) -> float:
+    def by_turning(self, required: Array, motions: Motions, start: Array | None) -> Pressures:
+        """Solve with free slopes; ``required`` holds up to the free motions."""
+        return self._on(Box.whole(required.shape), required, start, motions)
+
+    def _estimate(self, required: Array, motions: Motions) -> float:
         """Estimate the approach on a coarse grid: its summits are lower, it errs upwards."""
         factors = [
             1 << max(0, (n - 1).bit_length() - _FEW_CELLS.bit_length() + 1) for n in required.shape
         ]
         spacing = (self.spacing[0] * factors[0], self.spacing[1] * factors[1])
-        coarse = coarsened(required, factors)
-        part = total / (factors[0] * factors[1])
-        return nested_pressure(self.grids, coarse, spacing, total=part, tolerance=1e-2).approach
+        coarse = coarse_pressure(
+            self.grids,
+            coarsened(required, factors),
+            spacing,
+            motions=motions.coarsened(factors),
+            upper=self.upper,
+            tolerance=1e-2,
+            corner=(0.0, 0.0),
+        )
+        return float(coarse.motion[0])
 
     def _box(self, required: Array) -> Box:
         whole = self.grids.periodic or not np.isfinite(required).all()
         return Box.around(np.ones(required.shape, bool) if whole else required > 0.0)
 
-    def _on(self, box: Box, required: Array, start: Array | None, total: float | None) -> Pressures:
+    def _grown(
+        self, box: Box, required: Array, start: Array | None, motions: Motions | None
+    ) -> Pressures:
+        """Solve on a box, and on a larger one while the body lifts cells outside into contact."""
+        found = self._on(box, required, start, motions)
+        while self.grids.body is not None and box.shape != required.shape:
+            nearer = required if motions is None else required + motions.nearer(found.motion)
+            lifted = self._lifted(box, nearer, found)
+            if lifted is None:
+                break
+            box = lifted
+            again = self._on(box, required, found.pressure, motions)
+            found = again._replace(iterations=found.iterations + again.iterations)
+        return found
+
+    def _lifted(self, box: Box, nearer: Array, found: Pressures) -> Box | None:
+        """Return a box that also holds the cells lifted into contact; None where there are none.
+
+        The half-space's part only lowers cells, so that they are few at most whose displacement by
+        the body alone calls for a look at the whole.
+        """
+        outside = np.ones(nearer.shape, bool)
+        outside[box] = False
+        whole = Box.whole(nearer.shape)
+        risen = self.grids.risen(found.pressure, self.spacing)
+        if not np.any(outside & (risen < nearer)):
+            return None
+        grid = self.grids.at(nearer.shape, self.spacing, whole)
+        touched = outside & (grid.displacement(found.pressure) < nearer)
+        if not touched.any():
+            return None
+        return Box.around((found.pressure > 0.0) | (nearer > 0.0) | touched)
+
+    def _on(
+        self, box: Box, required: Array, start: Array | None, motions: Motions | None
+    ) -> Pressures:
         part = np.ascontiguousarray(required[box])
+        free = None if motions is None else motions.on(box)
         first = None if start is None else start[box]
         if first is None or not first.any():
             found = nested_pressure(
-                self.grids, part, self.spacing, total=total, tolerance=self.tolerance, box=box
+                self.grids,
+                part,
+                self.spacing,
+                motions=free,
+                upper=self.upper,
+                tolerance=self.tolerance,
+                box=box,
             )
         else:
             grid = self.grids.at(part.shape, self.spacing, box)
-            found = contact_pressure(grid, part, first, total=total, tolerance=self.tolerance)
+            found = contact_pressure(
+                grid, part, first, motions=free, upper=self.upper, tolerance=self.tolerance
+            )
         pressure = np.zeros(required.shape)
         pressure[box] = found.pressure
         return found._replace(pressure=pressure)

@@ -1,0 +1,69 @@
+"""Where a body that may turn about a given point stands clear of a surface, or what holds it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+
+from micro.cells.motions import Motions
+
+Array = NDArray[np.float64]
+
+_MOST_CUTS = 500
+
+
+class Clearance(NamedTuple):
+    """The free motions that leave most room.
+
+    Attributes:
+        motion: The motions, shape (k,) [mm].
+        overlap: Largest overlap of body and surface then [mm]; clear where it is not positive.
+        support: Shares of the cells that keep it from more, which have no load along any motion,
+            shape (nx, ny).
+    """
+
+    motion: Array
+    overlap: float
+    support: Array
+
+
+def clearance(required: Array, motions: Motions) -> Clearance:
+    """Find how far a body can come clear of a surface by its free motions.
+
+    A linear programme in the motions and the largest overlap, with one condition for every cell;
+    those that the motions found so far violate most are added one by one.
+
+    Args:
+        required: Displacements asked for where the motions are 0, shape (nx, ny) [mm].
+        motions: Free motions; the approach is not among them.
+    """
+    count = len(motions.loads)
+    size = float(np.abs(required).max()) or 1.0
+    levers = np.empty((0, count))
+    cells: list[int] = []
+    motion, shares = np.zeros(count), np.zeros(0)
+    bound = -np.inf
+    for _ in range(_MOST_CUTS):
+        overlap = required + motions.nearer(motion)
+        worst = int(np.argmax(overlap))
+        if worst in cells or overlap.ravel()[worst] <= bound * (1.0 + 1e-12) + 1e-14 * size:
+            break
+        cells.append(worst)
+        levers = np.vstack((levers, motions.among(np.array([worst])).T))
+        limits = [(-100.0 * size, 100.0 * size)] * count + [(None, None)]
+        found = linprog(
+            np.append(np.zeros(count), 1.0),
+            A_ub=np.column_stack((levers, -np.ones(len(cells)))),
+            b_ub=-required.ravel()[cells],
+            bounds=limits,
+            method="highs-ds",
+        )
+        motion, bound = np.asarray(found.x[:count]), float(found.x[count])
+        shares = np.maximum(-np.asarray(found.ineqlin.marginals), 0.0)
+    support = np.zeros(required.shape)
+    support.ravel()[cells[: len(shares)]] = shares
+    nearest = float((required + motions.nearer(motion)).max())
+    return Clearance(motion, nearest, support)
