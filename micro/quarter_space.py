@@ -88,10 +88,15 @@ def side_traction(logs: Array, poisson_ratio: float) -> Array:
     """Return A(z, x) at k = 1, compression positive, at depths and distances exp(logs)."""
     x = np.exp(logs)
     z, rho = x[:, None], np.hypot(x[:, None], x)
-    below = make_interp_spline(logs, kn(0, rho) * z).antiderivative()
-    rest = below(logs[-1]) - below(logs)
     direct = z * x**2 * kn(2, rho) / rho**2
-    return np.asarray(2.0 / np.pi * (direct - (1.0 - 2.0 * poisson_ratio) * rest))
+    return np.asarray(2.0 / np.pi * (direct - (1.0 - 2.0 * poisson_ratio) * depth_integral(logs)))
+
+
+def depth_integral(logs: Array) -> Array:
+    """Return ∫_z^∞ K₀(√(x² + s²)) ds at depths z and distances x of exp(logs), shape (n, n)."""
+    x = np.exp(logs)
+    below = make_interp_spline(logs, kn(0, np.hypot.outer(x, x)) * x[:, None]).antiderivative()
+    return np.asarray(below(logs[-1]) - below(logs))
 
 
 quarter_space = cache(QuarterSpace)

@@ -16,11 +16,13 @@ from geometry import Partition
 from geometry.errors import InputError
 from micro.cells.distance_nodes import distance_nodes, means_over, values_at
 from micro.quarter_space import quarter_space
+from micro.quarter_space_stresses import quarter_space_stresses
 
 Array = NDArray[np.float64]
 
 _SHORTEST = 24.0  # waves on the shortest rectangle along the side
 _NEAREST = 1.0 / 256.0  # of the narrowest rectangle across it: the first node
+_PLANE = 1e-4  # of a wave over the largest distance: plane strain
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,6 +72,21 @@ class FreeSides:
         larger, smaller = np.maximum(numbers, 1.0 / self.reach), np.minimum(numbers, 1 / self.reach)
         numbers = larger * (1.0 + (smaller / larger) ** 4) ** 0.25
         return np.stack([space.compliance(distances, number) for number in numbers])
+
+    def stresses(self, axis: int, distances: Array, waves: NDArray[np.intp]) -> Array:
+        """Return the stresses that one side adds at distances by line loads at distances.
+
+        Args:
+            axis: 0 for sides across x, 1 across y.
+            distances: From the side, shape (n,) [mm].
+            waves: Numbers of waves on twice the length of the side, shape (w,).
+
+        Returns:
+            Normal to the side, along it, and in shear, shape (3, w, n, n), the loads last [1/mm].
+        """
+        space = quarter_space_stresses(self.poisson_ratio)
+        numbers = np.maximum(np.pi * waves / self.lengths[1 - axis], _PLANE / distances[-1])
+        return np.stack([space.stresses(distances, number) for number in numbers], axis=1)
 
     def top(self, x: Array, y: Array, loads: Partition) -> Array:
         """Return the displacement of points by unit pressure on rectangles, for E* = 1.
