@@ -1,0 +1,157 @@
+"""What a finite body adds to the half-space: a smooth compliance in few modes of the contact face.
+
+Pressures p have the moments b_n = ∫ p φ_n dA with the modes φ_n, and displace by Σ φ_m D_mn b_n.
+Modes are products of Legendre modes along x and y (`geometry.legendre_modes`): all evaluations are
+thin products along the axes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from geometry import Partition
+from geometry.errors import InputError
+from geometry.legendre_modes import mode_means, mode_values
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyModes:
+    """Compliance of a rectangular contact face in its Legendre modes.
+
+    Args:
+        lengths: Sides (Lx, Ly) of the face, which starts at the origin [mm].
+        matrix: D, symmetric; mode k K + l varies as mode k along x and l along y, shape (K², K²)
+            [mm/N].
+
+    Raises:
+        InputError: When a length is not positive, or the matrix not one of K² modes, not finite or
+            not symmetric.
+    """
+
+    lengths: tuple[float, float]
+    matrix: Array
+
+    def __post_init__(self) -> None:
+        matrix = np.asarray(self.matrix, float)
+        object.__setattr__(self, "matrix", matrix)
+        if not (np.all(np.isfinite(self.lengths)) and min(self.lengths) > 0.0):
+            raise InputError("lengths must be positive", value=self.lengths, allowed="> 0 mm")
+        if matrix.ndim != 2 or not len(matrix) or matrix.shape != 2 * (self.count**2,):
+            raise InputError(
+                "the compliance is not one of K × K modes",
+                value=matrix.shape,
+                allowed="(K², K²), K ≥ 1",
+            )
+        if not np.all(np.isfinite(matrix)):
+            raise InputError("the compliance is not finite", value=matrix[0, 0], allowed="numbers")
+        apart = float(np.abs(matrix - matrix.T).max())
+        if apart > 1e-9 * np.abs(matrix).max():
+            raise InputError("the compliance is not symmetric", value=apart, allowed="D = Dᵀ")
+
+    @property
+    def count(self) -> int:
+        """Modes K along a side."""
+        return int(np.sqrt(len(self.matrix)) + 0.5)
+
+    def on(self, borders_x: ArrayLike, borders_y: ArrayLike) -> ModesOnCells:
+        """Return the compliance of cells of pressure, by means over the cells.
+
+        Args:
+            borders_x: Borders of the cells along x, ascending within the face, (nx + 1,) [mm].
+            borders_y: Borders along y, shape (ny + 1,) [mm].
+        """
+        borders = np.asarray(borders_x, float), np.asarray(borders_y, float)
+        means = [
+            mode_means(ticks, length, self.count)
+            for ticks, length in zip(borders, self.lengths, strict=True)
+        ]
+        return ModesOnCells(self.matrix, *means, *map(np.diff, borders))
+
+    def between(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Return displacements of points by unit forces at points, shape (n, n) [mm/N].
+
+        Args:
+            x: Abscissae, shape (n,) [mm].
+            y: Ordinates, shape (n,) [mm].
+        """
+        along_x = mode_values(x, self.lengths[0], self.count)
+        along_y = mode_values(y, self.lengths[1], self.count)
+        modes = (along_x[:, None] * along_y).reshape(len(self.matrix), -1)
+        found = modes.T @ self.matrix @ modes
+        return np.asarray(0.5 * (found + found.T))
+
+    def patch_compliance(self, patches: Partition) -> Array:
+        """Return the mean over patch i by unit pressure on patch j, shape (N, N) [mm/MPa].
+
+        Args:
+            patches: N patches within the face.
+        """
+        cells = self.on(patches.borders_x, patches.borders_y)
+        modes = np.kron(cells.means_x, cells.means_y)
+        return np.asarray(modes.T @ self.matrix @ modes * patches.areas)
+
+    def fewer(self, count: int) -> BodyModes:
+        """Return the first modes alone; what they lack tells how well K modes resolve the face.
+
+        Args:
+            count: Modes along a side, at most K.
+        """
+        if not 1 <= count <= self.count:
+            raise InputError("so many modes are not there", value=count, allowed=f"1 … {self.count}")
+        some = self.matrix.reshape(4 * (self.count,))[:count, :count, :count, :count]
+        return BodyModes(self.lengths, some.reshape(count**2, count**2))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModesOnCells:
+    """A compliance in modes on the cells of a grid; pressures are uniform on cells.
+
+    Displacements are means over the cells, which makes the compliance symmetric for equal cells.
+
+    Args:
+        matrix: D [mm/N].
+        means_x: Means of the modes along x over the cells, shape (K, nx).
+        means_y: Means along y, shape (K, ny).
+        widths_x: Widths of the cells along x, shape (nx,) [mm].
+        widths_y: Widths along y, shape (ny,) [mm].
+    """
+
+    matrix: Array
+    means_x: Array
+    means_y: Array
+    widths_x: Array
+    widths_y: Array
+
+    def displacement(self, pressure: Array) -> Array:
+        """Return the displacements of all cells by pressures on them.
+
+        Args:
+            pressure: Shape (nx, ny) [MPa].
+
+        Returns:
+            Shape (nx, ny) [mm].
+        """
+        moments = (self.means_x * self.widths_x) @ pressure @ (self.means_y * self.widths_y).T
+        amplitudes = (self.matrix @ moments.ravel()).reshape(moments.shape)
+        return np.asarray(self.means_x.T @ amplitudes @ self.means_y)
+
+    def among(self, rows: Indices, columns: Indices) -> ModesOnCells:
+        """Return the cells where some rows and columns of the grid cross.
+
+        Args:
+            rows: Indices of the rows, shape (r,).
+            columns: Indices of the columns, shape (c,).
+        """
+        return ModesOnCells(
+            self.matrix,
+            self.means_x[:, rows],
+            self.means_y[:, columns],
+            self.widths_x[rows],
+            self.widths_y[columns],
+        )
