@@ -371,6 +371,7 @@ class HalfSpaceModel:
     def _pressing(self) -> Pressing:
         grids = ElasticGrids(
             periodic=self.periodic,
+            whole=self.surface.grid,
             modulus=self.contact_modulus,
             sides=self.sides,
             body=self.body,

@@ -171,8 +171,12 @@ class _SideTerm:
 class BodyOnCells(Protocol):
     """What the rest of a finite body adds on some cells."""
 
-    def displacement(self, pressure: Array, rows: Indices | None = None) -> Array:
-        """Return displacements by pressures on the cells of some rows, shape (r, ny) [mm]."""
+    def displacement(self, pressure: Array, /) -> Array:
+        """Return the displacements by pressures on all cells, shape (nx, ny), [MPa] to [mm]."""
+        ...
+
+    def among(self, rows: Indices, columns: Indices, /) -> Self:
+        """Return the cells where some rows and columns cross."""
         ...
 
 
@@ -187,21 +191,17 @@ class BodyTerm(Protocol):
 class SurfaceTerm(Protocol):
     """A small part of the compliance that is evaluated on the whole surface."""
 
-    @property
-    def grid(self) -> tuple[int, int]:
-        """Numbers of cells of the surface."""
-        ...
-
-    def displacement(self, pressure: Array) -> Array:
-        """Return the displacements of all cells by pressures on them, [MPa] to [mm]."""
+    def displacement(self, pressure: Array, /) -> Array:
+        """Return the displacements by pressures on all cells, shape (nx, ny), [MPa] to [mm]."""
         ...
 
 
 class _BodyOnGrid:
-    """The rest of a body on a grid, for E* = 1."""
+    """The rest of a body on a grid, for E* = 1, and on the rows that were last asked for."""
 
     def __init__(self, body: BodyOnCells, modulus: float) -> None:
         self._body, self._modulus = body, modulus
+        self._last: tuple[Cells, BodyOnCells] | None = None
 
     def displacement(self, pressure: Array) -> Array:
         """Return the displacement by pressures on all cells, shape (nx, ny) [mm]."""
@@ -209,21 +209,23 @@ class _BodyOnGrid:
 
     def of_cells(self, cells: Cells, pressure: Array) -> Array:
         """Return the displacements of some cells by pressures on them, shape (n,) [mm]."""
+        if self._last is None or self._last[0] is not cells:
+            self._last = cells, self._body.among(cells.rows, np.arange(cells.columns))
         field = np.zeros((len(cells.rows), cells.columns))
         field.ravel()[cells.place] = pressure
-        found = self._body.displacement(field, cells.rows)
+        found = self._last[1].displacement(field)
         return np.asarray(self._modulus * found.ravel()[cells.place])
 
 
 class _SlopeTerm:
     """A part that is evaluated on the whole surface, on a box of its cells and for E* = 1."""
 
-    def __init__(self, term: SurfaceTerm, box: Box, modulus: float) -> None:
-        self._term, self._box, self._modulus = term, box, modulus
+    def __init__(self, term: SurfaceTerm, box: Box, grid: tuple[int, int], modulus: float) -> None:
+        self._term, self._box, self._grid, self._modulus = term, box, grid, modulus
 
     def displacement(self, pressure: Array) -> Array:
         """Return the displacement by pressures on all cells of the box, shape (nx, ny) [mm]."""
-        whole = np.zeros(self._term.grid)
+        whole = np.zeros(self._grid)
         whole[self._box] = pressure * self._modulus
         return np.asarray(self._term.displacement(whole)[self._box])
 
@@ -261,6 +263,7 @@ class ElasticGrids:
 
     Args:
         periodic: Whether pressures continue periodically.
+        whole: Numbers of cells of the surface.
         modulus: Contact modulus E* of the model [MPa].
         sides: Free sides, if there are any.
         body: What the rest of a finite body adds, if there is one.
@@ -271,12 +274,13 @@ class ElasticGrids:
         self,
         *,
         periodic: bool,
+        whole: tuple[int, int],
         modulus: float = 1.0,
         sides: FreeSides | None = None,
         body: BodyTerm | None = None,
         slopes: SurfaceTerm | None = None,
     ) -> None:
-        self.periodic, self.modulus = periodic, modulus
+        self.periodic, self.whole, self.modulus = periodic, whole, modulus
         self.sides, self.body, self.slopes = sides, body, slopes
         self._known: dict[tuple[object, ...], HalfSpaceGrid] = {}
 
@@ -295,7 +299,7 @@ class ElasticGrids:
             if self.sides is not None:
                 terms.append(_SideTerm(side_cells(self.sides, spacing), box))
             if self.slopes is not None:
-                terms.append(_SlopeTerm(self.slopes, box, self.modulus))
+                terms.append(_SlopeTerm(self.slopes, box, self.whole, self.modulus))
             origin = box.rows.start * spacing[0], box.columns.start * spacing[1]
             terms += self._of_body(grid, spacing, origin)
         return ElasticGrid(self._half_space(grid, spacing), terms)
@@ -348,14 +352,24 @@ class ElasticGrids:
 
     def __reduce__(self) -> tuple[object, ...]:
         """Travel without the work arrays."""
-        return _empty_grids, (self.periodic, self.modulus, self.sides, self.body, self.slopes)
+        return _empty_grids, (
+            self.periodic,
+            self.whole,
+            self.modulus,
+            self.sides,
+            self.body,
+            self.slopes,
+        )
 
 
 def _empty_grids(
     periodic: bool,
+    whole: tuple[int, int],
     modulus: float,
     sides: FreeSides | None,
     body: BodyTerm | None,
     slopes: SurfaceTerm | None,
 ) -> ElasticGrids:
-    return ElasticGrids(periodic=periodic, modulus=modulus, sides=sides, body=body, slopes=slopes)
+    return ElasticGrids(
+        periodic=periodic, whole=whole, modulus=modulus, sides=sides, body=body, slopes=slopes
+    )

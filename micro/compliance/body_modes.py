@@ -1,21 +1,18 @@
-"""What a finite body adds to the half-space at its contact face, as a matrix over smooth modes.
+"""What a finite body adds to the half-space: a smooth compliance in few modes of the contact face.
 
-The body's displacement under pressures p on its face is that of the half-space and a smooth rest
-
-    u_c(x) = Σ_mn φ_m(x) D_mn ∫ p φ_n dA,
-
-φ the products of Legendre modes along both sides of the face (`geometry.legendre_modes`) and D
-small and symmetric. On cells it is two thin products along each axis.
+Pressures p have the moments b_n = ∫ p φ_n dA with the modes φ_n, and displace by Σ φ_m D_mn b_n.
+Modes are products of Legendre modes along x and y (`geometry.legendre_modes`): all evaluations are
+thin products along the axes.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from geometry import Partition
 from geometry.errors import InputError
 from geometry.legendre_modes import mode_means, mode_values
 
@@ -23,92 +20,138 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class BodyModes:
-    """The smooth rest of a body in K × K modes of its contact face.
+    """Compliance of a rectangular contact face in its Legendre modes.
 
     Args:
-        lengths: Sides (Lx, Ly) of the face [mm].
-        matrix: D, displacement in mode m by a unit moment of the pressures in mode n, the mode
-            (k, l) along x and y at k K + l, symmetric, shape (K², K²) [mm/N].
+        lengths: Sides (Lx, Ly) of the face, which starts at the origin [mm].
+        matrix: D, symmetric; mode k K + l varies as mode k along x and l along y, shape (K², K²)
+            [mm/N].
 
     Raises:
-        InputError: When the matrix is not of this shape, finite and symmetric.
+        InputError: When a length is not positive, or the matrix not one of K² modes, not finite or
+            not symmetric.
     """
 
     lengths: tuple[float, float]
     matrix: Array
 
     def __post_init__(self) -> None:
-        matrix = self.matrix
-        count = int(round(np.sqrt(len(matrix))))
-        if matrix.shape != (count**2, count**2) or not np.isfinite(matrix).all():
+        matrix = np.asarray(self.matrix, float)
+        object.__setattr__(self, "matrix", matrix)
+        if not (np.all(np.isfinite(self.lengths)) and min(self.lengths) > 0.0):
+            raise InputError("lengths must be positive", value=self.lengths, allowed="> 0 mm")
+        if matrix.ndim != 2 or not len(matrix) or matrix.shape != 2 * (self.count**2,):
             raise InputError(
-                "the modes of a body need a finite square matrix",
+                "the compliance is not one of K × K modes",
                 value=matrix.shape,
-                allowed="(K², K²)",
+                allowed="(K², K²), K ≥ 1",
             )
-        if not np.allclose(matrix, matrix.T, rtol=0.0, atol=1e-12 * np.abs(matrix).max()):
-            raise InputError("the matrix over the modes is not symmetric", value="asymmetric")
+        if not np.all(np.isfinite(matrix)):
+            raise InputError("the compliance is not finite", value=matrix[0, 0], allowed="numbers")
+        apart = float(np.abs(matrix - matrix.T).max())
+        if apart > 1e-9 * np.abs(matrix).max():
+            raise InputError("the compliance is not symmetric", value=apart, allowed="D = Dᵀ")
 
-    @cached_property
+    @property
     def count(self) -> int:
-        """Number K of modes along each side."""
-        return int(round(np.sqrt(len(self.matrix))))
+        """Modes K along a side."""
+        return int(np.sqrt(len(self.matrix)) + 0.5)
 
-    def on(self, borders_x: Array, borders_y: Array) -> ModesOnCells:
-        """Return the rest on cells, loaded and displaced in their means.
+    def on(self, borders_x: ArrayLike, borders_y: ArrayLike) -> ModesOnCells:
+        """Return the compliance of cells of pressure, by means over the cells.
 
         Args:
-            borders_x: Borders of the cells along x, shape (nx + 1,) [mm].
+            borders_x: Borders of the cells along x, ascending within the face, (nx + 1,) [mm].
             borders_y: Borders along y, shape (ny + 1,) [mm].
         """
-        over_x = mode_means(borders_x, self.lengths[0], self.count)
-        over_y = mode_means(borders_y, self.lengths[1], self.count)
-        area = float((borders_x[1] - borders_x[0]) * (borders_y[1] - borders_y[0]))
-        return ModesOnCells(over_x, over_y, self.matrix * area)
+        borders = np.asarray(borders_x, float), np.asarray(borders_y, float)
+        means = [
+            mode_means(ticks, length, self.count)
+            for ticks, length in zip(borders, self.lengths, strict=True)
+        ]
+        return ModesOnCells(self.matrix, *means, *map(np.diff, borders))
 
     def between(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """Return the displacements of points by unit forces at points, shape (n, n) [mm/N].
+        """Return displacements of points by unit forces at points, shape (n, n) [mm/N].
 
         Args:
             x: Abscissae, shape (n,) [mm].
             y: Ordinates, shape (n,) [mm].
         """
-        values = self._at(x, y)
-        return np.asarray(values.T @ self.matrix @ values)
-
-    def _at(self, x: ArrayLike, y: ArrayLike) -> Array:
         along_x = mode_values(x, self.lengths[0], self.count)
         along_y = mode_values(y, self.lengths[1], self.count)
-        return np.asarray((along_x[:, None] * along_y[None]).reshape(self.count**2, -1))
+        modes = (along_x[:, None] * along_y).reshape(len(self.matrix), -1)
+        found = modes.T @ self.matrix @ modes
+        return np.asarray(0.5 * (found + found.T))
+
+    def patch_compliance(self, patches: Partition) -> Array:
+        """Return the mean over patch i by unit pressure on patch j, shape (N, N) [mm/MPa].
+
+        Args:
+            patches: N patches within the face.
+        """
+        cells = self.on(patches.borders_x, patches.borders_y)
+        modes = np.kron(cells.means_x, cells.means_y)
+        return np.asarray(modes.T @ self.matrix @ modes * patches.areas)
+
+    def fewer(self, count: int) -> BodyModes:
+        """Return the first modes alone; what they lack tells how well K modes resolve the face.
+
+        Args:
+            count: Modes along a side, at most K.
+        """
+        if not 1 <= count <= self.count:
+            raise InputError("so many modes are not there", value=count, allowed=f"1 … {self.count}")
+        some = self.matrix.reshape(4 * (self.count,))[:count, :count, :count, :count]
+        return BodyModes(self.lengths, some.reshape(count**2, count**2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModesOnCells:
-    """The smooth rest on equal cells.
+    """A compliance in modes on the cells of a grid; pressures are uniform on cells.
+
+    Displacements are means over the cells, which makes the compliance symmetric for equal cells.
 
     Args:
-        over_x: Means of the modes over the cells along x, shape (K, nx).
-        over_y: Means along y, shape (K, ny).
-        matrix: D times the area of a cell, shape (K², K²) [mm/MPa].
+        matrix: D [mm/N].
+        means_x: Means of the modes along x over the cells, shape (K, nx).
+        means_y: Means along y, shape (K, ny).
+        widths_x: Widths of the cells along x, shape (nx,) [mm].
+        widths_y: Widths along y, shape (ny,) [mm].
     """
 
-    over_x: Array
-    over_y: Array
     matrix: Array
+    means_x: Array
+    means_y: Array
+    widths_x: Array
+    widths_y: Array
 
-    def displacement(self, pressure: Array, rows: Indices | None = None) -> Array:
-        """Return the mean displacements of cells by pressures on them.
+    def displacement(self, pressure: Array) -> Array:
+        """Return the displacements of all cells by pressures on them.
 
         Args:
-            pressure: Pressures on all cells of some rows, shape (r, ny) [MPa].
-            rows: Indices of these rows, zeros being on all others; all rows when not given.
+            pressure: Shape (nx, ny) [MPa].
 
         Returns:
-            Displacements of the cells of these rows, shape (r, ny) [mm].
+            Shape (nx, ny) [mm].
         """
-        over_x = self.over_x if rows is None else self.over_x[:, rows]
-        moments = over_x @ (pressure @ self.over_y.T)
-        modes = (self.matrix @ moments.ravel()).reshape(moments.shape)
-        return np.asarray((over_x.T @ modes) @ self.over_y)
+        moments = (self.means_x * self.widths_x) @ pressure @ (self.means_y * self.widths_y).T
+        amplitudes = (self.matrix @ moments.ravel()).reshape(moments.shape)
+        return np.asarray(self.means_x.T @ amplitudes @ self.means_y)
+
+    def among(self, rows: Indices, columns: Indices) -> ModesOnCells:
+        """Return the cells where some rows and columns of the grid cross.
+
+        Args:
+            rows: Indices of the rows, shape (r,).
+            columns: Indices of the columns, shape (c,).
+        """
+        return ModesOnCells(
+            self.matrix,
+            self.means_x[:, rows],
+            self.means_y[:, columns],
+            self.widths_x[rows],
+            self.widths_y[columns],
+        )
