@@ -15,8 +15,9 @@ from micro.cells.free_sides import FreeSides
 Array = NDArray[np.float64]
 Waves = NDArray[np.complex128]
 
-_NEAREST = 1.0 / 64.0
-"""First node of the distance from a side, in cells."""
+_NEAREST = 1.0 / 256.0
+"""First node of the distance from a side, in cells; the mean over the cell in a corner of constant
+pressure then errs by 0.4 % of the largest stress, with 1/16 by 8 %."""
 _STRESSES = ([0, 1, 2], [1, 0, 2])
 """Of σ_xx, σ_yy, σ_xy, those normal to, along and in shear with the sides across x and across y."""
 
@@ -92,9 +93,7 @@ class _Pair:
         """Apply the transpose of `stresses`, shape (rows, cells)."""
         waves = [self._to_waves(self._loads @ field) for field in fields]
         waves[2] = waves[2] * _SHEAR.conj()
-        found = np.matmul(
-            self._kernels.transpose(0, 2, 1), _parts(np.concatenate(waves, axis=1))
-        )
+        found = np.matmul(self._kernels.transpose(0, 2, 1), _parts(np.concatenate(waves, axis=1)))
         return np.asarray(self._rows @ self._from_waves(_of_parts(found)))
 
     def _to_waves(self, lines: Array) -> Waves:
