@@ -239,7 +239,8 @@ class HalfSpaceModel:
         )
         required = self._allowed(self._required(self._plane(control.approach or 0.0, _LEVEL)))
         total = None if control.force is None else self._total(control)
-        found = self._pressing.by_turning(required, Motions.turning(x, y, total), start)
+        known = None if start is None else Pressures(start, np.zeros(3), 0.0, 0, 0)
+        found = self._pressing.by_turning(required, Motions.turning(x, y, total), known)
         approach = control.approach if control.force is None else float(found.motion[0])
         return self._state(
             self._plane(float(approach or 0.0), _slopes(found.motion[-2:], half)), found
@@ -325,7 +326,8 @@ class HalfSpaceModel:
                 value=plane.approach,
                 allowed=f"< {plane.approach - required.mean():.6g} mm; beyond it give the force",
             )
-        return self._state(plane, self._pressing.by_approach(self._allowed(required), start))
+        known = None if start is None else Pressures(start, np.zeros(0), 0.0, 0, 0)
+        return self._state(plane, self._pressing.by_approach(self._allowed(required), known))
 
     def _plane(self, approach: float, tilt: tuple[float, float]) -> RigidPlane:
         self._check_tilt(tilt)
@@ -375,7 +377,6 @@ class HalfSpaceModel:
     def _pressing(self) -> Pressing:
         grids = ElasticGrids(
             periodic=self.periodic,
-            whole=self.surface.grid,
             modulus=self.contact_modulus,
             sides=self.sides,
             body=self.body,
