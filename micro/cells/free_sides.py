@@ -22,7 +22,13 @@ Array = NDArray[np.float64]
 
 _SHORTEST = 24.0  # waves on the shortest rectangle along the side
 _NEAREST = 1.0 / 256.0  # of the narrowest rectangle across it: the first node
-_PLANE = 1e-4  # of a wave over the largest distance: plane strain
+_STRESS_REACH = 2.0
+"""Reach of stresses over that of displacements.
+
+With it the first-order effect of slopes on a smooth load at or beside a side differed by −0.7 to
+2.3 % from that in meshed cubes and columns (ν 0 to 0.45), and by −2 to −6 % in blocks half or a
+fifth as high as wide. In cubes, half the reach makes it −10 to 1 %, none 5 to 15 %.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,13 +74,14 @@ class FreeSides:
             Shape (w, n, n); symmetric.
         """
         space = quarter_space(self.poisson_ratio)
-        numbers = np.pi * waves / self.lengths[1 - axis]
-        larger, smaller = np.maximum(numbers, 1.0 / self.reach), np.minimum(numbers, 1 / self.reach)
-        numbers = larger * (1.0 + (smaller / larger) ** 4) ** 0.25
+        numbers = self._wave_numbers(axis, waves, self.reach)
         return np.stack([space.compliance(distances, number) for number in numbers])
 
     def stresses(self, axis: int, distances: Array, waves: NDArray[np.intp]) -> Array:
         """Return the stresses that one side adds at distances by line loads at distances.
+
+        They have twice the reach of displacements. At the side they cancel the half-space's
+        stresses, which know of no reach.
 
         Args:
             axis: 0 for sides across x, 1 across y.
@@ -85,8 +92,23 @@ class FreeSides:
             Normal to the side, along it, and in shear, shape (3, w, n, n), the loads last [1/mm].
         """
         space = quarter_space_stresses(self.poisson_ratio)
-        numbers = np.maximum(np.pi * waves / self.lengths[1 - axis], _PLANE / distances[-1])
-        return np.stack([space.stresses(distances, number) for number in numbers], axis=1)
+        numbers = self._wave_numbers(axis, waves, _STRESS_REACH * self.reach)
+        found = np.stack([space.stresses(distances, number) for number in numbers], axis=1)
+        apart = np.add.outer(distances, distances)
+        taken, due = (
+            number[:, None, None] * np.exp(-np.multiply.outer(number, apart))
+            for number in (numbers, np.pi * waves / self.lengths[1 - axis])
+        )
+        rest = (0.5 - self.poisson_ratio) * (taken - due)
+        found[0] += rest
+        found[2] -= rest
+        return found
+
+    def _wave_numbers(self, axis: int, waves: NDArray[np.intp], reach: float) -> Array:
+        """Return the wave numbers along a side, those of waves beyond the reach raised to 1/λ."""
+        numbers = np.pi * waves / self.lengths[1 - axis]
+        larger, smaller = np.maximum(numbers, 1.0 / reach), np.minimum(numbers, 1.0 / reach)
+        return np.asarray(larger * (1.0 + (smaller / larger) ** 4) ** 0.25)
 
     def top(self, x: Array, y: Array, loads: Partition) -> Array:
         """Return the displacement of points by unit pressure on rectangles, for E* = 1.
