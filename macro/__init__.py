@@ -3,17 +3,16 @@
 BlockShape → block_mesh → Block (with a Material) → Interface (with a PatchGrid)
 → PressedBlock (with one ContactLaw per patch) → PressState for every load step.
 
-`make_correction` gives what a finite block adds to the half-space; rough_block_mesh → Block
+`face_compliance` is the displacement of the contact face in smooth modes; rough_block_mesh → Block
 → ObstacleBlock meshes the roughness itself, as a reference.
 """
 
 from macro.block import Block
+from macro.body.face_compliance import FaceCompliance, cached_face_compliance, face_compliance
+from macro.body.mode_count import mode_count
 from macro.compliance import plain_compliance
-from macro.condense import HalfSpaceField, make_correction
-from macro.correction import Correction, Sag
 from macro.elasticity import Material
 from macro.interface import ContactLaw, Interface
-from macro.kept import cached_correction, correction_is_kept
 from macro.mesh import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
 from macro.obstacle import ObstacleBlock, ObstacleState
 from macro.output import write_fields, write_rough_fields
@@ -27,8 +26,7 @@ __all__ = [
     "Block",
     "BlockMesh",
     "ContactLaw",
-    "Correction",
-    "HalfSpaceField",
+    "FaceCompliance",
     "Interface",
     "Material",
     "MeshQuality",
@@ -36,11 +34,10 @@ __all__ = [
     "ObstacleState",
     "PressState",
     "PressedBlock",
-    "Sag",
     "block_mesh",
-    "cached_correction",
-    "correction_is_kept",
-    "make_correction",
+    "cached_face_compliance",
+    "face_compliance",
+    "mode_count",
     "plain_compliance",
     "rough_block_mesh",
     "write_fields",

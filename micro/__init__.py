@@ -13,6 +13,11 @@ from micro.boussinesq import HalfSpace
 from micro.cells.contacts import Contacts, find_contacts
 from micro.cells.free_sides import FreeSides
 from micro.cells.half_space_state import HalfSpaceState
+from micro.cells.side_stresses import SideStresses
+from micro.compliance.body_modes import BodyModes
+from micro.compliance.finite_slopes import FiniteSlopes
+from micro.compliance.half_space_modes import half_space_modes
+from micro.compliance.side_modes import side_modes
 from micro.ellipse import (
     area_factor,
     axis_factor,
@@ -21,14 +26,13 @@ from micro.ellipse import (
     eccentricity_approximate,
     force_factor,
 )
-from micro.finite_slope import finite_slope_effect
 from micro.half_space import HalfSpaceModel
 from micro.hertz import HertzContact, contact_modulus
 from micro.influence import influence_matrix, mutual_influence
 from micro.love import love_centre, love_integral, love_mean, love_mutual
 from micro.model import MicroModel
 from micro.models import MODEL_NAMES, micro_model
-from micro.plane import Field, RigidPlane
+from micro.plane import RigidPlane
 from micro.regions.island_state import IslandState
 from micro.regions.islands import IslandModel
 from micro.response import Pressed, Response
@@ -45,10 +49,11 @@ __all__ = [
     "SOLVERS",
     "AsperityModel",
     "AsperityState",
+    "BodyModes",
     "Candidate",
     "Choice",
     "Contacts",
-    "Field",
+    "FiniteSlopes",
     "FreeSides",
     "HalfSpace",
     "HalfSpaceModel",
@@ -62,6 +67,7 @@ __all__ = [
     "Response",
     "RigidPlane",
     "ScaledModel",
+    "SideStresses",
     "area_factor",
     "asperity_model",
     "axis_factor",
@@ -71,8 +77,8 @@ __all__ = [
     "eccentricity",
     "eccentricity_approximate",
     "find_contacts",
-    "finite_slope_effect",
     "force_factor",
+    "half_space_modes",
     "influence_matrix",
     "love_centre",
     "love_integral",
@@ -81,4 +87,5 @@ __all__ = [
     "micro_model",
     "mutual_influence",
     "resampled",
+    "side_modes",
 ]

@@ -182,7 +182,9 @@ class HalfSpaceModel:
         """
         return self.equilibrium(Control(force=force, tilt=tilt), start=start)
 
-    def equilibrium(self, control: Control, *, start: HalfSpaceState | None = None) -> HalfSpaceState:
+    def equilibrium(
+        self, control: Control, *, start: HalfSpaceState | None = None
+    ) -> HalfSpaceState:
         """Solve the contact and the motions of the plane that are free, as one problem.
 
         Args:
@@ -239,7 +241,9 @@ class HalfSpaceModel:
         total = None if control.force is None else self._total(control)
         found = self._pressing.by_turning(required, Motions.turning(x, y, total), start)
         approach = control.approach if control.force is None else float(found.motion[0])
-        return self._state(self._plane(float(approach or 0.0), _slopes(found.motion[-2:], half)), found)
+        return self._state(
+            self._plane(float(approach or 0.0), _slopes(found.motion[-2:], half)), found
+        )
 
     def _total(self, control: Control) -> float:
         dx, dy = self.surface.spacing

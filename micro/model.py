@@ -6,13 +6,12 @@ from typing import Any, Protocol, Self
 
 from numpy.typing import ArrayLike
 
-from geometry import Partition, PatchGrid
-from micro.plane import RigidPlane
+from geometry import Control, Partition, PatchGrid
 from micro.response import Pressed, Response
 
 
 class MicroModel(Protocol):
-    """A rough surface on an elastic half-space, pressed by a rigid plane."""
+    """A rough surface on an elastic body, pressed by a rigid plane."""
 
     @property
     def name(self) -> str:
@@ -73,24 +72,24 @@ class MicroModel(Protocol):
 
     def press(
         self,
-        plane: RigidPlane,
+        control: Control,
         *,
         patches: Partition,
         mean_heights: ArrayLike,
         start: Any = None,
     ) -> Pressed:
-        """Solve under one plane, which may be tilted and sag.
+        """Solve one load step: contacts and the free motions of the plane.
 
         Args:
-            plane: The plane, which turns about the centre of the surface's rectangle.
+            control: What is prescribed of the plane: approach or force, tilt or no moment.
             patches: Patches that results are summed over.
             mean_heights: Mean heights of the patches, shape (N,) [mm].
-            start: What this model returned under a plane nearby; None starts from nothing.
+            start: What this model returned at a load step nearby; None starts from nothing.
 
         Returns:
-            The response and where to start the next plane from.
+            The response, of one row, the plane, and where to start the next load step from.
 
         Raises:
             InputError: When the arguments do not fit the surface.
-            NotConverged: When the contact conditions cannot be met.
+            NotConverged: When the contact conditions or the prescribed loads cannot be met.
         """

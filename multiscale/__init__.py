@@ -7,16 +7,13 @@ patch its law, the laws go onto the flat interface of an elastic block, and load
 
 from multiscale.compare import compare
 from multiscale.comparing.comparison import Comparison, Row
-from multiscale.coupling import AnalyticCoupling, EmbeddedCoupling
-from multiscale.couplings.concurrent import ConcurrentCoupling
+from multiscale.coupling import ContactCoupling, EmbeddedCoupling
 from multiscale.couplings.condensed import CondensedCoupling
-from multiscale.couplings.yielding import SpreadLoads, UniformLoads
 from multiscale.history import History
 from multiscale.law_tables.consistent import consistent_laws
 from multiscale.law_tables.isolated import isolated_laws
 from multiscale.law_tables.law_files import LawTable, read_laws, write_laws
 from multiscale.law_tables.patch_laws import PatchLaws
-from multiscale.law_tables.spread import ContactSpread
 from multiscale.laws import PatchLaw
 from multiscale.load_step import LoadStep, PatchState
 from multiscale.loading import Programme, load_steps
@@ -30,12 +27,10 @@ from multiscale.stage import Stage
 from multiscale.staging import make_stage
 
 __all__ = [
-    "AnalyticCoupling",
     "Checkpoint",
     "Comparison",
-    "ConcurrentCoupling",
     "CondensedCoupling",
-    "ContactSpread",
+    "ContactCoupling",
     "EmbeddedCoupling",
     "Estimate",
     "History",
@@ -50,9 +45,7 @@ __all__ = [
     "Row",
     "Run",
     "Scene",
-    "SpreadLoads",
     "Stage",
-    "UniformLoads",
     "compare",
     "consistent_laws",
     "extrapolated",

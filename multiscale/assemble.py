@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from geometry.collective import on_root
+from geometry.control import Control
 from geometry.errors import InputError
-from micro import FreeSides, HalfSpaceModel, MicroModel, resampled
-from multiscale.coupling import AnalyticCoupling, EmbeddedCoupling
+from multiscale.coupling import ContactCoupling, EmbeddedCoupling
 from multiscale.couplings.blocks import (
-    bending_block,
-    contact_correction,
     contact_model,
     embedding,
-    yielding,
+    patch_compliance,
+    patch_displacements,
 )
-from multiscale.couplings.concurrent import TOLERANCE, ConcurrentCoupling
 from multiscale.couplings.condensed import CondensedCoupling
 from multiscale.law_tables.consistent import consistent_laws
 from multiscale.law_tables.isolated import isolated_laws
@@ -30,15 +26,9 @@ from multiscale.stage import Stage
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import Interface
 
-_SHARP = 1e-2 * TOLERANCE
-"""Residual of half-space solutions: their forces are then right to 1e-12, so that neither the unit
-of length nor the number of ranks is seen in a result. It costs a tenth more than the usual 1e-8."""
-
-_COARSE = 64  # cells along a side, at most, of the surface that goes ahead
-
 
 def make_table(stage: Stage, comm: Any) -> LawTable:
-    """Tabulate the laws of all patches: each alone, or all from the whole surface under its plane.
+    """Tabulate the laws of all patches: each alone, or all from the whole surface on its block.
 
     Args:
         stage: The scene's ingredients.
@@ -60,21 +50,21 @@ def make_table(stage: Stage, comm: Any) -> LawTable:
             allowed="isolated, consistent",
             file=stage.scene.file,
         )
+    model = contact_model(stage, comm)
     if kind == "consistent":
-        sinking = bending_block(stage, comm)
+        programme = stage.scene.loading.programme
         return consistent_laws(
-            _sharp(stage.model if sinking is None else contact_model(stage)),
+            model,
             stage.patches,
             mean_heights=stage.mean_heights,
-            approach_end=on_root(comm, lambda: stage.approach_end),
+            largest=Control(**{programme.quantity: programme.largest}, tilt=programme.tilt),
+            displacements=patch_displacements(stage, comm, dense=newton_choice(stage).condensed),
             tolerance=stage.table_tolerance,
             most_rows=stage.table_rows,
-            tilt=stage.furthest[1],
-            sinking=sinking,
             comm=comm,
         )
     return isolated_laws(
-        _sharp(stage.model),
+        model,
         stage.patches,
         mean_heights=stage.mean_heights,
         closure_ends=stage.closure_ends,
@@ -103,14 +93,13 @@ def assemble(stage: Stage, table: LawTable | None, comm: Any) -> tuple[Coupling,
         return _with_laws(stage, table, comm)
     if stage.meshes is not None:
         return make_reference(stage, comm), None
-    if stage.embedded:
-        return _concurrent(stage, comm), None
-    return AnalyticCoupling(_sharp(stage.model), stage.patches, stage.mean_heights), None
+    model = contact_model(stage, comm)
+    return ContactCoupling(model, stage.patches, stage.mean_heights, comm), None
 
 
 def _with_laws(stage: Stage, table: LawTable, comm: Any) -> tuple[Coupling, Interface | None]:
     if newton_choice(stage, table).condensed:
-        return CondensedCoupling(table, yielding(stage, table, comm)), None
+        return CondensedCoupling(table, patch_compliance(stage, comm)), None
     from macro import PressedBlock
 
     interface = embedding(stage, comm)
@@ -118,35 +107,3 @@ def _with_laws(stage: Stage, table: LawTable, comm: Any) -> tuple[Coupling, Inte
     mode = stage.scene.coupling.interface
     pressed = PressedBlock(interface.block, interface, laws, mode=mode)
     return EmbeddedCoupling(pressed, table), interface
-
-
-def _concurrent(stage: Stage, comm: Any) -> Coupling:
-    model = _sharp(contact_model(stage))
-    sides = model.sides if isinstance(model, HalfSpaceModel) else None
-    return ConcurrentCoupling(
-        model,
-        stage.patches,
-        stage.mean_heights,
-        contact_correction(stage, comm),
-        coarse=None if stage.by_summits else _coarse_model(stage, sides),
-        comm=comm,
-    )
-
-
-def _sharp(model: MicroModel) -> MicroModel:
-    """Return a micro model whose own error is none beside the tolerances of what it goes into."""
-    return replace(model, tolerance=_SHARP) if isinstance(model, HalfSpaceModel) else model
-
-
-def _coarse_model(stage: Stage, sides: FreeSides | None) -> MicroModel | None:
-    """Return a half-space of fewer cells; None where the surface itself has no more."""
-    surface = stage.surface
-    cells = min(surface.grid[0], _COARSE), min(surface.grid[1], _COARSE)
-    if cells == surface.grid:
-        return None
-    return HalfSpaceModel(
-        surface=resampled(surface, cells),
-        contact_modulus=stage.model.contact_modulus,
-        highest=surface.highest,
-        sides=sides,
-    )

@@ -1,4 +1,4 @@
-"""Couplings that solve every load step in full: the micro model alone, laws on finite elements."""
+"""Couplings that solve every load step in full: the contact problem, laws on finite elements."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.collective import on_root
 from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
 from micro import MicroModel, Response, RigidPlane
-from multiscale.couplings.balance import Balance
 from multiscale.law_tables.law_files import LawTable
 from multiscale.load_step import LoadStep, PatchState
 from multiscale.loading import BeyondLaws, described
@@ -24,56 +24,47 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
 Array = NDArray[np.float64]
 
 
-class AnalyticCoupling:
-    """The micro model alone: the whole surface on one elastic half-space.
+class ContactCoupling:
+    """The contact problem itself at every load step: no laws.
+
+    ``analytic`` is the micro model on a half-space, ``concurrent`` the same on the scene's block:
+    they differ by a term of the compliance. Rank 0 solves for all.
 
     Args:
-        model: Micro model of the whole surface.
+        model: Micro model of the whole surface, with the body that it is pressed on.
         patches: Partition that the results are summed over; it does not change the solution.
         mean_heights: Mean height of each patch, shape (N,) [mm].
+        comm: MPI communicator (mpi4py) or None.
     """
 
-    def __init__(self, model: MicroModel, patches: PatchGrid, mean_heights: Array) -> None:
+    def __init__(
+        self, model: MicroModel, patches: PatchGrid, mean_heights: Array, comm: Any = None
+    ) -> None:
         self._model, self._patches, self._mean_heights = model, patches, mean_heights
+        self._comm = comm
         self._start: Any = None
-        self._iterations = 0
-        half = 0.5 * float(np.hypot(*patches.lengths))
-        self._balance = Balance(half=half, first_touch=model.first_touch)
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `Coupling.press`."""
-        self._iterations = 0
-        plane, response = self._balance.solve(self._loads, control)
-        lean = tilted_approaches(self._patches, float(plane[0]), (plane[1], plane[2]))
-        return response_step(
-            response,
-            self._patches,
-            plane=plane,
-            closure=lean - response.patch_displacement[0],
-            iterations=self._iterations,
-        )
+        kept: list[Any] = [None]
+
+        def solved() -> tuple[Response, RigidPlane]:
+            response, plane, kept[0] = self._model.press(
+                control, patches=self._patches, mean_heights=self._mean_heights, start=self._start
+            )
+            return response, plane
+
+        response, plane = on_root(self._comm, solved)
+        self._start = kept[0]
+        return response_step(response, self._patches, plane=plane)
 
     def state(self) -> Arrays:
-        """Return the latest plane and solution; see `Restorable`."""
-        return packed((self._balance.plane, self._balance.force, self._start))
+        """Return the latest solution; see `Restorable`. It is whole on rank 0 alone."""
+        return packed(self._start)
 
     def restore(self, state: Arrays) -> None:
-        """Go on from a plane and a solution; see `Restorable`."""
-        self._balance.plane, self._balance.force, self._start = unpacked(state, ())
-
-    def _loads(self, plane: Array) -> tuple[Array, Response]:
-        """Return force and moments of a plane, and the response."""
-        middle = self._patches.middle
-        rigid = RigidPlane(
-            approach=float(plane[0]),
-            tilt=(float(plane[1]), float(plane[2])),
-            centre=(float(middle[0]), float(middle[1])),
-        )
-        response, self._start = self._model.press(
-            rigid, patches=self._patches, mean_heights=self._mean_heights, start=self._start
-        )
-        self._iterations += int(response.iterations[0])
-        return np.array([response.force[0], *response.moment[0]]), response
+        """Go on from a solution; see `Restorable`."""
+        self._start = unpacked(state, (RigidPlane,))
 
 
 class EmbeddedCoupling:
@@ -159,37 +150,33 @@ class EmbeddedCoupling:
         )
 
 
-def response_step(
-    response: Response, patches: PatchGrid, *, plane: Array, closure: Array, iterations: int
-) -> LoadStep:
+def response_step(response: Response, patches: PatchGrid, *, plane: RigidPlane) -> LoadStep:
     """Return the load step that a micro model's response to one plane is.
 
     Args:
         response: The response, of one row.
         patches: The partition it is summed over.
-        plane: Approach at the middle [mm] and slopes of the plane, shape (3,).
-        closure: Mean closures of the patches, shape (N,) [mm].
-        iterations: Iterations of the micro model, of all solutions that led to this one.
+        plane: The plane.
     """
     return LoadStep(
         step=0,
-        approach_mm=float(plane[0]),
+        approach_mm=plane.approach,
         force_N=float(response.force[0]),
         mean_pressure_MPa=float(response.mean_pressure[0]),
         contact_area_fraction=float(response.contact_area_fraction[0]),
         mean_separation_mm=float(response.mean_separation[0]),
         contacts=int(response.contacts[0]),
-        newton_iterations=iterations,
+        newton_iterations=int(response.iterations[0]),
         linear_iterations=0,
         wall_s=0.0,
         reason="CONVERGED",
         patches=PatchState(
-            closure_mm=closure,
+            closure_mm=plane.means(patches) - response.patch_displacement[0],
             pressure_MPa=response.patch_force[0] / patches.area,
             contact_area_fraction=response.patch_contact_area[0] / patches.area,
         ),
         residuals=(float(response.residual[0]),),
-        tilt=(float(plane[1]), float(plane[2])),
+        tilt=plane.tilt,
         moment_N_mm=(float(response.moment[0, 0]), float(response.moment[0, 1])),
         warnings=response.warnings,
     )

@@ -9,7 +9,6 @@ from typing import Any
 from geometry.errors import InputError
 from geometry.files import read_surface
 from geometry.meshes import BlockShape
-from geometry.smooth_shape import smooth_shape
 from geometry.spectrum import synthesise
 from geometry.surface import Surface
 from multiscale.scene import Scene
@@ -56,8 +55,6 @@ def make_shape(scene: Scene, surface: Surface) -> BlockShape:
         "margin_grading": block.margin_grading if block.margin else 1.0,
     }
     shape: BlockShape = _located(scene, "block", lambda: BlockShape(**given))
-    if scene.coupling.kind != "analytic" and scene.coupling.decomposed:
-        _located(scene, "block.cells", lambda: smooth_shape(shape))
     return shape
 
 

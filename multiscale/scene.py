@@ -138,6 +138,7 @@ class MicroSection(Section):
     tolerance: Annotated[Number, Field(gt=0, lt=0.5)] | None = None
     solver: Literal["active-set", "truncated-newton"] = "active-set"
     curvature: Literal["summit", "contact"] = "summit"
+    finite_slopes: Flag | None = None
     border: Literal["ignore", "include"] = "ignore"
 
     @model_validator(mode="after")

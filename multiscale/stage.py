@@ -13,7 +13,7 @@ from geometry.asperities import Asperities
 from geometry.meshes import BlockShape
 from geometry.patches import PatchGrid
 from geometry.surface import Surface
-from micro import AsperityModel, Choice, MicroModel, ScaledModel
+from micro import AsperityModel, Choice, HalfSpaceModel, MicroModel, ScaledModel
 from multiscale.coupling import tilted_approaches
 from multiscale.law_tables.refinement import MOST_ROWS
 from multiscale.planning.contact_estimate import Contacts, contacts, nearest
@@ -82,6 +82,13 @@ class Stage:
         return self.scene.coupling.kind in ("isolated", "consistent")
 
     @property
+    def finite_slopes(self) -> bool:
+        """Whether the micro model sees that slopes are finite."""
+        stated = self.scene.micro.finite_slopes
+        able = self.scene.coupling.kind != "isolated" and isinstance(self.micro, HalfSpaceModel)
+        return able if stated is None else stated and able
+
+    @property
     def by_summits(self) -> bool:
         """Whether the micro model sees summits rather than the whole surface."""
         return isinstance(self.micro, AsperityModel | ScaledModel)
@@ -145,24 +152,6 @@ class Stage:
         if loading.tilt == "free":
             ends = ends + (ends.max() - approach)
         return ends + CLOSURE_RESERVE * self.deepest
-
-    @cached_property
-    def approach_end(self) -> float:
-        """Largest approach at the middle that laws of the whole surface are made for [mm].
-
-        Under a patch that is closed further than its neighbours, or on a block that is stiffer
-        than the half-space, the law's own surface moves away under more load than is there; the
-        laws go further by what all of its displacement is worth. Solves the micro model once.
-
-        Raises:
-            NotConverged: When the micro model does not converge.
-        """
-        tilt = self.furthest[1]
-        end = float(np.max(self.closure_ends - tilted_approaches(self.patches, 0.0, tilt)))
-        response = self.model.respond(
-            [end], patches=self.patches, mean_heights=self.mean_heights, tilt=tilt
-        )
-        return end + float(response.patch_displacement.mean())
 
     @property
     def reached(self) -> NDArray[np.bool_]:

@@ -21,7 +21,6 @@ from multiscale.planning.micro_choice import (
     furthest_plane,
     stated_model,
 )
-from multiscale.planning.room import check_smooth_rest
 from multiscale.planning.surface_choice import chosen_surface, micro_tolerance
 from multiscale.reference.meshes import reference_meshes
 from multiscale.scene import Scene
@@ -61,7 +60,6 @@ def make_stage(
     stage = _micro_stage(scene, start, surface, patches, asperities, label, began)
     if free & SETTLED_LATE:
         return cheapest(stage, scene, free, nodes)
-    check_smooth_rest(stage, nodes)
     return stage
 
 

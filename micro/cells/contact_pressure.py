@@ -159,9 +159,7 @@ class _Search:
                 return
             pressure = found.support
         work = float(np.vdot(pressure, self.grid.displacement(pressure)))
-        balanced = self._admissible(
-            pressure * (float(np.vdot(pressure, self.required)) / work)
-        )
+        balanced = self._admissible(pressure * (float(np.vdot(pressure, self.required)) / work))
         self.accept(pressure if balanced is None else balanced)
 
     def accept(self, pressure: Array) -> None:
@@ -244,9 +242,7 @@ class _Search:
                 first = int(np.argmin(np.where(stuck, change, 0.0)))
                 part = 0.0
             else:
-                ways = np.divide(
-                    pressure, -change, out=np.full_like(change, np.inf), where=falling
-                )
+                ways = np.divide(pressure, -change, out=np.full_like(change, np.inf), where=falling)
                 first = int(np.argmin(ways))
                 part = min(1.0, float(ways[first]))
                 pressure = np.maximum(pressure + part * change, 0.0)

@@ -84,7 +84,9 @@ class Motions:
     def on(self, box: Box) -> Motions:
         """Return the motions on a part of the cells, which carries all loads."""
         return Motions(
-            along_x=self.along_x[:, box.rows], along_y=self.along_y[:, box.columns], loads=self.loads
+            along_x=self.along_x[:, box.rows],
+            along_y=self.along_y[:, box.columns],
+            loads=self.loads,
         )
 
     def coarsened(self, factors: Sequence[int]) -> Motions:

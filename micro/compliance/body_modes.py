@@ -103,7 +103,9 @@ class BodyModes:
             count: Modes along a side, at most K.
         """
         if not 1 <= count <= self.count:
-            raise InputError("so many modes are not there", value=count, allowed=f"1 … {self.count}")
+            raise InputError(
+                "so many modes are not there", value=count, allowed=f"1 … {self.count}"
+            )
         some = self.matrix.reshape(4 * (self.count,))[:count, :count, :count, :count]
         return BodyModes(self.lengths, some.reshape(count**2, count**2))
 

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from geometry.control import Control
 from multiscale.coupling import beyond_law, embedded_step
 from multiscale.couplings.dense_newton import DenseNewton, DenseState
-from multiscale.couplings.yielding import Yielding
 from multiscale.law_tables.law_files import LawTable
 from multiscale.law_tables.patch_laws import PatchLaws
 from multiscale.load_step import LoadStep, PatchState
@@ -24,17 +23,17 @@ class CondensedCoupling:
 
     Args:
         table: The laws.
-        block: How the block yields, or its compliance: mean displacement of patch i by unit
-            pressure on patch j, (N, N) [mm/MPa].
+        compliance: Mean displacement of patch i of the block by unit pressure on patch j, shape
+            (N, N) [mm/MPa].
 
     Raises:
-        InputError: When the block does not fit the patches.
+        InputError: When the compliance does not fit the patches.
     """
 
-    def __init__(self, table: LawTable, block: Array | Yielding) -> None:
+    def __init__(self, table: LawTable, compliance: Array) -> None:
         self._patches, self._made_for = table.patches, table.made_by.get("coupling")
         self._laws = PatchLaws(table.laws)
-        self._newton = DenseNewton(self._laws, block, table.patches)
+        self._newton = DenseNewton(self._laws, compliance, table.patches)
         self._last: DenseState | None = None
 
     def press(self, control: Control) -> LoadStep:

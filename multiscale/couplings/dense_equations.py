@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
-from multiscale.couplings.yielding import UniformLoads, Yielding
 from multiscale.law_tables.tangent import Tangent
 from multiscale.loading import described
 
@@ -67,8 +66,8 @@ class DenseEquations:
 
     Args:
         laws: The laws.
-        block: How the block yields, or its compliance: mean displacement of patch i by unit
-            pressure on patch j, (N, N) [mm/MPa].
+        compliance: Mean displacement of patch i of the block by unit pressure on patch j, shape
+            (N, N) [mm/MPa].
         patches: The partition.
 
     Attributes:
@@ -81,9 +80,16 @@ class DenseEquations:
         InputError: When the compliance is not a finite matrix of the size of the partition.
     """
 
-    def __init__(self, laws: Laws, block: Array | Yielding, patches: PatchGrid) -> None:
-        self.laws, self.block = laws, _yielding(block, patches.count)
+    def __init__(self, laws: Laws, compliance: Array, patches: PatchGrid) -> None:
         count = patches.count
+        if compliance.shape != (count, count) or not np.all(np.isfinite(compliance)):
+            raise InputError(
+                "the compliance does not fit the patches",
+                value=compliance.shape,
+                allowed=f"a finite matrix of shape {(count, count)}",
+            )
+        self.laws, self.compliance = laws, compliance
+        self._own = np.diagonal(compliance)
         middle = patches.middle
         self.lever: Array = np.column_stack((np.ones(count), patches.centres - middle))
         self.area = patches.area
@@ -94,7 +100,7 @@ class DenseEquations:
     def at(self, local: Array, plane: Array) -> Iterate:
         """Evaluate a trial state."""
         point = self.laws.along(local)
-        missing = self.lever @ plane - point.closure - self.block.displacement(local, point)
+        missing = self.lever @ plane - point.closure - self.compliance @ point.pressure
         load = self.area * (self.lever.T @ point.pressure)
         return Iterate(local, plane, point, missing, load)
 
@@ -110,15 +116,15 @@ class DenseEquations:
             step: Change of the local approaches, shape (N,) [mm].
             plane: The plane after the step, shape (3,).
         """
-        rise = now.point.dclosure + self.block.own * now.point.dpressure
-        wanted = now.point.closure + self.block.own * now.point.pressure + rise * step
+        rise = now.point.dclosure + self._own * now.point.dpressure
+        wanted = now.point.closure + self._own * now.point.pressure + rise * step
         low, high = now.local, now.local + 2.0 * np.maximum(rise, 1.0) * step
         local = now.local + step
         for _ in range(_BENDS):
             point = self.laws.along(local)
-            ahead = (wanted - point.closure - self.block.own * point.pressure) * np.sign(step)
+            ahead = (wanted - point.closure - self._own * point.pressure) * np.sign(step)
             low, high = np.where(ahead > 0.0, local, low), np.where(ahead > 0.0, high, local)
-            slope = np.maximum(point.dclosure + self.block.own * point.dpressure, _FLATTEST)
+            slope = np.maximum(point.dclosure + self._own * point.dpressure, _FLATTEST)
             newton = local + ahead * np.sign(step) / slope
             inside = (newton - low) * (newton - high) < 0.0
             local = np.where(inside, newton, 0.5 * (low + high))
@@ -126,7 +132,7 @@ class DenseEquations:
 
     def tangent(self, now: Iterate) -> Tangent:
         """Return the derivative of closure + displacement over the local approaches."""
-        return Tangent.of(now.point, lambda of: self.block.slope(now.local, now.point, of))
+        return Tangent.of(now.point, lambda of: self.compliance[:, of] * now.point.dpressure[of])
 
 
 class LoadCase:
@@ -216,7 +222,7 @@ class LoadCase:
                 return -1.0
             if self.control.force is not None:
                 return self._equations.area * float(point.pressure.sum()) - self.control.force
-            return self._mean_approach(common + lean, point, lean) - plane[0]
+            return self._mean_approach(point, lean) - plane[0]
 
         below, above = -self._equations.half, 1e-6 * self._equations.half
         while excess(above) < 0.0:
@@ -230,7 +236,7 @@ class LoadCase:
             below, above = (middle, above) if excess(middle) < 0.0 else (below, middle)
         if self.control.force is not None:
             local = above + lean
-            plane[0] = self._mean_approach(local, self._equations.laws.along(local), lean)
+            plane[0] = self._mean_approach(self._equations.laws.along(local), lean)
         return above + lean, plane
 
     def failure(self, reason: str, iterations: int) -> NotConverged:
@@ -242,24 +248,7 @@ class LoadCase:
             remedy="take more load steps (load.steps)",
         )
 
-    def _mean_approach(self, local: Array, point: LawPoint, lean: Array) -> float:
+    def _mean_approach(self, point: LawPoint, lean: Array) -> float:
         """Return the plane's approach that the pressures see on their average [mm]."""
-        sink = point.closure + self._equations.block.displacement(local, point) - lean
+        sink = point.closure + self._equations.compliance @ point.pressure - lean
         return float(sink @ point.pressure / point.pressure.sum())
-
-
-def _yielding(block: Array | Yielding, count: int) -> Yielding:
-    """Take a compliance for what it stands for, and check that it fits N patches."""
-    if isinstance(block, np.ndarray):
-        if block.shape != (count, count) or not np.all(np.isfinite(block)):
-            raise InputError(
-                "the compliance does not fit the patches",
-                value=block.shape,
-                allowed=f"a finite matrix of shape {(count, count)}",
-            )
-        return UniformLoads(block)
-    if block.count != count:
-        raise InputError(
-            "the block does not fit the patches", value=block.count, allowed=f"{count} patches"
-        )
-    return block

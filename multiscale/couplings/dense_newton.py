@@ -12,7 +12,6 @@ from geometry.control import Control
 from geometry.errors import NotConverged
 from geometry.patches import PatchGrid
 from multiscale.couplings.dense_equations import TOLERANCE, DenseEquations, Iterate, Laws, LoadCase
-from multiscale.couplings.yielding import Yielding
 
 Array = NDArray[np.float64]
 
@@ -61,16 +60,16 @@ class DenseNewton:
 
     Args:
         laws: The laws.
-        block: How the block yields, or its compliance: mean displacement of patch i by unit
-            pressure on patch j, (N, N) [mm/MPa].
+        compliance: C, mean displacement of patch i of the block by unit pressure on patch j, shape
+            (N, N) [mm/MPa].
         patches: The partition.
 
     Raises:
         InputError: When the compliance is not a finite matrix of the size of the partition.
     """
 
-    def __init__(self, laws: Laws, block: Array | Yielding, patches: PatchGrid) -> None:
-        self._equations = DenseEquations(laws, block, patches)
+    def __init__(self, laws: Laws, compliance: Array, patches: PatchGrid) -> None:
+        self._equations = DenseEquations(laws, compliance, patches)
 
     def solve(self, control: Control, start: DenseState | None = None) -> DenseState:
         """Find the equilibrium of one load step.

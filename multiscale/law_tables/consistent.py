@@ -8,14 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.collective import on_root
+from geometry.control import Control
 from geometry.patches import PatchGrid
 from micro import MicroModel, influence_matrix
 from multiscale.law_tables.law_files import LawTable
 from multiscale.law_tables.refinement import MOST_ROWS
-from multiscale.law_tables.spread import Sinking
-from multiscale.law_tables.whole_surface import WholeSurface
+from multiscale.law_tables.whole_surface import Displacements, WholeSurface
 
 Array = NDArray[np.float64]
+
+_RESERVE = 0.02
+"""Rows beyond the largest load, of the way from first touch: what lies between rows may ask."""
 
 
 def consistent_laws(
@@ -23,33 +26,30 @@ def consistent_laws(
     patches: PatchGrid,
     *,
     mean_heights: Array,
-    approach_end: float,
+    largest: Control,
+    displacements: Displacements | None = None,
     tolerance: float = 1e-3,
     most_rows: int = MOST_ROWS,
-    tilt: tuple[float, float] = (0.0, 0.0),
-    sinking: Sinking | None = None,
     comm: Any = None,
 ) -> LawTable:
     """Tabulate the laws of all patches of one surface that is pressed as a whole.
 
-    On a block whose compliance is that of the half-space they give back the solution they were
-    made from, whatever the partition: to rounding at their rows, and between them to the error
-    that the table states.
+    In the macro model whose displacements they were made with they give back the solution they
+    were made from, whatever the partition: to rounding at their rows, and between them to the
+    error that the table states. Where the plane is free to turn, rows follow it as it turns.
 
     Args:
-        model: Micro model of the whole surface.
+        model: Micro model of the whole surface, on the body that the laws are for.
         patches: Its partition.
         mean_heights: Mean height of the surface over each patch, shape (N,) [mm].
-        approach_end: Largest approach at the middle that the laws will be asked for [mm];
-            patches that are not touched up to it are open.
+        largest: The largest load that the laws will be asked for; patches that are not touched up
+            to it are open.
+        displacements: Mean displacements of the patches by their pressures in the macro model;
+            those of a half-space when not given. Collective.
         tolerance: Interpolation error of the force, see `refinement.refined`.
         most_rows: Rows that are solved at most.
-        tilt: Slopes of the plane that presses the surface; laws serve other planes less well.
-        sinking: What the block that the laws are for sinks more than a half-space. Where its
-            rectangles divide the patches, the table then tells where the contacts are; smaller
-            patches tell so themselves.
-        comm: MPI communicator; its first rank solves, so that the table is the same to the bit on
-            any number of ranks.
+        comm: MPI communicator, whose ranks share the rows. The table does not depend on their
+            number.
 
     Returns:
         All laws, on every rank.
@@ -61,15 +61,34 @@ def consistent_laws(
         Collective.
     """
     means = np.asarray(mean_heights, dtype=float)
+    compliance = np.divide(influence_matrix(patches), np.pi * model.contact_modulus)
     whole = WholeSurface(
         model=model,
         patches=patches,
         mean_heights=means,
-        compliance=np.divide(influence_matrix(patches), np.pi * model.contact_modulus),
-        tilt=tilt,
-        sinking=sinking,
+        displacements=displacements or (lambda pressures: pressures @ compliance.T),
+        tilt=largest.tilt,
+        comm=comm,
     )
-    laws, error, spread = on_root(comm, lambda: whole.tabulated(approach_end, tolerance, most_rows))
+
+    def ends() -> tuple[float, float, tuple[float, float]]:
+        touch = Control(force=0.0, tilt=largest.tilt)
+        known = {"patches": patches, "mean_heights": means}
+        end, start = largest, None
+        if largest.approach is None or largest.tilt is None:
+            _, plane, start = model.press(largest, start=None, **known)
+            end = Control(approach=plane.approach, tilt=plane.tilt)
+        first = model.press(touch, start=start, **known).plane.approach
+        return first, float(end.approach or 0.0), end.tilt or (0.0, 0.0)
+
+    first, end, tilt = on_root(comm, ends)
+    laws, error = whole.tabulated(
+        first,
+        end + _RESERVE * max(end - first, 0.0),
+        compliance=compliance,
+        tolerance=tolerance,
+        most_rows=most_rows,
+    )
     return LawTable(
         patches=patches,
         laws=tuple(laws),
@@ -78,8 +97,7 @@ def consistent_laws(
             "model": model.name,
             "love": "mean",
             "tolerance": f"{tolerance:g}",
-            "tilt": f"{tilt[0]:g}, {tilt[1]:g}",
+            "tilt": "free" if largest.tilt is None else f"{tilt[0]:g}, {tilt[1]:g}",
         },
         force_error=error,
-        spread=spread,
     )

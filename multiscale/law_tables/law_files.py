@@ -11,10 +11,8 @@ from typing import Any, BinaryIO
 import h5py
 
 from geometry.errors import InputError
-from geometry.partition import UnevenPartition
 from geometry.patches import PatchGrid
 from multiscale.law_tables.repair import evened_law
-from multiscale.law_tables.spread import ContactSpread
 from multiscale.laws import PatchLaw
 from multiscale.records import stored_numbers
 from multiscale.sealed_files import sealed, unsealed
@@ -35,8 +33,7 @@ _SCALARS = {
     "warned_from": "MPa",
     "repaired": "1",
 }
-_SPREAD = {"approach": "mm", "forces": "N", "correction": "mm/N"}
-FORMAT = "patchlaw laws 2"
+FORMAT = "patchlaw laws 3"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,15 +47,12 @@ class LawTable:
             slopes of the plane that pressed the whole surface.
         force_error: Estimated error of the force between the rows, see `refinement.Errors`: of
             all patches together, or of the worst where each was tabulated alone.
-        spread: Where the contacts are within the patches, and what the block that the laws were
-            made for yields there; None for laws of a half-space.
     """
 
     patches: PatchGrid
     laws: tuple[PatchLaw, ...]
     made_by: dict[str, str]
     force_error: float = float("nan")
-    spread: ContactSpread | None = None
 
     def __post_init__(self) -> None:
         if len(self.laws) != self.patches.count:
@@ -98,12 +92,6 @@ def _fill(file: Any, table: LawTable) -> None:
             group.create_dataset(name, data=getattr(law, name)).attrs["unit"] = unit
         for name in _SCALARS:
             group.attrs[name] = getattr(law, name)
-    if table.spread is not None:
-        group = file.create_group("spread")
-        group.attrs["load_borders_x_mm"] = table.spread.loads.borders_x
-        group.attrs["load_borders_y_mm"] = table.spread.loads.borders_y
-        for name, unit in _SPREAD.items():
-            group.create_dataset(name, data=getattr(table.spread, name)).attrs["unit"] = unit
 
 
 def read_laws(path: Path | BinaryIO) -> LawTable:
@@ -154,15 +142,7 @@ def _table(file: Any) -> LawTable:
         laws=tuple(map(law, groups)),
         made_by=made_by,
         force_error=float(file.attrs["force_error"]),
-        spread=_spread(file["spread"], patches) if "spread" in file else None,
     )
-
-
-def _spread(group: Any, patches: PatchGrid) -> ContactSpread:
-    ticks = {f"ticks_{axis}": tuple(group.attrs[f"load_borders_{axis}_mm"]) for axis in "xy"}
-    loads = UnevenPartition(**ticks)
-    columns = {name: stored_numbers(group[name]) for name in _SPREAD}
-    return ContactSpread(patches=patches, loads=loads, **columns)
 
 
 def _law(group: Any) -> PatchLaw:

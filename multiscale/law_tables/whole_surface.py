@@ -3,147 +3,104 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.collective import together
+from geometry.control import Control
 from geometry.patches import PatchGrid
-from micro import Field, MicroModel, Response, RigidPlane
-from multiscale.coupling import tilted_approaches
+from micro import MicroModel, Response, RigidPlane
 from multiscale.law_tables.refinement import law_of, refined
-from multiscale.law_tables.spread import ContactSpread, Sinking, divides
 from multiscale.laws import PatchLaw
 
 Array = NDArray[np.float64]
+Displacements = Callable[[Array], Array]
+"""From pressures of N patches at m load steps to their mean displacements, [MPa] to [mm]."""
 
-_BENT = 0.3  # of the approach: more bending is left to the load steps
-_TOUCH = 1e-3  # first touch under a tilt, relative to what the tilt adds to the approach
+_SHARE = 4
+"""Rows that one rank solves together, each starting from the one before: however many ranks there
+are, rows start from the same ones."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WholeSurface:
     """A rough surface pressed as a whole by a rigid plane, seen patch by patch.
 
-    The closure of a patch is its local approach less the mean displacement of the patch by the mean
-    pressures of all patches, c_i = s_i − Σ_j Λ_ij p_j / (π E*): what a block answers with. What a
-    patch sinks beyond that (`PatchLaw.relief`) is told from its first touch on; before, by that
-    there. Laws made under a tilt know how it shares the load, and laws made on a block how it
-    bends: the surface is then pressed a second time, by a plane that sags as the block does under
-    the forces found first. What it sinks in the mean is left out, as a plane that comes less near.
+    A row is the contact problem at one approach, its plane tilted as given or free to turn. The
+    closure of patch i is its local approach less what the macro model lets it sink by the mean
+    pressures of all patches, c_i = s_i − (C p)_i. The macro model that the laws are for therefore
+    finds every row again, whatever its partition or mesh.
 
-    Attributes:
-        model: Micro model of the whole surface.
+    Args:
+        model: Micro model of the whole surface, on the body.
         patches: Its partition.
         mean_heights: Mean height of each patch, shape (N,) [mm].
-        compliance: Λ / (π E*), shape (N, N) [mm/MPa].
-        tilt: Slopes of the plane.
-        sinking: What the block sinks more than the half-space; None on a half-space.
+        displacements: C p of the macro model, collective.
+        tilt: Slopes of the plane; None lets it turn.
+        comm: MPI communicator, whose ranks share the rows; None for this process alone.
     """
 
     model: MicroModel
     patches: PatchGrid
     mean_heights: Array
-    compliance: Array
-    tilt: tuple[float, float] = (0.0, 0.0)
-    sinking: Sinking | None = None
-
-    @cached_property
-    def lean(self) -> Array:
-        """Local approach of every patch over that at the middle, shape (N,) [mm]."""
-        return tilted_approaches(self.patches, 0.0, self.tilt)
-
-    @cached_property
-    def first_touch(self) -> float:
-        """Approach at the middle at first contact under the tilt [mm]."""
-        if self.tilt == (0.0, 0.0):
-            return self.model.first_touch
-        reach = 0.5 * float(np.abs(self.tilt) @ np.asarray(self.patches.lengths))
-        below = self.model.first_touch - reach
-        return below + _first_loaded(lambda way: self._force(below + way), 2.0 * reach)
+    displacements: Displacements
+    tilt: tuple[float, float] | None = (0.0, 0.0)
+    comm: Any = None
 
     def rows(self, approaches: Array) -> Array:
-        """Return rows of all patches at increasing approaches of the first, shape (m, N, 7).
+        """Return rows of all patches at increasing approaches at the middle, shape (m, N, 7).
 
         The columns are local approach, closure, pressure, area fraction, contacts, relief, and
         whether the model warns.
-        """
-        middle = approaches - self.lean[0]
-        response = self.model.respond(
-            middle, patches=self.patches, mean_heights=self.mean_heights, tilt=self.tilt
-        )
-        return self._rows(middle, middle[:, None] + self.lean, response)
 
-    def _rows(self, middle: Array, local: Array, response: Response) -> Array:
-        pressure = response.patch_pressure.copy()
-        pressure[middle <= self.first_touch] = 0.0  # whatever round-off makes of it
-        displacement = pressure @ self.compliance
+        Note:
+            Collective.
+        """
+        solved = self._solved(approaches)
+        pressure = np.array([response.patch_pressure[0] for response, _ in solved])
+        sunk = self.displacements(pressure)
+        local = np.array([plane.means(self.patches) for _, plane in solved])
         touched = pressure > 0.0
+        area, contacts, displacement = (
+            np.array([getattr(response, name)[0] for response, _ in solved])
+            for name in ("patch_contact_area", "patch_contacts", "patch_displacement")
+        )
+        warned = np.array([response.warning[0] != "" for response, _ in solved])
         columns = (
             local,
-            local - displacement,
+            local - sunk,
             pressure,
-            np.where(touched, response.patch_contact_area / self.patches.area, 0.0),
-            np.where(touched, response.patch_contacts, 0),
-            response.patch_displacement - displacement,
-            np.broadcast_to((response.warning != "")[:, None], pressure.shape),
+            np.where(touched, area / self.patches.area, 0.0),
+            np.where(touched, contacts, 0),
+            displacement - sunk,
+            np.broadcast_to(warned[:, None], pressure.shape),
         )
         return np.stack(columns, axis=2).astype(np.float64)
 
-    def rows_on(self, block: Sinking, approaches: Array) -> tuple[Array, Array]:
-        """Return rows on a block that bends, and the forces on its rectangles, shape (m, M)."""
-        middle = approaches - self.lean[0]
-        nowhere: Array = np.zeros(block.loads.count)
-        responses, locals_, forces, start = [], [], [], None
-        for approach in middle:
-            plane = RigidPlane(approach=approach, tilt=self.tilt, centre=self._middle)
-            first, start = self.model.press(
-                plane, patches=block.loads, mean_heights=nowhere, start=start
+    def _solved(self, approaches: Array) -> list[tuple[Response, RigidPlane]]:
+        """Solve the contact problem at all approaches, shared by the ranks."""
+        parts = [approaches[k : k + _SHARE] for k in range(0, len(approaches), _SHARE)]
+        rank, size = (0, 1) if self.comm is None else (self.comm.rank, self.comm.size)
+        mine = together(self.comm, lambda: [self._along(part) for part in parts[rank::size]])
+        if size == 1:
+            return [row for part in mine for row in part]
+        gathered = self.comm.allgather(mine)
+        return [row for k in range(len(parts)) for row in gathered[k % size][k // size]]
+
+    def _along(self, approaches: Array) -> list[tuple[Response, RigidPlane]]:
+        found, start = [], None
+        for approach in approaches:
+            response, plane, start = self.model.press(
+                Control(approach=float(approach), tilt=self.tilt),
+                patches=self.patches,
+                mean_heights=self.mean_heights,
+                start=start,
             )
-            plane = replace(plane, sag=self._bending(block, first.patch_force[0], approach))
-            found, start = self.model.press(
-                plane, patches=self.patches, mean_heights=self.mean_heights, start=start
-            )
-            responses.append(found)
-            locals_.append(plane.means(self.patches))
-            forces.append(first.patch_force[0])
-        local = np.array(locals_)
-        rows = [
-            self._rows(middle[[k]], local[[k]], response) for k, response in enumerate(responses)
-        ]
-        return np.concatenate(rows), np.array(forces)
-
-    def _bending(self, block: Sinking, forces: Array, approach: float) -> Field | None:
-        """Return what the block sinks but for its mean under the forces, within limits."""
-        total = float(forces.sum())
-        if total <= 0.0:
-            return None
-        sag = block.sag(forces)
-        sunk = sag(*block.loads.centres.T)
-        mean = float(sunk @ forces) / total
-        furthest = _BENT * (approach - self.first_touch + float(np.abs(self.lean).max()))
-        bent = float(np.abs(sunk - mean).max())
-        share = min(1.0, furthest / bent) if bent else 1.0
-        return lambda x, y: share * (sag(x, y) - mean)
-
-    def _reserve(self, approach: float) -> float:
-        """Return how much further laws must go where the block bends, twice what it does [mm].
-
-        Patches that sag end at smaller local approaches; a step's own forces bend it once more.
-        """
-        if self.sinking is None:
-            return 0.0
-        plane = RigidPlane(approach=approach, tilt=self.tilt, centre=self._middle)
-        loads = self.sinking.loads
-        found = self.model.press(plane, patches=loads, mean_heights=np.zeros(loads.count))
-        sag = self._bending(self.sinking, found.response.patch_force[0], approach)
-        return 0.0 if sag is None else 2.0 * float(np.abs(sag(*loads.centres.T)).max())
-
-    @property
-    def _middle(self) -> tuple[float, float]:
-        x, y = self.patches.middle
-        return float(x), float(y)
+            found.append((response, plane))
+        return found
 
     def laws(self, rows: Array) -> list[PatchLaw]:
         """Return the laws of all patches through rows (m, N, 7), the plane coming nearer."""
@@ -151,60 +108,37 @@ class WholeSurface:
         return [_law(rows[:, index], float(reach)) for index, reach in enumerate(reaches)]
 
     def tabulated(
-        self, approach_end: float, tolerance: float, most_rows: int
-    ) -> tuple[list[PatchLaw], float, ContactSpread | None]:
-        """Return all laws up to an approach, the error of the force, and where the contacts are."""
-        seen: list[tuple[Array, Array, Array]] = []
+        self,
+        first_touch: float,
+        approach_end: float,
+        *,
+        compliance: Array,
+        tolerance: float,
+        most_rows: int,
+    ) -> tuple[list[PatchLaw], float]:
+        """Return all laws up to an approach, and the error of the force between rows.
 
-        def solve(approaches: Array) -> Array:
-            if self.sinking is None:
-                return self.rows(approaches)
-            rows, forces = self.rows_on(self.sinking, approaches)
-            seen.append((approaches, rows[:, :, 0], forces))
-            return rows
+        Args:
+            first_touch: Approach at the middle at first contact [mm].
+            approach_end: Largest approach at the middle [mm].
+            compliance: Of the patches, roughly that of the macro model, shape (N, N) [mm/MPa].
+            tolerance: Interpolation error of the force, see `refinement.refined`.
+            most_rows: Rows that are solved at most.
 
-        if approach_end <= self.first_touch:
-            laws, error = self.laws(solve(np.array([approach_end]) + self.lean[0])), 0.0
-        else:
-            laws, error = refined(
-                solve,
-                self.laws,
-                self.first_touch + self.lean[0],
-                approach_end + self._reserve(approach_end) + self.lean[0],
-                compliance=self.compliance,
-                tolerance=tolerance,
-                most_rows=most_rows,
-            )
-        return laws, error, self._spread(seen)
-
-    def _spread(self, seen: list[tuple[Array, Array, Array]]) -> ContactSpread | None:
-        if self.sinking is None or not divides(self.sinking.loads, self.patches):
-            return None
-        asked, local, forces = (np.concatenate(parts) for parts in zip(*seen, strict=True))
-        order = np.argsort(asked, kind="stable")
-        loads = self.sinking.loads
-        return ContactSpread(
-            patches=self.patches,
-            loads=loads,
-            approach=np.maximum.accumulate(local[order], axis=0),  # see `_law`
-            forces=forces[order],
-            correction=np.divide(self.sinking.patch_compliance(loads), loads.areas),
+        Note:
+            Collective.
+        """
+        if approach_end <= first_touch:
+            return self.laws(self.rows(np.array([approach_end]))), 0.0
+        return refined(
+            self.rows,
+            self.laws,
+            first_touch,
+            approach_end,
+            compliance=compliance,
+            tolerance=tolerance,
+            most_rows=most_rows,
         )
-
-    def _force(self, approach: float) -> float:
-        response = self.model.respond(
-            [approach], patches=self.patches, mean_heights=self.mean_heights, tilt=self.tilt
-        )
-        return float(response.force[0])
-
-
-def _first_loaded(force: Callable[[float], float], way: float) -> float:
-    """Return the way on which a force appears, to a thousandth below."""
-    low, high = 0.0, way
-    while high - low > _TOUCH * way:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if force(middle) <= 0.0 else (low, middle)
-    return low
 
 
 def _law(rows: Array, reach: float) -> PatchLaw:

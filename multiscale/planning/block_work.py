@@ -1,4 +1,4 @@
-"""Counts the work and the memory of blocks: smooth rests, meshes under laws, explicit rough ones.
+"""Counts the work and the memory of blocks: body terms, meshes under laws, explicit rough ones.
 
 Counts are measured: operations and entries of factors as MUMPS tells them, on 2 to 82 thousand
 unknowns; cycles and times of set-ups over the machine's rates, on 8 to 131 thousand.
@@ -10,21 +10,18 @@ import math
 import sys
 
 from geometry.meshes import BlockShape
-from geometry.smooth_shape import smooth_shape
-from multiscale.nodes import Need
 from multiscale.planning.work import Work
 from multiscale.reference.meshes import ReferenceMeshes
 
 IMPORT = Work(call=2_700_000)
 """Loading dolfinx, PETSc and gmsh, unless they are there."""
 
+BODY = Work(call=250_000)
+"""The body term of a cube; thin blocks take several times more."""
+
 _CYCLE = 6.6  # products with the stiffness that a cycle is worth
 _SET_UP = 250.0  # products that mesh, stiffness and multigrid are worth
 _ENTRIES = {"Q1": 81.0, "P1": 45.0, "Q2": 190.0, "P2": 85.0}  # of the stiffness, per unknown
-_FACTOR = 30.0  # operations over unknowns²
-_FILL = 21.0  # entries of the factor over unknowns^(4/3)
-_FIELD = 200.0  # logarithms that the half-space's stresses at a point by a rectangle are worth
-_ASSEMBLY = 120.0  # products that the smooth rest's stiffness is worth
 _REFERENCE_CYCLES = {"Q1": 15, "Q2": 60, "P1": 40, "P2": 60}
 """Multigrid cycles of all active sets of a load step: 15 to 22, 31 to 44 and 51 to 76 were counted
 with Q1, P1 and P2; Q2 is taken like P2."""
@@ -35,36 +32,6 @@ _TURNING = 1.4  # times more where the plane turns: up to 90 with P2
 def import_work() -> Work:
     """Return the work of loading the finite elements, none where they are loaded."""
     return Work() if "dolfinx" in sys.modules else IMPORT
-
-
-def smooth_work(shape: BlockShape, loads: tuple[int, int]) -> Work:
-    """Return the work of the smooth rest of a block: assembly, factors, a solution for each load.
-
-    Args:
-        shape: The block.
-        loads: Rectangles along x and y.
-    """
-    unknowns, count = smooth_shape(shape).unknowns, math.prod(loads)
-    return Work(
-        call=60_000,
-        function=_FIELD * _side_points(shape, loads) * count,
-        flop=_FACTOR * unknowns**2 + 7.0 * _FILL * unknowns ** (4 / 3) * count,
-        product=_ASSEMBLY * 170.0 * unknowns,
-    )
-
-
-def smooth_need(shape: BlockShape, loads: tuple[int, int]) -> Need:
-    """Return the memory of that: every rank's factors, and its displacements by its rectangles.
-
-    Args:
-        shape: The block.
-        loads: Rectangles along x and y.
-    """
-    unknowns, count = smooth_shape(shape).unknowns, math.prod(loads)
-    sides = 1.5 * _side_points(shape, loads) * count
-    return Need(
-        held=16.0 * _FILL * unknowns ** (4 / 3), shared=8.0 * (4.0 * unknowns * count + sides)
-    )
 
 
 def mesh_unknowns(shape: BlockShape) -> int:
@@ -129,13 +96,3 @@ def reference_work(
     made = import_work() + Work(call=200_000, product=_SET_UP * entries)
     cycles = steps * _REFERENCE_CYCLES[kind] * (_TURNING if turning else 1.0)
     return made, Work(call=50_000.0 * steps, product=_CYCLE * cycles * entries)
-
-
-def _side_points(shape: BlockShape, loads: tuple[int, int]) -> float:
-    """Return the quadrature points on the four sides; see `macro.side_loads.sides`."""
-    smooth = smooth_shape(shape)
-    across, depth = [len(ticks) - 1 for ticks in smooth.ticks[:2]], len(smooth.ticks[2]) - 1
-    narrow = min(length / count for length, count in zip(shape.interface, loads, strict=True))
-    halvings = max(math.ceil(math.log2(shape.height / (0.02 * narrow))), 1)
-    along = sum(cells + count - 2 for cells, count in zip(across, loads, strict=True))
-    return 2.0 * 16.0 * along * (depth + halvings)

@@ -17,7 +17,6 @@ from multiscale.planning.costs import predicted_cost
 from multiscale.planning.decision import Alternative, decided
 from multiscale.planning.expected_errors import expected_errors
 from multiscale.planning.machine import this_machine
-from multiscale.planning.room import check_smooth_rest
 from multiscale.scene import Scene
 from multiscale.scenes.sections import CouplingSection
 from multiscale.stage import Stage
@@ -183,7 +182,6 @@ def _with(stage: Stage, scene: Scene, nodes: Nodes) -> Stage:
     shape = make_shape(scene, stage.surface)
     means = patch_means(stage.surface, patches)
     made = replace(stage, scene=scene, patches=patches, mean_heights=means, shape=shape)
-    check_smooth_rest(made, nodes)
     return made
 
 

@@ -9,19 +9,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from micro import HalfSpaceModel
-from multiscale.couplings.blocks import correction_known, scene_loads
 from multiscale.planning.block_work import (
+    BODY,
     cycle_work,
     import_work,
     mesh_bytes,
     mesh_work,
     reference_work,
-    smooth_need,
-    smooth_work,
 )
 from multiscale.planning.machine import Machine
 from multiscale.planning.newton_choice import CYCLES_PER_PATCH, full_cycles, newton_choice
-from multiscale.planning.press_work import law_work, press_work, presses, step_count
+from multiscale.planning.press_work import law_work, press_work, step_count
 from multiscale.planning.work import Work
 from multiscale.stage import Stage
 
@@ -54,26 +52,23 @@ class Cost:
         return sum(self.seconds.values())
 
 
-def predicted_cost(stage: Stage, machine: Machine, *, cold: bool = False) -> Cost:
+def predicted_cost(stage: Stage, machine: Machine) -> Cost:
     """Predict what a run takes.
 
     Args:
         stage: The scene's ingredients.
         machine: How fast it is; only the rates that are needed are measured.
-        cold: Whether the run finds nothing on disk from earlier ones.
     """
-    kept = not cold and _correction_helps(stage) and correction_known(stage)
-    works = run_work(stage, kept=kept)
+    works = run_work(stage)
     seconds = {phase: works[phase].seconds(machine) for phase in PHASES if phase in works}
-    return Cost(seconds=seconds, memory=_memory(stage, kept))
+    return Cost(seconds=seconds, memory=_memory(stage))
 
 
-def run_work(stage: Stage, *, kept: bool = False) -> dict[str, Work]:
+def run_work(stage: Stage) -> dict[str, Work]:
     """Return the work of every phase that a run of a scene has.
 
     Args:
         stage: The scene's ingredients.
-        kept: Whether the smooth rest of its block is on disk.
     """
     works = {"surface": _surface(stage.surface.heights.size)}
     if stage.choice is not None:
@@ -86,9 +81,7 @@ def run_work(stage: Stage, *, kept: bool = False) -> dict[str, Work]:
             stage.meshes, step_count(programme), turning=programme.tilt is None
         )
     else:
-        works["block"], works["load steps"] = _block(stage, kept), _load_steps(stage)
-    if stage.embedded and stage.scene.coupling.kind == "consistent" and _bends(stage):
-        works["laws"], works["block"] = works["laws"] + works["block"], Work(call=10_000)
+        works["block"], works["load steps"] = _block(stage), _load_steps(stage)
     output = stage.scene.output
     if output.fields and stage.embedded and not (stage.meshes or _on_mesh(stage)):
         works["field"] = mesh_work(stage.shape) + cycle_work(stage.shape, CYCLES_PER_PATCH)
@@ -108,26 +101,16 @@ def _micro_choice(stage: Stage) -> Work:
     return Work(call=200_000, passes=300.0 * heights, transform=350.0 * heights * np.log2(heights))
 
 
-def _bends(stage: Stage) -> bool:
-    return stage.scene.coupling.decomposed
-
-
-def _correction_helps(stage: Stage) -> bool:
-    """Tell whether a run would take the smooth rest of its block from disk."""
-    return stage.embedded and stage.meshes is None and _bends(stage)
-
-
 def _on_mesh(stage: Stage) -> bool:
     return stage.by_laws and not newton_choice(stage).condensed
 
 
-def _block(stage: Stage, kept: bool) -> Work:
+def _block(stage: Stage) -> Work:
     if not stage.embedded:
         return Work(call=1_000)
     coupling = stage.scene.coupling
     if coupling.decomposed:
-        ready = Work(call=160_000)  # the sag by every rectangle
-        return ready if kept else ready + smooth_work(stage.shape, scene_loads(stage).shape)
+        return import_work() + BODY
     work = import_work() + mesh_work(stage.shape)
     if newton_choice(stage).condensed:
         work += cycle_work(stage.shape, CYCLES_PER_PATCH * stage.patches.count)
@@ -136,10 +119,8 @@ def _block(stage: Stage, kept: bool) -> Work:
 
 def _load_steps(stage: Stage) -> Work:
     steps = step_count(stage.scene.loading.programme)
-    if not stage.embedded:
-        return steps * press_work(stage, sagging=False)
     if not stage.by_laws:
-        return presses(stage.scene.loading.programme) * press_work(stage, sagging=True)
+        return steps * press_work(stage)
     if _on_mesh(stage):
         return cycle_work(stage.shape, full_cycles(stage, steps))
     patches = stage.patches.count
@@ -147,7 +128,7 @@ def _load_steps(stage: Stage) -> Work:
     return (_LAW_NEWTON * steps) * dense
 
 
-def _memory(stage: Stage, smooth_kept: bool) -> float:
+def _memory(stage: Stage) -> float:
     """Return what is in use now, and what the largest phase adds."""
     model, shape = stage.micro, stage.shape
     cells = float(np.prod(model.surface.grid)) if isinstance(model, HalfSpaceModel) else 0.0
@@ -161,8 +142,6 @@ def _memory(stage: Stage, smooth_kept: bool) -> float:
             block += stage.meshes.bytes
         elif not stage.scene.coupling.decomposed:
             block += mesh_bytes(shape)
-        elif not smooth_kept:
-            block += smooth_need(shape, scene_loads(stage).shape).alone
     drawn = stage.scene.output.figures and "matplotlib" not in sys.modules
     return peak_memory() + max(micro, block) + kept + _PICTURES * drawn
 

@@ -16,11 +16,11 @@ from micro import (
     contact_modulus,
     micro_model,
 )
-from multiscale.coupling import AnalyticCoupling
+from multiscale.coupling import ContactCoupling
 from multiscale.loading import Programme, load_steps
 from multiscale.planning.contact_estimate import Contacts, contacts, nearest, rough_half_space
 from multiscale.planning.machine import this_machine
-from multiscale.planning.press_work import kind_work, presses, reach
+from multiscale.planning.press_work import kind_work, reach
 from multiscale.scene import Scene
 
 _FEW_SUMMITS = 30  # that interact, for the cost of models that may be taken
@@ -59,11 +59,10 @@ def chosen_model(
     at = reach(surface, plane, summits=_FEW_SUMMITS)
     by_laws = kind in ("isolated", "consistent")
     solutions = SOLUTIONS_OF_LAWS if by_laws else scene.loading.programme.count
-    count = solutions if kind != "concurrent" else presses(scene.loading.programme)
 
     def cost(model: str, cells: int) -> float:
-        work = kind_work(model, cells, at, sagging=kind in ("consistent", "concurrent"))
-        return count * work.seconds(this_machine())
+        work = kind_work(model, cells, at)
+        return solutions * work.seconds(this_machine())
 
     return choose(
         surface,
@@ -99,7 +98,7 @@ def furthest_plane(
     """
     if programme.quantity == "approach" and programme.tilt is not None:
         return programme.largest, programme.tilt
-    alone = AnalyticCoupling(model, patches, mean_heights)
+    alone = ContactCoupling(model, patches, mean_heights)
     there = replace(programme, points=(programme.largest,), steps=1, force_change=None)
     (step,) = load_steps(alone, there)
     return step.approach_mm, step.tilt

@@ -13,7 +13,6 @@ import numpy as np
 
 from geometry.surface import Surface
 from micro import HalfSpaceModel, ScaledModel
-from multiscale.couplings.blocks import free_sides
 from multiscale.loading import Programme
 from multiscale.planning.work import Work
 from multiscale.stage import Stage
@@ -24,15 +23,10 @@ _LOADS = (0.25, 0.5, 0.75, 1.0)
 ROWS = {"cells": 56, "summits": 70}
 """Rows of a table of laws: 45 to 65, and 60 to 150 where the model sees summits."""
 
-PRESSES = {"approach": 5.2, "force": 7.6, "free": 10.0}
-"""Presses of the fine model that a load step of the concurrent coupling takes, the last one, which
-sums over the patches, included: where the approach, the force, or neither tilt is prescribed."""
-
-_BESIDE = 2.0
-"""Times more work where the half-space takes free sides into account: 1.5 to 2.9 were measured."""
-
-_MANY_STEPS = 24
-"""Load steps beyond which each takes a press less, for it starts near."""
+_SLOPES = 2.5
+"""Times more work where finite slopes are seen."""
+_BODY = 1.3
+"""And where the half-space has free sides and a body."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,36 +65,32 @@ def reach(surface: Surface, plane: tuple[float, tuple[float, float]], summits: i
     return Reach(heights=size, box=float(np.mean(boxes)) / size, summits=summits)
 
 
-def kind_work(kind: str, cells: int, at: Reach, *, sagging: bool) -> Work:
+def kind_work(kind: str, cells: int, at: Reach) -> Work:
     """Return the work of one press of a micro model, started from one nearby.
 
     Args:
         kind: Its name; ``scaled`` for asperities at the scale of the contact.
         cells: Cells of its grid, for ``half-space``.
         at: What the plane reaches.
-        sagging: Whether the plane sags as the block does, and forces are gathered on rectangles.
     """
     if kind == "half-space":
         padded = 4.0 * max(at.box * cells, 1.0)
         # 20 to 30 iterations of a product and a preconditioner, on a box of twice the sides
         transforms = 75.0 * padded * np.log2(padded)
-        solved = Work(call=12_000, passes=60.0 * cells, transform=float(transforms))
-        return solved + Work(call=9_000, passes=50.0 * cells) * sagging
+        return Work(call=12_000, passes=60.0 * cells, transform=float(transforms))
     if kind == "islands":
-        around = Work(call=700_000, passes=2_000.0 * at.heights)
-        return around if sagging else Work(call=60_000, passes=80.0 * at.heights)
+        return Work(call=60_000, passes=80.0 * at.heights)
     each = Work(call=4_000 + 50 * at.summits, function=40.0 * at.summits**2)
     if kind == "scaled":
-        return Work(call=70_000) + each if sagging else Work(call=18_000) + each
-    return Work(call=12_000) + each if sagging else each
+        return Work(call=18_000) + each
+    return each
 
 
-def press_work(stage: Stage, *, sagging: bool, alone: bool = False) -> Work:
+def press_work(stage: Stage, *, alone: bool = False) -> Work:
     """Return the work of one press of a scene's micro model, started from one nearby.
 
     Args:
         stage: The scene's ingredients.
-        sagging: Whether the plane sags as the block does, and forces are gathered on rectangles.
         alone: Whether one of the patches is pressed by itself.
     """
     model, cells = stage.model, 0
@@ -112,8 +102,11 @@ def press_work(stage: Stage, *, sagging: bool, alone: bool = False) -> Work:
         cells //= stage.patches.count
         heights = at.heights // stage.patches.count
         at = replace(at, heights=heights, summits=at.summits // max(stage.reached_patches, 1))
-    work = kind_work(kind, cells, at, sagging=sagging)
-    return work if alone or free_sides(stage) is None else _BESIDE * work
+    work = kind_work(kind, cells, at)
+    if alone:
+        return work
+    work = _SLOPES * work if stage.finite_slopes else work
+    return _BODY * work if stage.embedded and cells else work
 
 
 def law_work(stage: Stage) -> Work:
@@ -124,16 +117,8 @@ def law_work(stage: Stage) -> Work:
     """
     rows = ROWS["summits" if stage.by_summits else "cells"]
     if stage.scene.coupling.kind == "isolated":
-        return rows * stage.reached_patches * press_work(stage, sagging=False, alone=True)
-    decomposed = stage.scene.coupling.decomposed
-    once = bent = press_work(stage, sagging=False)
-    if stage.by_summits:  # rows follow each other closely
-        bent = 0.5 * press_work(stage, sagging=True)
-    elif decomposed:
-        bent = press_work(stage, sagging=True) + Work(call=-5_000)
-    # every row is pressed level, and once more by a plane that sags as the block does
-    each = once + bent if decomposed else once
-    return rows * (each + Work(call=15 * stage.patches.count))
+        return rows * stage.reached_patches * press_work(stage, alone=True)
+    return rows * (press_work(stage) + Work(call=15 * stage.patches.count))
 
 
 def step_count(programme: Programme) -> int:
@@ -146,15 +131,3 @@ def step_count(programme: Programme) -> int:
     if programme.force_change is None:
         return steps
     return max(steps, int(np.ceil(len(programme.points) / programme.force_change)))
-
-
-def presses(programme: Programme) -> float:
-    """Return the presses of the concurrent coupling over all load steps.
-
-    Args:
-        programme: What the plane is made to do.
-    """
-    steps = step_count(programme)
-    how = "free" if programme.tilt is None else programme.quantity
-    few = min(steps, _MANY_STEPS)
-    return PRESSES[how] * few + (PRESSES[how] - 1.0) * (steps - few)
