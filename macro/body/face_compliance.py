@@ -61,8 +61,12 @@ def face_compliance(
     """
     if count < 1:
         raise InputError("a face has one mode at least", value=count, allowed="K ≥ 1")
-    lines = division(shape, count)
-    quarter = Quarter(lines=lines, lengths=shape.interface, material=material, sides=sides)
+    given: dict[str, Any] = {
+        "division": division(shape, count),
+        "lengths": shape.interface,
+        "material": material,
+        "sides": sides,
+    }
     families = [parity for parity in product((0, 1), repeat=2) if max(parity) < count]
     alike = shape.interface[0] == shape.interface[1]
     if alike and (1, 0) in families:
@@ -70,7 +74,7 @@ def face_compliance(
 
     def solved() -> dict[Parity, tuple[Array, Array, Array]]:
         mine = families[comm.rank :: comm.size]
-        return {parity: quarter.displacements(count, parity) for parity in mine}
+        return {parity: Quarter(parity=parity, **given).displacements(count) for parity in mine}
 
     found: dict[Parity, tuple[Array, Array, Array]] = {}
     for part in comm.allgather(together(comm, solved)):

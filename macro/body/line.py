@@ -2,96 +2,125 @@
 
 On an element, t from −1 to 1, the shapes are (1 ∓ t)/2 and (P_k − P_{k−2}) / √(2(2k − 1)) for
 k = 2 … p (Szabó & Babuška 1991, ch. 3): the slopes of the latter are orthogonal, and all matrices
-are nearly diagonal.
+are nearly diagonal. Where a line is symmetric about its start, functions on it are even or odd:
+the first element goes on beyond the start, and its shapes are even or odd polynomials alone.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
 
 from geometry.legendre_modes import mode_values
 
 Array = NDArray[np.float64]
 
-_NOUGHT = 1e-13
-"""Entries below this share of the largest are rounding of integrals that vanish."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
-    """A line divided into elements; unknown e p is the value at tick e.
+    """A line divided into elements.
 
     Args:
         ticks: Borders of the elements, ascending [mm].
-        degree: p, at least 1.
+        degrees: Degree of every element, at least 1.
+        parity: 0 for functions even about the first tick, 1 for odd ones; None for any function
+            that vanishes there.
     """
 
     ticks: tuple[float, ...]
-    degree: int
+    degrees: tuple[int, ...]
+    parity: int | None = None
 
     @property
-    def count(self) -> int:
-        """Number of unknowns."""
-        return self.degree * (len(self.ticks) - 1) + 1
+    def unknowns(self) -> NDArray[np.intp]:
+        """Element and degree of the shapes, element by element, shape (n, 2).
 
-    def matrices(self) -> dict[str, csr_matrix]:
-        """Return the integrals of products of shapes and slopes, by rows i and columns j.
-
-        ``mass``: N_i N_j [mm]; ``stiffness``: N_i' N_j' [1/mm]; ``slopes of rows``: N_i' N_j, and
-        ``slopes of columns``: N_i N_j'.
+        The first shape of an element is 1 at its far end and linear on the next; it counts as of
+        degree 1.
         """
-        points, weights = legendre.leggauss(self.degree + 1)
-        values, slopes = self._shapes(points)
-        mass, stiffness, mixed = np.zeros((3, self.count, self.count))
-        for element, length in enumerate(np.diff(self.ticks)):
-            own = np.ix_(*2 * (self._unknowns(element),))
-            mass[own] += 0.5 * length * (values * weights) @ values.T
-            stiffness[own] += 2.0 / length * (slopes * weights) @ slopes.T
-            mixed[own] += (slopes * weights) @ values.T
-        return {
-            "mass": _sparse(mass),
-            "stiffness": _sparse(stiffness),
-            "slopes of rows": _sparse(mixed),
-            "slopes of columns": _sparse(mixed.T),
-        }
+        found = []
+        for element, degree in enumerate(self.degrees):
+            inner = range(2, degree + 1)
+            if element == 0 and self.parity is not None:
+                inner = range(2 + self.parity, degree + 1, 2)
+            found += [(element, order) for order in (1, *inner)]
+        return np.array(found)
 
-    def mode_integrals(self, length: float, count: int) -> Array:
-        """Return the integrals of Legendre modes times shapes, shape (modes, unknowns) [mm].
+    @property
+    def end(self) -> int:
+        """The one shape that does not vanish at the last tick, where it is 1."""
+        return int(np.flatnonzero(self.unknowns[:, 1] == 1)[-1])
+
+    def sampled(self, points: int) -> Sampled:
+        """Return the shapes at the points of Gauss' rule on every element.
 
         Args:
-            length: Length L of the modes [mm]; elements beyond 0 … L do not count.
-            count: Number of modes.
+            points: Number of points on an element.
         """
-        points, weights = legendre.leggauss((self.degree + count) // 2 + 1)
-        values, _ = self._shapes(points)
-        found = np.zeros((count, self.count))
+        nodes, weights = legendre.leggauss(points)
+        unknowns = self.unknowns
+        first = np.flatnonzero(unknowns[:, 1] == 1)
+        values, slopes = np.zeros((2, len(unknowns), len(self.degrees), points))
+        places, spread = np.empty((2, len(self.degrees), points))
         for element, (low, high) in enumerate(zip(self.ticks, self.ticks[1:], strict=False)):
-            middle, half = 0.5 * (low + high), 0.5 * (high - low)
-            if 0.0 < middle < length:
-                modes = mode_values(middle + half * points, length, count)
-                found[:, self._unknowns(element)] += (modes * (half * weights)) @ values.T
-        return found
-
-    def _unknowns(self, element: int) -> NDArray[np.intp]:
-        """Return the unknowns of an element: both ticks, then those between."""
-        first, last = element * self.degree, (element + 1) * self.degree
-        return np.array([first, last, *range(first + 1, last)])
-
-    def _shapes(self, points: Array) -> tuple[Array, Array]:
-        """Return shapes and their slopes at points of an element, shape (p + 1, points)."""
-        polynomials = legendre.legvander(points, self.degree).T
-        k = np.arange(2, self.degree + 1)[:, None]
-        rest = (polynomials[2:] - polynomials[:-2]) / np.sqrt(2.0 * (2.0 * k - 1.0))
-        slopes = np.sqrt(k - 0.5) * polynomials[1:-1]
-        ends, even = np.stack([1.0 - points, 1.0 + points]) / 2.0, np.full_like(points, 0.5)
-        return np.concatenate([ends, rest]), np.concatenate([[-even, even], slopes])
+            half = 0.5 * (high - low)
+            places[element], spread[element] = low + half * (1.0 + nodes), half * weights
+            whole = element == 0 and self.parity is not None
+            t, half = (0.5 * (1.0 + nodes), 2.0 * half) if whole else (nodes, half)
+            shapes, rises = _shapes(t, self.degrees[element])
+            if whole:  # 1, or t, goes through both ends
+                sign = (1.0, -1.0)[self.parity or 0]
+                shapes[1] += sign * shapes[0]
+                rises[1] += sign * rises[0]
+            elif element:
+                values[first[element - 1], element] = shapes[0]
+                slopes[first[element - 1], element] = rises[0] / half
+            own = np.flatnonzero(unknowns[:, 0] == element)
+            values[own, element] = shapes[unknowns[own, 1]]
+            slopes[own, element] = rises[unknowns[own, 1]] / half
+        flat = len(unknowns), -1
+        return Sampled(places.ravel(), spread.ravel(), values.reshape(flat), slopes.reshape(flat))
 
 
-def _sparse(matrix: Array) -> csr_matrix:
-    large = np.abs(matrix) > _NOUGHT * np.abs(matrix).max()
-    return csr_matrix(np.where(large, matrix, 0.0))
+class Sampled(NamedTuple):
+    """Shapes at the points of a rule.
+
+    Attributes:
+        points: Shape (m,) [mm].
+        weights: Shape (m,) [mm].
+        values: Of n shapes at the points, shape (n, m).
+        slopes: Shape (n, m) [1/mm].
+    """
+
+    points: Array
+    weights: Array
+    values: Array
+    slopes: Array
+
+
+def mode_integrals(line: Line, length: float, count: int) -> Array:
+    """Return the integrals of Legendre modes times shapes, shape (modes, n) [mm].
+
+    Args:
+        line: Elements from the middle of the modes on; those beyond their end do not count.
+        length: Length L of the modes, from 0 [mm].
+        count: Modes K, of which those of the line's parity are taken.
+    """
+    rule = line.sampled((max(line.degrees) + count) // 2 + 1)
+    modes = mode_values(rule.points, length, count)[line.parity or 0 :: 2]
+    inside = np.where(rule.points < length, rule.weights, 0.0)
+    return np.asarray((modes * inside) @ rule.values.T)
+
+
+def _shapes(t: Array, degree: int) -> tuple[Array, Array]:
+    """Return shapes and their slopes at places t, by degree: (1 − t)/2, (1 + t)/2, and the rest."""
+    polynomials = legendre.legvander(t, max(degree, 1)).T
+    k = np.arange(2, degree + 1)[:, None]
+    rest = (polynomials[2:] - polynomials[:-2]) / np.sqrt(2.0 * (2.0 * k - 1.0))
+    slopes = np.sqrt(k - 0.5) * polynomials[1:-1]
+    ends, even = np.stack([1.0 - t, 1.0 + t]) / 2.0, np.full_like(t, 0.5)
+    return np.concatenate([ends, rest]), np.concatenate([[-even, even], slopes])

@@ -1,12 +1,12 @@
 """A quarter of a block, in which even and odd modes of pressure are solved for apart.
 
-The planes through the middle of the block divide it into quarters. Pressures that are even about
-such a plane do not displace it across, odd ones do not displace it along.
+The planes through the middle of the block divide it into quarters. Displacements along an axis are
+odd along it where the pressure is even, and even where it is odd; otherwise as the pressure.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from typing import Any
 
@@ -16,13 +16,17 @@ from petsc4py import PETSc
 from scipy.sparse import bmat, csr_matrix, kron
 
 from macro.block import Sides
-from macro.body.line import Line
+from macro.body.division import Division
+from macro.body.line import Line, mode_integrals
 from macro.elasticity import Material
 from macro.factorisation import set_up
 
 Array = NDArray[np.float64]
 Parity = tuple[int, int]
-"""0 for modes that are even along x, and along y; 1 for odd ones."""
+"""0 for pressures that are even along x, and along y; 1 for odd ones."""
+
+_NOUGHT = 1e-13
+"""Entries below this share of the largest are rounding of integrals that vanish."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -30,99 +34,126 @@ class Quarter:
     """The quarter of a block beyond the middle of its contact face, clamped at the bottom.
 
     Args:
-        lines: Elements along x and y from the middle to the sides, along z from the bottom up.
+        division: Its elements.
         lengths: Sides (Lx, Ly) of the contact face [mm].
         material: Elastic constants.
         sides: Support of the block's sides.
+        parity: That of the pressures.
     """
 
-    lines: tuple[Line, Line, Line]
+    division: Division
     lengths: tuple[float, float]
     material: Material
     sides: Sides
+    parity: Parity
 
-    @property
-    def shape(self) -> tuple[int, int, int]:
-        """Unknowns of a component along x, y and z."""
-        x, y, z = (line.count for line in self.lines)
-        return x, y, z
-
-    def displacements(self, count: int, parity: Parity) -> tuple[Array, Array, Array]:
-        """Return how the modes of one parity displace the face.
+    def displacements(self, count: int) -> tuple[Array, Array, Array]:
+        """Return how the modes of the parity displace the face.
 
         Args:
             count: Modes K along a side, even and odd together.
-            parity: That of the modes of pressure.
 
         Returns:
             Integrals over the face of modes times displacements by unit modes of pressure, along
-            x, y and downwards, shape (k, l, m, n) [mm³/MPa]. Displacements along an axis are
-            even along it where the pressure is odd, and odd where it is even: k and l count the
-            modes of their parity, m and n those of the pressure.
+            x, y and downwards, shape (k, l, m, n) [mm³/MPa]: k and l count the modes of the
+            displacement's parity, m and n those of the pressure's.
         """
-        free = np.flatnonzero(self._free(parity))
-        stiffness = self._stiffness[free][:, free]
-        top, place = self._top(free)
         modes = [
-            [self._modes(along, count, (parity[along] + (along == axis)) % 2) for along in (0, 1)]
+            [
+                mode_integrals(self._lines[axis][along], self.lengths[along], count)
+                for along in (0, 1)
+            ]
             for axis in range(3)
         ]
-        loads = np.kron(*modes[2])[:, place[2]]
-        right = np.zeros((len(free), len(loads)), order="F")
-        right[top[2]] = -loads.T
-        solved = _solved(stiffness, right)
+        free = np.concatenate([kept.ravel() for kept in self._kept])
+        top, place = self._top
+        loads = np.kron(*modes[2])[:, place[2]].T
+        right = np.zeros((int(free.sum()), loads.shape[1]), order="F")
+        right[top[2]] = -loads
+        solved = _solved(self._stiffness[free][:, free], right)
         found = []
         for axis, sign in enumerate((1.0, 1.0, -1.0)):
-            seen = 4.0 * sign * np.kron(*modes[axis])[:, place[axis]] @ solved[top[axis]]
+            seen = np.kron(*modes[axis])[:, place[axis]] @ solved[top[axis]]
             sizes = [len(part) for part in (*modes[axis], *modes[2])]
-            found.append(seen.reshape(sizes))
+            found.append(4.0 * sign * seen.reshape(sizes))
         return found[0], found[1], found[2]
 
     @cached_property
+    def _lines(self) -> list[tuple[Line, Line, Line]]:
+        """Lines along x, y and z by component of the displacement."""
+        x, y, z = self.division.x, self.division.y, self.division.z
+        odd_x, odd_y = self.parity
+        return [
+            (
+                replace(x, parity=(odd_x + (component == 0)) % 2),
+                replace(y, parity=(odd_y + (component == 1)) % 2),
+                z,
+            )
+            for component in range(3)
+        ]
+
+    @cached_property
+    def _kept(self) -> list[NDArray[np.bool_]]:
+        """Unknowns (ix, iy, iz) that no roller holds, by component."""
+        found = [np.ones([len(line.unknowns) for line in lines], bool) for lines in self._lines]
+        if self.sides == "roller":
+            for axis in (0, 1):
+                np.moveaxis(found[axis], axis, 0)[self._lines[axis][axis].end] = False
+        return found
+
+    @property
+    def _top(self) -> tuple[list[NDArray[np.intp]], list[NDArray[np.intp]]]:
+        """Kept unknowns that are values on top, by component, and their places (ix, iy), flat."""
+        top, place, before = [], [], 0
+        for kept in self._kept:
+            number = before + np.cumsum(kept).reshape(kept.shape) - 1
+            here = kept[:, :, self.division.z.end]
+            top.append(number[:, :, self.division.z.end][here])
+            place.append(np.flatnonzero(here))
+            before += int(kept.sum())
+        return top, place
+
+    @cached_property
     def _stiffness(self) -> csr_matrix:
-        """Stiffness without any support, of unknowns (component, ix, iy, iz) [N/mm]."""
-        parts = [line.matrices() for line in self.lines]
+        """Stiffness of all unknowns (component, ix, iy, iz) [N/mm]."""
         lame, shear = self.material.lame
         blocks: list[list[Any]] = [[None] * 3 for _ in range(3)]
         for row in range(3):
             weights = [lame + 2.0 * shear if axis == row else shear for axis in range(3)]
             blocks[row][row] = sum(
-                weight * _product(parts, {axis: "stiffness"}) for axis, weight in enumerate(weights)
+                weight * self._product((row, row), (axis,), (axis,))
+                for axis, weight in enumerate(weights)
             )
             for column in range(row):
-                first = _product(parts, {row: "slopes of rows", column: "slopes of columns"})
-                second = _product(parts, {column: "slopes of rows", row: "slopes of columns"})
+                first = self._product((row, column), (row,), (column,))
+                second = self._product((row, column), (column,), (row,))
                 blocks[row][column] = lame * first + shear * second
                 blocks[column][row] = blocks[row][column].T
         return csr_matrix(bmat(blocks))
 
-    def _free(self, parity: Parity) -> NDArray[np.bool_]:
-        """Return which unknowns no support and no symmetry holds, flat."""
-        free = np.ones((3, *self.shape), dtype=bool)
-        free[:, :, :, 0] = False
-        for axis in (0, 1):
-            for component in range(3):
-                line = np.moveaxis(free[component], axis, 0)
-                line[0] &= (component == axis) == (parity[axis] == 1)
-                if self.sides == "roller" and component == axis:
-                    line[-1] = False
-        return free.ravel()
+    def _product(
+        self, components: tuple[int, int], rows: tuple[int, ...], columns: tuple[int, ...]
+    ) -> csr_matrix:
+        """Return the integrals of products of two components' shapes.
 
-    def _top(self, free: NDArray[np.intp]) -> tuple[list[NDArray[np.intp]], list[NDArray[np.intp]]]:
-        """Return the free unknowns on top, by component, and their places (ix, iy), flat."""
-        component, ix, iy, iz = np.unravel_index(free, (3, *self.shape))
-        flat = ix * self.shape[1] + iy
-        top = [np.flatnonzero((component == axis) & (iz == self.shape[2] - 1)) for axis in range(3)]
-        return top, [flat[index] for index in top]
+        Args:
+            components: Of the rows and of the columns.
+            rows: Axes along which the rows' slopes are taken.
+            columns: Axes along which the columns' are.
+        """
+        factors = []
+        for axis in range(3):
+            one, other = (self._sampled[component][axis] for component in components)
+            left = one.slopes if axis in rows else one.values
+            right = other.slopes if axis in columns else other.values
+            matrix = (left * one.weights) @ right.T
+            large = np.abs(matrix) > _NOUGHT * np.abs(matrix).max(initial=0.0)
+            factors.append(csr_matrix(np.where(large, matrix, 0.0)))
+        return reduce(kron, factors)
 
-    def _modes(self, axis: int, count: int, parity: int) -> Array:
-        every = self.lines[axis].mode_integrals(self.lengths[axis], count)
-        return every[parity::2]
-
-
-def _product(parts: list[dict[str, csr_matrix]], kinds: dict[int, str]) -> csr_matrix:
-    """Return the Kronecker product of some matrices of the axes, else of their masses."""
-    return reduce(kron, (part[kinds.get(axis, "mass")] for axis, part in enumerate(parts)))
+    @cached_property
+    def _sampled(self) -> list[list[Any]]:
+        return [[line.sampled(max(line.degrees) + 1) for line in lines] for lines in self._lines]
 
 
 def _solved(stiffness: csr_matrix, right: Array) -> Array:

@@ -7,11 +7,10 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
-from scipy.sparse import csr_array, hstack
+from scipy.sparse import csr_array
 
-from micro.cells.distance_nodes import distance_nodes, means_over
 from micro.cells.free_sides import FreeSides
+from micro.cells.side_waves import SideWaves, multiplied
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -68,33 +67,25 @@ class _Pair:
     """Two opposite sides; rows of cells lie along them."""
 
     def __init__(self, sides: FreeSides, axis: int, rows: int, cells: int) -> None:
-        length = sides.lengths[axis]
-        step = length / rows
-        nodes = distance_nodes(_NEAREST * step, length)
-        lower = means_over(nodes, np.linspace(0.0, length, rows + 1))
-        self._rows = csr_array(hstack([lower, lower[::-1]]))
-        self._period, self._nodes = 2 * cells, len(nodes)
-        waves = np.arange(self._period // 2 + 1)
-        self._compliance = np.zeros((len(waves), len(nodes), len(nodes)))
-        for shift in (-self._period, 0, self._period):  # short waves that cells take for long ones
-            shares = np.sinc((waves + shift) / self._period) ** 2
-            seen = sides.compliance(axis, nodes, np.abs(waves + shift))
-            self._compliance += step * shares[:, None, None] * seen
+        self._along = SideWaves(sides.lengths[axis], rows, cells, _NEAREST)
+        self._compliance = np.sum(
+            [
+                shares[:, None, None] * sides.compliance(axis, self._along.nodes, np.abs(waves))
+                for waves, shares in self._along.aliases()
+            ],
+            axis=0,
+        )
 
     def among(self, rows: Indices, cells: Indices) -> _Lines:
         """Return some cells of some rows."""
-        every = len(rows) == self._rows.shape[0]
-        near = self._rows if every else self._rows[rows]
+        means = self._along.means
+        near = means if len(rows) == means.shape[0] else means[rows]
         return _Lines(self, near, csr_array(near.T), cells - cells[0])
 
     def displaced(self, lines: Array) -> Array:
         """Return displacements at the nodes of both sides by loads at them, shape (2 a, n)."""
-        waves = fft.rfft(lines, self._period, axis=1)
-        by_wave = waves.reshape(2, self._nodes, -1).transpose(2, 1, 0)
-        parts = np.ascontiguousarray(by_wave).view(np.float64)  # of both sides, real and imaginary
-        found = np.matmul(self._compliance, parts).view(np.complex128)
-        back = fft.irfft(found.transpose(2, 1, 0).reshape(waves.shape), self._period, axis=1)
-        return np.asarray(back[:, : lines.shape[1]])
+        found = multiplied(self._compliance, self._along.of(lines))
+        return self._along.lines(found)[:, : lines.shape[1]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,50 +6,60 @@ equations of equilibrium give the traction there,
 
     σ_iz = −p δ_iz + ∂_α (h σ_iα + ½ h² ∂_z σ_iα + …),    u_z(h) = u_z + h ∂_z u_z + ½ h² ∂_z² u_z.
 
-Order by order these are half-space problems. With σ the stresses in the plane under p (a double
-Riesz transform, σ_αβ = −2ν p δ_αβ − (1 − 2ν) k_α k_β/|k|² p in waves of wave vector k), e(σ) the
-strains by them alone, and ∇∇u_z = (1 − ν)/G · k_α k_β/|k| p, the compliance, softer positive, is
+Order by order these are half-space problems. Let σ be the stresses in the plane by p, for waves of
+wave vector k and k = |k|: σ_αβ = −2ν p δ_αβ − (1 − 2ν) k_α k_β/k² p; e(σ) the strains by these
+alone; and κ_αβ = ∂_α ∂_β u_z = (1 − ν)/G k_α k_β/k p. The compliance, positive where it is softer,
+grows by the forms
 
-    first order:   ∫ h (σ_zz σ'_zz / E − σ : e(σ')) dA,
-    second order:  ∫ t · G_tt t' dA + ½ ∫ h² (σ : ∇∇u_z' + σ' : ∇∇u_z) dA,    t_β = ∂_α (h σ_αβ),
+    first order:   ∫ h (p p'/E − σ : e(σ')) dA,
+    second order:  ∫ t · u(t') dA + ½ ∫ h² (σ : κ' + σ' : κ) dA,    t_β = ∂_α (h σ_αβ),
 
-G_tt the tangential compliance (1/G|k|) (1 − ν k k/|k|²) of the half-space (Cerruti). The first is
-what Eshelby's energy-momentum tensor gives, as e(σ) = ε − e(σ_zz). Both are symmetric, and do not
-change when h does by a constant.
+u(t) = (1/Gk) (t − ν k (k · t)/k²) the displacement by tangential tractions (Cerruti). The first is
+also what Eshelby's energy-momentum tensor gives. Both are symmetric, and on a half-space they do
+not change when h does by a constant. A finite body changes with its height: the first order takes
+heights from the plane of the flat body. The second, which takes its tractions as on a half-space,
+takes them from the top, where they are smallest under the loads.
 
-Heights of either sign are those of a possible body, so the compliance has no singularity at real
-multiples of h: its series in them ends at the circle through some complex pair. The sum is taken
-as a₁ + a₂/(1 + (a₂/a₁)²), with the values a₁, a₂ of both forms at the pressures: the simplest
-function with these two terms and no real pole.
+Heights of either sign are those of a possible body: as a function of a factor on the heights the
+compliance has no singularity on the real axis. The orders are summed as a₁ + a₂/(1 + (a₂/a₁)²), the
+simplest function with these two terms whose poles are a conjugate pair, with the values a₁, a₂ of
+the forms at the pressures. On caps and rough surfaces (rms gradient 0.215) that is within 0.1 % of
+the compliance from the series to sixth order; two orders alone are within 0.5 %.
 
-Sources: Eshelby 1975, doi 10.1007/BF00126994; Johnson 1985, ch. 3.
+Sources: Johnson 1985, ch. 3; Eshelby 1975, doi 10.1007/BF00126994.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import fft
 
 from geometry import Surface
 from geometry.errors import InputError
 from micro.boussinesq import HalfSpace
 from micro.compliance.surface_stress import SurfaceStress
-from micro.compliance.waves import Spectrum, Waves
+from micro.compliance.waves import Around, Spectrum, Waves
 
 Array = NDArray[np.float64]
 
-_LARGE = 128
-"""Cells along the shorter side from which on two of them make a coarse one."""
+
+_RATIOS = 4, 2, 1
+_FEWEST = 64
+_GRADIENT = 0.9
+"""Cells per coarse cell along an axis: the first ratio that leaves 64 coarse cells a side and 0.9
+of the mean square gradient. Forces of rough surfaces of 128² … 1024² cells changed by up to 0.1 %
+against ratio 1, which takes 10 to 20 times as long."""
 
 
 class FiniteSlopes:
     """The compliance that finite slopes add to a surface on a half-space.
 
-    Stresses fall off as 1/r² around contacts: the term acts on the whole surface. Beyond a
-    surface that is not periodic nothing is added.
+    Stresses fall off as 1/r² around contacts: the term acts on the whole surface. A half-space
+    goes on around it with mirrored heights; where stresses beside the half-space's are given,
+    which are those of a body that ends there, nothing is around it.
 
     Args:
         surface: The surface.
@@ -57,11 +67,13 @@ class FiniteSlopes:
         order: Highest power of the heights, 1 or 2.
         periodic: Whether surface and pressures continue periodically; displacements then count
             from their mean, as those of the periodic half-space do.
-        beside: Stresses in the surface beyond those of the half-space, on the cells of `grid`
-            with sides `spacing`.
+        plane: Height of the surface of the flat body that has the stresses ``beside`` [mm]; that
+            of the mean plane when not given. On the half-space alone it does not matter.
+        beside: Stresses in the surface beyond those of the half-space, on the cells of
+            `coarse_grid`.
 
     Attributes:
-        grid: Cells that the term works on, the surface's or coarser.
+        grid: Cells that the term works on, the surface's or coarser: `coarse_grid`.
         spacing: Sides of these cells [mm].
 
     Raises:
@@ -75,6 +87,7 @@ class FiniteSlopes:
         *,
         order: int = 2,
         periodic: bool = False,
+        plane: float | None = None,
         beside: Sequence[SurfaceStress] = (),
     ) -> None:
         if order not in (1, 2):
@@ -82,12 +95,14 @@ class FiniteSlopes:
         if periodic and not surface.periodic:
             raise InputError("periodic slopes need a periodic surface", value=surface.source)
         self.half_space, self.order, self.beside = half_space, order, tuple(beside)
-        ratio = coarse_ratio(surface.grid)
-        self._waves = Waves(surface.grid, surface.spacing, periodic=periodic, ratio=ratio)
-        self.grid, self.spacing = self._waves.coarse, self._waves.spacing
         self._periodic = periodic
-        # counted from the top, where the load is, what rounding and cut tails leave is least
-        self._heights = _means(surface.heights, ratio) - float(surface.heights.max())
+        self.grid = coarse_grid(surface)
+        around: Around = "copies" if periodic else "nothing" if beside else "mirrored"
+        self._waves = Waves(surface.grid, surface.spacing, coarse=self.grid, around=around)
+        self.spacing = self._waves.spacing
+        heights = self._waves.continued(self._waves.coarsened(surface.heights))
+        self._heights = heights - (surface.mean_height if plane is None else plane)
+        self._below = heights - float(surface.heights.max())
 
     def displacement(self, pressure: Array) -> Array:
         """Return the displacement that is added to the half-space's, positive into the body.
@@ -98,120 +113,113 @@ class FiniteSlopes:
         Returns:
             Shape (nx, ny) [mm].
         """
-        loads = self._waves.entering(pressure)
-        parts = self._of_load(loads)
-        beside = self._beside(parts[0])
-        first, moments = self._first(parts, beside)
-        total = first
+        waves, heights = self._waves, self._heights
+        modulus = self.half_space.young_modulus
+        loaded = waves.alone(waves.coarsened(pressure))
+        loads = waves.of(loaded)
+        xx, _, xy = waves.directions
+        along, across = waves.fields(np.stack([xx * loads, xy * loads]))
+        stresses = self._stresses(loaded, along, across)
+        strains = self._strains(stresses)
+        pulls = -heights * strains
+        total = waves.of(heights * loaded) / modulus
         if self.order == 2:
-            second = self._second(loads, parts, beside, moments)
-            total = first + _share(_value(loads, first), _value(loads, second)) * second
+            value, pulls_again, moved = self._second(loads, stresses)
+            energy = loaded**2 / modulus - _product(stresses, strains)
+            share = _share(float(np.sum(self._below * energy)), value)
+            pulls = pulls + share * pulls_again
+            total = total + share * moved
+        total = total + self._adjoint(pulls)
         if self._periodic:
             total[0, 0] = 0.0
-        return self._waves.leaving(total)
+        cx, cy = self.grid
+        return waves.refined(waves.fields(total)[:cx, :cy])
 
-    def _of_load(self, loads: Spectrum) -> Array:
-        """Return p, and its Riesz transforms along xx and xy, on the cells, (3, cx, cy) [MPa]."""
-        along = self._waves.directions
-        return self._waves.fields(np.stack([loads, along[0] * loads, along[2] * loads]))
+    def _second(self, loads: Spectrum, stresses: Array) -> tuple[float, Array, Spectrum]:
+        """Return of the second order its form's value, and the two parts of its displacement.
 
-    def _beside(self, pressure: Array) -> Array | None:
-        """Return the stresses that the half-space does not have."""
-        if not self.beside:
-            return None
-        return np.sum([term.stresses(pressure) for term in self.beside], axis=0)
-
-    def _first(self, parts: Array, beside: Array | None) -> tuple[Spectrum, Spectrum]:
-        """Return the waves of the first-order displacement, and of h σ."""
-        heights, waves = self._heights, self._waves
-        loaded = waves.of(heights * parts)
-        moments = self._stresses(loaded)
-        if beside is not None:
-            moments = moments + waves.of(heights * beside)
-        stresses = None if beside is None else self._stresses(parts) + beside
-        strains = None if stresses is None else heights * self._strains(stresses)
-        modulus = self.half_space.young_modulus
-        return loaded[0] / modulus - self._adjoint(self._strains(moments), strains), moments
-
-    def _second(
-        self, loads: Spectrum, parts: Array, beside: Array | None, moments: Spectrum
-    ) -> Spectrum:
-        """Return the waves of the second-order displacement."""
-        heights, waves = self._heights, self._waves
+        One is what the adjoint of the stresses is to be applied to, the other in waves.
+        """
+        waves, heights = self._waves, self._below
         nu, shear = self.half_space.poisson_ratio, self.half_space.shear_modulus
         bending = (1.0 - nu) / shear * waves.wave_number
-        curvatures = bending * waves.directions * loads
-        strains, curved = waves.fields(np.stack([self._strains_by_traction(moments), curvatures]))
-        pulled = heights * (0.5 * heights * curved - strains)
-        doubled = self._stresses(waves.of(heights**2 * parts))
-        if beside is not None:
-            doubled = doubled + waves.of(heights**2 * beside)
-        return self._adjoint(waves.of(pulled), pulled) + 0.5 * bending * self._along(doubled)
+        strains = waves.fields(self._strains_by_traction(waves.of(heights * stresses)))
+        curvatures = waves.fields(bending * loads * waves.directions)
+        pulls = heights * (0.5 * heights * curvatures - strains)
+        value = float(np.sum(_product(stresses, heights * (heights * curvatures - strains))))
+        return value, pulls, 0.5 * bending * self._lengthwise(waves.of(heights**2 * stresses))
 
-    def _stresses(self, parts: NDArray[Any]) -> NDArray[Any]:
-        """Return σ_xx, σ_yy, σ_xy of the half-space from p and its Riesz transforms."""
+    def _stresses(self, pressure: Array, along: Array, across: Array) -> Array:
+        """Return σ_xx, σ_yy, σ_xy by pressures and their k_x²/k² and k_x k_y/k² transforms."""
         nu = self.half_space.poisson_ratio
-        p, xx, xy = parts
         side = 1.0 - 2.0 * nu
-        return np.stack([-2.0 * nu * p - side * xx, -p + side * xx, -side * xy])
+        own = np.stack(
+            [-2.0 * nu * pressure - side * along, side * along - pressure, -side * across]
+        )
+        return np.asarray(sum((term.stresses(pressure) for term in self.beside), own))
 
-    def _strains(self, stresses: NDArray[Any]) -> NDArray[Any]:
-        """Return the strains by stresses in the plane alone: xx, yy, xy."""
+    def _adjoint(self, pulls: Array) -> Spectrum:
+        """Return the waves of the displacement that does the work of the stresses on a tensor."""
+        nu = self.half_space.poisson_ratio
+        waves = self._waves.of(pulls)
+        found = -2.0 * nu * (waves[0] + waves[1]) - (1.0 - 2.0 * nu) * self._lengthwise(waves)
+        if not self.beside:
+            return np.asarray(found)
+        both = pulls * np.array([1.0, 1.0, 2.0])[:, None, None]  # xy and yx
+        added = np.sum([term.adjoint(both) for term in self.beside], axis=0)
+        return np.asarray(found + self._waves.of(added))
+
+    def _strains(self, stresses: Array) -> Array:
+        """Return the strains xx, yy, xy by stresses in the plane alone."""
         nu, modulus = self.half_space.poisson_ratio, self.half_space.young_modulus
         xx, yy, xy = stresses
         return np.stack([xx - nu * yy, yy - nu * xx, (1.0 + nu) * xy]) / modulus
 
     def _strains_by_traction(self, moments: Spectrum) -> Spectrum:
-        """Return the waves of the strains in the surface by the tractions ∂_α (h σ_αβ)."""
+        """Return the waves of the strains in the plane by tractions ∂_α (h σ_αβ) on it."""
         nu, shear = self.half_space.poisson_ratio, self.half_space.shear_modulus
-        along = self._waves.directions
+        along_x, along_y, across = self._waves.directions
         xx, yy, xy = moments
-        main = nu * self._along(moments)
-        found = [
-            along[0] * xx + along[2] * xy - along[0] * main,
-            along[1] * yy + along[2] * xy - along[1] * main,
-            0.5 * ((along[0] + along[1]) * xy + along[2] * (xx + yy)) - along[2] * main,
+        both = nu * self._lengthwise(moments)
+        strains = [
+            along_x * (xx - both) + across * xy,
+            along_y * (yy - both) + across * xy,
+            across * (0.5 * (xx + yy) - both) + 0.5 * (along_x + along_y) * xy,
         ]
-        return np.stack(found) * (-self._waves.wave_number / shear)
+        return np.stack(strains) * (-self._waves.wave_number / shear)
 
-    def _along(self, tensor: Spectrum) -> Spectrum:
-        """Return the component k · tensor k / |k|² of every wave."""
+    def _lengthwise(self, tensor: Spectrum) -> Spectrum:
+        """Return the component k · tensor k/k² of every wave."""
         xx, yy, xy = self._waves.directions
         return np.asarray(xx * tensor[0] + yy * tensor[1] + 2.0 * xy * tensor[2])
 
-    def _adjoint(self, waves: Spectrum, tensor: Array | None) -> Spectrum:
-        """Return the adjoint of the stresses, applied to a tensor of given waves."""
-        nu = self.half_space.poisson_ratio
-        found = -2.0 * nu * (waves[0] + waves[1]) - (1.0 - 2.0 * nu) * self._along(waves)
-        if tensor is None or not self.beside:
-            return found
-        whole = tensor * np.array([1.0, 1.0, 2.0])[:, None, None]  # xy and yx
-        return found + self._waves.of(np.sum([term.adjoint(whole) for term in self.beside], axis=0))
+
+def coarse_grid(surface: Surface) -> tuple[int, int]:
+    """Return the cells that finite slopes of a surface are worked out on."""
+    nx, ny = surface.grid
+    dx, dy = surface.spacing
+    squared = fft.dctn(surface.heights, norm="ortho") ** 2
+    squared *= (np.arange(nx)[:, None] / (nx * dx)) ** 2 + (np.arange(ny) / (ny * dy)) ** 2
+    for ratio in _RATIOS:
+        coarse = _cells(nx, ratio), _cells(ny, ratio)
+        kept = squared[: coarse[0], : coarse[1]].sum() >= _GRADIENT * squared.sum()
+        if kept and min(coarse) >= _FEWEST:
+            return coarse
+    return nx, ny
 
 
-def coarse_ratio(grid: tuple[int, int]) -> int:
-    """Return how many cells along an axis make a cell that finite slopes are worked out on.
-
-    Halving 256² cells changes the force of rough surfaces by less than 0.1 %.
-    """
-    even = all(count % 2 == 0 for count in grid)
-    return 2 if even and min(grid) >= _LARGE else 1
+def _cells(count: int, ratio: int) -> int:
+    """Return a number of coarse cells with a fast transform."""
+    return min(count, int(fft.next_fast_len(-(-count // ratio), real=True)))
 
 
-def _means(heights: Array, ratio: int) -> Array:
-    """Return the means over ratio × ratio cells."""
-    nx, ny = heights.shape
-    return np.asarray(heights.reshape(nx // ratio, ratio, ny // ratio, ratio).mean(axis=(1, 3)))
-
-
-def _value(loads: Spectrum, waves: Spectrum) -> float:
-    """Return the sum over the torus of two fields' product, up to a factor."""
-    product = (np.conj(loads) * waves).real
-    return float(2.0 * product.sum() - product[:, 0].sum())  # the last column is left out
+def _product(one: Array, other: Array) -> Array:
+    """Return the double contraction of two symmetric tensors of components xx, yy, xy."""
+    return np.asarray(one[0] * other[0] + one[1] * other[1] + 2.0 * one[2] * other[2])
 
 
 def _share(first: float, second: float) -> float:
-    """Return what the second order is multiplied by for those beyond it, ½ at least."""
+    """Return the share of the second order that the orders beyond leave, ½ at least."""
     if abs(second) >= abs(first):
         return 0.5
     return 1.0 / (1.0 + (second / first) ** 2)

@@ -13,9 +13,9 @@ from micro.cells.free_sides import FreeSides
 
 Array = NDArray[np.float64]
 
-_WAVES = 16
+_WAVES = 8
 """Waves along a side, per mode: shorter ones are left out, as the cube of their length."""
-_NEAREST = 1.0 / 32.0
+_NEAREST = 1.0 / 1024.0
 """First node of the distance from a side, of its length over the square of the modes."""
 
 

@@ -24,11 +24,11 @@ class SurfaceStress(Protocol):
         """
 
     def adjoint(self, fields: Array) -> Array:
-        """Return the transposed map: Σ fields · stresses(p) = Σ adjoint(fields) p for every p.
+        """Apply the transpose of `stresses`.
 
         Args:
             fields: What σ_xx, σ_yy and σ_xy are multiplied by, shape (3, nx, ny).
 
         Returns:
-            Shape (nx, ny).
+            What the pressures are multiplied by, with the same sum, shape (nx, ny).
         """

@@ -97,7 +97,7 @@ def test_stresses_beside_a_side_are_those_of_a_meshed_block(nu):
 
     near = (np.hypot(*(centres - [PLACE, 0.5]).T) < 2.0 * WIDTH) & (centres[:, 0] > TICKS[0])
     error = np.sqrt(np.mean((meshed - at_centres(both))[:, near] ** 2, axis=1))
-    # of the largest pressure; 0.1 to 0.5 %, most of it the mesh's
+    # of the largest pressure; 0.2 to 0.8 %, most of it the mesh's
     assert (error < 0.009).all()
     alone = np.sqrt(np.mean((meshed - at_centres(half_space))[:, near] ** 2, axis=1))
     assert error.max() < 0.06 * alone.max()
@@ -109,7 +109,6 @@ def test_stresses_beside_a_side_are_those_of_a_meshed_block(nu):
         return exact, parts[0] - parts[1]
 
     found, beyond = effect(both)
-    print("RES", nu, error, alone, beyond / found)
-    assert abs(beyond) < 0.02 * found  # 0.6 %
+    assert abs(beyond) < 0.02 * found  # 0.7 %
     found, beyond = effect(half_space)
     assert beyond > 0.5 * found
