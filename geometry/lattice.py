@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import itertools
+import math
 import signal
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -52,6 +53,16 @@ class Segment:
     def ratio(self) -> float:
         """Ratio of the sizes of successive cells."""
         return self.growth ** (1.0 / (self.cells - 1)) if self.cells > 1 else 1.0
+
+    @property
+    def narrowest(self) -> float:
+        """Size of the smallest cell [mm], without making the others."""
+        length, count = abs(self.end - self.start), self.cells
+        steepness = abs(math.log(self.growth))
+        if count == 1 or steepness == 0.0:
+            return length / count
+        per_cell = steepness / (count - 1)
+        return length * math.expm1(per_cell) / math.expm1(count * per_cell)
 
     @property
     def ticks(self) -> NDArray[np.float64]:
