@@ -10,7 +10,7 @@ from geometry.errors import InputError, NotConverged, PatchlawError
 from geometry.files import read_surface
 from geometry.meshes import Alignment, BlockShape, alignment, flat_block
 from geometry.partition import Partition, UnevenPartition
-from geometry.patches import PatchGrid, patch_means
+from geometry.patches import PatchGrid, overlaps, patch_means
 from geometry.reference_meshes import characteristic_size, reference_shapes
 from geometry.refined_block import RefinedShape, places_in_reach
 from geometry.spectrum import Spectrum, synthesise
@@ -38,6 +38,7 @@ __all__ = [
     "characteristic_size",
     "find_asperities",
     "flat_block",
+    "overlaps",
     "patch_means",
     "places_in_reach",
     "power_spectrum",

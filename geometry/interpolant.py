@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+import copy
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,6 +37,7 @@ class Interpolant:
         self, heights: Array, lengths: tuple[float, float], *, periodic: bool = False
     ) -> None:
         self.lengths, self.periodic = lengths, periodic
+        self._corner = (0.0, 0.0)
         self._spacing = (lengths[0] / heights.shape[0], lengths[1] / heights.shape[1])
         padding = _PADDING if periodic else 0
         self._lowest = float(heights.min())  # apart, so that its size adds no rounding to slopes
@@ -46,6 +48,18 @@ class Interpolant:
             box += [min(0.0, centres[-1][0]), max(length, centres[-1][-1])]
         self._spline = RectBivariateSpline(*centres, samples, bbox=box, kx=3, ky=3, s=0)
         self._derivatives: dict[tuple[int, int], BivariateSpline] = {}
+
+    def window(self, corner: tuple[float, float], lengths: tuple[float, float]) -> Self:
+        """Return the same spline on a rectangle within, whose lower corner is its origin.
+
+        Args:
+            corner: Lower corner of the rectangle [mm].
+            lengths: Its sides [mm].
+        """
+        part = copy.copy(self)
+        part.lengths, part.periodic = lengths, False
+        part._corner = (self._corner[0] + corner[0], self._corner[1] + corner[1])
+        return part
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out the derivatives, each as large as the spline that they follow from."""
@@ -82,7 +96,7 @@ class Interpolant:
         best = int(np.argmax(z))
         points = [(float(x[best]), float(y[best]), float(z[best])), *refined]
         x_m, y_m, z_m = max(points, key=lambda point: point[2])
-        return x_m, y_m, z_m + self._lowest
+        return x_m - self._corner[0], y_m - self._corner[1], z_m + self._lowest
 
     def _derivative(self, dx: int, dy: int) -> BivariateSpline:
         """Return a derivative as a spline of its own, made once: evaluation would remake it."""
@@ -96,7 +110,7 @@ class Interpolant:
         value = np.asarray(coordinate, dtype=np.float64)
         length = self.lengths[axis]
         if self.periodic:
-            return np.mod(value, length)
+            return np.mod(value, length) + self._corner[axis]
         outside = ~((value >= 0.0) & (value <= length))
         if outside.any():
             raise InputError(
@@ -104,7 +118,7 @@ class Interpolant:
                 value=float(value[outside].flat[0]),
                 allowed=f"0 ≤ {'xy'[axis]} ≤ {length} mm",
             )
-        return value
+        return value + self._corner[axis]
 
     def _starts(self) -> tuple[Array, Array, Array]:
         """Return the highest points of a fine sampling of the spans that can hold the maximum."""
@@ -123,38 +137,51 @@ class Interpolant:
         rows = np.argsort(z.max(axis=1))[-_MOST_STARTS:]
         return px[rows, inner[rows]], py[rows, inner[rows]], z[rows, inner[rows]]
 
+    def _box(self, axis: int) -> tuple[float, float]:
+        """Return where the rectangle begins and ends in the spline's own coordinate [mm]."""
+        return self._corner[axis], self._corner[axis] + self.lengths[axis]
+
+    def _spans(self, axis: int) -> slice:
+        """Return the spans of the spline that reach into the rectangle."""
+        knots, (low, high) = self._spline.get_knots()[axis][3:-3], self._box(axis)
+        first = int(np.searchsorted(knots, low, side="right")) - 1
+        last = int(np.searchsorted(knots, high, side="left"))
+        return slice(max(first, 0), min(last, len(knots) - 1))
+
     def _edges(self, axis: int) -> Array:
         """Return the two ends of every span, cut to the rectangle, shape (n, 2) [mm]."""
-        knots = np.clip(self._spline.get_knots()[axis][3:-3], 0.0, self.lengths[axis])
+        spans = self._spans(axis)
+        knots = self._spline.get_knots()[axis][3:-3][spans.start : spans.stop + 1]
+        knots = np.clip(knots, *self._box(axis))
         return np.stack([knots[:-1], knots[1:]], axis=1)
 
-    def _span_bounds(self) -> Array:
-        """Return an upper bound of the spline on every span, −inf on those outside [mm]."""
+    def _coefficients(self) -> Array:
+        """Return the B-spline coefficients that the rectangle's spans depend on [mm]."""
         shape = [len(knots) - 4 for knots in self._spline.get_knots()]
-        rows = self._spline.get_coeffs().reshape(shape)
-        strips = np.maximum.reduce([rows[k : shape[0] - 3 + k] for k in range(4)])
-        bound = np.maximum.reduce([strips[:, k : shape[1] - 3 + k] for k in range(4)])
-        for axis in range(2):
-            empty = np.diff(self._edges(axis))[:, 0] <= 0.0
-            bound[(empty, slice(None)) if axis == 0 else (slice(None), empty)] = -np.inf
-        return bound
+        x, y = (slice(part.start, part.stop + 3) for part in map(self._spans, range(2)))
+        return np.asarray(self._spline.get_coeffs().reshape(shape)[x, y])
+
+    def _span_bounds(self) -> Array:
+        """Return an upper bound of the spline on every span [mm]."""
+        rows = self._coefficients()
+        nx, ny = rows.shape[0] - 3, rows.shape[1] - 3
+        strips = np.maximum.reduce([rows[k : nx + k] for k in range(4)])
+        return np.asarray(np.maximum.reduce([strips[:, k : ny + k] for k in range(4)]))
 
     def _climb(self, x: float, y: float) -> tuple[float, float, float]:
         """Return the local maximum reached from (x, y) without leaving the rectangle."""
         origin, (dx, dy) = np.array([x, y]), self._spacing
         along_x, along_y = self._derivative(1, 0), self._derivative(0, 1)
-        height = float(np.ptp(self._spline.get_coeffs())) or 1.0
+        height = float(np.ptp(self._coefficients())) or 1.0
 
         def depth(step: Array) -> tuple[float, Array]:
             px, py = origin + step * (dx, dy)
             slope = [dx * along_x(px, py, grid=False), dy * along_y(px, py, grid=False)]
             return -float(self._spline(px, py, grid=False)) / height, -np.array(slope) / height
 
-        limits: list[tuple[float, float]] = [
-            (float(-origin[i] / size), float((self.lengths[i] - origin[i]) / size))
-            for i, size in enumerate((dx, dy))
-        ]
+        low, high = np.transpose([self._box(axis) for axis in range(2)])
+        limits = list(zip((low - origin) / (dx, dy), (high - origin) / (dx, dy), strict=True))
         options = {"ftol": 1e-16, "gtol": 1e-12}
         found = minimize(depth, np.zeros(2), jac=True, bounds=limits, options=options)
-        px, py = np.clip(origin + found.x * (dx, dy), 0.0, self.lengths)
+        px, py = np.clip(origin + found.x * (dx, dy), low, high)
         return float(px), float(py), float(self._spline(px, py, grid=False))

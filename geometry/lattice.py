@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import itertools
+import math
 import signal
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -14,6 +16,7 @@ from numpy.typing import NDArray
 
 # Settings that a caller's own gmsh session may have changed; they are put back afterwards.
 _OPTIONS = {
+    "General.AbortOnError": 2,  # errors raise exceptions; 4 would end the process
     "General.Verbosity": 0,
     "General.Terminal": 0,
     "Mesh.Algorithm": 6,
@@ -50,6 +53,16 @@ class Segment:
     def ratio(self) -> float:
         """Ratio of the sizes of successive cells."""
         return self.growth ** (1.0 / (self.cells - 1)) if self.cells > 1 else 1.0
+
+    @property
+    def narrowest(self) -> float:
+        """Size of the smallest cell [mm], without making the others."""
+        length, count = abs(self.end - self.start), self.cells
+        steepness = abs(math.log(self.growth))
+        if count == 1 or steepness == 0.0:
+            return length / count
+        per_cell = steepness / (count - 1)
+        return length * math.expm1(per_cell) / math.expm1(count * per_cell)
 
     @property
     def ticks(self) -> NDArray[np.float64]:
@@ -93,7 +106,7 @@ def gmsh_session(name: str) -> Iterator[Any]:
     with sigint_kept():
         import gmsh  # here, so that everything without a mesh works without gmsh
 
-        owned = not _is_initialised(gmsh)
+        owned = not is_initialised(gmsh)
         if owned:
             gmsh.initialize(["", "-v", "0"], readConfigFiles=False)
     current = gmsh.model.getCurrent()
@@ -198,10 +211,29 @@ def _outer_faces(shape: Sequence[int], faces: dict[tuple[int, Place], int]) -> d
     return outer
 
 
-def _is_initialised(gmsh: Any) -> bool:
+def is_initialised(gmsh: Any) -> bool:
+    """Tell whether gmsh has a session, calling nothing that may end the process.
+
+    A call before the first session makes gmsh 4.8 report an error. It then reads how to treat
+    errors from memory that nothing has set, and where that holds a 4 it exits without a word.
+    """
     if hasattr(gmsh, "isInitialized"):
         return bool(gmsh.isInitialized())
-    try:  # gmsh 4.8 answers 0, or raises, before it is initialised
+    if not _has_context(gmsh):
+        return False
+    try:  # gmsh 4.8 answers 0, or raises, between two sessions
         return bool(gmsh.option.getNumber("Mesh.ElementOrder") >= 1.0)
     except Exception:
+        return False
+
+
+def _has_context(gmsh: Any) -> bool:
+    """Tell whether gmsh has had a session, which leaves its options' singleton behind.
+
+    Where the library hides that (no release that we know does so and lacks ``isInitialized``),
+    the answer is no, and a caller's session, if there is one, ends with ours.
+    """
+    try:
+        return ctypes.c_void_p.in_dll(gmsh.lib, "_ZN3CTX9_instanceE").value is not None
+    except ValueError:
         return False

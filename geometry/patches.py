@@ -113,6 +113,24 @@ def patch_means(surface: Surface, patches: Partition) -> Array:
     return (shares_x @ surface.heights @ shares_y.T).ravel()
 
 
+def overlaps(borders: Array, length: float, cells: int) -> Array:
+    """Return the length of every cell in every interval, shape (intervals, cells) [mm].
+
+    What lies beyond the outer borders counts for the nearest interval.
+
+    Args:
+        borders: Ends of the intervals, ascending, shape (intervals + 1,) [mm].
+        length: Side that equal cells divide [mm].
+        cells: Their number.
+    """
+    edges = np.linspace(0.0, length, cells + 1)
+    inner = borders[1:-1, None]
+    lower = np.concatenate([np.full((1, 1), -np.inf), inner])
+    upper = np.concatenate([inner, np.full((1, 1), np.inf)])
+    overlap = np.minimum(upper, edges[1:]) - np.maximum(lower, edges[:-1])
+    return np.clip(overlap, 0.0, None)
+
+
 def _shares(borders: Array, length: float, cells: int, axis: str) -> Array:
     """Return the share of every cell in every interval's mean, shape (intervals, cells)."""
     slack = 1e-9 * length  # rounding of borders that were computed from an origin

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import ceil
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +14,10 @@ from geometry.errors import InputError
 from geometry.interpolant import Interpolant
 
 Array = NDArray[np.float64]
+
+_FEWEST = 4  # heights along a side
+_WHOLE = 1e-6  # of a cell: a rectangle that reaches no further into it does by rounding
+_SLACK = 1e-9  # of a side: rounding of coordinates that were computed from an origin
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -163,6 +168,45 @@ class Surface:
         lengths = (heights.shape[0] * self.spacing[0], heights.shape[1] * self.spacing[1])
         return replace(self, heights=heights, lengths=lengths, periodic=False)
 
+    def piece(self, x: tuple[float, float], y: tuple[float, float]) -> Surface:
+        """Return what lies in a rectangle, with the interpolant of the whole.
+
+        It ends at the very coordinates, and rises nowhere above the whole, which the spline of a
+        surface that is `cropped` may do by micrometres. Its cells are those of the whole where
+        they fill the rectangle, else a little smaller; there are at least 4 × 4.
+
+        Args:
+            x: Interval (lo, hi) along x [mm].
+            y: Interval (lo, hi) along y [mm].
+
+        Returns:
+            A surface that is not periodic, whose origin is the rectangle's lower corner.
+
+        Raises:
+            InputError: When an interval is empty or leaves the surface.
+        """
+        corner, lengths, grid = [], [], []
+        for axis, interval in enumerate((x, y)):
+            low, high = _within(interval, self.lengths[axis], "xy"[axis])
+            corner.append(low)
+            lengths.append(high - low)
+            cells = (high - low) / self.spacing[axis]
+            grid.append(max(ceil(cells - _WHOLE), _FEWEST))
+        interpolant = self.interpolant.window((corner[0], corner[1]), (lengths[0], lengths[1]))
+        centres = [
+            (np.arange(count) + 0.5) * (length / count)
+            for count, length in zip(grid, lengths, strict=True)
+        ]
+        part = replace(
+            self,
+            heights=interpolant(centres[0][:, None], centres[1]),
+            lengths=(lengths[0], lengths[1]),
+            periodic=False,
+        )
+        # no field: a surface that `replace` makes of this one has heights of its own
+        vars(part)["interpolant"] = interpolant
+        return part
+
     def shifted(self, i: int, j: int) -> Surface:
         """Move a periodic surface by whole cells.
 
@@ -190,7 +234,7 @@ def _checked_heights(heights: ArrayLike) -> Array:
     if kind not in "biuf":
         raise InputError("the heights are not an array of real numbers")
     array = frozen_array(heights)
-    if array.ndim != 2 or min(array.shape) < 4:
+    if array.ndim != 2 or min(array.shape) < _FEWEST:
         raise InputError(
             "a surface needs at least 4 × 4 heights on a two-dimensional grid",
             value=array.shape,
@@ -222,3 +266,16 @@ def _cells_between(
             allowed=f"0 ≤ lo < hi ≤ {length} mm",
         )
     return slice(lo, hi)
+
+
+def _within(interval: tuple[float, float], length: float, axis: str) -> tuple[float, float]:
+    """Return an interval, cut to the surface where rounding alone takes it beyond."""
+    low, high = map(float, interval)
+    slack = _SLACK * length
+    if not -slack <= low < high <= length + slack:
+        raise InputError(
+            f"the piece along {axis} does not lie within the surface or is empty",
+            value=(low, high),
+            allowed=f"0 ≤ lo < hi ≤ {length} mm",
+        )
+    return max(low, 0.0), min(high, length)

@@ -54,6 +54,12 @@ class TopFacets:
     reference: Array
     corners: Array
 
+    @property
+    def area(self) -> Array:
+        """Areas in the plane, shape (n,) [mm²]."""
+        parallelogram = 2.0 * _areas(self.corners[:, :3])
+        return parallelogram if self.corners.shape[1] == 4 else 0.5 * parallelogram
+
     def pull_back(self, facet: NDArray[np.intp], points: Array) -> Array:
         """Map points (n, 2) of given facets (n,) to the reference cell, (n, 3)."""
         edges = np.swapaxes(self.corners[:, 1:3] - self.corners[:, :1], 1, 2)

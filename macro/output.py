@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from macro import compat
+from macro.facets import top_facets
 from macro.interface import Interface
 from macro.obstacle import ObstacleBlock
 from macro.obstacle_state import ObstacleState
@@ -25,9 +26,10 @@ def write_fields(
 ) -> None:
     """Write displacements [mm] and patch pressures [MPa] as XDMF, with an HDF5 file beside it.
 
-    Quadratic displacements are written at the vertices. The pressure of a patch colours the cells
-    under it; it is zero elsewhere. Where dolfinx has ADIOS2, displacements of any degree are also
-    written as VTX, in a folder beside it that ends in ``.bp``.
+    Quadratic displacements are written at the vertices. The pressure of a cell is the mean over
+    its facet of the top, to which the patches on it contribute by area; it is zero elsewhere. Where
+    dolfinx has ADIOS2, displacements of any degree are also written as VTX, in a folder beside it
+    that ends in ``.bp``.
 
     Args:
         path: File to write, ending in ``.xdmf``.
@@ -46,9 +48,12 @@ def write_fields(
     if block.degree > 1:
         moved = _interpolated(compat.vector_space(mesh, 1), moved, moved.name)
     pressed = fem.Function(compat.cellwise_space(mesh), name="pressure")
-    points = interface.quadrature
+    points, facets = interface.quadrature, top_facets(block.mesh)
     cells = compat.cell_nodes(pressed.function_space)[:, 0]
-    pressed.x.array[cells[points.cell]] = pressure[points.patch]
+    force = points.weight * pressure[points.patch]
+    total = np.bincount(cells[points.cell], force, minlength=len(pressed.x.array))
+    loaded = cells[facets.cell]
+    pressed.x.array[loaded] = total[loaded] / facets.area
     pressed.x.scatter_forward()
     compat.write_xdmf(str(path), mesh, [moved, pressed])
 

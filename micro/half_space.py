@@ -18,17 +18,14 @@ from micro.cells.free_sides import FreeSides
 from micro.cells.half_space_curve import CellSums
 from micro.cells.half_space_state import HalfSpaceState
 from micro.cells.motions import Motions
-from micro.cells.patch_cells import cells_outside, whole_cells
 from micro.cells.pressing import Pressing
-from micro.curve import checked_approaches
+from micro.curve import checked_approaches, whole_patch
 from micro.plane import RigidPlane
 from micro.response import Pressed, Response
 
 Array = NDArray[np.float64]
 
 _LEVEL = (0.0, 0.0)
-_OUT_OF_REACH = 1e3
-"""Sides of the surface by which cells are lowered that may not touch."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,8 +43,6 @@ class HalfSpaceModel:
         tolerance: Largest residual of a solution (see `HalfSpaceState`), which bounds the error of
             the force; on a random surface of 256² cells the force erred by 5e-10 with 1e-8, and by
             1e-13 with 1e-10.
-        within: Patches that hold the centres of all cells that may touch; all cells when not
-            given.
         highest: Height z_M that the approach counts from [mm], such as that of the surface that
             this one was resampled from; the surface's own when not given.
         sides: Free sides of the surface's rectangle, which yield beyond the half-space; none when
@@ -59,8 +54,7 @@ class HalfSpaceModel:
 
     Raises:
         InputError: When the modulus or the tolerance is not positive, a periodic model is asked
-            of a surface that is not, or with free sides, these are not the surface's, or no cell
-            may touch.
+            of a surface that is not, or with free sides, or these are not the surface's.
 
     Source:
         Polonsky & Keer 1999, doi 10.1016/S0043-1648(99)00113-1.
@@ -70,7 +64,6 @@ class HalfSpaceModel:
     contact_modulus: float
     periodic: bool = False
     tolerance: float = 1e-8
-    within: PatchGrid | None = None
     highest: float | None = None
     sides: FreeSides | None = None
     body: BodyTerm | None = None
@@ -88,12 +81,6 @@ class HalfSpaceModel:
                 "a periodic half-space needs a periodic surface", value=self.surface.source
             )
         self._check_sides()
-        if self._free is not None and self._free.all():
-            raise InputError(
-                "no cell has its centre in the patches that may touch",
-                value=self.within,
-                allowed=f"patches within {self.surface.lengths} mm",
-            )
 
     def _check_sides(self) -> None:
         if self.sides is None:
@@ -120,23 +107,18 @@ class HalfSpaceModel:
     @property
     def first_touch(self) -> float:
         """Approach of a level plane at first contact of a cell's centre [mm]."""
-        return -float(self._allowed(self._required(self._plane(0.0, _LEVEL))).max())
+        return -float(self._required(self._plane(0.0, _LEVEL)).max())
 
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
-        """Return the model of the cells of one patch; see `MicroModel.of_patch`.
+        """Return the model of one patch cut out along its borders; see `MicroModel.of_patch`.
 
-        Model and patch count places from the corner of the first of these cells. The patch's own
-        half-space has no free sides.
+        Its cells fill the patch: where its borders run through the surface's cells, they are a
+        little smaller than those. The patch has a half-space of its own.
         """
-        own, bounds = patches.single(index), patches.bounds(index)
-        cells = zip(bounds, self.surface.spacing, self.surface.grid, strict=True)
-        x, y = (whole_cells(*axis) for axis in cells)
-        patch = replace(own, origin=(own.origin[0] - x[0], own.origin[1] - y[0]))
-        piece = self.surface.cropped(x=x, y=y)
-        model = replace(
-            self, surface=piece, within=patch, periodic=False, highest=self.datum, sides=None
-        )
-        return model, patch
+        piece = self.surface.piece(*patches.bounds(index))
+        alone = {"periodic": False, "sides": None, "body": None, "slopes": None}
+        model = replace(self, surface=piece, highest=self.datum, **alone)
+        return model, whole_patch(piece)
 
     def solve(
         self,
@@ -213,13 +195,13 @@ class HalfSpaceModel:
     ) -> HalfSpaceState:
         tilt = tilt if control.tilt is None else control.tilt
         if control.force == 0.0:
-            level = self._allowed(self._required(self._plane(0.0, tilt)))
+            level = self._required(self._plane(0.0, tilt))
             return self._pressed(self._plane(-float(level.max()), tilt), None)
         if control.tilt is None:
             return self._turned(control, start)
         if control.approach is not None:
             return self._pressed(self._plane(control.approach, tilt), start)
-        level = self._allowed(self._required(self._plane(0.0, tilt)))
+        level = self._required(self._plane(0.0, tilt))
         known = None
         if start is not None and start.any() and near is not None:
             known = Pressures(start, np.array([near]), 0.0, 0, 0)
@@ -237,9 +219,10 @@ class HalfSpaceModel:
                 (self.surface.x, self.surface.y), self.surface.lengths, strict=True
             )
         )
-        required = self._allowed(self._required(self._plane(control.approach or 0.0, _LEVEL)))
+        required = self._required(self._plane(control.approach or 0.0, _LEVEL))
         total = None if control.force is None else self._total(control)
-        found = self._pressing.by_turning(required, Motions.turning(x, y, total), start)
+        known = None if start is None else Pressures(start, np.zeros(3), 0.0, 0, 0)
+        found = self._pressing.by_turning(required, Motions.turning(x, y, total), known)
         approach = control.approach if control.force is None else float(found.motion[0])
         return self._state(
             self._plane(float(approach or 0.0), _slopes(found.motion[-2:], half)), found
@@ -325,7 +308,8 @@ class HalfSpaceModel:
                 value=plane.approach,
                 allowed=f"< {plane.approach - required.mean():.6g} mm; beyond it give the force",
             )
-        return self._state(plane, self._pressing.by_approach(self._allowed(required), start))
+        known = None if start is None else Pressures(start, np.zeros(0), 0.0, 0, 0)
+        return self._state(plane, self._pressing.by_approach(required, known))
 
     def _plane(self, approach: float, tilt: tuple[float, float]) -> RigidPlane:
         self._check_tilt(tilt)
@@ -340,29 +324,13 @@ class HalfSpaceModel:
     def _required(self, plane: RigidPlane) -> Array:
         surface = self.surface
         below = self.datum - surface.heights
-        required = plane.at(surface.x[:, None], surface.y) - below
-        return np.asarray(required)
-
-    def _allowed(self, required: Array) -> Array:
-        """Return the displacements asked for, none where cells may not touch."""
-        if self._free is None:
-            return required
-        low = float(required.min()) - _OUT_OF_REACH * max(self.surface.lengths)
-        return np.where(self._free, low, required)
-
-    @cached_property
-    def _free(self) -> NDArray[np.bool_] | None:
-        """Cells that may not touch, shape (nx, ny)."""
-        if self.within is None:
-            return None
-        return cells_outside(self.surface, self.within)
+        return np.asarray(plane.at(surface.x[:, None], surface.y) - below)
 
     def _state(self, plane: RigidPlane, found: Pressures) -> HalfSpaceState:
         return HalfSpaceState(
             plane=plane,
             required=self._required(plane),
             pressure=found.pressure * self.contact_modulus,
-            may_touch=None if self._free is None else ~self._free,
             contact_modulus=self.contact_modulus,
             spacing=self.surface.spacing,
             periodic=self.periodic,
@@ -375,7 +343,6 @@ class HalfSpaceModel:
     def _pressing(self) -> Pressing:
         grids = ElasticGrids(
             periodic=self.periodic,
-            whole=self.surface.grid,
             modulus=self.contact_modulus,
             sides=self.sides,
             body=self.body,

@@ -127,11 +127,6 @@ def _of_cells(scene: Scene, cells: int) -> Need:
 def check_patches(scene: Scene, surface: Surface) -> None:
     """Refuse patches that no element or no height can resolve."""
     limits: list[tuple[str, Sequence[int]]] = [("heights of the surface", surface.grid)]
-    alone = scene.coupling.kind == "isolated"
-    # it cuts patches out, and a surface has at least 4 × 4 heights
-    if alone and scene.micro.model == "islands":
-        fourths = (surface.grid[0] // 4, surface.grid[1] // 4)
-        limits = [("fourths of the surface's heights", fourths)]
     on_mesh = not scene.coupling.decomposed or scene.output.fields
     if scene.coupling.kind not in ("analytic", "reference") and on_mesh:
         limits.append(("cells of the interface (block.cells)", block_cells(scene)[:2]))

@@ -1,7 +1,7 @@
 """The elastic body seen through a grid of cells: pressures to displacements and back.
 
-The compliance is a sum of symmetric terms: the half-space, and what free sides, the rest of a
-finite body and finite slopes add to it.
+The compliance is a sum of symmetric terms: the half-space, and what free sides and the rest of a
+finite body add to it.
 """
 
 from __future__ import annotations
@@ -56,12 +56,8 @@ class GridTerm(Protocol):
         """Return the displacement by pressures on all cells, shape (nx, ny) [mm]."""
         ...
 
-    def of_cells(self, cells: Cells, pressure: Array) -> Array | None:
-        """Return the displacements of some cells by pressures on them, shape (n,) [mm].
-
-        None of a term so small that it need not be seen by the conjugate gradients, only by the
-        gaps that they start from.
-        """
+    def of_cells(self, cells: Cells, pressure: Array) -> Array:
+        """Return the displacements of some cells by pressures on them, shape (n,) [mm]."""
         ...
 
 
@@ -131,9 +127,7 @@ class ElasticGrid:
         self.products += 1
         found = _among(cells, pressure, self._half_space.rough_compliance)
         for term in self._terms:
-            part = term.of_cells(cells, pressure)
-            if part is not None:
-                found += part
+            found += term.of_cells(cells, pressure)
         return found
 
     def resist(self, cells: Cells, displacement: Array) -> Array:
@@ -217,23 +211,6 @@ class _BodyOnGrid:
         return np.asarray(self._modulus * found.ravel()[cells.place])
 
 
-class _SlopeTerm:
-    """A part that is evaluated on the whole surface, on a box of its cells and for E* = 1."""
-
-    def __init__(self, term: SurfaceTerm, box: Box, grid: tuple[int, int], modulus: float) -> None:
-        self._term, self._box, self._grid, self._modulus = term, box, grid, modulus
-
-    def displacement(self, pressure: Array) -> Array:
-        """Return the displacement by pressures on all cells of the box, shape (nx, ny) [mm]."""
-        whole = np.zeros(self._grid)
-        whole[self._box] = pressure * self._modulus
-        return np.asarray(self._term.displacement(whole)[self._box])
-
-    def of_cells(self, cells: Cells, pressure: Array) -> None:
-        """Leave the conjugate gradients alone: it is a few per cent of the displacements."""
-        return None
-
-
 def _among(cells: Cells, values: Array, convolution: Convolution) -> Array:
     scale = float(np.abs(values).max(initial=0.0)) or 1.0  # single precision ends at 1e-38
     field = np.zeros((len(cells.rows), convolution.grid[1]), np.float32)
@@ -263,24 +240,23 @@ class ElasticGrids:
 
     Args:
         periodic: Whether pressures continue periodically.
-        whole: Numbers of cells of the surface.
         modulus: Contact modulus E* of the model [MPa].
         sides: Free sides, if there are any.
         body: What the rest of a finite body adds, if there is one.
-        slopes: What finite slopes add, if they are to be seen.
+        slopes: What finite slopes add, if they are to be seen; it is for whoever solves on the
+            grids to take it into account.
     """
 
     def __init__(
         self,
         *,
         periodic: bool,
-        whole: tuple[int, int],
         modulus: float = 1.0,
         sides: FreeSides | None = None,
         body: BodyTerm | None = None,
         slopes: SurfaceTerm | None = None,
     ) -> None:
-        self.periodic, self.whole, self.modulus = periodic, whole, modulus
+        self.periodic, self.modulus = periodic, modulus
         self.sides, self.body, self.slopes = sides, body, slopes
         self._known: dict[tuple[object, ...], HalfSpaceGrid] = {}
 
@@ -298,8 +274,6 @@ class ElasticGrids:
         if box is not None:
             if self.sides is not None:
                 terms.append(_SideTerm(side_cells(self.sides, spacing), box))
-            if self.slopes is not None:
-                terms.append(_SlopeTerm(self.slopes, box, self.whole, self.modulus))
             origin = box.rows.start * spacing[0], box.columns.start * spacing[1]
             terms += self._of_body(grid, spacing, origin)
         return ElasticGrid(self._half_space(grid, spacing), terms)
@@ -354,7 +328,6 @@ class ElasticGrids:
         """Travel without the work arrays."""
         return _empty_grids, (
             self.periodic,
-            self.whole,
             self.modulus,
             self.sides,
             self.body,
@@ -364,12 +337,9 @@ class ElasticGrids:
 
 def _empty_grids(
     periodic: bool,
-    whole: tuple[int, int],
     modulus: float,
     sides: FreeSides | None,
     body: BodyTerm | None,
     slopes: SurfaceTerm | None,
 ) -> ElasticGrids:
-    return ElasticGrids(
-        periodic=periodic, whole=whole, modulus=modulus, sides=sides, body=body, slopes=slopes
-    )
+    return ElasticGrids(periodic=periodic, modulus=modulus, sides=sides, body=body, slopes=slopes)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Partition, Surface, patch_means
+from geometry import Partition, Surface, overlaps, patch_means
 from micro.cells.contacts import true_area
 from micro.cells.half_space_state import HalfSpaceState
 from micro.curve import checked_means
@@ -90,15 +90,5 @@ class CellSums:
     def _sums(self, field: Array) -> Array:
         """Integrate over every patch, and beyond the outer borders for the nearest patch."""
         borders = self.patches.borders_x, self.patches.borders_y
-        x, y = map(_overlaps, borders, self.surface.lengths, self.surface.grid)
+        x, y = map(overlaps, borders, self.surface.lengths, self.surface.grid)
         return np.asarray((x @ field @ y.T).ravel())
-
-
-def _overlaps(borders: Array, length: float, cells: int) -> Array:
-    """Return the length of every cell in every interval, shape (intervals, cells) [mm]."""
-    edges = np.linspace(0.0, length, cells + 1)
-    inner = borders[1:-1, None]
-    lower = np.concatenate([np.full((1, 1), -np.inf), inner])
-    upper = np.concatenate([inner, np.full((1, 1), np.inf)])
-    overlap = np.minimum(upper, edges[1:]) - np.maximum(lower, edges[:-1])
-    return np.clip(overlap, 0.0, None)

@@ -25,7 +25,6 @@ class HalfSpaceState:
         required: Displacement that the plane asks of each cell, δ(x, y) − (z_M − z), negative
             where they are apart, shape (nx, ny) [mm].
         pressure: Contact pressure, shape (nx, ny) [MPa].
-        may_touch: Cells that may touch, shape (nx, ny); all when not given.
         contact_modulus: E* [MPa].
         spacing: Sides (dx, dy) of a cell [mm].
         periodic: Whether surface and pressures continue periodically.
@@ -39,7 +38,6 @@ class HalfSpaceState:
     plane: RigidPlane
     required: Array
     pressure: Array
-    may_touch: NDArray[np.bool_] | None
     contact_modulus: float
     spacing: tuple[float, float]
     periodic: bool
@@ -89,8 +87,5 @@ class HalfSpaceState:
 
     @property
     def gap(self) -> Array:
-        """Distance of the displaced surface from the plane, shape (nx, ny) [mm].
-
-        Where cells may not touch, the plane may have gone through them.
-        """
+        """Distance of the displaced surface from the plane, shape (nx, ny) [mm]."""
         return self.displacement - self.required

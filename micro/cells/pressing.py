@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.errors import NotConverged
+from micro.cells.anderson import Anderson
 from micro.cells.coarse_start import coarse_pressure, coarsened, nested_pressure
 from micro.cells.contact_pressure import Pressures, contact_pressure
 from micro.cells.elastic_grid import ElasticGrids
@@ -17,8 +20,18 @@ Array = NDArray[np.float64]
 
 _MARGIN = 1.1
 """Factor on an estimated approach, so that the cells in its reach hold the contact."""
+_MOST_LAGS = 30
+_FIRST = 1e-2
+"""Residual of the first solution, before finite slopes are known."""
+_AHEAD = 2e-2
+"""Residual of a solution, of the last change by finite slopes: what the next change will be."""
+_LAG = 3e-9
+"""Change by finite slopes that is let be, of the largest displacement."""
 _FEW_CELLS = 32
 """Cells per side on which the approach is estimated."""
+
+
+Solve = Callable[[Array, Motions | None, Pressures | None, float], Pressures]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,11 +54,9 @@ class Pressing:
     tolerance: float
     upper: float = np.inf
 
-    def by_approach(self, required: Array, start: Array | None) -> Pressures:
+    def by_approach(self, required: Array, start: Pressures | None) -> Pressures:
         """Solve with given displacements d, as `contact_pressure`; pressures on all cells."""
-        if required.max() <= 0.0:
-            return Pressures(np.zeros(required.shape), np.zeros(0), 0.0, 0, 0)
-        return self._grown(self._box(required), required, start, None)
+        return self._with_slopes(self._by_approach, required, None, start)
 
     def by_force(self, required: Array, total: float, start: Pressures | None) -> Pressures:
         """Solve with a given sum of pressures / E*; ``required`` holds up to a constant.
@@ -55,25 +66,93 @@ class Pressing:
             total: Sum of pressures / E* over the cells.
             start: A solution nearby, its motion the approach.
         """
+        motions = Motions.approach(required.shape, total)
+        return self._with_slopes(self._by_force, required, motions, start)
+
+    def by_turning(self, required: Array, motions: Motions, start: Pressures | None) -> Pressures:
+        """Solve with free slopes; ``required`` holds up to the free motions."""
+        return self._with_slopes(self._by_turning, required, motions, start)
+
+    def _with_slopes(
+        self, solve: Solve, required: Array, motions: Motions | None, start: Pressures | None
+    ) -> Pressures:
+        """Solve, displacements by finite slopes taken from the solution before, until both agree.
+
+        They are a few per cent of all, and change by a hundredth of that in the second solution.
+        """
+        slopes = self.grids.slopes
+        if slopes is None:
+            return solve(required, motions, start, self.tolerance)
+        modulus, known = self.grids.modulus, Anderson()
+        lag = np.zeros(required.shape)
+        if start is not None and start.pressure.any():
+            lag = slopes.displacement(start.pressure * modulus)
+        tolerance, iterations, passes = max(self.tolerance, _FIRST), 0, 0
+        for _ in range(_MOST_LAGS):
+            found = start = solve(required - lag, motions, start, tolerance)
+            iterations, passes = iterations + found.iterations, passes + found.passes
+            touching = found.pressure > 0.0
+            if not touching.any():
+                return found
+            change = slopes.displacement(found.pressure * modulus) - lag
+            nearer = required if motions is None else required + motions.nearer(found.motion)
+            scale = float(nearer[touching].max())
+            left = float(np.abs(change[touching]).max()) / scale
+            if left <= _LAG and tolerance <= self.tolerance:
+                residual = max(found.residual, left)
+                return found._replace(residual=residual, iterations=iterations, passes=passes)
+            lag = known.next(lag, change)
+            tolerance = max(self.tolerance, min(_FIRST, _AHEAD * left))
+        raise NotConverged(
+            "the displacements by finite slopes",
+            reason=f"they still change by {left:.1e} of the displacement",
+            iterations=iterations,
+            remedy="set micro.finite_slopes = false, or smooth the surface",
+        )
+
+    def _by_approach(
+        self,
+        required: Array,
+        _motions: Motions | None,
+        start: Pressures | None,
+        tolerance: float,
+    ) -> Pressures:
+        if required.max() <= 0.0:
+            return Pressures(np.zeros(required.shape), np.zeros(0), 0.0, 0, 0)
+        return self._grown(self._box(required), required, _pressure(start), None, tolerance)
+
+    def _by_turning(
+        self,
+        required: Array,
+        motions: Motions | None,
+        start: Pressures | None,
+        tolerance: float,
+    ) -> Pressures:
+        whole = Box.whole(required.shape)
+        return self._on(whole, required, _pressure(start), motions, tolerance)
+
+    def _by_force(
+        self,
+        required: Array,
+        motions: Motions | None,
+        start: Pressures | None,
+        tolerance: float,
+    ) -> Pressures:
+        assert motions is not None
         top = float(required.max())
         level = required - top  # from here on the approach counts from first touch of a cell
-        motions = Motions.approach(required.shape, total)
         first, reach = None, np.inf
-        if start is not None:
+        if start is not None and start.pressure.any():
             first, reach = start.pressure, _MARGIN * (float(start.motion[0]) + top)
         elif not self.grids.periodic:
             reach = _MARGIN * self._estimate(level, motions)
         while True:
             box = self._box(level + max(reach, float(np.finfo(float).tiny)))
-            found = self._grown(box, level, first, motions)
+            found = self._grown(box, level, first, motions, tolerance)
             approach = float(found.motion[0])
             if approach <= reach or box.shape == required.shape:
                 return found._replace(motion=found.motion - top)
             first, reach = found.pressure, _MARGIN * approach
-
-    def by_turning(self, required: Array, motions: Motions, start: Array | None) -> Pressures:
-        """Solve with free slopes; ``required`` holds up to the free motions."""
-        return self._on(Box.whole(required.shape), required, start, motions)
 
     def _estimate(self, required: Array, motions: Motions) -> float:
         """Estimate the approach on a coarse grid: its summits are lower, it errs upwards."""
@@ -97,17 +176,22 @@ class Pressing:
         return Box.around(np.ones(required.shape, bool) if whole else required > 0.0)
 
     def _grown(
-        self, box: Box, required: Array, start: Array | None, motions: Motions | None
+        self,
+        box: Box,
+        required: Array,
+        start: Array | None,
+        motions: Motions | None,
+        tolerance: float,
     ) -> Pressures:
         """Solve on a box, and on a larger one while the body lifts cells outside into contact."""
-        found = self._on(box, required, start, motions)
+        found = self._on(box, required, start, motions, tolerance)
         while self.grids.body is not None and box.shape != required.shape:
             nearer = required if motions is None else required + motions.nearer(found.motion)
             lifted = self._lifted(box, nearer, found)
             if lifted is None:
                 break
             box = lifted
-            again = self._on(box, required, found.pressure, motions)
+            again = self._on(box, required, found.pressure, motions, tolerance)
             found = again._replace(iterations=found.iterations + again.iterations)
         return found
 
@@ -130,7 +214,12 @@ class Pressing:
         return Box.around((found.pressure > 0.0) | (nearer > 0.0) | touched)
 
     def _on(
-        self, box: Box, required: Array, start: Array | None, motions: Motions | None
+        self,
+        box: Box,
+        required: Array,
+        start: Array | None,
+        motions: Motions | None,
+        tolerance: float,
     ) -> Pressures:
         part = np.ascontiguousarray(required[box])
         free = None if motions is None else motions.on(box)
@@ -142,14 +231,18 @@ class Pressing:
                 self.spacing,
                 motions=free,
                 upper=self.upper,
-                tolerance=self.tolerance,
+                tolerance=tolerance,
                 box=box,
             )
         else:
             grid = self.grids.at(part.shape, self.spacing, box)
             found = contact_pressure(
-                grid, part, first, motions=free, upper=self.upper, tolerance=self.tolerance
+                grid, part, first, motions=free, upper=self.upper, tolerance=tolerance
             )
         pressure = np.zeros(required.shape)
         pressure[box] = found.pressure
         return found._replace(pressure=pressure)
+
+
+def _pressure(found: Pressures | None) -> Array | None:
+    return None if found is None else found.pressure

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Partition
+from geometry import Partition, overlaps
 from micro.patch_displacement import patch_displacements
 from micro.plane import RigidPlane
 from micro.regions.island_passes import Settled
@@ -17,6 +18,9 @@ from micro.regions.island_state import IslandState
 from micro.regions.relief import Relief
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+_TIE = 1e-9  # of a side: a point that is no further from a border lies on it
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,7 +49,8 @@ class IslandSums:
         Raises:
             InputError: When a peak above the plane lies outside the patches.
         """
-        force_share, area_share = self._shares(settled)
+        tops, owner = self._tops(settled)
+        force_share, area_share = self._shares(settled, tops)
         displacement = self._displacement(state)
         separation = self.highest - plane.means(self.patches) - self.mean_heights
         separation = separation + displacement
@@ -61,63 +66,83 @@ class IslandSums:
             "engulfed": state.merged,
             "patch_force": state.force @ force_share,
             "patch_contact_area": state.contact_area @ area_share,
-            "patch_contacts": np.bincount(self._homes(settled), minlength=self.patches.count),
+            "patch_contacts": np.bincount(owner, minlength=self.patches.count),
             "patch_displacement": displacement,
             "patch_separation": separation,
             "warning": state.warning,
         }
 
-    def _homes(self, settled: Settled) -> NDArray[np.intp]:
-        """Return the patch with the highest peak of each island, shape (m,)."""
+    def _tops(self, settled: Settled) -> tuple[Array, Indices]:
+        """Return the places of the highest peaks of the islands, (m, 2) [mm], and their patches."""
         member = settled.islands.member
         peaks = np.flatnonzero(member >= 0)
         owner = self.patches.index_of(self.relief.x[peaks], self.relief.y[peaks])
         order = np.argsort(settled.height[peaks], kind="stable")  # the highest is written last
-        home = np.zeros(len(settled.islands), dtype=np.intp)
-        home[member[peaks][order]] = owner[order]
-        return home
+        top = np.zeros(len(settled.islands), dtype=np.intp)
+        top[member[peaks][order]] = order
+        place = np.stack([self.relief.x[peaks], self.relief.y[peaks]], axis=1)
+        return place[top], owner[top]
 
-    def _shares(self, settled: Settled) -> tuple[Array, Array]:
+    def _shares(self, settled: Settled, tops: Array) -> tuple[Array, Array]:
         """Return the shares of each patch in the force and in the area of each island, (m, N).
 
         A sample at a height e above its level weighs as Hertz's pressure does in a paraboloid cap
-        of height w, (2 e/w − 1)^½, in force, and as 1 in area where e > w/2.
+        of height w, (2 e/w − 1)^½, in force, and as 1 in area where e > w/2. Samples that straddle
+        a border are shared by area.
         """
         found = settled.islands
         catchment, sample, height = self.relief.above(settled.height)
         kept = found.member[catchment] >= 0
         island = found.member[catchment[kept]]
-        row, column = np.divmod(sample[kept], self.relief.grid[1])
-        patch = self._rows[row] * self.patches.shape[1] + self._columns[column]
-        pressed = 2.0 * height[kept] / found.depth[island] - 1.0
-        place = island * self.patches.count + patch
-        home = self._homes(settled)
+        sample, pressed = sample[kept], 2.0 * height[kept] / found.depth[island] - 1.0
         force, area = (
-            self._share(place, weight, home)
+            self._share(island, sample, weight, tops)
             for weight in (np.sqrt(np.maximum(pressed, 0.0)), (pressed > 0.0).astype(float))
         )
         return force, area
 
-    def _share(self, place: NDArray[np.intp], weight: Array, home: NDArray[np.intp]) -> Array:
-        """Sum up weights and norm them; an island without weight counts for its home."""
-        shape = len(home), self.patches.count
-        share = np.bincount(place, weight, minlength=shape[0] * shape[1]).reshape(shape)
+    def _share(self, island: Indices, sample: Indices, weight: Array, tops: Array) -> Array:
+        """Sum up the weights of samples over patches and norm them."""
+        on = np.flatnonzero(weight > 0.0)
+        island, weight = island[on], weight[on]
+        row, column = np.divmod(sample[on], self.relief.grid[1])
+        count, total = self.patches.count, np.zeros(len(tops) * self.patches.count)
+        for (ix, along), (iy, across) in product(self._rows, self._columns):
+            place = island * count + ix[row] * self.patches.shape[1] + iy[column]
+            parts = weight * along[row] * across[column]
+            total += np.bincount(place, parts, minlength=len(total))
+        share = total.reshape(len(tops), count)
         empty = np.flatnonzero(share.sum(axis=1) == 0.0)
-        share[empty, home[empty]] = 1.0
+        share[empty] = self._at(tops[empty])
         return share / share.sum(axis=1, keepdims=True)
 
+    def _at(self, point: Array) -> Array:
+        """Return the shares of the patches in points, which those on a border halve, (m, N)."""
+        x, y = self.patches.borders_x, self.patches.borders_y
+        slack = _TIE * min(self.lengths)
+        share = np.zeros((len(point), self.patches.count))
+        for offset in product((-slack, slack), repeat=2):
+            inside = np.clip(point + offset, (x[0], y[0]), (x[-1], y[-1]))
+            np.add.at(share, (np.arange(len(point)), self.patches.index_of(*inside.T)), 0.25)
+        return share
+
     @cached_property
-    def _rows(self) -> NDArray[np.intp]:
+    def _rows(self) -> list[tuple[Indices, Array]]:
         return self._intervals(0, self.patches.borders_x)
 
     @cached_property
-    def _columns(self) -> NDArray[np.intp]:
+    def _columns(self) -> list[tuple[Indices, Array]]:
         return self._intervals(1, self.patches.borders_y)
 
-    def _intervals(self, axis: int, borders: Array) -> NDArray[np.intp]:
-        cells = self.relief.grid[axis]
-        centres = (np.arange(cells) + 0.5) * self.lengths[axis] / cells
-        return np.searchsorted(borders[1:-1], centres, side="right")
+    def _intervals(self, axis: int, borders: Array) -> list[tuple[Indices, Array]]:
+        """Return the first, second, … interval that every sample reaches into, and its share."""
+        cells, length = self.relief.grid[axis], self.lengths[axis]
+        share = overlaps(borders, length, cells) * (cells / length)
+        first, most = np.argmax(share > 0.0, axis=0), int((share > 0.0).sum(axis=0).max())
+        place = first + np.arange(most)[:, None]
+        inside = np.minimum(place, len(share) - 1)
+        parts = np.where(place == inside, np.take_along_axis(share, inside, axis=0), 0.0)
+        return list(zip(inside, parts, strict=True))
 
     def _displacement(self, state: IslandState) -> Array:
         return patch_displacements(

@@ -79,9 +79,8 @@ class IslandModel:
         return self.datum - self.surface.highest
 
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
-        """Return the model of one patch cut out along whole cells; see `MicroModel.of_patch`."""
-        x, y = patches.bounds(index)
-        piece = self.surface.cropped(x=x, y=y)
+        """Return the model of one patch cut out along its borders; see `MicroModel.of_patch`."""
+        piece = self.surface.piece(*patches.bounds(index))
         return replace(self, surface=piece, highest=self.datum), whole_patch(piece)
 
     def solve(self, approach: float, *, tilt: tuple[float, float] = _LEVEL) -> IslandState:

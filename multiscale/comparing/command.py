@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import Any
 
 from geometry.errors import InputError, NotConverged
 from multiscale.commands import scene_and_folder
 from multiscale.compare import compare
+from multiscale.comparing.comparison import Comparison
 from multiscale.comparing.level import Level
 from multiscale.comparing.level_results import LevelResult
 from multiscale.comparing.level_runs import check_launchable
 from multiscale.comparing.outcomes import AGAINST
 from multiscale.comparing.report import bargains, headline, write_comparison
 from multiscale.reporting import terminal
+from multiscale.restart.folder_lock import locked
+from multiscale.scene import Scene
 from multiscale.scenes.quantities import parse_duration
 
 KEPT = "levels"
@@ -56,26 +60,11 @@ def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> 
     if options:
         raise InputError("levels take no PETSc options", key="--", value=" ".join(options))
     scene, folder = scene_and_folder(choice, comm, ending=ENDING)
-    with terminal.following(comm) as (begun, ended):
-        try:
-            found = compare(
-                scene,
-                comm,
-                against=choice.against,
-                budget_s=budget,
-                folder=folder / KEPT,
-                ranks=choice.ranks,
-                begin=lambda level: begun(level.name),
-                observe=lambda level, result, kept: ended(_line(level, result, kept)),
-            )
-        except KeyboardInterrupt:
-            ended(
-                f"interrupted: finished levels are kept in {folder / KEPT}; the same call goes on"
-            )
-            raise
-    for text in (*headline(found), *bargains(found), *found.warnings):
-        terminal.say(comm, text)
-    terminal.show_files(comm, write_comparison(folder, found))
+    with locked(folder, comm):
+        found = _followed(scene, choice, comm, budget, folder / KEPT)
+        for text in (*headline(found), *bargains(found), *found.warnings):
+            terminal.say(comm, text)
+        terminal.show_files(comm, write_comparison(folder, found))
     if found.measure is None or (choice.against and found.against != choice.against):
         raise NotConverged(
             f"the comparison against {choice.against or 'anything'}",
@@ -83,6 +72,27 @@ def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> 
             iterations=0,
             remedy="give more --budget; finished levels are kept",
         )
+
+
+def _followed(
+    scene: Scene, choice: argparse.Namespace, comm: Any, budget: float | None, kept: Path
+) -> Comparison:
+    """Run all levels and say how each ended; finished ones are kept in a folder."""
+    with terminal.following(comm) as (begun, ended):
+        try:
+            return compare(
+                scene,
+                comm,
+                against=choice.against,
+                budget_s=budget,
+                folder=kept,
+                ranks=choice.ranks,
+                begin=lambda level: begun(level.name),
+                observe=lambda level, result, known: ended(_line(level, result, known)),
+            )
+        except KeyboardInterrupt:
+            ended(f"interrupted: finished levels are kept in {kept}; the same call goes on")
+            raise
 
 
 def _line(level: Level, result: LevelResult, kept: bool) -> str:

@@ -120,13 +120,16 @@ class Balance:
         excess = (load[free] - wanted) * unit
         # a force that grows as F ~ δ^(3/2), spread evenly over the interface
         largest = max(float(load[0]), control.force or 0.0)
-        depth = max(abs(plane[0]) - self.first_touch, 1e-6 * self.half)
+        depth = max(self._depth(plane, load), 1e-6 * self.half)
         stiffness = np.diag(np.array([1.0, 1 / 6, 1 / 6])[free]) * 1.5 * (largest or 1.0) / depth
         for count in range(_MOST_EVALUATIONS):
             largest = max(float(load[0]), control.force or 0.0)
             if np.abs(excess).max() <= TOLERANCE * largest:
                 return plane, load, known
-            step = -np.linalg.solve(stiffness, excess)
+            try:
+                step = -np.linalg.solve(stiffness, excess)
+            except np.linalg.LinAlgError:  # nothing holds a plane that has turned without bound
+                raise _failure(control, "NO_BALANCE", count) from None
             step *= min(1.0, 0.5 * depth / np.abs(step).max()) if self.force == 0.0 else 1.0
             share, found = self._searched(evaluate, plane, excess, free, unit, wanted, step)
             if found is None:
@@ -138,6 +141,10 @@ class Balance:
             stiffness = _updated(stiffness, change, after - excess)
             excess = after
         raise _failure(control, "NO_BALANCE", _MOST_EVALUATIONS)
+
+    def _depth(self, plane: Array, load: Array) -> float:
+        """Return how far a plane has come since first touch where its forces have their centre."""
+        return float(plane @ load) / load[0] - self.first_touch if load[0] > 0.0 else 0.0
 
     def _searched(
         self,

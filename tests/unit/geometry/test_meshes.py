@@ -161,6 +161,12 @@ def test_interface_nodes_are_even_to_rounding():
         ({"margin": 1.0}, r"\(1\.0, 0\): the block's margin and its cells"),
         ({"margin_cells": 3}, "margin > 0 with margin_cells ≥ 1, or both 0"),
         ({"margin_grading": 0.0}, "margin grading is out of range"),
+        (
+            MARGIN | {"margin": 1e-7},
+            "margin is too narrow to be meshed .*0, or at least 0.001",
+        ),
+        (MARGIN | {"margin_grading": 1e6}, "too narrow to be meshed .*a smaller margin_grading"),
+        (MARGIN | {"margin_cells": 10**400}, "margin has cells of .* fewer margin_cells"),
     ],
 )
 def test_blocks_that_make_no_sense_are_refused(change, message):

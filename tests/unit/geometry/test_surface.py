@@ -1,4 +1,5 @@
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -123,6 +124,59 @@ def test_crop_must_lie_within(interval):
         match=r"crop along x does not lie within the surface or keeps no.*0 ≤ lo < hi ≤ 2\.0 mm",
     ):
         plane().cropped(x=interval)
+
+
+@pytest.mark.parametrize("periodic", [False, True])
+def test_a_piece_takes_the_interpolant_of_the_whole(periodic):
+    heights = np.random.default_rng(3).normal(size=(9, 12))
+    surface = Surface(heights=heights, lengths=(2.0, 3.0), periodic=periodic)
+    part = surface.piece((0.5, 1.7), (1.0, 3.0))
+    assert part.lengths == (pytest.approx(1.2), 2.0) and not part.periodic
+    assert part.grid == (6, 8)  # 5.4 cells of 0.222 mm make 6 smaller ones
+    x, y = np.linspace(0.0, part.lengths[0], 41)[:, None], np.linspace(0.0, 2.0, 41)
+    np.testing.assert_allclose(  # the same spline at places that differ by rounding
+        part.height_at(x, y), surface.height_at(x + 0.5, y + 1.0), atol=1e-12
+    )
+    np.testing.assert_allclose(part.heights, part.height_at(part.x[:, None], part.y), atol=1e-12)
+    dense = part.height_at(x, y)
+    assert dense.max() <= part.highest < dense.max() + 0.05 * np.ptp(heights)
+    assert part.height_at(*part.highest_point) == pytest.approx(part.highest, abs=1e-12)
+    inner = part.piece((0.2, 0.7), (0.5, 1.0))
+    assert inner.height_at(0.1, 0.3) == pytest.approx(surface.height_at(0.8, 1.8), abs=1e-12)
+
+
+def test_pieces_hold_the_highest_point_and_none_above_it():
+    for seed in range(20):
+        heights = np.random.default_rng(seed).normal(size=(8, 8))
+        surface = Surface(heights=heights, lengths=(1.0, 1.0))
+        edges = np.linspace(0.0, 1.0, 4)
+        tops = [
+            surface.piece(edges[i : i + 2], edges[j : j + 2]).highest
+            for i in range(3)
+            for j in range(3)
+        ]
+        assert max(tops) == pytest.approx(surface.highest, abs=1e-12)  # of the climb
+
+
+def test_whole_cells_of_a_piece_keep_their_heights():
+    heights = np.random.default_rng(3).normal(size=(10, 12))
+    surface = Surface(heights=heights, lengths=(1.0, 1.2))
+    part = surface.piece((0.3, 0.7), (0.6, 1.2))
+    assert part.grid == (4, 6)
+    np.testing.assert_allclose(part.heights, heights[3:7, 6:], atol=1e-12)
+    assert surface.piece((0.3, 0.4), (0.6, 1.2)).grid == (4, 6)  # one cell becomes four
+    raised = replace(part, heights=part.heights + 1.0)
+    assert raised.highest > part.highest + 0.5  # an interpolant of its own
+
+
+@pytest.mark.parametrize("interval", [(1.0, 1.0), (1.5, 1.0), (-1e-3, 1.0), (0.0, 2.001)])
+def test_a_piece_must_lie_within(interval):
+    with pytest.raises(
+        InputError,
+        match=r"piece along x does not lie within the surface or is empty.*0 ≤ lo < hi ≤ 2\.0 mm",
+    ):
+        plane().piece(interval, (0.0, 3.0))
+    assert plane().piece((-1e-12, 1.0), (0.0, 3.0)).lengths == (1.0, 3.0)
 
 
 def test_shift_moves_the_interpolant_of_a_periodic_surface():

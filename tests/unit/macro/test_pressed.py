@@ -167,3 +167,25 @@ def test_fields_are_written_for_paraview(element, tmp_path):
     # with ADIOS2 also at all nodes: three components of 8 bytes each
     vtx = sum(file.stat().st_size for file in tmp_path.glob("fields.bp/data.*"))
     assert vtx >= 8 * len(state.displacement) if compat.HAS_VTX else vtx == 0
+
+
+@pytest.mark.parametrize("element", ["Q1", "P1"])
+def test_fields_share_cells_that_borders_cut(element, tmp_path):
+    """Patches of a third on cells of a quarter: the cells' pressures carry the whole force."""
+    h5py = pytest.importorskip("h5py")
+    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(4, 4, 2), element=element)
+    block = Block(
+        block_mesh(shape, MPI.COMM_SELF), Material(young_modulus=4000.0, poisson_ratio=0.15)
+    )
+    interface = Interface(block, PatchGrid(grid=(3, 1), lengths=(1.0, 1.0)))
+    given = np.array([3.0, 5.0, 8.0])
+    write_fields(tmp_path / "fields.xdmf", interface, np.zeros(block.owned_dofs), given)
+    with h5py.File(tmp_path / "fields.h5") as file:
+        found = file["Function/pressure/0"][...].ravel()
+    loaded = found[found > 0.0]
+    area = 1.0 / len(loaded)
+    assert loaded.sum() * area == pytest.approx(given.sum() / 3.0, rel=1e-12)
+    if element == "Q1":
+        # the second column of cells has a third of its width in the first patch
+        expected = [3.0, 3.0 / 3 + 5.0 * 2 / 3, 5.0 * 2 / 3 + 8.0 / 3, 8.0]
+        np.testing.assert_allclose(np.unique(loaded.round(9)), np.sort(expected), rtol=1e-8)

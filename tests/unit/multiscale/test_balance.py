@@ -80,6 +80,34 @@ def test_following_a_load_is_cheap():
     assert springs.evaluations < 20 * 15
 
 
+@pytest.mark.parametrize("tilt", [(1e-2, 0.0), (2e-2, -1e-2)])
+def test_the_way_does_not_depend_on_where_the_approach_counts_from(tilt):
+    """The plane touches beside the middle, above which it has not come to first touch."""
+    found = []
+    for origin in (0.0, 3e-3, -3e-3):
+        springs = Springs(touch=TOUCH + origin)
+        balanced = Balance(half=HALF, first_touch=origin)
+        plane, _ = balanced.solve(springs, Control(force=1e-2, tilt=tilt))
+        assert plane[0] < origin
+        springs.evaluations = 0
+        plane, _ = balanced.solve(springs, Control(force=1.1e-2, tilt=None))
+        found.append((springs.evaluations, plane[0] - origin))
+    for count, approach in found:
+        assert count <= 60 and abs(count - found[0][0]) <= 3  # rounding may cost a step
+        assert approach == pytest.approx(found[0][1], rel=1e-6)  # force and moments to 1e-8
+
+
+@pytest.mark.parametrize("seed", [5, 120, 133])
+def test_springs_all_on_one_side_are_refused(seed):
+    """Nothing holds the plane, which turns until its stiffness is singular."""
+    random = np.random.default_rng(seed)
+    x, y = random.uniform(0.05, 0.5, 5), random.uniform(-0.5, 0.5, 5)
+    springs, balanced = Springs(x, y, random.uniform(0.0, 5e-3, 5)), balance()
+    balanced.solve(springs, Control(force=1e-2, tilt=(-1e-2, 0.0)))
+    with pytest.raises(NotConverged, match="NO_BALANCE"):
+        balanced.solve(springs, Control(force=1e-2, tilt=None))
+
+
 def test_symmetric_springs_stay_level():
     springs = Springs([-0.3, 0.3, -0.3, 0.3], [-0.2, -0.2, 0.2, 0.2], np.zeros(4))
     plane, _ = balance().solve(springs, Control(force=1.0, tilt=None))

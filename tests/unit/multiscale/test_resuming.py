@@ -275,8 +275,9 @@ def test_two_runs_do_not_share_a_folder(tmp_path):
     assert not (tmp_path / "out").exists()  # neither wrote anything
 
 
-@pytest.mark.parametrize("command", ["laws", "surface", "run"])
-def test_no_command_writes_where_a_run_does(tmp_path, capsys, command):
+@pytest.mark.parametrize("command", ["laws", "surface", "run", "compare"])
+def test_no_command_writes_where_a_run_does(tmp_path, capsys, monkeypatch, command):
+    monkeypatch.delattr("multiscale.comparing.level_runs.launch_process")  # no level is begun
     out = tmp_path / "out"
     lock = FolderLock(out)
     lock.hold()

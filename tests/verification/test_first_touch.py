@@ -1,0 +1,72 @@
+"""No force below first touch, and forces that rise from nothing: all models in all couplings.
+
+No contact at an approach δ carries more than a punch over a circle around the whole face, which
+is 2 E* r δ on a half-space; a block as high as it is wide does not change that by half.
+"""
+
+import numpy as np
+import pytest
+from hard_cases import KINDS, history, scene
+
+from geometry import PatchGrid, patch_means
+from micro.models import MODEL_NAMES
+from multiscale.ingredients import make_surface
+from multiscale.planning.micro_choice import stated_model
+
+MODULUS = 4000.0 / (1.0 - 0.15**2)
+PUNCH = 1.5 * 2.0 * MODULUS * np.sqrt(0.5)  # N/mm
+COARSE = {
+    "surface__grid": [24, 24],
+    "surface__spectrum": {"hurst": 0.95, "waves": [2, 10], "rms_slope": 0.215, "seed": 2},
+}
+OPTIONS = {"micro__curvature": "contact", "micro__border": "include"}
+SHORT = ("isolated", "analytic")  # the others make the body's compliance first
+
+
+def models():
+    """Yield what names each micro model."""
+    yield from ({"micro__model": name} for name in MODEL_NAMES)
+    yield {"micro__model": "elliptic"} | OPTIONS
+
+
+def named(given):
+    """Return what a case is called."""
+    return given if isinstance(given, str) else "-".join(given.values())
+
+
+@pytest.mark.parametrize(
+    ("kind", "model"),
+    [(kind, model) for model in models() for kind in KINDS if kind in SHORT or len(model) == 1],
+    ids=named,
+)
+def test_forces_rise_from_nothing(kind, model):
+    """Twenty-four heights across ten waves: a spline of a part differs from the whole's by 3 µm."""
+    force = history(
+        coupling__kind=kind, load__steps=1, load__approach=["1 pm", "1 nm"], **COARSE, **model
+    ).force_N
+    assert np.all((force >= 0.0) & (force <= PUNCH * np.array([1e-9, 1e-6])))
+
+
+@pytest.mark.parametrize("model", list(models()), ids=named)
+@pytest.mark.parametrize("patches", [(1, 1), (4, 4), (3, 5)])
+def test_nothing_touches_before_first_touch(model, patches):
+    """Neither the whole surface nor a patch of it alone, which rises no higher than the whole."""
+    for seed in range(3):
+        spectrum = COARSE["surface__spectrum"] | {"seed": seed}
+        given = scene(**COARSE | {"surface__spectrum": spectrum}, **model)
+        surface = make_surface(given)
+        grid = PatchGrid(grid=patches, lengths=surface.lengths)
+        means = patch_means(surface, grid)
+        whole = stated_model(given, surface)
+        parts = [(whole, grid, means)]
+        for index in range(grid.count):
+            parts.append((*whole.of_patch(grid, index), means[index : index + 1]))
+        for part, patch, heights in parts:
+            touch = part.first_touch
+            if not np.isfinite(touch):
+                continue
+            assert touch > -1e-12  # mm: rounding of the highest point
+            near = touch + np.array([-1e-2, -1e-6, -1e-12, 1e-6])
+            force = part.respond(near, patches=patch, mean_heights=heights).force
+            assert np.all(force[:3] == 0.0)
+            assert 0.0 < force[3] <= PUNCH * 1e-6
