@@ -1,4 +1,4 @@
-"""Compliance of a block's contact face, in Legendre modes."""
+"""Compliance of a block's contact face, and the stresses in it, in Legendre modes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from geometry.errors import InputError
 from geometry.meshes import BlockShape
 from macro.block import Sides
 from macro.body.division import division
-from macro.body.quarter import Parity, Quarter
+from macro.body.quarter import Parity, Quarter, Response
 from macro.compliance_cache import Arrays, cached
 from macro.elasticity import Material
 
@@ -23,24 +23,27 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FaceCompliance:
-    """Displacements of a contact face by pressures on it, both in Legendre modes φ.
+    """Displacements and stresses of a contact face by pressures on it, in Legendre modes φ.
 
     Mode k K + l is P̂_k(x) P̂_l(y) (`geometry.legendre_modes`). A pressure p with the moments
     b_n = ∫ p φ_n dA displaces the face by Σ φ_m C_mn b_n.
 
     Args:
         normal: C, downwards, symmetric, shape (K², K²) [mm/N].
-        tangential: The same along x and y, shape (2, K², K²) [mm/N].
+        growth: Derivative of C to the height of the block, symmetric, shape (K², K²) [1/N].
+        stresses: The same of σ_xx, σ_yy and σ_xy in the face, which is pressed by −σ_zz, shape
+            (3, K², K²) [1/mm²].
     """
 
     normal: Array
-    tangential: Array
+    growth: Array
+    stresses: Array
 
 
 def face_compliance(
     shape: BlockShape, material: Material, sides: Sides, count: int, comm: Any
 ) -> FaceCompliance:
-    """Solve for the displacements of a block's contact face by every mode of pressure.
+    """Solve for what every mode of pressure does to a block's contact face.
 
     The modes are smooth, and so are the displacements but at the edges of the bottom: few elements
     of high order do. Modes of different parity do not mix: they are solved for apart, on a quarter
@@ -72,17 +75,17 @@ def face_compliance(
     if alike and (1, 0) in families:
         families.remove((1, 0))
 
-    def solved() -> dict[Parity, tuple[Array, Array, Array]]:
+    def solved() -> dict[Parity, Response]:
         mine = families[comm.rank :: comm.size]
-        return {parity: Quarter(parity=parity, **given).displacements(count) for parity in mine}
+        return {parity: Quarter(parity=parity, **given).response(count) for parity in mine}
 
-    found: dict[Parity, tuple[Array, Array, Array]] = {}
+    found: dict[Parity, Response] = {}
     for part in comm.allgather(together(comm, solved)):
         found |= part
     if alike and (0, 1) in found:  # exchange x and y
-        x, y, z = (part.transpose(1, 0, 3, 2) for part in found[0, 1])
-        found[1, 0] = y, x, z
-    return _gathered(found, shape.interface, count)
+        turned = Response(*(part.transpose(1, 0, 3, 2) for part in found[0, 1]))
+        found[1, 0] = turned._replace(xx=turned.yy, yy=turned.xx)
+    return _gathered(found, shape.interface, count, material)
 
 
 def cached_face_compliance(
@@ -103,21 +106,35 @@ def cached_face_compliance(
 
     def compute() -> Arrays:
         made = face_compliance(shape, material, sides, count, comm)
-        return {"normal": made.normal, "tangential": made.tangential}
+        return {"normal": made.normal, "growth": made.growth, "stresses": made.stresses}
 
     block = shape.interface, shape.height, shape.margin
     return FaceCompliance(**cached("face", (block, material, sides, count), compute, comm))
 
 
 def _gathered(
-    found: dict[Parity, tuple[Array, Array, Array]], lengths: tuple[float, float], count: int
+    found: dict[Parity, Response], lengths: tuple[float, float], count: int, material: Material
 ) -> FaceCompliance:
     """Put the modes of all parities together, per force."""
-    total = np.zeros((3, *4 * (count,)))
-    for (odd_x, odd_y), displacements in found.items():
-        for axis, part in enumerate(displacements):
-            seen_x, seen_y = (odd_x + (axis == 0)) % 2, (odd_y + (axis == 1)) % 2
-            total[axis, seen_x::2, seen_y::2, odd_x::2, odd_y::2] = part
-    total = total.reshape(3, count**2, count**2) / (lengths[0] * lengths[1]) ** 2
-    normal = 0.5 * (total[2] + total[2].T)  # rounding apart it is symmetric
-    return FaceCompliance(normal=normal, tangential=total[:2])
+    area = lengths[0] * lengths[1]
+    total = np.zeros((len(Response._fields), *4 * (count,)))
+    for (odd_x, odd_y), response in found.items():
+        for field, part in zip(total, response, strict=True):
+            turn = part is response.xy
+            seen_x, seen_y = (odd_x + turn) % 2, (odd_y + turn) % 2
+            field[seen_x::2, seen_y::2, odd_x::2, odd_y::2] = part
+    normal, xx, yy, xy, growth = total.reshape(-1, count**2, count**2) / area**2
+    return FaceCompliance(
+        normal=0.5 * (normal + normal.T),  # rounding apart it is symmetric
+        growth=0.5 * (growth + growth.T),
+        stresses=_stresses(xx, yy, xy, np.eye(count**2) / area, material),
+    )
+
+
+def _stresses(xx: Array, yy: Array, xy: Array, pressure: Array, material: Material) -> Array:
+    """Return σ_xx, σ_yy, σ_xy where σ_zz = −p, by the strains in the face: Hooke's law."""
+    nu = material.poisson_ratio
+    modulus = material.young_modulus / (1.0 - nu**2)
+    pushed = nu / (1.0 - nu) * pressure
+    found = modulus * (xx + nu * yy) - pushed, modulus * (yy + nu * xx) - pushed
+    return np.stack([*found, material.young_modulus / (1.0 + nu) * xy])
