@@ -11,21 +11,26 @@ from numpy.typing import NDArray
 
 from micro import (
     BodyModes,
+    BodyStresses,
     FiniteSlopes,
     FreeSides,
     HalfSpace,
     HalfSpaceModel,
     MicroModel,
-    SideStresses,
+    SurfaceStress,
+    coarse_grid,
     half_space_modes,
+    half_space_stress_modes,
     influence_matrix,
     side_modes,
+    side_stress_modes,
+    side_stresses,
 )
 from multiscale.scene import Scene
 from multiscale.stage import Stage
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import Interface, Material
+    from macro import FaceCompliance, Interface, Material
 
 Array = NDArray[np.float64]
 
@@ -50,12 +55,12 @@ def contact_model(stage: Stage, comm: Any) -> MicroModel:
     if stage.scene.coupling.kind == "isolated":
         return model
     sides = free_sides(stage)
-    body = None
-    if stage.embedded:
-        body = body_modes(stage, sides, comm)
+    face = _face(stage, comm) if stage.embedded else None
+    body = None if face is None else _body_modes(stage, face, sides)
     if not isinstance(model, HalfSpaceModel):
         return replace(model, body=body) if body is not None else model  # type: ignore[type-var]
-    return replace(model, sides=sides, body=body, slopes=finite_slopes(stage, sides))
+    slopes = _finite_slopes(stage, sides, face) if stage.finite_slopes else None
+    return replace(model, sides=sides, body=body, slopes=slopes)
 
 
 def _sharp(model: MicroModel) -> MicroModel:
@@ -63,21 +68,26 @@ def _sharp(model: MicroModel) -> MicroModel:
     return replace(model, tolerance=_SHARP) if isinstance(model, HalfSpaceModel) else model
 
 
-def finite_slopes(stage: Stage, sides: FreeSides | None) -> FiniteSlopes | None:
-    """Return what finite slopes add in a scene; None where they are left out.
-
-    Args:
-        stage: The scene's ingredients.
-        sides: Free sides, if there are any.
-    """
-    if not stage.finite_slopes or not isinstance(stage.model, HalfSpaceModel):
-        return None
-    material = _half_space(stage)
-    slopes = FiniteSlopes(stage.model.surface, material)
-    if sides is None:
-        return slopes
-    beside = SideStresses(sides, slopes.spacing)
-    return FiniteSlopes(stage.model.surface, material, beside=(beside,))
+def _finite_slopes(
+    stage: Stage, sides: FreeSides | None, face: FaceCompliance | None
+) -> FiniteSlopes:
+    """Return what finite slopes add on a scene's body, whose stresses are those in its face."""
+    surface, section = stage.surface, stage.scene.block
+    if isinstance(stage.model, HalfSpaceModel):
+        surface = stage.model.surface
+    half_space = HalfSpace(section.young_modulus, section.poisson_ratio)
+    if face is None:
+        return FiniteSlopes(surface, half_space)
+    grid, lengths = coarse_grid(surface), surface.lengths
+    count = int(round(np.sqrt(len(face.normal))))
+    known = half_space_stress_modes(lengths, section.poisson_ratio, count)
+    beside: list[SurfaceStress] = []
+    if sides is not None:
+        spacing = lengths[0] / grid[0], lengths[1] / grid[1]
+        beside.append(side_stresses(sides, spacing))
+        known = known + side_stress_modes(sides, count)
+    beside.append(BodyStresses(lengths, grid, face.stresses - known))
+    return FiniteSlopes(surface, half_space, beside=beside)
 
 
 def free_sides(stage: Stage) -> FreeSides | None:
@@ -98,31 +108,28 @@ def free_sides(stage: Stage) -> FreeSides | None:
     )
 
 
-def body_modes(stage: Stage, sides: FreeSides | None, comm: Any) -> BodyModes:
-    """Return what a scene's block adds to the half-space and to some free sides.
-
-    Args:
-        stage: The scene's ingredients.
-        sides: Free sides that are known apart, if there are any.
-        comm: MPI communicator; None for this process alone.
-
-    Note:
-        Collective.
-    """
+def _face(stage: Stage, comm: Any) -> FaceCompliance:
+    """Return what pressures do to the contact face of a scene's block; collective."""
     from mpi4py import MPI
 
     from macro import cached_face_compliance, mode_count
 
-    count = mode_count(stage.shape)
-    section = stage.scene.block
-    found = cached_face_compliance(
-        stage.shape, block_material(stage), section.sides, count, comm or MPI.COMM_SELF
+    return cached_face_compliance(
+        stage.shape,
+        block_material(stage),
+        stage.scene.block.sides,
+        mode_count(stage.shape),
+        comm or MPI.COMM_SELF,
     )
-    lengths = stage.surface.lengths
+
+
+def _body_modes(stage: Stage, face: FaceCompliance, sides: FreeSides | None) -> BodyModes:
+    """Return what a scene's block adds to the half-space, and to free sides known apart."""
+    lengths, count = stage.surface.lengths, int(round(np.sqrt(len(face.normal))))
     known = half_space_modes(lengths, count)
     if sides is not None:
         known = known + side_modes(sides, count)
-    return BodyModes(lengths, found.normal - known / stage.model.contact_modulus)
+    return BodyModes(lengths, face.normal - known / stage.model.contact_modulus)
 
 
 def patch_displacements(stage: Stage, comm: Any, *, dense: bool) -> Callable[[Array], Array]:
@@ -170,7 +177,7 @@ def patch_compliance(stage: Stage, comm: Any) -> Array:
     """
     if stage.scene.coupling.decomposed:
         half_space = influence_matrix(stage.patches) / (np.pi * stage.model.contact_modulus)
-        body = body_modes(stage, None, comm)
+        body = _body_modes(stage, _face(stage, comm), None)
         return np.asarray(half_space + body.patch_compliance(stage.patches))
     from mpi4py import MPI
 
@@ -227,11 +234,6 @@ def block_material(stage: Stage) -> Material:
 
     section = stage.scene.block
     return Material(young_modulus=section.young_modulus, poisson_ratio=section.poisson_ratio)
-
-
-def _half_space(stage: Stage) -> HalfSpace:
-    section = stage.scene.block
-    return HalfSpace(section.young_modulus, section.poisson_ratio)
 
 
 def final_field(stage: Stage, pressure: Array, comm: Any) -> tuple[Interface, Array]:
