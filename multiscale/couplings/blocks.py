@@ -79,7 +79,7 @@ def _finite_slopes(
     if face is None:
         return FiniteSlopes(surface, half_space)
     grid, lengths = coarse_grid(surface), surface.lengths
-    count = int(round(np.sqrt(len(face.normal))))
+    count = round(np.sqrt(len(face.normal)))
     known = half_space_stress_modes(lengths, section.poisson_ratio, count)
     beside: list[SurfaceStress] = []
     if sides is not None:
@@ -125,7 +125,7 @@ def _face(stage: Stage, comm: Any) -> FaceCompliance:
 
 def _body_modes(stage: Stage, face: FaceCompliance, sides: FreeSides | None) -> BodyModes:
     """Return what a scene's block adds to the half-space, and to free sides known apart."""
-    lengths, count = stage.surface.lengths, int(round(np.sqrt(len(face.normal))))
+    lengths, count = stage.surface.lengths, round(np.sqrt(len(face.normal)))
     known = half_space_modes(lengths, count)
     if sides is not None:
         known = known + side_modes(sides, count)
