@@ -25,7 +25,7 @@ _FIRST = 1e-2
 """Residual of the first solution, before finite slopes are known."""
 _AHEAD = 2e-2
 """Residual of a solution, of the last change by finite slopes: what the next change will be."""
-_LAG = 3e-9
+_LAG = 1e-9
 """Change by finite slopes that is let be, of the largest displacement."""
 _FEW_CELLS = 32
 """Cells per side on which the approach is estimated."""

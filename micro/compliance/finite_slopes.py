@@ -103,7 +103,7 @@ class FiniteSlopes:
         below = self._waves.coarsened(surface.heights - top)
         self._below = self._waves.continued(below)
         plane = surface.mean_height if plane is None else plane
-        self._heights = self._below + np.float32(top - plane)
+        self._heights = self._below + np.float64(top - plane)
 
     def displacement(self, pressure: Array) -> Array:
         """Return the displacement that is added to the half-space's, positive into the body.
@@ -157,7 +157,7 @@ class FiniteSlopes:
         own = np.stack(
             [-2.0 * nu * pressure - side * along, side * along - pressure, -side * across]
         )
-        return np.asarray(sum((term.stresses(pressure) for term in self.beside), own), np.float32)
+        return np.asarray(sum((term.stresses(pressure) for term in self.beside), own), np.float64)
 
     def _adjoint(self, pulls: Array) -> Spectrum:
         """Return the waves of the displacement that does the work of the stresses on a tensor."""
@@ -168,7 +168,7 @@ class FiniteSlopes:
             return np.asarray(found)
         both = pulls.astype(np.float64) * np.array([1.0, 1.0, 2.0])[:, None, None]  # xy and yx
         added = np.sum([term.adjoint(both) for term in self.beside], axis=0)
-        return np.asarray(found + self._waves.of(added.astype(np.float32)))
+        return np.asarray(found + self._waves.of(added.astype(np.float64)))
 
     def _strains(self, stresses: Array) -> Array:
         """Return the strains xx, yy, xy by stresses in the plane alone."""

@@ -3,8 +3,7 @@
 Heights times stresses make waves shorter than either. Cells hold waves of two cells and longer;
 products that fall below come back as others, which makes the powers of heights in an expansion
 unstable. Waves shorter than about three of the coarse cells are therefore left out on the way in,
-and on the way out, so that the map as a whole stays symmetric. Everything is in single precision:
-what it makes is a few hundredths of the displacement, and lagged.
+and on the way out, so that the map as a whole stays symmetric.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 Array = NDArray[np.floating]
-Spectrum = NDArray[np.complex64]
+Spectrum = NDArray[np.complex128]
 Around = Literal["copies", "mirrored", "nothing"]
 
 _KEPT, _DROPPED = 0.6, 0.9
@@ -60,8 +59,8 @@ class Waves:
         self.shown = coarse if around == "nothing" else self.padded
         kx = 2.0 * np.pi * fft.fftfreq(self.padded[0], self.spacing[0])[:, None]
         ky = 2.0 * np.pi * fft.rfftfreq(self.padded[1], self.spacing[1])
-        self.wave_number = np.hypot(kx, ky).astype(np.float32)
-        self.directions = _directions(kx, ky).astype(np.float32)
+        self.wave_number = np.hypot(kx, ky).astype(np.float64)
+        self.directions = _directions(kx, ky).astype(np.float64)
         self._filter = _filter(self.coarse)
 
     def coarsened(self, field: Array) -> Array:
@@ -75,7 +74,7 @@ class Waves:
         Returns:
             Shape (cx, cy).
         """
-        rows = fft.dct(field.astype(np.float32), axis=1, norm="ortho")[:, : self.coarse[1]]
+        rows = fft.dct(field.astype(np.float64), axis=1, norm="ortho")[:, : self.coarse[1]]
         cosines = fft.dct(rows, axis=0, norm="ortho")[: self.coarse[0]] * self._filter
         return np.asarray(fft.idctn(cosines * self._scale, norm="ortho"))
 
@@ -84,7 +83,7 @@ class Waves:
 
         It is the transpose of `coarsened`, times the number of cells per coarse cell.
         """
-        cosines = fft.dctn(field.astype(np.float32), norm="ortho") * (self._filter / self._scale)
+        cosines = fft.dctn(field.astype(np.float64), norm="ortho") * (self._filter / self._scale)
         columns = fft.idct(cosines, n=self.grid[0], axis=0, norm="ortho")
         rows = fft.idct(columns, n=self.grid[1], axis=1, norm="ortho")
         return np.asarray(rows, np.float64)
@@ -122,4 +121,4 @@ def _filter(coarse: tuple[int, int]) -> Array:
     """Fall from one to zero between two radii of the plane of wave numbers."""
     radius = np.hypot(np.arange(coarse[0])[:, None] / coarse[0], np.arange(coarse[1]) / coarse[1])
     falling = (_DROPPED - radius) / (_DROPPED - _KEPT)
-    return np.clip(falling, 0.0, 1.0).astype(np.float32)
+    return np.clip(falling, 0.0, 1.0).astype(np.float64)
