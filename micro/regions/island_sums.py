@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Partition
+from micro.compliance.body_modes import BodyModes
+from micro.pairs.body_points import BodyPoints
 from micro.patch_displacement import patch_displacements
 from micro.plane import RigidPlane
 from micro.regions.island_passes import Settled
@@ -30,6 +32,7 @@ class IslandSums:
         patches: Patches; every peak above the plane lies in one.
         mean_heights: Mean heights of the patches, shape (N,) [mm].
         contact_modulus: E* [MPa].
+        body: What a finite body adds to the half-space; None on a half-space.
     """
 
     relief: Relief
@@ -38,6 +41,7 @@ class IslandSums:
     patches: Partition
     mean_heights: Array
     contact_modulus: float
+    body: BodyModes | None = None
 
     def row(self, plane: RigidPlane, settled: Settled, state: IslandState) -> dict[str, Any]:
         """Return the fields of a response for one approach.
@@ -69,13 +73,8 @@ class IslandSums:
 
     def _homes(self, settled: Settled) -> NDArray[np.intp]:
         """Return the patch with the highest peak of each island, shape (m,)."""
-        member = settled.islands.member
-        peaks = np.flatnonzero(member >= 0)
-        owner = self.patches.index_of(self.relief.x[peaks], self.relief.y[peaks])
-        order = np.argsort(settled.height[peaks], kind="stable")  # the highest is written last
-        home = np.zeros(len(settled.islands), dtype=np.intp)
-        home[member[peaks][order]] = owner[order]
-        return home
+        top = settled.islands.top
+        return self.patches.index_of(self.relief.x[top], self.relief.y[top])
 
     def _shares(self, settled: Settled) -> tuple[Array, Array]:
         """Return the shares of each patch in the force and in the area of each island, (m, N).
@@ -120,7 +119,7 @@ class IslandSums:
         return np.searchsorted(borders[1:-1], centres, side="right")
 
     def _displacement(self, state: IslandState) -> Array:
-        return patch_displacements(
+        found = patch_displacements(
             self.patches,
             np.stack([state.x, state.y], axis=1),
             state.semi_axes,
@@ -128,3 +127,8 @@ class IslandSums:
             state.force,
             self.contact_modulus,
         )
+        if self.body is None:
+            return found
+        points = BodyPoints.at(self.body, state.x, state.y, self.contact_modulus)
+        moment = state.force / (np.pi * self.contact_modulus)
+        return found + points.patch_means(self.patches, moment)
