@@ -50,18 +50,18 @@ class Held(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Peaks:
-    """Points that a rigid plane can touch, as springs that do not see each other.
+    """Points that a rigid plane can touch, with forces that do not see each other.
 
     Args:
         lever: 1 and the distances along x and y from the middle, shape (n, 3) [1, mm, mm].
         below: Depths below the height that approaches count from, shape (n,) [mm].
-        force: Coefficients c of forces c w^(3/2), shape (n,) [N mm^(-3/2)].
+        force: Returns the force of a plane that penetrates the points by (n,) mm [N].
         half: Half the diagonal of the rectangle [mm].
     """
 
     lever: Array
     below: Array
-    force: Array
+    force: Callable[[Array], float]
     half: float
 
     def first_touch(self, tilt: tuple[float, float]) -> float:
@@ -69,7 +69,7 @@ class Peaks:
         return float((self.below - self.lever[:, 1:] @ np.asarray(tilt)).min(initial=np.inf))
 
     def first_plane(self, control: Control, near: RigidPlane | None) -> Array:
-        """Return a plane to start from: one near, or one that would do if peaks were springs.
+        """Return a plane to start from: one near, or one in balance with contacts that stand alone.
 
         Args:
             control: What is prescribed.
@@ -98,17 +98,19 @@ class Peaks:
         return np.array([touch + self._depth(control.force or 0.0, tilt), *tilt])
 
     def _depth(self, force: float, tilt: tuple[float, float]) -> float:
-        """Return how far a plane moves from first touch under a force on springs [mm]."""
+        """Return how far a plane moves from first touch under a force [mm]."""
         if force == 0.0:
             return 0.0
         gap = self.below - self.lever[:, 1:] @ np.asarray(tilt)
         gap = gap - gap.min()
 
         def lacking(depth: float) -> float:
-            return float(self.force @ np.maximum(depth - gap, 0.0) ** 1.5) - force
+            return self.force(depth - gap) - force
 
-        alone = float((force / self.force[np.argmin(gap)]) ** (2.0 / 3.0))
-        return float(brentq(lacking, 0.0, 1.01 * alone, rtol=1e-6))
+        most = 1e-6 * self.half
+        while lacking(most) < 0.0:
+            most *= 4.0
+        return float(brentq(lacking, 0.0, most, rtol=1e-3))
 
     def _resting(self, control: Control) -> tuple[float, float]:
         """Return the slopes of a plane that rests on the peaks under a force in the middle.
