@@ -39,6 +39,11 @@ class FaceCompliance:
     growth: Array
     stresses: Array
 
+    @property
+    def count(self) -> int:
+        """Modes K along a side."""
+        return int(np.sqrt(len(self.normal)) + 0.5)
+
 
 def face_compliance(
     shape: BlockShape, material: Material, sides: Sides, count: int, comm: Any

@@ -72,9 +72,7 @@ def _stresses(sides: FreeSides, axis: int, count: int) -> tuple[Array, Array, Ar
     )
 
 
-def _lines(
-    sides: FreeSides, axis: int, count: int
-) -> tuple[Array, NDArray[np.intp], Array]:
+def _lines(sides: FreeSides, axis: int, count: int) -> tuple[Array, NDArray[np.intp], Array]:
     """Return nodes of the distance from a side, waves along it, and modes' integrals at nodes."""
     length = sides.lengths[axis]
     nodes = distance_nodes(_NEAREST * length / count**2, length)

@@ -11,21 +11,26 @@ from numpy.typing import NDArray
 
 from micro import (
     BodyModes,
+    BodyStresses,
     FiniteSlopes,
     FreeSides,
     HalfSpace,
     HalfSpaceModel,
     MicroModel,
-    SideStresses,
+    SurfaceStress,
+    coarse_grid,
     half_space_modes,
+    half_space_stress_modes,
     influence_matrix,
     side_modes,
+    side_stress_modes,
+    side_stresses,
 )
 from multiscale.scene import Scene
 from multiscale.stage import Stage
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import Interface, Material
+    from macro import FaceCompliance, Interface, Material
 
 Array = NDArray[np.float64]
 
@@ -50,12 +55,17 @@ def contact_model(stage: Stage, comm: Any) -> MicroModel:
     if stage.scene.coupling.kind == "isolated":
         return model
     sides = free_sides(stage)
-    body = None
-    if stage.embedded:
-        body = body_modes(stage, sides, comm)
+    if not stage.embedded:
+        if stage.finite_slopes and isinstance(model, HalfSpaceModel):
+            model = replace(model, slopes=FiniteSlopes(model.surface, _half_space(stage)))
+        return model
+    face = _face(stage, comm)
+    body = _modes(stage, sides, face)
     if not isinstance(model, HalfSpaceModel):
-        return replace(model, body=body) if body is not None else model  # type: ignore[type-var]
-    return replace(model, sides=sides, body=body, slopes=finite_slopes(stage, sides))
+        return replace(model, body=body)  # type: ignore[type-var]
+    if stage.finite_slopes:
+        return _with_slopes(replace(model, sides=sides), stage, body, face)
+    return replace(model, sides=sides, body=body)
 
 
 def _sharp(model: MicroModel) -> MicroModel:
@@ -63,21 +73,30 @@ def _sharp(model: MicroModel) -> MicroModel:
     return replace(model, tolerance=_SHARP) if isinstance(model, HalfSpaceModel) else model
 
 
-def finite_slopes(stage: Stage, sides: FreeSides | None) -> FiniteSlopes | None:
-    """Return what finite slopes add in a scene; None where they are left out.
+def _with_slopes(
+    model: HalfSpaceModel, stage: Stage, body: BodyModes, face: FaceCompliance
+) -> HalfSpaceModel:
+    """Return the model on a body with finite slopes, heights counted from the highest point.
 
-    Args:
-        stage: The scene's ingredients.
-        sides: Free sides, if there are any.
+    Loads are near that plane, and slopes are then least under them. The flat body that slopes are
+    added to reaches up to it, and so is higher than the block, which ends at the mean plane.
     """
-    if not stage.finite_slopes or not isinstance(stage.model, HalfSpaceModel):
-        return None
-    material = _half_space(stage)
-    slopes = FiniteSlopes(stage.model.surface, material)
-    if sides is None:
-        return slopes
-    beside = SideStresses(sides, slopes.spacing)
-    return FiniteSlopes(stage.model.surface, material, beside=(beside,))
+    surface, sides, material = model.surface, model.sides, _half_space(stage)
+    lengths, count, nu = body.lengths, body.count, material.poisson_ratio
+    rest = face.stresses - half_space_stress_modes(lengths, nu, count)
+    grid = coarse_grid(surface)
+    spacing = surface.lengths[0] / grid[0], surface.lengths[1] / grid[1]
+    beside: list[SurfaceStress] = []
+    if sides is not None:
+        rest -= side_stress_modes(sides, count)
+        beside.append(side_stresses(sides, spacing))
+    beside.append(BodyStresses(lengths, grid, rest))
+    higher = body.matrix + (surface.highest - surface.mean_height) * face.growth
+    return replace(
+        model,
+        body=BodyModes(lengths, higher),
+        slopes=FiniteSlopes(surface, material, plane=surface.highest, beside=beside),
+    )
 
 
 def free_sides(stage: Stage) -> FreeSides | None:
@@ -109,20 +128,27 @@ def body_modes(stage: Stage, sides: FreeSides | None, comm: Any) -> BodyModes:
     Note:
         Collective.
     """
+    return _modes(stage, sides, _face(stage, comm))
+
+
+def _face(stage: Stage, comm: Any) -> FaceCompliance:
+    """Return what pressures do to the contact face of a scene's block."""
     from mpi4py import MPI
 
     from macro import cached_face_compliance, mode_count
 
-    count = mode_count(stage.shape)
-    section = stage.scene.block
-    found = cached_face_compliance(
-        stage.shape, block_material(stage), section.sides, count, comm or MPI.COMM_SELF
-    )
-    lengths = stage.surface.lengths
+    shape, sides = stage.shape, stage.scene.block.sides
+    material, count = block_material(stage), mode_count(shape)
+    return cached_face_compliance(shape, material, sides, count, comm or MPI.COMM_SELF)
+
+
+def _modes(stage: Stage, sides: FreeSides | None, face: FaceCompliance) -> BodyModes:
+    """Return what a contact face adds to the half-space and to some free sides."""
+    lengths, count = stage.surface.lengths, face.count
     known = half_space_modes(lengths, count)
     if sides is not None:
         known = known + side_modes(sides, count)
-    return BodyModes(lengths, found.normal - known / stage.model.contact_modulus)
+    return BodyModes(lengths, face.normal - known / stage.model.contact_modulus)
 
 
 def patch_displacements(stage: Stage, comm: Any, *, dense: bool) -> Callable[[Array], Array]:
