@@ -28,6 +28,7 @@ from micro.ellipse import (
     eccentricity_approximate,
     force_factor,
 )
+from micro.finite_slope import finite_slope_effect
 from micro.half_space import HalfSpaceModel
 from micro.hertz import HertzContact, contact_modulus
 from micro.influence import influence_matrix, mutual_influence
@@ -82,6 +83,7 @@ __all__ = [
     "eccentricity",
     "eccentricity_approximate",
     "find_contacts",
+    "finite_slope_effect",
     "force_factor",
     "half_space_modes",
     "half_space_stress_modes",

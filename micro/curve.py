@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from geometry import Asperities, Partition, PatchGrid, Surface
 from geometry.errors import InputError
+from micro.pairs.body_points import BodyPoints
 from micro.patch_displacement import patch_displacements
 from micro.plane import RigidPlane
 from micro.response import Response
@@ -40,6 +41,7 @@ class PatchSums:
         mean_heights: Mean heights of the patches, shape (N,) [mm].
         hertz: Coefficients of the asperities.
         contact_modulus: E* [MPa].
+        body: Compliance of a finite body between the asperities; None on a half-space.
 
     Raises:
         InputError: When a summit lies outside the patches, or not every patch has a mean height.
@@ -51,6 +53,7 @@ class PatchSums:
     mean_heights: Array
     hertz: HertzCoefficients
     contact_modulus: float
+    body: BodyPoints | None = None
 
     def __post_init__(self) -> None:
         means = checked_means(self.mean_heights, self.patches)
@@ -112,7 +115,7 @@ class PatchSums:
         return np.stack([self.asperities.x[on], self.asperities.y[on]], axis=1)
 
     def _displacement(self, on: NDArray[np.intp], axes: Array, force: Array) -> Array:
-        return patch_displacements(
+        found = patch_displacements(
             self.patches,
             self._positions(on),
             axes,
@@ -120,6 +123,10 @@ class PatchSums:
             force,
             self.contact_modulus,
         )
+        if self.body is None:
+            return found
+        moment = force / (np.pi * self.contact_modulus)
+        return found + self.body.among(on).patch_means(self.patches, moment)
 
 
 def whole_patch(surface: Surface) -> PatchGrid:

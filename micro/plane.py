@@ -84,11 +84,14 @@ class RigidPlane:
         (xc, yc), force = self.centre, np.asarray(force)
         return float(np.sum(force * (x - xc))), float(np.sum(force * (y - yc)))
 
+    def overlap(self, asperities: Asperities) -> Array:
+        """Return how far undisplaced summits would penetrate, negative below the plane [mm]."""
+        return self.at(asperities.x, asperities.y) - (asperities.highest - asperities.z)
+
     def required(self, asperities: Asperities) -> Array:
         """Return the displacements d_k = <δ(x_k) − (z_M − z_k)> of the summits [mm].
 
         Source:
             Waddad et al. 2016, eq. 6, doi 10.1016/j.triboint.2015.12.023.
         """
-        below = asperities.highest - asperities.z
-        return np.maximum(self.at(asperities.x, asperities.y) - below, 0.0)
+        return np.maximum(self.overlap(asperities), 0.0)

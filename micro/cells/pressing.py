@@ -98,7 +98,7 @@ class Pressing:
             nearer = required if motions is None else required + motions.nearer(found.motion)
             scale = float(nearer[touching].max())
             left = float(np.abs(change[touching]).max()) / scale
-            if left <= _LAG and tolerance <= self.tolerance:
+            if left <= max(_LAG, 10.0 * self.tolerance) and tolerance <= self.tolerance:
                 residual = max(found.residual, left)
                 return found._replace(residual=residual, iterations=iterations, passes=passes)
             lag = known.next(lag, change)

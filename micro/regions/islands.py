@@ -23,10 +23,11 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry import Partition, PatchGrid, Surface
+from geometry import Control, Partition, PatchGrid, Surface
 from micro.curve import checked_approaches, checked_means, whole_patch
 from micro.hertz import checked_modulus
 from micro.plane import RigidPlane
+from micro.plane_equilibrium import Held, Peaks, balanced, contact_stiffness
 from micro.regions.island_passes import Settled, settle
 from micro.regions.island_state import IslandState
 from micro.regions.island_sums import IslandSums
@@ -121,17 +122,36 @@ class IslandModel:
 
     def press(
         self,
-        plane: RigidPlane,
+        control: Control,
         *,
         patches: Partition,
         mean_heights: ArrayLike,
         start: Any = None,
     ) -> Pressed:
-        """Solve under one plane; see `MicroModel.press`.
+        """Solve one load step; see `MicroModel.press`.
 
-        Islands are found anew under every plane: there is no start to go on from.
+        Islands are found anew under every plane; the start tells the plane alone.
         """
-        return Pressed(self._response([plane], patches, mean_heights), None)
+        whole = self._relief(RigidPlane.above(self.surface, 0.0))
+        middle, half = 0.5 * np.asarray(self.surface.lengths), 0.5 * np.hypot(*self.surface.lengths)
+        lever = np.stack([np.ones(len(whole)), whole.x - middle[0], whole.y - middle[1]], axis=1)
+        force = np.full(len(whole), self.contact_modulus * np.sqrt(half))
+        peaks = Peaks(lever=lever, below=self.datum - whole.z, force=force, half=half)
+
+        def evaluate(motion: Array) -> tuple[Held, RigidPlane]:
+            plane = RigidPlane.above(self.surface, motion[0], (motion[1], motion[2]))
+            state = self._state(plane, self._settled(self._relief(plane), plane))
+            lever = np.stack(
+                [np.ones(len(state.x)), state.x - middle[0], state.y - middle[1]], axis=1
+            )
+            rate = 1.5 * state.force / state.indentation
+            apart = np.hypot(state.x[:, None] - state.x, state.y[:, None] - state.y)
+            np.fill_diagonal(apart, np.inf)
+            coupling = rate / (np.pi * self.contact_modulus) / np.maximum(apart, 1e-3 * half)
+            return Held(lever.T @ state.force, contact_stiffness(lever, rate, coupling)), plane
+
+        _, plane = balanced(evaluate, control, peaks.first_plane(control, start), half)
+        return Pressed(self._response([plane], patches, mean_heights), plane, plane)
 
     def _response(
         self, planes: list[RigidPlane], patches: Partition, mean_heights: ArrayLike

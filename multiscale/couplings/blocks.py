@@ -55,17 +55,12 @@ def contact_model(stage: Stage, comm: Any) -> MicroModel:
     if stage.scene.coupling.kind == "isolated":
         return model
     sides = free_sides(stage)
-    if not stage.embedded:
-        if stage.finite_slopes and isinstance(model, HalfSpaceModel):
-            model = replace(model, slopes=FiniteSlopes(model.surface, _half_space(stage)))
-        return model
-    face = _face(stage, comm)
-    body = _modes(stage, sides, face)
+    face = _face(stage, comm) if stage.embedded else None
+    body = None if face is None else _body_modes(stage, face, sides)
     if not isinstance(model, HalfSpaceModel):
-        return replace(model, body=body)  # type: ignore[type-var]
-    if stage.finite_slopes:
-        return _with_slopes(replace(model, sides=sides), stage, body, face)
-    return replace(model, sides=sides, body=body)
+        return replace(model, body=body) if body is not None else model  # type: ignore[type-var]
+    model = replace(model, sides=sides, body=body)
+    return _with_slopes(model, stage, face) if stage.finite_slopes else model
 
 
 def _sharp(model: MicroModel) -> MicroModel:
@@ -74,28 +69,29 @@ def _sharp(model: MicroModel) -> MicroModel:
 
 
 def _with_slopes(
-    model: HalfSpaceModel, stage: Stage, body: BodyModes, face: FaceCompliance
+    model: HalfSpaceModel, stage: Stage, face: FaceCompliance | None
 ) -> HalfSpaceModel:
-    """Return the model on a body with finite slopes, heights counted from the highest point.
+    """Return a scene's model with finite slopes, which see the stresses of its body.
 
-    Loads are near that plane, and slopes are then least under them. The flat body that slopes are
-    added to reaches up to it, and so is higher than the block, which ends at the mean plane.
+    Heights count from the highest point: loads are near it, and slopes add least to them there.
+    The flat body then reaches up to it; its block ends at the mean plane, and is lower.
     """
-    surface, sides, material = model.surface, model.sides, _half_space(stage)
-    lengths, count, nu = body.lengths, body.count, material.poisson_ratio
-    rest = face.stresses - half_space_stress_modes(lengths, nu, count)
-    grid = coarse_grid(surface)
-    spacing = surface.lengths[0] / grid[0], surface.lengths[1] / grid[1]
+    surface, section = model.surface, stage.scene.block
+    half_space = HalfSpace(section.young_modulus, section.poisson_ratio)
+    if face is None:
+        return replace(model, slopes=FiniteSlopes(surface, half_space))
+    grid, lengths = coarse_grid(surface), surface.lengths
+    known = half_space_stress_modes(lengths, section.poisson_ratio, face.count)
     beside: list[SurfaceStress] = []
-    if sides is not None:
-        rest -= side_stress_modes(sides, count)
-        beside.append(side_stresses(sides, spacing))
-    beside.append(BodyStresses(lengths, grid, rest))
-    higher = body.matrix + (surface.highest - surface.mean_height) * face.growth
+    if model.sides is not None:
+        spacing = lengths[0] / grid[0], lengths[1] / grid[1]
+        beside.append(side_stresses(model.sides, spacing))
+        known = known + side_stress_modes(model.sides, face.count)
+    beside.append(BodyStresses(lengths, grid, face.stresses - known))
     return replace(
         model,
-        body=BodyModes(lengths, higher),
-        slopes=FiniteSlopes(surface, material, plane=surface.highest, beside=beside),
+        body=_body_modes(stage, face, model.sides, higher=surface.highest - surface.mean_height),
+        slopes=FiniteSlopes(surface, half_space, plane=surface.highest, beside=beside),
     )
 
 
@@ -117,38 +113,39 @@ def free_sides(stage: Stage) -> FreeSides | None:
     )
 
 
-def body_modes(stage: Stage, sides: FreeSides | None, comm: Any) -> BodyModes:
-    """Return what a scene's block adds to the half-space and to some free sides.
-
-    Args:
-        stage: The scene's ingredients.
-        sides: Free sides that are known apart, if there are any.
-        comm: MPI communicator; None for this process alone.
-
-    Note:
-        Collective.
-    """
-    return _modes(stage, sides, _face(stage, comm))
-
-
 def _face(stage: Stage, comm: Any) -> FaceCompliance:
-    """Return what pressures do to the contact face of a scene's block."""
+    """Return what pressures do to the contact face of a scene's block; collective."""
     from mpi4py import MPI
 
     from macro import cached_face_compliance, mode_count
 
-    shape, sides = stage.shape, stage.scene.block.sides
-    material, count = block_material(stage), mode_count(shape)
-    return cached_face_compliance(shape, material, sides, count, comm or MPI.COMM_SELF)
+    return cached_face_compliance(
+        stage.shape,
+        block_material(stage),
+        stage.scene.block.sides,
+        mode_count(stage.shape),
+        comm or MPI.COMM_SELF,
+    )
 
 
-def _modes(stage: Stage, sides: FreeSides | None, face: FaceCompliance) -> BodyModes:
-    """Return what a contact face adds to the half-space and to some free sides."""
-    lengths, count = stage.surface.lengths, face.count
-    known = half_space_modes(lengths, count)
+def _body_modes(
+    stage: Stage, face: FaceCompliance, sides: FreeSides | None, *, higher: float = 0.0
+) -> BodyModes:
+    """Return what a scene's block adds to the half-space, and to free sides known apart.
+
+    Args:
+        stage: The scene's ingredients.
+        face: What pressures do to its contact face.
+        sides: Free sides.
+        higher: Height that is added to the block, to first order [mm].
+    """
+    lengths = stage.surface.lengths
+    known = half_space_modes(lengths, face.count)
     if sides is not None:
-        known = known + side_modes(sides, count)
-    return BodyModes(lengths, face.normal - known / stage.model.contact_modulus)
+        known = known + side_modes(sides, face.count)
+    return BodyModes(
+        lengths, face.normal + higher * face.growth - known / stage.model.contact_modulus
+    )
 
 
 def patch_displacements(stage: Stage, comm: Any, *, dense: bool) -> Callable[[Array], Array]:
@@ -196,7 +193,7 @@ def patch_compliance(stage: Stage, comm: Any) -> Array:
     """
     if stage.scene.coupling.decomposed:
         half_space = influence_matrix(stage.patches) / (np.pi * stage.model.contact_modulus)
-        body = body_modes(stage, None, comm)
+        body = _body_modes(stage, _face(stage, comm), None)
         return np.asarray(half_space + body.patch_compliance(stage.patches))
     from mpi4py import MPI
 
@@ -253,11 +250,6 @@ def block_material(stage: Stage) -> Material:
 
     section = stage.scene.block
     return Material(young_modulus=section.young_modulus, poisson_ratio=section.poisson_ratio)
-
-
-def _half_space(stage: Stage) -> HalfSpace:
-    section = stage.scene.block
-    return HalfSpace(section.young_modulus, section.poisson_ratio)
 
 
 def final_field(stage: Stage, pressure: Array, comm: Any) -> tuple[Interface, Array]:
