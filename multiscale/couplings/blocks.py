@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry import Surface
 from micro import (
     BodyModes,
     BodyStresses,
@@ -56,11 +57,16 @@ def contact_model(stage: Stage, comm: Any) -> MicroModel:
         return model
     sides = free_sides(stage)
     face = _face(stage, comm) if stage.embedded else None
-    body = None if face is None else _body_modes(stage, face, sides)
-    if not isinstance(model, HalfSpaceModel):
-        return replace(model, body=body) if body is not None else model  # type: ignore[type-var]
-    model = replace(model, sides=sides, body=body)
-    return _with_slopes(model, stage, face) if stage.finite_slopes else model
+    higher, slopes = 0.0, None
+    if stage.finite_slopes and isinstance(model, HalfSpaceModel):
+        # heights count from the highest point, which is near the loads: slopes add least there;
+        # the flat body then reaches up to it, while the block's height is that of the mean plane
+        higher = model.surface.highest - model.surface.mean_height
+        slopes = _finite_slopes(stage, model.surface, sides, face)
+    body = None if face is None else _body_modes(stage, face, sides, higher=higher)
+    if isinstance(model, HalfSpaceModel):
+        return replace(model, sides=sides, body=body, slopes=slopes)
+    return replace(model, body=body) if body is not None else model  # type: ignore[type-var]
 
 
 def _sharp(model: MicroModel) -> MicroModel:
@@ -68,31 +74,23 @@ def _sharp(model: MicroModel) -> MicroModel:
     return replace(model, tolerance=_SHARP) if isinstance(model, HalfSpaceModel) else model
 
 
-def _with_slopes(
-    model: HalfSpaceModel, stage: Stage, face: FaceCompliance | None
-) -> HalfSpaceModel:
-    """Return a scene's model with finite slopes, which see the stresses of its body.
-
-    Heights count from the highest point: loads are near it, and slopes add least to them there.
-    The flat body then reaches up to it; its block ends at the mean plane, and is lower.
-    """
-    surface, section = model.surface, stage.scene.block
+def _finite_slopes(
+    stage: Stage, surface: Surface, sides: FreeSides | None, face: FaceCompliance | None
+) -> FiniteSlopes:
+    """Return what finite slopes add on a scene's body, whose stresses are those in its face."""
+    section = stage.scene.block
     half_space = HalfSpace(section.young_modulus, section.poisson_ratio)
     if face is None:
-        return replace(model, slopes=FiniteSlopes(surface, half_space))
+        return FiniteSlopes(surface, half_space)
     grid, lengths = coarse_grid(surface), surface.lengths
     known = half_space_stress_modes(lengths, section.poisson_ratio, face.count)
     beside: list[SurfaceStress] = []
-    if model.sides is not None:
+    if sides is not None:
         spacing = lengths[0] / grid[0], lengths[1] / grid[1]
-        beside.append(side_stresses(model.sides, spacing))
-        known = known + side_stress_modes(model.sides, face.count)
+        beside.append(side_stresses(sides, spacing))
+        known = known + side_stress_modes(sides, face.count)
     beside.append(BodyStresses(lengths, grid, face.stresses - known))
-    return replace(
-        model,
-        body=_body_modes(stage, face, model.sides, higher=surface.highest - surface.mean_height),
-        slopes=FiniteSlopes(surface, half_space, plane=surface.highest, beside=beside),
-    )
+    return FiniteSlopes(surface, half_space, plane=surface.highest, beside=beside)
 
 
 def free_sides(stage: Stage) -> FreeSides | None:
