@@ -39,6 +39,11 @@ class FaceCompliance:
     growth: Array
     stresses: Array
 
+    @property
+    def count(self) -> int:
+        """Modes K along a side."""
+        return int(np.sqrt(len(self.normal)) + 0.5)
+
 
 def face_compliance(
     shape: BlockShape, material: Material, sides: Sides, count: int, comm: Any
@@ -70,7 +75,7 @@ def face_compliance(
         "material": material,
         "sides": sides,
     }
-    families = [parity for parity in product((0, 1), repeat=2) if max(parity) < count]
+    families: list[Parity] = [(i, j) for i, j in product((0, 1), repeat=2) if max(i, j) < count]
     alike = shape.interface[0] == shape.interface[1]
     if alike and (1, 0) in families:
         families.remove((1, 0))

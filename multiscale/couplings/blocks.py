@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry import Surface
 from micro import (
     BodyModes,
     BodyStresses,
@@ -56,11 +57,16 @@ def contact_model(stage: Stage, comm: Any) -> MicroModel:
         return model
     sides = free_sides(stage)
     face = _face(stage, comm) if stage.embedded else None
-    body = None if face is None else _body_modes(stage, face, sides)
-    if not isinstance(model, HalfSpaceModel):
-        return replace(model, body=body) if body is not None else model  # type: ignore[type-var]
-    slopes = _finite_slopes(stage, sides, face) if stage.finite_slopes else None
-    return replace(model, sides=sides, body=body, slopes=slopes)
+    higher, slopes = 0.0, None
+    if stage.finite_slopes and isinstance(model, HalfSpaceModel):
+        # heights count from the highest point, which is near the loads: slopes add least there;
+        # the flat body then reaches up to it, while the block's height is that of the mean plane
+        higher = model.surface.highest - model.surface.mean_height
+        slopes = _finite_slopes(stage, model.surface, sides, face)
+    body = None if face is None else _body_modes(stage, face, sides, higher=higher)
+    if isinstance(model, HalfSpaceModel):
+        return replace(model, sides=sides, body=body, slopes=slopes)
+    return replace(model, body=body) if body is not None else model  # type: ignore[type-var]
 
 
 def _sharp(model: MicroModel) -> MicroModel:
@@ -69,25 +75,22 @@ def _sharp(model: MicroModel) -> MicroModel:
 
 
 def _finite_slopes(
-    stage: Stage, sides: FreeSides | None, face: FaceCompliance | None
+    stage: Stage, surface: Surface, sides: FreeSides | None, face: FaceCompliance | None
 ) -> FiniteSlopes:
     """Return what finite slopes add on a scene's body, whose stresses are those in its face."""
-    surface, section = stage.surface, stage.scene.block
-    if isinstance(stage.model, HalfSpaceModel):
-        surface = stage.model.surface
+    section = stage.scene.block
     half_space = HalfSpace(section.young_modulus, section.poisson_ratio)
     if face is None:
         return FiniteSlopes(surface, half_space)
     grid, lengths = coarse_grid(surface), surface.lengths
-    count = round(np.sqrt(len(face.normal)))
-    known = half_space_stress_modes(lengths, section.poisson_ratio, count)
+    known = half_space_stress_modes(lengths, section.poisson_ratio, face.count)
     beside: list[SurfaceStress] = []
     if sides is not None:
         spacing = lengths[0] / grid[0], lengths[1] / grid[1]
         beside.append(side_stresses(sides, spacing))
-        known = known + side_stress_modes(sides, count)
+        known = known + side_stress_modes(sides, face.count)
     beside.append(BodyStresses(lengths, grid, face.stresses - known))
-    return FiniteSlopes(surface, half_space, beside=beside)
+    return FiniteSlopes(surface, half_space, plane=surface.highest, beside=beside)
 
 
 def free_sides(stage: Stage) -> FreeSides | None:
@@ -123,13 +126,24 @@ def _face(stage: Stage, comm: Any) -> FaceCompliance:
     )
 
 
-def _body_modes(stage: Stage, face: FaceCompliance, sides: FreeSides | None) -> BodyModes:
-    """Return what a scene's block adds to the half-space, and to free sides known apart."""
-    lengths, count = stage.surface.lengths, round(np.sqrt(len(face.normal)))
-    known = half_space_modes(lengths, count)
+def _body_modes(
+    stage: Stage, face: FaceCompliance, sides: FreeSides | None, *, higher: float = 0.0
+) -> BodyModes:
+    """Return what a scene's block adds to the half-space, and to free sides known apart.
+
+    Args:
+        stage: The scene's ingredients.
+        face: What pressures do to its contact face.
+        sides: Free sides.
+        higher: Height that is added to the block, to first order [mm].
+    """
+    lengths = stage.surface.lengths
+    known = half_space_modes(lengths, face.count)
     if sides is not None:
-        known = known + side_modes(sides, count)
-    return BodyModes(lengths, face.normal - known / stage.model.contact_modulus)
+        known = known + side_modes(sides, face.count)
+    return BodyModes(
+        lengths, face.normal + higher * face.growth - known / stage.model.contact_modulus
+    )
 
 
 def patch_displacements(stage: Stage, comm: Any, *, dense: bool) -> Callable[[Array], Array]:
