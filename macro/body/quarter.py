@@ -1,7 +1,8 @@
 """A quarter of a block, in which even and odd modes of pressure are solved for apart.
 
 The planes through the middle of the block divide it into quarters. Displacements along an axis are
-odd along it where the pressure is even, and even where it is odd; otherwise as the pressure.
+odd along it where the pressure is even, and even where it is odd; along the other axis they are as
+the pressure is.
 """
 
 from __future__ import annotations
@@ -31,11 +32,11 @@ _NOUGHT = 1e-13
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Quarter:
-    """The quarter of a block beyond the middle of its contact face, clamped at the bottom.
+    """The quarter of a block beyond the middle of its top, clamped at the bottom.
 
     Args:
         division: Its elements.
-        lengths: Sides (Lx, Ly) of the contact face [mm].
+        lengths: Sides (Lx, Ly) of the top [mm].
         material: Elastic constants.
         sides: Support of the block's sides.
         parity: That of the pressures.
@@ -48,22 +49,22 @@ class Quarter:
     parity: Parity
 
     def displacements(self, count: int) -> tuple[Array, Array, Array]:
-        """Return how the modes of the parity displace the face.
+        """Return how the modes of the parity displace the top.
 
         Args:
             count: Modes K along a side, even and odd together.
 
         Returns:
-            Integrals over the face of modes times displacements by unit modes of pressure, along
+            Integrals over the top of modes times displacements by unit modes of pressure, along
             x, y and downwards, shape (k, l, m, n) [mm³/MPa]: k and l count the modes of the
             displacement's parity, m and n those of the pressure's.
         """
         modes = [
             [
-                mode_integrals(self._lines[axis][along], self.lengths[along], count)
-                for along in (0, 1)
+                mode_integrals(line, length, count)
+                for line, length in zip(lines, self.lengths, strict=False)
             ]
-            for axis in range(3)
+            for lines in self._lines
         ]
         free = np.concatenate([kept.ravel() for kept in self._kept])
         top, place = self._top
@@ -71,23 +72,23 @@ class Quarter:
         right = np.zeros((int(free.sum()), loads.shape[1]), order="F")
         right[top[2]] = -loads
         solved = _solved(self._stiffness[free][:, free], right)
-        found = []
-        for axis, sign in enumerate((1.0, 1.0, -1.0)):
-            seen = np.kron(*modes[axis])[:, place[axis]] @ solved[top[axis]]
+
+        def seen(axis: int, sign: float) -> Array:
             sizes = [len(part) for part in (*modes[axis], *modes[2])]
-            found.append(4.0 * sign * seen.reshape(sizes))
-        return found[0], found[1], found[2]
+            integrals = np.kron(*modes[axis])[:, place[axis]] @ solved[top[axis]]
+            return np.asarray(4.0 * sign * integrals).reshape(sizes)  # of four quarters
+
+        return seen(0, 1.0), seen(1, 1.0), seen(2, -1.0)
 
     @cached_property
     def _lines(self) -> list[tuple[Line, Line, Line]]:
         """Lines along x, y and z by component of the displacement."""
-        x, y, z = self.division.x, self.division.y, self.division.z
-        odd_x, odd_y = self.parity
+        division, (odd_x, odd_y) = self.division, self.parity
         return [
             (
-                replace(x, parity=(odd_x + (component == 0)) % 2),
-                replace(y, parity=(odd_y + (component == 1)) % 2),
-                z,
+                replace(division.x, parity=(odd_x + (component == 0)) % 2),
+                replace(division.y, parity=(odd_y + (component == 1)) % 2),
+                division.z,
             )
             for component in range(3)
         ]
