@@ -34,8 +34,8 @@ class Anderson:
             change = residual - self._last[1]
             size = float(np.linalg.norm(change))
             if size > 0.0:  # steps of length one: they shrink by orders of magnitude
-                step = (point - self._last[0]) / size, change / size
-                self._steps = [*self._steps, step][-_MEMORY:]
+                pair = (point - self._last[0]) / size, change / size
+                self._steps = [*self._steps, pair][-_MEMORY:]
         self._last = point, residual
         moved = point + residual
         if not self._steps:

@@ -18,8 +18,8 @@ class BodyStresses:
     have the means.
 
     Args:
-        lengths: Sides (Lx, Ly) of the face, which the cells fill [mm].
-        grid: Cells (nx, ny).
+        lengths: Sides (Lx, Ly) of the face [mm].
+        borders: Borders of the equal cells in it along x and y, shapes (nx + 1,), (ny + 1,) [mm].
         matrix: S of σ_xx, σ_yy and σ_xy; mode k K + l varies as mode k along x and l along y, shape
             (3, K², K²) [1/mm²].
 
@@ -28,7 +28,7 @@ class BodyStresses:
     """
 
     def __init__(
-        self, lengths: tuple[float, float], grid: tuple[int, int], matrix: ArrayLike
+        self, lengths: tuple[float, float], borders: tuple[Array, Array], matrix: ArrayLike
     ) -> None:
         self._matrix = np.asarray(matrix, float)
         count = int(np.sqrt(self._matrix.shape[-1]) + 0.5)
@@ -41,10 +41,9 @@ class BodyStresses:
         if not np.all(np.isfinite(self._matrix)):
             raise InputError("the stresses are not finite", value="nan or inf", allowed="numbers")
         self._x, self._y = (
-            mode_means(np.linspace(0.0, length, cells + 1), length, count)
-            for length, cells in zip(lengths, grid, strict=True)
+            mode_means(ticks, length, count) for length, ticks in zip(lengths, borders, strict=True)
         )
-        self._cell = lengths[0] * lengths[1] / (grid[0] * grid[1])
+        self._cell = float(np.prod([ticks[1] - ticks[0] for ticks in borders]))
 
     def stresses(self, pressure: Array) -> Array:
         """Return σ_xx, σ_yy and σ_xy on the cells, shape (3, nx, ny) [MPa].

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from geometry import Surface
 from micro import (
-    BodyModes,
-    BodyStresses,
     FiniteSlopes,
     FreeSides,
     HalfSpace,
@@ -20,13 +18,10 @@ from micro import (
     MicroModel,
     SurfaceStress,
     coarse_grid,
-    half_space_modes,
-    half_space_stress_modes,
     influence_matrix,
-    side_modes,
-    side_stress_modes,
     side_stresses,
 )
+from multiscale.couplings.body import Body
 from multiscale.scene import Scene
 from multiscale.stage import Stage
 
@@ -55,18 +50,20 @@ def contact_model(stage: Stage, comm: Any) -> MicroModel:
     model = _sharp(stage.model)
     if stage.scene.coupling.kind == "isolated":
         return model
-    sides = free_sides(stage)
-    face = _face(stage, comm) if stage.embedded else None
+    body = scene_body(stage) if stage.embedded else None
+    face = None if body is None else body.face(comm)
     higher, slopes = 0.0, None
     if stage.finite_slopes and isinstance(model, HalfSpaceModel):
         # heights count from the highest point, which is near the loads: slopes add least there;
         # the flat body then reaches up to it, while the block's height is that of the mean plane
         higher = model.surface.highest - model.surface.mean_height
-        slopes = _finite_slopes(stage, model.surface, sides, face)
-    body = None if face is None else _body_modes(stage, face, sides, higher=higher)
+        slopes = _finite_slopes(stage, model.surface, body, face)
+    if body is None or face is None:
+        return replace(model, slopes=slopes) if slopes is not None else model
+    term = body.term(face, higher=higher)
     if isinstance(model, HalfSpaceModel):
-        return replace(model, sides=sides, body=body, slopes=slopes)
-    return replace(model, body=body) if body is not None else model  # type: ignore[type-var]
+        return replace(model, sides=body.known, body=term, slopes=slopes)
+    return replace(model, body=term)  # type: ignore[type-var]
 
 
 def _sharp(model: MicroModel) -> MicroModel:
@@ -75,22 +72,33 @@ def _sharp(model: MicroModel) -> MicroModel:
 
 
 def _finite_slopes(
-    stage: Stage, surface: Surface, sides: FreeSides | None, face: FaceCompliance | None
+    stage: Stage, surface: Surface, body: Body | None, face: FaceCompliance | None
 ) -> FiniteSlopes:
     """Return what finite slopes add on a scene's body, whose stresses are those in its face."""
     section = stage.scene.block
     half_space = HalfSpace(section.young_modulus, section.poisson_ratio)
-    if face is None:
+    if body is None or face is None:
         return FiniteSlopes(surface, half_space)
-    grid, lengths = coarse_grid(surface), surface.lengths
-    known = half_space_stress_modes(lengths, section.poisson_ratio, face.count)
-    beside: list[SurfaceStress] = []
-    if sides is not None:
-        spacing = lengths[0] / grid[0], lengths[1] / grid[1]
-        beside.append(side_stresses(sides, spacing))
-        known = known + side_stress_modes(sides, face.count)
-    beside.append(BodyStresses(lengths, grid, face.stresses - known))
+    grid = coarse_grid(surface)
+    beside: list[SurfaceStress] = [body.stresses(face, grid)]
+    if body.known is not None:
+        spacing = surface.lengths[0] / grid[0], surface.lengths[1] / grid[1]
+        beside.append(side_stresses(body.known, spacing))
     return FiniteSlopes(surface, half_space, plane=surface.highest, beside=beside)
+
+
+def scene_body(stage: Stage) -> Body:
+    """Return the block of a scene, some of whose free sides its micro model knows of itself.
+
+    Args:
+        stage: The scene's ingredients.
+    """
+    return Body(
+        shape=stage.shape,
+        material=block_material(stage),
+        sides=stage.scene.block.sides,
+        known=free_sides(stage),
+    )
 
 
 def free_sides(stage: Stage) -> FreeSides | None:
@@ -108,41 +116,6 @@ def free_sides(stage: Stage) -> FreeSides | None:
         lengths=stage.surface.lengths,
         poisson_ratio=stage.scene.block.poisson_ratio,
         reach=_REACH * min(*stage.surface.lengths, stage.shape.height),
-    )
-
-
-def _face(stage: Stage, comm: Any) -> FaceCompliance:
-    """Return what pressures do to the contact face of a scene's block; collective."""
-    from mpi4py import MPI
-
-    from macro import cached_face_compliance, mode_count
-
-    return cached_face_compliance(
-        stage.shape,
-        block_material(stage),
-        stage.scene.block.sides,
-        mode_count(stage.shape),
-        comm or MPI.COMM_SELF,
-    )
-
-
-def _body_modes(
-    stage: Stage, face: FaceCompliance, sides: FreeSides | None, *, higher: float = 0.0
-) -> BodyModes:
-    """Return what a scene's block adds to the half-space, and to free sides known apart.
-
-    Args:
-        stage: The scene's ingredients.
-        face: What pressures do to its contact face.
-        sides: Free sides.
-        higher: Height that is added to the block, to first order [mm].
-    """
-    lengths = stage.surface.lengths
-    known = half_space_modes(lengths, face.count)
-    if sides is not None:
-        known = known + side_modes(sides, face.count)
-    return BodyModes(
-        lengths, face.normal + higher * face.growth - known / stage.model.contact_modulus
     )
 
 
@@ -191,8 +164,9 @@ def patch_compliance(stage: Stage, comm: Any) -> Array:
     """
     if stage.scene.coupling.decomposed:
         half_space = influence_matrix(stage.patches) / (np.pi * stage.model.contact_modulus)
-        body = _body_modes(stage, _face(stage, comm), None)
-        return np.asarray(half_space + body.patch_compliance(stage.patches))
+        body = replace(scene_body(stage), known=None)
+        rest = body.term(body.face(comm)).patch_compliance(stage.patches)
+        return np.asarray(half_space + rest)
     from mpi4py import MPI
 
     from macro import plain_compliance

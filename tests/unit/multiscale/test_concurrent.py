@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from multiscale.couplings.concurrent import ConcurrentCoupling
+from multiscale.couplings.concurrent_newton import damped_turn
 
 from geometry import PatchGrid, Spectrum, Surface, patch_means, synthesise
 from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from micro import HalfSpaceModel, RigidPlane, micro_model
 from multiscale.couplings import concurrent
-from multiscale.couplings.concurrent import ConcurrentCoupling
-from multiscale.couplings.concurrent_newton import damped_turn
 
 MODULUS = 4000.0
 SURFACE = synthesise(

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from multiscale.couplings.yielding import SpreadLoads, UniformLoads
+from multiscale.law_tables.spread import ContactSpread, divides
 
 from geometry import PatchGrid
 from geometry.errors import InputError
-from multiscale.couplings.yielding import SpreadLoads, UniformLoads
-from multiscale.law_tables.spread import ContactSpread, divides
 from multiscale.laws import LawPoint
 
 PATCHES = PatchGrid(grid=(2, 1), lengths=(2.0, 1.0))
