@@ -15,7 +15,7 @@ from micro.cells.free_sides import FreeSides
 from micro.cells.half_space_state import HalfSpaceState
 from micro.cells.side_stresses import SideStresses
 from micro.compliance.body_modes import BodyModes
-from micro.compliance.finite_slopes import FiniteSlopes
+from micro.compliance.finite_slopes import FiniteSlopes, coarse_grid
 from micro.compliance.half_space_modes import half_space_modes
 from micro.compliance.side_modes import side_modes
 from micro.ellipse import (
@@ -73,6 +73,7 @@ __all__ = [
     "axis_factor",
     "axis_ratio",
     "choose",
+    "coarse_grid",
     "contact_modulus",
     "eccentricity",
     "eccentricity_approximate",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.surface import Surface
 from micro import (
     BodyModes,
     FiniteSlopes,
@@ -17,6 +18,7 @@ from micro import (
     HalfSpaceModel,
     MicroModel,
     SideStresses,
+    coarse_grid,
     half_space_modes,
     influence_matrix,
     side_modes,
@@ -28,6 +30,12 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import Interface, Material
 
 Array = NDArray[np.float64]
+
+Models = Callable[[Surface, int], HalfSpaceModel]
+"""From cells of a surface and the order of finite slopes, 0 for none, to its half-space model."""
+
+SLOPES = 2
+"""Order of finite slopes where they are seen."""
 
 _REACH = 0.25
 """Reach of free sides in the micro model, of the shortest side of the block."""
@@ -46,38 +54,56 @@ def contact_model(stage: Stage, comm: Any) -> MicroModel:
     Note:
         Collective.
     """
-    model = _sharp(stage.model)
-    if stage.scene.coupling.kind == "isolated":
-        return model
-    sides = free_sides(stage)
-    body = None
-    if stage.embedded:
-        body = body_modes(stage, sides, comm)
-    if not isinstance(model, HalfSpaceModel):
-        return replace(model, body=body) if body is not None else model  # type: ignore[type-var]
-    return replace(model, sides=sides, body=body, slopes=finite_slopes(stage, sides))
+    model = stage.model
+    if isinstance(model, HalfSpaceModel):
+        order = SLOPES if stage.finite_slopes else 0
+        alone = stage.scene.coupling.kind == "isolated"
+        return half_space_models(stage, comm, body=stage.embedded and not alone)(
+            model.surface, order
+        )
+    if stage.embedded and stage.scene.coupling.kind != "isolated":
+        return replace(model, body=body_modes(stage, None, comm))  # type: ignore[type-var]
+    return model
 
 
-def _sharp(model: MicroModel) -> MicroModel:
-    """Return a micro model whose own error is none beside the tolerances of what it goes into."""
-    return replace(model, tolerance=_SHARP) if isinstance(model, HalfSpaceModel) else model
-
-
-def finite_slopes(stage: Stage, sides: FreeSides | None) -> FiniteSlopes | None:
-    """Return what finite slopes add in a scene; None where they are left out.
+def half_space_models(stage: Stage, comm: Any, *, body: bool) -> Models:
+    """Return what makes a scene's half-space model on any cells, its body solved for once.
 
     Args:
-        stage: The scene's ingredients.
-        sides: Free sides, if there are any.
+        stage: The scene's ingredients, with a half-space model.
+        comm: MPI communicator; None for this process alone.
+        body: Whether the surface lies on the scene's block, or on a half-space.
+
+    Returns:
+        A function from the surface and the order of finite slopes, 0 for none, to the model. It is
+        not collective.
+
+    Note:
+        Collective.
     """
-    if not stage.finite_slopes or not isinstance(stage.model, HalfSpaceModel):
-        return None
+    sides = free_sides(stage) if body else None
+    modes = body_modes(stage, sides, comm) if body else None
     material = _half_space(stage)
-    slopes = FiniteSlopes(stage.model.surface, material)
-    if sides is None:
-        return slopes
-    beside = SideStresses(sides, slopes.spacing)
-    return FiniteSlopes(stage.model.surface, material, beside=(beside,))
+
+    def made(surface: Surface, order: int) -> HalfSpaceModel:
+        model = replace(
+            stage.model,  # type: ignore[type-var]
+            surface=surface,
+            highest=stage.model.datum,
+            tolerance=_SHARP,
+            sides=sides,
+            body=modes,
+        )
+        if not order:
+            return model
+        beside = []
+        if sides is not None:
+            cells = coarse_grid(surface)
+            spacing = surface.lengths[0] / cells[0], surface.lengths[1] / cells[1]
+            beside = [SideStresses(sides, spacing)]
+        return replace(model, slopes=FiniteSlopes(surface, material, order=order, beside=beside))
+
+    return made
 
 
 def free_sides(stage: Stage) -> FreeSides | None:
