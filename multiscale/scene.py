@@ -160,11 +160,16 @@ class MicroSection(Section):
 
 
 class OutputSection(Section):
-    """What is written beside the tables; nothing else is computed."""
+    """What is told of the results, and written beside the tables.
+
+    ``check``: the load steps whose errors are measured by further contact problems, where the
+    micro model is ``half-space``.
+    """
 
     figures: Flag = True
     report: Flag = True
     fields: Flag = False
+    check: Literal["last", "none", "all"] = "last"
 
 
 class Scene(Section):

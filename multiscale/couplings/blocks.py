@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Surface
+from geometry.surface import Surface
 from micro import (
     FiniteSlopes,
     FreeSides,
@@ -30,6 +30,12 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
 
 Array = NDArray[np.float64]
 
+Models = Callable[[Surface, int], HalfSpaceModel]
+"""From cells of a surface and the order of finite slopes, 0 for none, to its half-space model."""
+
+SLOPES = 2
+"""Order of finite slopes where they are seen."""
+
 _REACH = 0.25
 """Reach of free sides in the micro model, of the shortest side of the block."""
 _SHARP = 1e-10
@@ -47,44 +53,75 @@ def contact_model(stage: Stage, comm: Any) -> MicroModel:
     Note:
         Collective.
     """
-    model = _sharp(stage.model)
-    if stage.scene.coupling.kind == "isolated":
+    model = stage.model
+    embedded = stage.embedded and stage.scene.coupling.kind != "isolated"
+    if isinstance(model, HalfSpaceModel):
+        order = SLOPES if stage.finite_slopes else 0
+        return half_space_models(stage, comm, embedded=embedded)(model.surface, order)
+    if not embedded:
         return model
-    body = scene_body(stage) if stage.embedded else None
-    face = None if body is None else body.face(comm)
-    higher, slopes = 0.0, None
-    if stage.finite_slopes and isinstance(model, HalfSpaceModel):
+    body = scene_body(stage)
+    return replace(model, body=body.term(body.face(comm)))  # type: ignore[type-var]
+
+
+def half_space_models(
+    stage: Stage, comm: Any, *, embedded: bool, modes: int | None = None, coarse: bool = False
+) -> Models:
+    """Return what makes a scene's half-space model on any cells, its body solved for once.
+
+    Args:
+        stage: The scene's ingredients, with a half-space model.
+        comm: MPI communicator; None for this process alone.
+        embedded: Whether the surface lies on the scene's block, or on a half-space.
+        modes: Modes of the body along a side; by default those of its shape.
+        coarse: Whether to take coarser elements for the body.
+
+    Returns:
+        A function from the surface and the order of finite slopes, 0 for none, to the model. It is
+        not collective.
+
+    Note:
+        Collective.
+    """
+    given = stage.model
+    if not isinstance(given, HalfSpaceModel):
+        raise TypeError("the scene's micro model is no half-space")
+    body = scene_body(stage) if embedded else None
+    face = None if body is None else body.face(comm, modes=modes, coarse=coarse)
+    section = stage.scene.block
+    material = HalfSpace(section.young_modulus, section.poisson_ratio)
+
+    def made(surface: Surface, order: int) -> HalfSpaceModel:
+        model = replace(
+            given,
+            surface=surface,
+            highest=given.datum,
+            tolerance=_SHARP,
+        )
         # heights count from the highest point, which is near the loads: slopes add least there;
         # the flat body then reaches up to it, while the block's height is that of the mean plane
-        higher = model.surface.highest - model.surface.mean_height
-        slopes = _finite_slopes(stage, model.surface, body, face)
-    if body is None or face is None:
-        return replace(model, slopes=slopes) if slopes is not None else model
-    term = body.term(face, higher=higher)
-    if isinstance(model, HalfSpaceModel):
-        return replace(model, sides=body.known, body=term, slopes=slopes)
-    return replace(model, body=term)  # type: ignore[type-var]
+        higher = surface.highest - surface.mean_height if order else 0.0
+        beside: list[SurfaceStress] = []
+        if body is not None and face is not None:
+            model = replace(model, sides=body.known, body=body.term(face, higher=higher))
+            beside = _stresses(body, face, surface) if order else []
+        if not order:
+            return model
+        plane = surface.highest if beside else None
+        slopes = FiniteSlopes(surface, material, order=order, plane=plane, beside=beside)
+        return replace(model, slopes=slopes)
+
+    return made
 
 
-def _sharp(model: MicroModel) -> MicroModel:
-    """Return a micro model whose own error is none beside the tolerances of what it goes into."""
-    return replace(model, tolerance=_SHARP) if isinstance(model, HalfSpaceModel) else model
-
-
-def _finite_slopes(
-    stage: Stage, surface: Surface, body: Body | None, face: FaceCompliance | None
-) -> FiniteSlopes:
-    """Return what finite slopes add on a scene's body, whose stresses are those in its face."""
-    section = stage.scene.block
-    half_space = HalfSpace(section.young_modulus, section.poisson_ratio)
-    if body is None or face is None:
-        return FiniteSlopes(surface, half_space)
+def _stresses(body: Body, face: FaceCompliance, surface: Surface) -> list[SurfaceStress]:
+    """Return the stresses in a contact face beyond those of the half-space."""
     grid = coarse_grid(surface)
-    beside: list[SurfaceStress] = [body.stresses(face, grid)]
+    found: list[SurfaceStress] = [body.stresses(face, grid)]
     if body.known is not None:
         spacing = surface.lengths[0] / grid[0], surface.lengths[1] / grid[1]
-        beside.append(side_stresses(body.known, spacing))
-    return FiniteSlopes(surface, half_space, plane=surface.highest, beside=beside)
+        found.append(side_stresses(body.known, spacing))
+    return found
 
 
 def scene_body(stage: Stage) -> Body:
