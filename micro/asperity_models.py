@@ -255,7 +255,7 @@ class AsperityModel:
             return Held(loads, self.contacts.stiffness(own, peaks.lever)), known
 
         motion = np.array([first.approach, *first.tilt])
-        return balanced(evaluate, control, motion, peaks.half)[1]
+        return balanced(evaluate, control, motion, peaks)[1]
 
     def first_plane(self, control: Control, start: Balanced | None = None) -> RigidPlane:
         """Return the plane that an equilibrium is looked for from.

@@ -31,6 +31,7 @@ TOLERANCE = 1e-9
 _LEVEL = (0.0, 0.0)
 _MOST_EVALUATIONS = 100
 _MOST_SHARES = 60
+_MOST_RETREATS = 6
 _ENOUGH = 0.9  # share of a slope that a step may leave, or it is lengthened or shortened
 _SOFT = 1e-9  # of the mean stiffness: what holds motions that no contact resists
 _ROUNDING = 64.0 * np.finfo(float).eps
@@ -136,7 +137,7 @@ class Peaks:
 
 
 def balanced(
-    evaluate: Callable[[Array], tuple[Held, T]], control: Control, first: Array, half: float
+    evaluate: Callable[[Array], tuple[Held, T]], control: Control, first: Array, peaks: Peaks
 ) -> tuple[Array, T]:
     """Find the plane in balance with what is prescribed.
 
@@ -144,7 +145,7 @@ def balanced(
         evaluate: Returns what the contacts do to a plane (3,), and whatever else is known of them.
         control: What is prescribed.
         first: A plane to start from, with the prescribed approach or slopes, shape (3,).
-        half: Half the diagonal of the rectangle [mm].
+        peaks: The points that the plane can touch.
 
     Returns:
         The plane, and what ``evaluate`` told about it.
@@ -152,7 +153,7 @@ def balanced(
     Raises:
         NotConverged: When no plane is found, or ``evaluate`` fails.
     """
-    turns = control.tilt is None and control.force != 0.0
+    half, turns = peaks.half, control.tilt is None and control.force != 0.0
     free = np.array([bool(control.force), turns, turns])
     unit = np.array([1.0, 1.0 / half, 1.0 / half])[free]
     wanted = np.array([control.force or 0.0, 0.0, 0.0])[free]
@@ -162,8 +163,7 @@ def balanced(
         stiffness = held.stiffness[np.ix_(free, free)] * np.outer(unit, unit)
         return (held.loads[free] - wanted) * unit, stiffness, float(held.loads[0]), known
 
-    plane = np.array(first, float)
-    at = lacking(plane)
+    plane, at = _begun(lacking, control, np.array(first, float), peaks)
     step, change = np.zeros(len(unit)), np.zeros(len(unit))
     for count in range(_MOST_EVALUATIONS):
         residual, stiffness, force, known = at
@@ -178,6 +178,24 @@ def balanced(
         step, change, at = share * step, found[0] - residual, found
         plane[free] += unit * step
     raise failure(control, "NO_BALANCE", _MOST_EVALUATIONS)
+
+
+def _begun(
+    lacking: Callable[[Array], tuple[Array, Array, float, T]],
+    control: Control,
+    plane: Array,
+    peaks: Peaks,
+) -> tuple[Array, tuple[Array, Array, float, T]]:
+    """Start from a plane, or nearer to first touch where the contacts do not bear so much."""
+    touch = peaks.first_touch((plane[1], plane[2]))
+    for _ in range(_MOST_RETREATS):
+        try:
+            return plane, lacking(plane)
+        except NotConverged:
+            if not control.force or plane[0] <= touch:
+                raise
+            plane[0] = 0.5 * (plane[0] + touch)
+    return plane, lacking(plane)
 
 
 def _searched(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from geometry import Control
 from micro.pairs.body_points import BodyPoints
 from micro.pairs.interaction import Lift
-from micro.plane_equilibrium import Held, balanced, contact_stiffness
+from micro.plane_equilibrium import Held, Peaks, balanced, contact_stiffness
 from micro.regions.island_passes import Answer
 from micro.regions.island_shapes import Islands
 from micro.regions.relief import Relief
@@ -87,8 +87,7 @@ class IslandContact:
 
     Args:
         relief: The n catchments.
-        lever: 1 and the distances of the peaks from the middle, shape (n, 3) [1, mm, mm].
-        half: Half the diagonal of the rectangle [mm].
+        peaks: Their peaks.
         control: What is prescribed of the plane.
         level: Heights of the first plane over the peaks, shape (n,) [mm].
         motion: Approach and slopes of the first plane, shape (3,).
@@ -97,8 +96,7 @@ class IslandContact:
     """
 
     relief: Relief
-    lever: Array
-    half: float
+    peaks: Peaks
     control: Control
     level: Array
     motion: Array
@@ -122,9 +120,9 @@ class IslandContact:
             return Answer(kernel @ found.force, self.motion, found)
         if self.body is not None:
             kernel = kernel + self.body.by(self.body.elsewhere(found.x, found.y)) / np.pi
-        top, depth = found.top, found.depth
+        top, depth, lever = found.top, found.depth, self.peaks.lever
         forces = PointForces(law=found.force / depth**1.5, matrix=kernel[top])
-        over, moved = self.relief.z[top] - self.level[top], self.lever[top]
+        over, moved = self.relief.z[top] - self.level[top], lever[top]
         x, y = self.relief.x[top], self.relief.y[top]
         arms = moved + np.stack([np.zeros(len(x)), found.x - x, found.y - y], axis=1)
 
@@ -135,6 +133,12 @@ class IslandContact:
             loads = self.contact_modulus * (arms.T @ (forces.law * depth**1.5))
             return Held(loads, self.contact_modulus * forces.stiffness(depth, arms)), depth
 
-        motion, depth = balanced(evaluate, self.control, motion, self.half)
-        lift = kernel @ (forces.law * depth**1.5) - self.lever @ (motion - self.motion)
+        goal, depth = balanced(evaluate, self.control, motion, self.peaks)
+        # other peaks than those of these islands hold a plane that moves far
+        most = float(found.depth.max())
+        part = min(1.0, most / max(float(np.abs(lever @ (goal - motion)).max()), most))
+        motion = goal if part == 1.0 else motion + part * (goal - motion)
+        if part < 1.0:
+            depth = evaluate(motion)[1]
+        lift = kernel @ (forces.law * depth**1.5) - lever @ (motion - self.motion)
         return Answer(lift, motion, found.under(depth))

@@ -207,8 +207,7 @@ class IslandModel:
             body = BodyPoints.at(self.body, relief.x, relief.y, self.contact_modulus)
         contact = IslandContact(
             relief=relief,
-            lever=lever,
-            half=half,
+            peaks=peaks,
             control=control,
             level=level,
             motion=motion,
