@@ -132,11 +132,13 @@ class IslandModel:
 
         Islands are found anew under every plane; the start tells the plane alone.
         """
-        whole = self._relief(RigidPlane.above(self.surface, 0.0))
+        tilt = control.tilt or _LEVEL  # peaks are those that such a plane can touch
+        whole = self._relief(RigidPlane.above(self.surface, 0.0, tilt))
         middle, half = 0.5 * np.asarray(self.surface.lengths), 0.5 * np.hypot(*self.surface.lengths)
         lever = np.stack([np.ones(len(whole)), whole.x - middle[0], whole.y - middle[1]], axis=1)
         force = np.full(len(whole), self.contact_modulus * np.sqrt(half))
-        peaks = Peaks(lever=lever, below=self.datum - whole.z, force=force, half=half)
+        below = self.datum - whole.z + lever[:, 1:] @ np.asarray(tilt)
+        peaks = Peaks(lever=lever, below=below, force=force, half=half)
 
         def evaluate(motion: Array) -> tuple[Held, RigidPlane]:
             plane = RigidPlane.above(self.surface, motion[0], (motion[1], motion[2]))
@@ -179,7 +181,7 @@ class IslandModel:
         """Return the catchments that a plane and all above it need."""
         surface, small = self.surface, self.surface.heights.size <= _MOST_KEPT
         lean = None
-        level = plane.tilt == _LEVEL and plane.sag is None
+        level = plane.tilt == _LEVEL
         if level and small:
             return self._whole
         if not level:
