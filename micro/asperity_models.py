@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from geometry import Asperities, Control, Partition, PatchGrid
 from geometry.errors import InputError
 from micro.compliance.body_modes import BodyModes
-from micro.curve import PatchSums, checked_approaches
+from micro.curve import PatchSums, checked_approaches, checked_means
 from micro.plane import RigidPlane
 from micro.plane_equilibrium import Held, Peaks, balanced
 from micro.response import Pressed, Response
@@ -324,7 +324,7 @@ class AsperityModel:
             asperities=self.asperities,
             home=self.asperities if home is None else home,
             patches=patches,
-            mean_heights=np.asarray(mean_heights, float),
+            mean_heights=checked_means(mean_heights, patches),
             hertz=self.contacts.hertz,
             contact_modulus=self.contact_modulus,
             body=self.contacts.points,

@@ -44,7 +44,7 @@ class PatchSums:
         body: Compliance of a finite body between the asperities; None on a half-space.
 
     Raises:
-        InputError: When a summit lies outside the patches, or not every patch has a mean height.
+        InputError: When a summit lies outside the patches.
     """
 
     asperities: Asperities
@@ -56,8 +56,6 @@ class PatchSums:
     body: BodyPoints | None = None
 
     def __post_init__(self) -> None:
-        means = checked_means(self.mean_heights, self.patches)
-        object.__setattr__(self, "mean_heights", means)
         _ = self.owner  # refuses summits outside
 
     @cached_property
@@ -163,12 +161,18 @@ def checked_means(mean_heights: ArrayLike, patches: Partition) -> Array:
     Raises:
         InputError: When there is not one finite number for every patch.
     """
-    means = np.asarray(mean_heights, float)
+    allowed = f"shape ({patches.count},)"
+    try:
+        means = np.asarray(mean_heights, float)
+    except (TypeError, ValueError):
+        raise InputError(
+            "the mean heights are no numbers", value=mean_heights, allowed=allowed
+        ) from None
     if means.shape != (patches.count,):
         raise InputError(
             "every patch needs one mean height",
             value=means.shape,
-            allowed=f"shape ({patches.count},)",
+            allowed=allowed,
         )
     if not np.isfinite(means).all():
         raise InputError("a mean height is not finite", value=means.tolist(), allowed="mm")
