@@ -193,7 +193,12 @@ def _searched(
     for _ in range(_MOST_SHARES):
         trial = plane.copy()
         trial[free] += unit * share * step
-        found = lacking(trial)
+        try:
+            found = lacking(trial)
+        except NotConverged:  # contacts pressed beyond what their model can bear
+            high = share
+            share = 0.5 * (low + high)
+            continue
         left = float(found[0] @ step)
         lost = free[0] and found[2] == 0.0  # a force that nothing bears
         if abs(left) <= _ENOUGH * abs(slope) and not lost:

@@ -130,8 +130,8 @@ class IslandContact:
 
         def evaluate(trial: Array) -> tuple[Held, Array]:
             nonlocal depth
-            required = np.asarray(over + moved @ (trial - self.motion))
-            depth = forces.solve(required, depth)
+            required = over + moved @ (trial - self.motion)
+            depth = forces.solve(np.asarray(required, float), depth)
             loads = self.contact_modulus * (arms.T @ (forces.law * depth**1.5))
             return Held(loads, self.contact_modulus * forces.stiffness(depth, arms)), depth
 
