@@ -82,7 +82,12 @@ def test_modes_do_not_depend_on_their_number():
 
 @pytest.mark.parametrize(
     ("height", "nu", "mean", "summed"),
-    [(1.0, 0.15, 4e-5, 0.02), (1.0, 0.45, 2e-3, 0.02), (0.1, 0.3, 1e-3, 0.1), (10.0, 0.3, 1e-4, 2e-3)],
+    [
+        (1.0, 0.15, 4e-5, 0.02),
+        (1.0, 0.45, 2e-3, 0.02),
+        (0.1, 0.3, 1e-3, 0.1),
+        (10.0, 0.3, 1e-4, 2e-3),
+    ],
 )
 def test_coarser_elements_are_stiffer_and_tell_the_error(height, nu, mean, summed):
     material = Material(young_modulus=1.0, poisson_ratio=nu)
