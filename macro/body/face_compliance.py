@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -87,7 +86,8 @@ def face_compliance(
     if count < 1:
         raise InputError("a top has one mode at least", value=count, allowed="K ≥ 1")
     elements = division(lengths, height, count, coarse=coarse)
-    families: list[Parity] = [(i, j) for i, j in product((0, 1), repeat=2) if max(i, j) < count]
+    parities: tuple[Parity, ...] = ((0, 0), (0, 1), (1, 0), (1, 1))
+    families = [parity for parity in parities if max(parity) < count]
     alike = lengths[0] == lengths[1]
     if alike and count > 1:
         families.remove((1, 0))

@@ -18,7 +18,6 @@ from micro import (
     MicroModel,
     SurfaceStress,
     coarse_grid,
-    influence_matrix,
     side_stresses,
 )
 from multiscale.couplings.body import Body
@@ -146,8 +145,12 @@ def free_sides(stage: Stage) -> FreeSides | None:
     Args:
         stage: The scene's ingredients.
     """
-    free = stage.embedded and stage.scene.block.sides == "free" and not stage.shape.margin
-    if not (free and isinstance(stage.model, HalfSpaceModel)):
+    return _block_sides(stage) if isinstance(stage.model, HalfSpaceModel) else None
+
+
+def _block_sides(stage: Stage) -> FreeSides | None:
+    """Return the free sides of a scene's block that end its interface; None without them."""
+    if not stage.embedded or stage.scene.block.sides != "free" or stage.shape.margin:
         return None
     return FreeSides(
         lengths=stage.surface.lengths,
@@ -200,10 +203,8 @@ def patch_compliance(stage: Stage, comm: Any) -> Array:
         Collective.
     """
     if stage.scene.coupling.decomposed:
-        half_space = influence_matrix(stage.patches) / (np.pi * stage.model.contact_modulus)
-        body = replace(scene_body(stage), known=None)
-        rest = body.term(body.face(comm)).patch_compliance(stage.patches)
-        return np.asarray(half_space + rest)
+        body = replace(scene_body(stage), known=_block_sides(stage))
+        return body.patch_compliance(stage.patches, comm)
     from mpi4py import MPI
 
     from macro import plain_compliance
