@@ -9,29 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Surface
-from micro import (
-    BodyModes,
-    BodyStresses,
-    FiniteSlopes,
-    FreeSides,
-    HalfSpace,
-    HalfSpaceModel,
-    MicroModel,
-    SurfaceStress,
-    coarse_grid,
-    half_space_modes,
-    half_space_stress_modes,
-    influence_matrix,
-    side_modes,
-    side_stress_modes,
-    side_stresses,
-)
+from micro import FiniteSlopes, FreeSides, HalfSpace, HalfSpaceModel, MicroModel
+from multiscale.couplings.body import Body
 from multiscale.scene import Scene
 from multiscale.stage import Stage
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import FaceCompliance, Interface, Material
+    from macro import Interface, Material
 
 Array = NDArray[np.float64]
 
@@ -55,42 +39,35 @@ def contact_model(stage: Stage, comm: Any) -> MicroModel:
     model = _sharp(stage.model)
     if stage.scene.coupling.kind == "isolated":
         return model
-    sides = free_sides(stage)
-    face = _face(stage, comm) if stage.embedded else None
-    higher, slopes = 0.0, None
-    if stage.finite_slopes and isinstance(model, HalfSpaceModel):
-        # heights count from the highest point, which is near the loads: slopes add least there;
-        # the flat body then reaches up to it, while the block's height is that of the mean plane
-        higher = model.surface.highest - model.surface.mean_height
-        slopes = _finite_slopes(stage, model.surface, sides, face)
-    body = None if face is None else _body_modes(stage, face, sides, higher=higher)
-    if isinstance(model, HalfSpaceModel):
-        return replace(model, sides=sides, body=body, slopes=slopes)
-    return replace(model, body=body) if body is not None else model  # type: ignore[type-var]
+    if not isinstance(model, HalfSpaceModel):
+        if not stage.embedded:
+            return model
+        return replace(model, body=_body(stage).term(comm))  # type: ignore[type-var]
+    if not stage.embedded:
+        section = stage.scene.block
+        half_space = HalfSpace(section.young_modulus, section.poisson_ratio)
+        slopes = FiniteSlopes(model.surface, half_space) if stage.finite_slopes else None
+        return replace(model, slopes=slopes)
+    model = replace(model, sides=free_sides(stage))
+    if not stage.finite_slopes:
+        return replace(model, body=_body(stage).term(comm))
+    body, rough = _body(stage).terms_of_rough(model.surface, comm)
+    return replace(model, body=body, slopes=rough)
+
+
+def _body(stage: Stage) -> Body:
+    """Return the block of a scene under its contact."""
+    return Body(
+        shape=stage.shape,
+        material=block_material(stage),
+        sides=stage.scene.block.sides,
+        known=free_sides(stage),
+    )
 
 
 def _sharp(model: MicroModel) -> MicroModel:
     """Return a micro model whose own error is none beside the tolerances of what it goes into."""
     return replace(model, tolerance=_SHARP) if isinstance(model, HalfSpaceModel) else model
-
-
-def _finite_slopes(
-    stage: Stage, surface: Surface, sides: FreeSides | None, face: FaceCompliance | None
-) -> FiniteSlopes:
-    """Return what finite slopes add on a scene's body, whose stresses are those in its face."""
-    section = stage.scene.block
-    half_space = HalfSpace(section.young_modulus, section.poisson_ratio)
-    if face is None:
-        return FiniteSlopes(surface, half_space)
-    grid, lengths = coarse_grid(surface), surface.lengths
-    known = half_space_stress_modes(lengths, section.poisson_ratio, face.count)
-    beside: list[SurfaceStress] = []
-    if sides is not None:
-        spacing = lengths[0] / grid[0], lengths[1] / grid[1]
-        beside.append(side_stresses(sides, spacing))
-        known = known + side_stress_modes(sides, face.count)
-    beside.append(BodyStresses(lengths, grid, face.stresses - known))
-    return FiniteSlopes(surface, half_space, plane=surface.highest, beside=beside)
 
 
 def free_sides(stage: Stage) -> FreeSides | None:
@@ -108,41 +85,6 @@ def free_sides(stage: Stage) -> FreeSides | None:
         lengths=stage.surface.lengths,
         poisson_ratio=stage.scene.block.poisson_ratio,
         reach=_REACH * min(*stage.surface.lengths, stage.shape.height),
-    )
-
-
-def _face(stage: Stage, comm: Any) -> FaceCompliance:
-    """Return what pressures do to the contact face of a scene's block; collective."""
-    from mpi4py import MPI
-
-    from macro import cached_face_compliance, mode_count
-
-    return cached_face_compliance(
-        stage.shape,
-        block_material(stage),
-        stage.scene.block.sides,
-        mode_count(stage.shape),
-        comm or MPI.COMM_SELF,
-    )
-
-
-def _body_modes(
-    stage: Stage, face: FaceCompliance, sides: FreeSides | None, *, higher: float = 0.0
-) -> BodyModes:
-    """Return what a scene's block adds to the half-space, and to free sides known apart.
-
-    Args:
-        stage: The scene's ingredients.
-        face: What pressures do to its contact face.
-        sides: Free sides.
-        higher: Height that is added to the block, to first order [mm].
-    """
-    lengths = stage.surface.lengths
-    known = half_space_modes(lengths, face.count)
-    if sides is not None:
-        known = known + side_modes(sides, face.count)
-    return BodyModes(
-        lengths, face.normal + higher * face.growth - known / stage.model.contact_modulus
     )
 
 
@@ -190,9 +132,7 @@ def patch_compliance(stage: Stage, comm: Any) -> Array:
         Collective.
     """
     if stage.scene.coupling.decomposed:
-        half_space = influence_matrix(stage.patches) / (np.pi * stage.model.contact_modulus)
-        body = _body_modes(stage, _face(stage, comm), None)
-        return np.asarray(half_space + body.patch_compliance(stage.patches))
+        return _body(stage).patch_compliance(stage.patches, comm)
     from mpi4py import MPI
 
     from macro import plain_compliance
