@@ -31,7 +31,7 @@ _NOUGHT = 1e-13
 
 
 class Response(NamedTuple):
-    """What modes of pressure do to the contact face, as integrals over it of modes times fields.
+    """What modes of pressure do to the top, as integrals over it of modes times fields.
 
     Fields are per mode of pressure of mean square 1 MPa², and have the shape (k, l, m, n): k and l
     count the modes of the field's parity, m and n those of the pressure's. That of σ_xy is the
@@ -71,7 +71,7 @@ class Quarter:
     parity: Parity
 
     def response(self, count: int) -> Response:
-        """Return how the modes of the parity displace and stretch the face.
+        """Return how the modes of the parity displace and stretch the top.
 
         Args:
             count: Modes K along a side, even and odd together.

@@ -135,11 +135,7 @@ class Body:
         known = half_space_stress_modes(self.lengths, nu, face.count)
         if self.known is not None:
             known = known + side_stress_modes(self.known, face.count)
-        borders = [
-            np.linspace(0.0, length, cells + 1) + self.shape.margin
-            for length, cells in zip(self.shape.interface, grid, strict=True)
-        ]
-        return BodyStresses(self.lengths, (borders[0], borders[1]), face.stresses - known)
+        return BodyStresses(self.lengths, grid, face.stresses - known, self.shape.margin)
 
     def patch_compliance(self, patches: Partition, comm: Any) -> Array:
         """Return the whole compliance of the block under its patches.

@@ -65,7 +65,7 @@ def test_modes_of_a_shape_resolve_points(height, miss):
     shape = BlockShape(interface=(1.0, 1.0), height=height, cells=(1, 1, 1))
     block = body(shape)
     places = np.array([0.5, 0.31, 0.02, 0.5, 0.9]), np.array([0.5, 0.44, 0.5, 0.97, 0.85])
-    usual = block.term(COMM).between(*places)
-    more = block.term(COMM, modes=block.modes + 5).between(*places)
+    usual = block.term(block.face(COMM)).between(*places)
+    more = block.term(block.face(COMM, modes=block.modes + 5)).between(*places)
     own = 1.0 / (2.0 * 0.02 * block.material.contact_modulus)
     assert np.abs(usual - more).max() < miss * 20 * own * 0.05 / 0.02

@@ -4,16 +4,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from geometry import BlockShape
 from macro import Material, face_compliance
 
 MODULUS, LENGTHS, COUNT = 3000.0, (1.0, 1.4), 4
 
 
 def face(height=0.8, nu=0.3, sides="free", lengths=LENGTHS, count=COUNT):
-    shape = BlockShape(interface=lengths, height=height, cells=(2, 2, 2))
     material = Material(young_modulus=MODULUS, poisson_ratio=nu)
-    return face_compliance(shape, material, sides, count, MPI.COMM_SELF)
+    return face_compliance(lengths, height, material, sides, count, MPI.COMM_SELF)
 
 
 def test_rollers_leave_uniaxial_strain():

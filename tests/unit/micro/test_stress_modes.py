@@ -111,6 +111,15 @@ def test_body_stresses_follow_the_moments_of_the_pressure(matrix):
     np.testing.assert_allclose(found, means[0].T @ column @ means[1], rtol=1e-10)
 
 
+def test_a_margin_is_around_the_cells(matrix):
+    """Cells of 0.1 mm, the outermost of them without pressure."""
+    pressure = np.pad(np.random.default_rng(3).random((10, 15)), 1)
+    lengths = LENGTHS[0] * 12 / 10, LENGTHS[1] * 17 / 15
+    whole = BodyStresses(lengths, (12, 17), matrix).stresses(pressure)
+    inner = BodyStresses(lengths, (10, 15), matrix, margin=0.1).stresses(pressure[1:-1, 1:-1])
+    np.testing.assert_allclose(inner, whole[:, 1:-1, 1:-1], rtol=1e-10)
+
+
 def test_body_stresses_have_a_transpose(matrix):
     grid = 9, 14
     rng = np.random.default_rng(2)
