@@ -28,7 +28,7 @@ from micro.influence import influence_matrix, mutual_influence
 from micro.love import love_centre, love_integral, love_mean, love_mutual
 from micro.model import MicroModel
 from micro.models import MODEL_NAMES, micro_model
-from micro.plane import Field, RigidPlane
+from micro.plane import RigidPlane
 from micro.regions.island_state import IslandState
 from micro.regions.islands import IslandModel
 from micro.response import Pressed, Response
@@ -48,7 +48,6 @@ __all__ = [
     "Candidate",
     "Choice",
     "Contacts",
-    "Field",
     "FreeSides",
     "HalfSpace",
     "HalfSpaceModel",
