@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
-from geometry.spectrum import Spectrum
+from geometry.spectrum import LARGEST_SEED, Spectrum
 from multiscale.scenes.left_open import Open, OrAuto
 from multiscale.scenes.quantities import Length, Pressure, Slope, SpectralAmplitude
 from multiscale.scenes.refusals import first_refusal
@@ -41,7 +41,7 @@ class SpectrumSection(Section):
     rms_slope: Annotated[Slope, Field(gt=0)] | None = None
     rms_height: PositiveLength | None = None
     s0: Annotated[SpectralAmplitude, Field(gt=0)] | None = None
-    seed: Annotated[int, Field(ge=0, strict=True)] = 0
+    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED, strict=True)] = 0
 
     @model_validator(mode="after")
     def _makes_a_spectrum(self) -> Self:
@@ -160,11 +160,16 @@ class MicroSection(Section):
 
 
 class OutputSection(Section):
-    """What is written beside the tables; nothing else is computed."""
+    """What is told of the results, and written beside the tables.
+
+    ``check``: the load steps whose errors are measured by further contact problems, where the
+    micro model is ``half-space``.
+    """
 
     figures: Flag = True
     report: Flag = True
     fields: Flag = False
+    check: Literal["last", "none", "all"] = "last"
 
 
 class Scene(Section):
