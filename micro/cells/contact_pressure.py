@@ -20,6 +20,8 @@ from micro.cells.elastic_grid import Cells, ElasticGrid
 from micro.cells.motions import Motions
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Indices = NDArray[np.intp]
 
 _MOST_PASSES = 200
 _MOST_ITERATIONS = 100
@@ -29,6 +31,9 @@ _TRUSTING_PASSES = 20
 _MOST_HALVINGS = 12
 _HELD = 1e-8
 """Weight of cells that touch without pressure, of the largest pressure, in the body's motions."""
+_NOISE = 1e-12
+"""Changes of a pressure at a bound that are rounding, of the largest pressure: loads that must stay
+as they are may leave a cell none."""
 _ROUNDING = 4.0 * float(np.finfo(float).eps)
 """Part of the largest distance of a plane free to turn that its gaps are known to."""
 _LEAST_EVEN, _MOST_EVEN = 1e-3, 1e6
@@ -119,8 +124,9 @@ class _Search:
         self.motion = np.zeros(0 if motions is None else len(motions.loads))
         self.unloaded = motions is not None and not motions.loads.any()
         self.careful = False
-        self.held: NDArray[np.intp] = np.zeros(0, np.intp)
-        self.mask: NDArray[np.bool_] = np.zeros(required.shape, bool)
+        self.held: Indices = np.zeros(0, np.intp)
+        self.mask: Flags = np.zeros(required.shape, bool)
+        self.yielding: Flags | None = None
 
     def begin(self, start: Array) -> None:
         """Evaluate the start; where it cannot meet the loads, with a share of even pressure."""
@@ -159,7 +165,9 @@ class _Search:
                 return
             pressure = found.support
         work = float(np.vdot(pressure, self.grid.displacement(pressure)))
-        balanced = self._admissible(pressure * (float(np.vdot(pressure, self.required)) / work))
+        best = float(np.vdot(pressure, self.required)) / work
+        pressure = pressure * min(best, self.upper / float(pressure.max()))
+        balanced = self._admissible(pressure)
         self.accept(pressure if balanced is None else balanced)
 
     def accept(self, pressure: Array) -> None:
@@ -173,11 +181,7 @@ class _Search:
         highest = self.required
         if self.motions is not None:
             if pressure.any():
-                weights = pressure
-                if self.held.size:
-                    weights = pressure.copy()
-                    weights.ravel()[self.held] += _HELD * float(pressure.max())
-                self.motion = self.motions.best(weights, gap)
+                self.motion = self.motions.best(self._closing(pressure), gap)
             nearer = self.motions.nearer(self.motion)
             gap -= nearer
             highest = self.required + nearer
@@ -190,6 +194,16 @@ class _Search:
         if self.motions is not None and self.motions.turns and self.scale > 0.0:
             self.rounding = _ROUNDING * float(np.abs(highest).max()) / self.scale
 
+    def _closing(self, pressure: Array) -> Array:
+        """Return weights of the cells whose gaps tell the motions: yielding cells may overlap."""
+        weights = pressure
+        if self.upper < np.inf and (pressure < self.upper).any(where=pressure > 0.0):
+            weights = np.where(pressure < self.upper, pressure, 0.0)
+        if self.held.size:
+            weights = weights.copy()
+            weights.ravel()[self.held] += _HELD * float(pressure.max())
+        return weights
+
     def step(self, tolerance: float, *, cautious: bool) -> None:
         """Solve on the present set and accept what it gives, shortened while that is no gain.
 
@@ -199,7 +213,8 @@ class _Search:
         """
         mask = (self.pressure > 0.0) | (self.gap < 0.0)
         if self.upper < np.inf:
-            mask &= (self.pressure < self.upper) | (self.gap > 0.0)
+            self.yielding = (self.pressure >= self.upper) & (self.gap <= 0.0)
+            mask &= ~self.yielding
         mask.ravel()[self.held] = True
         kept = np.array_equal(mask, self.mask)
         if not kept:
@@ -225,53 +240,73 @@ class _Search:
             self.accept(old)
             self.accept(self._cell_by_cell(old, cells, stop))
 
-    def _cell_by_cell(self, old: Array, cells: NDArray[np.intp], stop: float) -> Array:
-        """Close the gaps of some cells, dropping one at a time that would come under tension.
+    def _cell_by_cell(self, old: Array, cells: Indices, stop: float) -> Array:
+        """Close the gaps of some cells, dropping one at a time that would leave its bounds.
 
         Each move keeps the loads and lowers the energy, however few cells carry the body: what
         drops many at once may leave it on a single contact, which cannot hold it. Cells that touch
         without pressure tell how a body turns that lies on two contacts and the middle between.
         """
+        new = self._others(old)
         pressure, gap = old.ravel()[cells], self.gap.ravel()[cells]
         for _ in range(len(cells)):
             contact = self._among(cells)
             change = contact.close(gap, stop=stop, limit=_MOST_ITERATIONS)
-            falling = change < 0.0
-            stuck = falling & (pressure <= 0.0)
-            if stuck.any():
-                first = int(np.argmin(np.where(stuck, change, 0.0)))
-                part = 0.0
-            else:
-                ways = np.divide(pressure, -change, out=np.full_like(change, np.inf), where=falling)
-                first = int(np.argmin(ways))
-                part = min(1.0, float(ways[first]))
-                pressure = np.maximum(pressure + part * change, 0.0)
+            bound = (pressure <= 0.0) | (pressure >= self.upper)
+            change[bound & (np.abs(change) <= _NOISE * old.max())] = 0.0
+            first, part = _first_bound(pressure, change, self.upper)
+            if part > 0.0:
+                pressure = np.clip(pressure + part * change, 0.0, self.upper)
                 gap = gap + part * self.grid.comply(contact.cells, change)
-                if part == 1.0:
-                    break
-            pressure[first] = 0.0
+            if part == 1.0:
+                break
+            new.ravel()[cells[first]] = self.upper if change[first] > 0.0 else 0.0
             left = np.arange(len(cells)) != first
             cells, pressure, gap = cells[left], pressure[left], gap[left]
-        new = np.zeros(old.shape)
         new.ravel()[cells] = pressure
-        self.held = cells[pressure <= 0.0]
+        self.held = cells[(pressure <= 0.0) | (pressure >= self.upper)]
         found = self._admissible(new)
         return old if found is None else found
 
-    def _among(self, flat: NDArray[np.intp]) -> ContactCells:
+    def _among(self, flat: Indices) -> ContactCells:
         cells = Cells.of(flat, self.required.shape)
         levers = np.empty((0, flat.size))
         if self.motions is not None:
             levers = self.motions.among(flat)
         return ContactCells.among(self.grid, cells, levers)
 
-    def _moved(self, old: Array, cells: NDArray[np.intp], change: Array) -> Array | None:
-        new = np.zeros(old.shape) if self.upper == np.inf else np.where(old < self.upper, 0.0, old)
-        new.ravel()[cells] = np.maximum(old.ravel()[cells] + change, 0.0)
+    def _moved(self, old: Array, cells: Indices, change: Array) -> Array | None:
+        new = self._others(old)
+        new.ravel()[cells] = np.clip(old.ravel()[cells] + change, 0.0, self.upper)
         return self._admissible(new)
+
+    def _others(self, old: Array) -> Array:
+        """Return the pressures of the cells that no pass changes: those that yield."""
+        if self.yielding is None:
+            return np.zeros(old.shape)
+        return np.where(self.yielding, self.upper, 0.0)
 
     def _admissible(self, pressure: Array) -> Array | None:
         """Return pressures within their bounds that meet the loads; None where there are none."""
-        if self.motions is not None:
-            return self.motions.balanced(pressure, self.upper)
-        return pressure if self.upper == np.inf else np.minimum(pressure, self.upper)
+        if self.motions is None:
+            return pressure if self.upper == np.inf else np.minimum(pressure, self.upper)
+        if self.yielding is not None:
+            found = self.motions.balanced(pressure, self.upper, self.yielding)
+            if found is not None:
+                return found
+        return self.motions.balanced(pressure, self.upper)
+
+
+def _first_bound(pressure: Array, change: Array, upper: float) -> tuple[int, float]:
+    """Return which cell a change drives out of its bounds first, and the part that it may do.
+
+    Of those that are at their bound already, it is the one driven most.
+    """
+    room = np.where(change < 0.0, pressure, upper - pressure)
+    size = np.abs(change)
+    stuck = (room <= 0.0) & (size > 0.0)
+    if stuck.any():
+        return int(np.argmax(np.where(stuck, size, 0.0))), 0.0
+    ways = np.divide(room, size, out=np.full_like(change, np.inf), where=size > 0.0)
+    first = int(np.argmin(ways))
+    return first, min(1.0, float(ways[first]))
