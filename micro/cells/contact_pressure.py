@@ -205,28 +205,36 @@ class _Search:
         return weights
 
     def step(self, tolerance: float, *, cautious: bool) -> None:
-        """Solve on the present set and accept what it gives, shortened while that is no gain.
+        """Solve on the cells that seem to touch and accept what that gives.
 
-        Steps that lower the energy cannot return to where they were: a cautious search takes no
-        others. It is needed where cells of very different sides meet the periodic kernel, whose
-        inverse is then far from an M-matrix, for which the sets are known to converge.
+        Args:
+            tolerance: Largest residual asked for.
+            cautious: Whether no step may raise the energy. Steps that lower it cannot return to
+                where they were: that is needed where cells of very different sides meet the
+                periodic kernel, whose inverse is then far from an M-matrix, for which the sets are
+                known to converge.
         """
-        mask = (self.pressure > 0.0) | (self.gap < 0.0)
-        if self.upper < np.inf:
-            self.yielding = (self.pressure >= self.upper) & (self.gap <= 0.0)
-            mask &= ~self.yielding
-        mask.ravel()[self.held] = True
+        if not self.careful:
+            old = self.pressure
+            if self._step_together(tolerance, cautious=cautious or self.unloaded):
+                return
+            if self.motions is None or not self.motions.turns:
+                return
+            self.careful = True
+            self.accept(old)
+        self._step_singly(tolerance)
+
+    def _step_together(self, tolerance: float, *, cautious: bool) -> bool:
+        """Move all cells at once, by less while that is no gain; tell whether it was one."""
+        mask = self._touching()
         kept = np.array_equal(mask, self.mask)
         if not kept:
             self.mask, self.contact = mask, self._among(np.flatnonzero(mask))
         cells = self.contact.cells.flat
-        stop = max(_FORCING[kept] * self.residual, 0.25 * tolerance) * self.scale
-        if self.careful:
-            self.accept(self._cell_by_cell(self.pressure, cells, stop))
-            return
-        change = self.contact.close(self.gap.ravel()[cells], stop=stop, limit=_MOST_ITERATIONS)
+        change = self.contact.close(
+            self.gap.ravel()[cells], stop=self._stop(tolerance, kept), limit=_MOST_ITERATIONS
+        )
         old, residual, energy = self.pressure, self.residual, self.energy
-        cautious = cautious or self.unloaded
         for halving in range(_MOST_HALVINGS):
             moved = self._moved(old, cells, 0.5**halving * change)
             if moved is None:
@@ -234,20 +242,25 @@ class _Search:
             self.accept(moved)
             gain = self.energy < energy or (self.residual < residual and not cautious)
             if gain or self.residual <= max(tolerance, self.rounding):
-                return
-        if self.motions is not None and self.motions.turns:
-            self.careful = True
-            self.accept(old)
-            self.accept(self._cell_by_cell(old, cells, stop))
+                return True
+        return False
 
-    def _cell_by_cell(self, old: Array, cells: Indices, stop: float) -> Array:
-        """Close the gaps of some cells, dropping one at a time that would leave its bounds.
+    def _step_singly(self, tolerance: float) -> None:
+        """Close the gaps of cells, dropping one at a time that would leave its bounds.
 
         Each move keeps the loads and lowers the energy, however few cells carry the body: what
-        drops many at once may leave it on a single contact, which cannot hold it. Cells that touch
-        without pressure tell how a body turns that lies on two contacts and the middle between.
+        drops many at once may leave it on a single contact, which cannot hold it. As many cells
+        come in as carry, those with the worst gaps. Cells that stay at a bound without a gap tell
+        how a body turns that lies on two contacts and the middle between.
         """
-        new = self._others(old)
+        touching, old = self._touching(), self.pressure
+        carry = touching & (old > 0.0) & (old < self.upper)
+        carry.ravel()[self.held] = True
+        entering = np.flatnonzero(touching & ~carry)
+        worst = np.argsort(-np.abs(self.gap.ravel()[entering]), kind="stable")
+        entering = entering[worst[: max(1, np.count_nonzero(carry))]]
+        cells = np.union1d(np.flatnonzero(carry), entering)
+        new, stop = old.copy(), self._stop(tolerance, kept=True)
         pressure, gap = old.ravel()[cells], self.gap.ravel()[cells]
         for _ in range(len(cells)):
             contact = self._among(cells)
@@ -266,7 +279,19 @@ class _Search:
         new.ravel()[cells] = pressure
         self.held = cells[(pressure <= 0.0) | (pressure >= self.upper)]
         found = self._admissible(new)
-        return old if found is None else found
+        self.accept(old if found is None else found)
+
+    def _touching(self) -> Flags:
+        """Return the cells to find pressures of; those that yield are not among them."""
+        mask = (self.pressure > 0.0) | (self.gap < 0.0)
+        if self.upper < np.inf:
+            self.yielding = (self.pressure >= self.upper) & (self.gap <= 0.0)
+            mask &= ~self.yielding
+        mask.ravel()[self.held] = True
+        return mask
+
+    def _stop(self, tolerance: float, kept: bool) -> float:
+        return max(_FORCING[kept] * self.residual, 0.25 * tolerance) * self.scale
 
     def _among(self, flat: Indices) -> ContactCells:
         cells = Cells.of(flat, self.required.shape)
@@ -276,15 +301,9 @@ class _Search:
         return ContactCells.among(self.grid, cells, levers)
 
     def _moved(self, old: Array, cells: Indices, change: Array) -> Array | None:
-        new = self._others(old)
+        new = old.copy()
         new.ravel()[cells] = np.clip(old.ravel()[cells] + change, 0.0, self.upper)
         return self._admissible(new)
-
-    def _others(self, old: Array) -> Array:
-        """Return the pressures of the cells that no pass changes: those that yield."""
-        if self.yielding is None:
-            return np.zeros(old.shape)
-        return np.where(self.yielding, self.upper, 0.0)
 
     def _admissible(self, pressure: Array) -> Array | None:
         """Return pressures within their bounds that meet the loads; None where there are none."""

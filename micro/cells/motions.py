@@ -84,8 +84,12 @@ class Motions:
         """Return the motion that closes gaps best, weighted with the pressures, shape (k,) [mm]."""
         cells = np.flatnonzero(pressure)
         root = np.sqrt(pressure.ravel()[cells] / pressure.max())
-        levers = self.among(cells) * root
-        return np.asarray(np.linalg.lstsq(levers.T, gap.ravel()[cells] * root, rcond=1e-10)[0])
+        levers, left = self.among(cells), gap.ravel()[cells]
+        found = np.zeros(len(self.loads))
+        for _ in range(2 if self.turns else 1):  # again for what rounding leaves of light cells
+            change = np.linalg.lstsq((levers * root).T, left * root, rcond=1e-10)[0]
+            found, left = found + change, left - change @ levers
+        return found
 
     def on(self, box: Box) -> Motions:
         """Return the motions on a part of the cells, which carries all loads."""

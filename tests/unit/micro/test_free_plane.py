@@ -144,7 +144,7 @@ def test_one_problem_takes_no_more_than_a_level_plane(model):
     shares = []
     for seed in range(60):
         dice = np.random.default_rng(seed)
-        nx, ny = dice.choice([32, 48, 64, 96], 2)
+        nx, ny = dice.choice([32, 32, 48, 64, 96], 2)
         spectrum = Spectrum(
             hurst=dice.uniform(0.3, 1.0),
             waves=(1 + (seed % 3 > 0), int(dice.integers(4, 16))),
@@ -153,7 +153,8 @@ def test_one_problem_takes_no_more_than_a_level_plane(model):
         )
         surface = synthesise(spectrum, grid=(nx, ny), lengths=(1.0, float(ny / nx)))
         scene = HalfSpaceModel(surface=surface, contact_modulus=4000.0, tolerance=1e-9)
-        largest = scene.solve(dice.uniform(0.2, 3.0) * surface.heights.std()).force
+        deep = dice.uniform(0.2, 3.0) * surface.heights.std()
+        largest = replace(scene, tolerance=1e-2).solve(deep).force
         level = scene.solve_force(1e-4 * largest)
         turned = scene.solve_force(1e-4 * largest, tilt=None)
         moments = [abs(np.sum(turned.pressure * arm)) for arm in arms(surface)]
