@@ -83,7 +83,9 @@ class HalfSpaceState:
         """
         whole = Box.whole(self.pressure.shape)
         grid = self.grids.at(self.pressure.shape, self.spacing, whole)
-        return grid.displacement(np.divide(self.pressure, self.contact_modulus))
+        found = grid.displacement(np.divide(self.pressure, self.contact_modulus))
+        slopes = self.grids.slopes
+        return found if slopes is None else found + slopes.displacement(self.pressure)
 
     @property
     def gap(self) -> Array:

@@ -27,7 +27,9 @@ def test_is_that_of_all_cells(seed, scale):
     dice = np.random.default_rng(seed)
     grid = tuple(dice.integers(3, 14, 2))
     required = scale * (dice.standard_normal(grid) - dice.uniform(0.0, 2.0))
-    motions = Motions.turning(np.linspace(-0.7, 0.7, grid[0]), np.linspace(-0.6, 0.6, grid[1]), None)
+    motions = Motions.turning(
+        np.linspace(-0.7, 0.7, grid[0]), np.linspace(-0.6, 0.6, grid[1]), None
+    )
     found = clearance(required, motions)
     levers = motions.among(np.arange(required.size))
     best = scale * brute_force(required / scale, levers)

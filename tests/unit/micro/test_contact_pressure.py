@@ -136,9 +136,7 @@ def test_coarse_start_saves_products_on_the_fine_grid():
     cold = contact_pressure.contact_pressure(
         grids.at((n, n), (1 / n, 1 / n)), required, np.zeros((n, n)), tolerance=1e-8
     )
-    nested = nested_pressure(
-        grids, required, (1 / n, 1 / n), tolerance=1e-8, box=Box.whole((n, n))
-    )
+    nested = nested_pressure(grids, required, (1 / n, 1 / n), tolerance=1e-8, box=Box.whole((n, n)))
     assert nested.iterations < 0.8 * cold.iterations
     assert nested.pressure.sum() == pytest.approx(cold.pressure.sum(), rel=1e-7)  # 2 ε dlnF/dlnδ
 
