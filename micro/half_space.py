@@ -120,8 +120,15 @@ class HalfSpaceModel:
         little smaller than those. The patch has a half-space of its own.
         """
         piece = self.surface.piece(*patches.bounds(index))
-        alone = {"periodic": False, "sides": None, "body": None, "slopes": None}
-        model = replace(self, surface=piece, highest=self.datum, **alone)
+        model = replace(
+            self,
+            surface=piece,
+            highest=self.datum,
+            periodic=False,
+            sides=None,
+            body=None,
+            slopes=None,
+        )
         return model, whole_patch(piece)
 
     def solve(
