@@ -19,6 +19,7 @@ from micro.compliance.body_stresses import BodyStresses
 from micro.compliance.finite_slopes import FiniteSlopes, coarse_grid
 from micro.compliance.half_space_modes import half_space_modes, half_space_stress_modes
 from micro.compliance.side_modes import side_modes, side_stress_modes
+from micro.compliance.side_patches import side_patches
 from micro.compliance.surface_stress import SurfaceStress
 from micro.ellipse import (
     area_factor,
@@ -96,6 +97,7 @@ __all__ = [
     "mutual_influence",
     "resampled",
     "side_modes",
+    "side_patches",
     "side_stress_modes",
     "side_stresses",
 ]

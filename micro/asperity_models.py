@@ -250,12 +250,12 @@ class AsperityModel:
             plane = self._plane(motion)
             found = self.contacts.solution(plane.overlap(self.asperities), own)
             own, spent = found.indentation, spent + found.iterations
-            loads = peaks.lever.T @ (peaks.force * own**1.5)
+            loads = peaks.lever.T @ (self.contacts.hertz.force * own**1.5)
             known = Balanced(plane, found._replace(iterations=spent))
             return Held(loads, self.contacts.stiffness(own, peaks.lever)), known
 
         motion = np.array([first.approach, *first.tilt])
-        return balanced(evaluate, control, motion, peaks.half)[1]
+        return balanced(evaluate, control, motion, peaks)[1]
 
     def first_plane(self, control: Control, start: Balanced | None = None) -> RigidPlane:
         """Return the plane that an equilibrium is looked for from.
@@ -281,9 +281,12 @@ class AsperityModel:
         a = self.asperities
         middle, sides = 0.5 * np.asarray(a.lengths), np.hypot(*a.lengths)
         lever = np.stack([np.ones(len(a)), a.x - middle[0], a.y - middle[1]], axis=1)
-        return Peaks(
-            lever=lever, below=a.highest - a.z, force=self.contacts.hertz.force, half=0.5 * sides
-        )
+        force = self.contacts.hertz.force
+
+        def alone(overlap: Array) -> float:
+            return float(force @ np.maximum(overlap, 0.0) ** 1.5)
+
+        return Peaks(lever=lever, below=a.highest - a.z, force=alone, half=0.5 * sides)
 
     def surface_displacement(self, state: AsperityState, x: ArrayLike, y: ArrayLike) -> Array:
         """Return the normal displacement of the surface at points, by all contacts [mm].

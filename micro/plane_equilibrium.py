@@ -31,6 +31,7 @@ TOLERANCE = 1e-9
 _LEVEL = (0.0, 0.0)
 _MOST_EVALUATIONS = 100
 _MOST_SHARES = 60
+_MOST_RETREATS = 6
 _ENOUGH = 0.9  # share of a slope that a step may leave, or it is lengthened or shortened
 _SOFT = 1e-9  # of the mean stiffness: what holds motions that no contact resists
 _ROUNDING = 64.0 * np.finfo(float).eps
@@ -50,18 +51,18 @@ class Held(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Peaks:
-    """Points that a rigid plane can touch, as springs that do not see each other.
+    """Points that a rigid plane can touch, with forces that do not see each other.
 
     Args:
         lever: 1 and the distances along x and y from the middle, shape (n, 3) [1, mm, mm].
         below: Depths below the height that approaches count from, shape (n,) [mm].
-        force: Coefficients c of forces c w^(3/2), shape (n,) [N mm^(-3/2)].
+        force: Returns the force of a plane that penetrates the points by (n,) mm [N].
         half: Half the diagonal of the rectangle [mm].
     """
 
     lever: Array
     below: Array
-    force: Array
+    force: Callable[[Array], float]
     half: float
 
     def first_touch(self, tilt: tuple[float, float]) -> float:
@@ -69,7 +70,7 @@ class Peaks:
         return float((self.below - self.lever[:, 1:] @ np.asarray(tilt)).min(initial=np.inf))
 
     def first_plane(self, control: Control, near: RigidPlane | None) -> Array:
-        """Return a plane to start from: one near, or one that would do if peaks were springs.
+        """Return a plane to start from: one near, or one in balance with contacts that stand alone.
 
         Args:
             control: What is prescribed.
@@ -98,17 +99,19 @@ class Peaks:
         return np.array([touch + self._depth(control.force or 0.0, tilt), *tilt])
 
     def _depth(self, force: float, tilt: tuple[float, float]) -> float:
-        """Return how far a plane moves from first touch under a force on springs [mm]."""
+        """Return how far a plane moves from first touch under a force [mm]."""
         if force == 0.0:
             return 0.0
         gap = self.below - self.lever[:, 1:] @ np.asarray(tilt)
         gap = gap - gap.min()
 
         def lacking(depth: float) -> float:
-            return float(self.force @ np.maximum(depth - gap, 0.0) ** 1.5) - force
+            return self.force(depth - gap) - force
 
-        alone = float((force / self.force[np.argmin(gap)]) ** (2.0 / 3.0))
-        return float(brentq(lacking, 0.0, 1.01 * alone, rtol=1e-6))
+        most = 1e-6 * self.half
+        while lacking(most) < 0.0:
+            most *= 4.0
+        return float(brentq(lacking, 0.0, most, rtol=1e-3))
 
     def _resting(self, control: Control) -> tuple[float, float]:
         """Return the slopes of a plane that rests on the peaks under a force in the middle.
@@ -134,7 +137,7 @@ class Peaks:
 
 
 def balanced(
-    evaluate: Callable[[Array], tuple[Held, T]], control: Control, first: Array, half: float
+    evaluate: Callable[[Array], tuple[Held, T]], control: Control, first: Array, peaks: Peaks
 ) -> tuple[Array, T]:
     """Find the plane in balance with what is prescribed.
 
@@ -142,7 +145,7 @@ def balanced(
         evaluate: Returns what the contacts do to a plane (3,), and whatever else is known of them.
         control: What is prescribed.
         first: A plane to start from, with the prescribed approach or slopes, shape (3,).
-        half: Half the diagonal of the rectangle [mm].
+        peaks: The points that the plane can touch.
 
     Returns:
         The plane, and what ``evaluate`` told about it.
@@ -150,7 +153,7 @@ def balanced(
     Raises:
         NotConverged: When no plane is found, or ``evaluate`` fails.
     """
-    turns = control.tilt is None and control.force != 0.0
+    half, turns = peaks.half, control.tilt is None and control.force != 0.0
     free = np.array([bool(control.force), turns, turns])
     unit = np.array([1.0, 1.0 / half, 1.0 / half])[free]
     wanted = np.array([control.force or 0.0, 0.0, 0.0])[free]
@@ -160,8 +163,7 @@ def balanced(
         stiffness = held.stiffness[np.ix_(free, free)] * np.outer(unit, unit)
         return (held.loads[free] - wanted) * unit, stiffness, float(held.loads[0]), known
 
-    plane = np.array(first, float)
-    at = lacking(plane)
+    plane, at = _begun(lacking, control, np.array(first, float), peaks)
     step, change = np.zeros(len(unit)), np.zeros(len(unit))
     for count in range(_MOST_EVALUATIONS):
         residual, stiffness, force, known = at
@@ -178,6 +180,24 @@ def balanced(
     raise failure(control, "NO_BALANCE", _MOST_EVALUATIONS)
 
 
+def _begun(
+    lacking: Callable[[Array], tuple[Array, Array, float, T]],
+    control: Control,
+    plane: Array,
+    peaks: Peaks,
+) -> tuple[Array, tuple[Array, Array, float, T]]:
+    """Start from a plane, or nearer to first touch where the contacts do not bear so much."""
+    touch = peaks.first_touch((plane[1], plane[2]))
+    for _ in range(_MOST_RETREATS):
+        try:
+            return plane, lacking(plane)
+        except NotConverged:
+            if not control.force or plane[0] <= touch:
+                raise
+            plane[0] = 0.5 * (plane[0] + touch)
+    return plane, lacking(plane)
+
+
 def _searched(
     lacking: Callable[[Array], tuple[Array, Array, float, T]],
     plane: Array,
@@ -191,7 +211,12 @@ def _searched(
     for _ in range(_MOST_SHARES):
         trial = plane.copy()
         trial[free] += unit * share * step
-        found = lacking(trial)
+        try:
+            found = lacking(trial)
+        except NotConverged:  # contacts pressed beyond what their model can bear
+            high = share
+            share = 0.5 * (low + high)
+            continue
         left = float(found[0] @ step)
         lost = free[0] and found[2] == 0.0  # a force that nothing bears
         if abs(left) <= _ENOUGH * abs(slope) and not lost:

@@ -6,13 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 from geometry.control import Control
 from geometry.errors import InputError
+from micro import MicroModel
 from multiscale.coupling import ContactCoupling, EmbeddedCoupling
-from multiscale.couplings.blocks import (
-    contact_model,
-    embedding,
-    patch_compliance,
-    patch_displacements,
-)
+from multiscale.couplings.blocks import embedding, patch_compliance, patch_displacements
 from multiscale.couplings.condensed import CondensedCoupling
 from multiscale.law_tables.consistent import consistent_laws
 from multiscale.law_tables.isolated import isolated_laws
@@ -27,11 +23,12 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import Interface
 
 
-def make_table(stage: Stage, comm: Any) -> LawTable:
+def make_table(stage: Stage, model: MicroModel, comm: Any) -> LawTable:
     """Tabulate the laws of all patches: each alone, or all from the whole surface on its block.
 
     Args:
         stage: The scene's ingredients.
+        model: Its micro model on the body, see `contact_model`.
         comm: MPI communicator; None for this process alone.
 
     Raises:
@@ -50,7 +47,6 @@ def make_table(stage: Stage, comm: Any) -> LawTable:
             allowed="isolated, consistent",
             file=stage.scene.file,
         )
-    model = contact_model(stage, comm)
     if kind == "consistent":
         programme = stage.scene.loading.programme
         return consistent_laws(
@@ -75,12 +71,15 @@ def make_table(stage: Stage, comm: Any) -> LawTable:
     )
 
 
-def assemble(stage: Stage, table: LawTable | None, comm: Any) -> tuple[Coupling, Interface | None]:
+def assemble(
+    stage: Stage, made: LawTable | MicroModel | None, comm: Any
+) -> tuple[Coupling, Interface | None]:
     """Put micro and macro model together as the scene asks.
 
     Args:
         stage: The scene's ingredients.
-        table: The patch laws, of couplings that use them.
+        made: The patch laws, of couplings that use them, or else the micro model on the body; None
+            in a reference.
         comm: MPI communicator; None for this process alone.
 
     Returns:
@@ -89,12 +88,11 @@ def assemble(stage: Stage, table: LawTable | None, comm: Any) -> tuple[Coupling,
     Note:
         Collective.
     """
-    if table is not None:
-        return _with_laws(stage, table, comm)
-    if stage.meshes is not None:
+    if isinstance(made, LawTable):
+        return _with_laws(stage, made, comm)
+    if made is None:
         return make_reference(stage, comm), None
-    model = contact_model(stage, comm)
-    return ContactCoupling(model, stage.patches, stage.mean_heights, comm), None
+    return ContactCoupling(made, stage.patches, stage.mean_heights, comm), None
 
 
 def _with_laws(stage: Stage, table: LawTable, comm: Any) -> tuple[Coupling, Interface | None]:

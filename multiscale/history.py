@@ -31,6 +31,8 @@ COLUMNS = (
     "tilt_y",
     "moment_x_N_mm",
     "moment_y_N_mm",
+    "force_error_N",
+    "approach_error_mm",
 )
 PATCH_COLUMNS = ("step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area_fraction")
 

@@ -14,9 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.collective import on_root
+from geometry.errors import NotConverged
+from micro import HalfSpaceModel, MicroModel
 from multiscale.assemble import assemble, make_table
 from multiscale.coupling import EmbeddedCoupling
-from multiscale.couplings.blocks import final_field, load_together
+from multiscale.couplings.blocks import (
+    SLOPES,
+    Models,
+    contact_model,
+    final_field,
+    half_space_models,
+    load_together,
+)
 from multiscale.history import History
 from multiscale.law_tables.law_files import LawTable, read_laws, write_laws
 from multiscale.law_tables.repair import repair_notes
@@ -34,6 +43,7 @@ from multiscale.restart.checkpoint import Checkpoint, digest
 from multiscale.scene import Scene
 from multiscale.stage import Stage
 from multiscale.staging import make_stage
+from multiscale.step_checks import checked, error_notes, error_probe
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import Interface
@@ -69,6 +79,8 @@ class Run:
         self.position = Position()
         self._resumed: Checkpoint | None = None
         self._laws: bytes | None = None
+        self._models: Models | None = None
+        self._unchecked: list[str] = []
         self.table: LawTable | None = None
         self.interface: Interface | None = None
         self.coupling: Coupling | None = None
@@ -78,19 +90,41 @@ class Run:
         self.scene = self.stage.scene
         self.seconds = dict(self.stage.seconds)
 
+    def make_models(self) -> Models | None:
+        """Make what gives the half-space model on the body, once; None for other micro models."""
+        if self._models is None and isinstance(self.stage.micro, HalfSpaceModel):
+            with self.phase("block"):
+                self._models = half_space_models(
+                    self.stage, self.comm, embedded=self.stage.embedded
+                )
+        return self._models
+
+    def make_model(self) -> MicroModel:
+        """Make the micro model that contacts are solved with, on the body unless isolated."""
+        alone = self.stage.scene.coupling.kind == "isolated"
+        models = None if alone else self.make_models()
+        if models is None:
+            with self.phase("block"):
+                return contact_model(self.stage, self.comm)
+        surface = getattr(self.stage.model, "surface", self.stage.surface)  # "auto" may resample it
+        return models(surface, SLOPES if self.stage.finite_slopes else 0)
+
     def make_laws(self) -> LawTable:
         """Tabulate the laws of all patches, once."""
         if self.table is None:
+            model = self.make_model()
             with self.phase("laws"):
-                self.table = make_table(self.stage, self.comm)
+                self.table = make_table(self.stage, model, self.comm)
         return self.table
 
     def make_coupling(self) -> Coupling:
         """Make what finds the load steps, once, and what it needs."""
         if self.coupling is None:
-            table = self.make_laws() if self.stage.by_laws else None
+            made: LawTable | MicroModel | None = None
+            if self.stage.micro is not None:
+                made = self.make_laws() if self.stage.by_laws else self.make_model()
             with self.phase("block"):
-                coupling, self.interface = assemble(self.stage, table, self.comm)
+                coupling, self.interface = assemble(self.stage, made, self.comm)
                 if self._resumed and self._resumed.state and isinstance(coupling, Restorable):
                     coupling.restore(self._resumed.state)
                 self.coupling = coupling
@@ -105,9 +139,25 @@ class Run:
         drive = Drive(self.make_coupling(), self.scene.loading.programme, self.position)
         with self.phase("load steps"):
             for step in drive:
-                self.steps.append(step)
                 self.position = drive.position
-                yield step
+                self.steps.append(self._checked(step))
+                yield self.steps[-1]
+
+    def _checked(self, step: LoadStep) -> LoadStep:
+        """Return a load step with its errors, where they are to be measured."""
+        check = self.scene.output.check
+        if check == "none" or (check == "last" and not self.finished):
+            return step
+        models = self.make_models()
+        if models is None:
+            return step
+        with self.phase("check"):
+            probe = error_probe(self.stage, models)
+            try:
+                return checked(step, probe, self.scene.loading.programme, self.comm)
+            except NotConverged as error:
+                self._unchecked.append(f"errors of load step {step.step} not measured: {error}")
+                return step
 
     @property
     def finished(self) -> bool:
@@ -188,15 +238,17 @@ class Run:
         if imbalances:
             notes.append(f"force against the support's reaction: equal to {max(imbalances):.1e}")
         notes += range_notes(self.steps, self.table)
+        notes += [*self._unchecked, *error_notes(self.steps)]
         if self._resumed:
             count = len(self._resumed.steps)
             notes.append(f"resumed after load step {count}; times of phases are those since then")
-        record = None
+        record, steps = None, tuple(self.steps)
         if isinstance(self.coupling, ReferenceCoupling):
             record = recorded(self.stage, self.coupling, self.steps)
+            steps = record.with_errors(steps)
             notes += reference_notes(record, self.coupling, self.steps, self.stage)
         return History(
-            steps=tuple(self.steps),
+            steps=steps,
             patches=self.stage.patches,
             seconds=dict(self.seconds),
             notes=tuple(notes),
@@ -255,16 +307,18 @@ class Run:
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:
-        """Take the wall time of a phase.
+        """Take the wall time of a phase, that of phases within it left out.
 
         Args:
             name: Its name in `seconds`.
         """
-        start = time.perf_counter()
+        start, others = time.perf_counter(), sum(self.seconds.values())
         try:
             yield
         finally:
-            self.seconds[name] = time.perf_counter() - start
+            within = sum(self.seconds.values()) - others
+            spent = time.perf_counter() - start - within
+            self.seconds[name] = self.seconds.get(name, 0.0) + spent
 
 
 def run(

@@ -1,9 +1,9 @@
-"""Compliance of a block's contact face, and the stresses in it, in Legendre modes."""
+"""Compliance of a block's top, and the stresses in it, in Legendre modes."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from geometry.collective import together
 from geometry.errors import InputError
-from geometry.meshes import BlockShape
 from macro.block import Sides
 from macro.body.division import division
 from macro.body.quarter import Parity, Quarter, Response
@@ -23,10 +22,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FaceCompliance:
-    """Displacements and stresses of a contact face by pressures on it, in Legendre modes φ.
+    """Displacements and stresses of a block's top by pressures on it, in Legendre modes φ.
 
     Mode k K + l is P̂_k(x) P̂_l(y) (`geometry.legendre_modes`). A pressure p with the moments
-    b_n = ∫ p φ_n dA displaces the face by Σ φ_m C_mn b_n.
+    b_n = ∫ p φ_n dA displaces the top by Σ φ_m C_mn b_n.
 
     Args:
         normal: C, downwards, symmetric, shape (K², K²) [mm/N].
@@ -39,77 +38,111 @@ class FaceCompliance:
     growth: Array
     stresses: Array
 
+    @property
+    def count(self) -> int:
+        """Modes K along a side."""
+        return int(np.sqrt(len(self.normal)) + 0.5)
+
 
 def face_compliance(
-    shape: BlockShape, material: Material, sides: Sides, count: int, comm: Any
+    lengths: tuple[float, float],
+    height: float,
+    material: Material,
+    sides: Sides,
+    count: int,
+    comm: Any,
+    *,
+    coarse: bool = False,
 ) -> FaceCompliance:
-    """Solve for what every mode of pressure does to a block's contact face.
+    """Solve for what every mode of pressure does to a block's top.
 
-    The modes are smooth, and so are the displacements but at the edges of the bottom: few elements
-    of high order do. Modes of different parity do not mix: they are solved for apart, on a quarter
-    of the block, by the ranks in turn.
+    The modes are smooth, and so are the displacements but at the edges of the clamped bottom: few
+    elements of high order do. Modes of different parity do not mix: they are solved for apart, on
+    a quarter of the block, by the ranks in turn.
 
     Args:
-        shape: The block; its cells do not matter.
+        lengths: Sides (Lx, Ly) of the block's top, all of which the modes cover [mm].
+        height: Height of the block [mm].
         material: Elastic constants.
         sides: Support of the block's sides.
-        count: Modes K along a side of the contact face.
+        count: Modes K along a side of the top.
         comm: MPI communicator.
+        coarse: Whether to take lower degrees: the difference bounds the error of the usual ones.
+
+    Returns:
+        The compliance, the same on every rank and for every number of ranks.
 
     Raises:
-        InputError: When there is no mode.
+        InputError: When a length is not positive, or there is no mode.
 
     Note:
-        Collective. The result does not depend on the number of ranks.
+        Collective. A free cube with 8 × 8 modes takes 0.14 s on one core, and its mean compliance
+        lacks 8e-6, 6e-5 and 4e-4 at ν = 0.15, 0.3 and 0.45.
     """
+    if not all(math.isfinite(length) and length > 0.0 for length in (*lengths, height)):
+        raise InputError(
+            "the block has no such size", value=(*lengths, height), allowed="lengths > 0 mm"
+        )
     if count < 1:
-        raise InputError("a face has one mode at least", value=count, allowed="K ≥ 1")
-    given: dict[str, Any] = {
-        "division": division(shape, count),
-        "lengths": shape.interface,
-        "material": material,
-        "sides": sides,
-    }
-    families = [parity for parity in product((0, 1), repeat=2) if max(parity) < count]
-    alike = shape.interface[0] == shape.interface[1]
-    if alike and (1, 0) in families:
+        raise InputError("a top has one mode at least", value=count, allowed="K ≥ 1")
+    elements = division(lengths, height, count, coarse=coarse)
+    parities: tuple[Parity, ...] = ((0, 0), (0, 1), (1, 0), (1, 1))
+    families = [parity for parity in parities if max(parity) < count]
+    alike = lengths[0] == lengths[1]
+    if alike and count > 1:
         families.remove((1, 0))
 
     def solved() -> dict[Parity, Response]:
-        mine = families[comm.rank :: comm.size]
-        return {parity: Quarter(parity=parity, **given).response(count) for parity in mine}
+        return {
+            parity: Quarter(
+                division=elements, lengths=lengths, material=material, sides=sides, parity=parity
+            ).response(count)
+            for parity in families[comm.rank :: comm.size]
+        }
 
     found: dict[Parity, Response] = {}
     for part in comm.allgather(together(comm, solved)):
         found |= part
-    if alike and (0, 1) in found:  # exchange x and y
+    if alike and count > 1:  # exchange x and y
         turned = Response(*(part.transpose(1, 0, 3, 2) for part in found[0, 1]))
         found[1, 0] = turned._replace(xx=turned.yy, yy=turned.xx)
-    return _gathered(found, shape.interface, count, material)
+    return _gathered(found, lengths, count, material)
 
 
 def cached_face_compliance(
-    shape: BlockShape, material: Material, sides: Sides, count: int, comm: Any
+    lengths: tuple[float, float],
+    height: float,
+    material: Material,
+    sides: Sides,
+    count: int,
+    comm: Any,
+    *,
+    coarse: bool = False,
 ) -> FaceCompliance:
     """Return `face_compliance` of the same arguments, from the cache where it was made before.
 
     Args:
-        shape: The block; its cells do not matter.
+        lengths: Sides of the block's top [mm].
+        height: Height of the block [mm].
         material: Elastic constants.
         sides: Support of the block's sides.
-        count: Modes K along a side of the contact face.
+        count: Modes K along a side of the top.
         comm: MPI communicator.
+        coarse: Whether to take lower degrees.
+
+    Raises:
+        InputError: When a length is not positive, or there is no mode.
 
     Note:
         Collective.
     """
 
     def compute() -> Arrays:
-        made = face_compliance(shape, material, sides, count, comm)
+        made = face_compliance(lengths, height, material, sides, count, comm, coarse=coarse)
         return {"normal": made.normal, "growth": made.growth, "stresses": made.stresses}
 
-    block = shape.interface, shape.height, shape.margin
-    return FaceCompliance(**cached("face", (block, material, sides, count), compute, comm))
+    key = (lengths, height, material, sides, count, coarse)
+    return FaceCompliance(**cached("face", key, compute, comm))
 
 
 def _gathered(

@@ -1,7 +1,8 @@
 """A quarter of a block, in which even and odd modes of pressure are solved for apart.
 
 The planes through the middle of the block divide it into quarters. Displacements along an axis are
-odd along it where the pressure is even, and even where it is odd; otherwise as the pressure.
+odd along it where the pressure is even, and even where it is odd; along the other axis they are as
+the pressure is.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ _NOUGHT = 1e-13
 
 
 class Response(NamedTuple):
-    """What modes of pressure do to the contact face, as integrals over it of modes times fields.
+    """What modes of pressure do to the top, as integrals over it of modes times fields.
 
     Fields are per mode of pressure of mean square 1 MPa², and have the shape (k, l, m, n): k and l
     count the modes of the field's parity, m and n those of the pressure's. That of σ_xy is the
@@ -53,11 +54,11 @@ class Response(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Quarter:
-    """The quarter of a block beyond the middle of its contact face, clamped at the bottom.
+    """The quarter of a block beyond the middle of its top, clamped at the bottom.
 
     Args:
         division: Its elements.
-        lengths: Sides (Lx, Ly) of the contact face [mm].
+        lengths: Sides (Lx, Ly) of the top [mm].
         material: Elastic constants.
         sides: Support of the block's sides.
         parity: That of the pressures.
@@ -70,7 +71,7 @@ class Quarter:
     parity: Parity
 
     def response(self, count: int) -> Response:
-        """Return how the modes of the parity displace and stretch the face.
+        """Return how the modes of the parity displace and stretch the top.
 
         Args:
             count: Modes K along a side, even and odd together.
@@ -113,13 +114,12 @@ class Quarter:
     @cached_property
     def _lines(self) -> list[tuple[Line, Line, Line]]:
         """Lines along x, y and z by component of the displacement."""
-        x, y, z = self.division.x, self.division.y, self.division.z
-        odd_x, odd_y = self.parity
+        division, (odd_x, odd_y) = self.division, self.parity
         return [
             (
-                replace(x, parity=(odd_x + (component == 0)) % 2),
-                replace(y, parity=(odd_y + (component == 1)) % 2),
-                z,
+                replace(division.x, parity=(odd_x + (component == 0)) % 2),
+                replace(division.y, parity=(odd_y + (component == 1)) % 2),
+                division.z,
             )
             for component in range(3)
         ]

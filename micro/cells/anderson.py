@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _MEMORY = 2
+_NOISE = 2.0
+"""Change of a residual over the step: more is not the step's doing."""
 _DEPENDENT = 1e-2
 """Changes that differ less in direction, times their length, are taken for one."""
 
@@ -31,11 +33,11 @@ class Anderson:
             residual: What a plain step would change, of the same shape.
         """
         if self._last is not None:
-            change = residual - self._last[1]
+            step, change = point - self._last[0], residual - self._last[1]
             size = float(np.linalg.norm(change))
-            if size > 0.0:  # steps of length one: they shrink by orders of magnitude
-                step = (point - self._last[0]) / size, change / size
-                self._steps = [*self._steps, step][-_MEMORY:]
+            if 0.0 < size <= _NOISE * float(np.linalg.norm(step)):
+                pair = step / size, change / size  # they shrink by orders of magnitude
+                self._steps = [*self._steps, pair][-_MEMORY:]
         self._last = point, residual
         moved = point + residual
         if not self._steps:

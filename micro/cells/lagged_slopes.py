@@ -26,7 +26,7 @@ _FIRST = 1e-2
 """Residual of the first solution, before finite slopes are known."""
 _AHEAD = 2e-2
 """Residual of a solution, of the last change by finite slopes: what the next change will be."""
-_LAG = 1e-9
+_LAG = 3e-9
 """Change by finite slopes that is let be, of the largest displacement."""
 
 
@@ -51,27 +51,28 @@ def with_slopes(
     Raises:
         NotConverged: When a solution does not converge, or displacements do not agree.
     """
-    slopes = grids.slopes
-    if slopes is None:
+    if grids.slopes is None:
         return solve(required, motions, start, tolerance)
     known, lag = Anderson(), np.zeros(required.shape)
     if start is not None and start.pressure.any():
-        lag = slopes.displacement(start.pressure * grids.modulus)
+        lag = grids.by_slopes(start.pressure)
     rough, iterations, passes = max(tolerance, _FIRST), 0, 0
+    last = max(_LAG, 10.0 * tolerance)
     for _ in range(_MOST_LAGS):
         found = start = solve(required - lag, motions, start, rough)
         iterations, passes = iterations + found.iterations, passes + found.passes
         touching = found.pressure > 0.0
         if not touching.any():
             return found
-        change = slopes.displacement(found.pressure * grids.modulus) - lag
+        change = grids.by_slopes(found.pressure) - lag
         nearer = required if motions is None else required + motions.nearer(found.motion)
         left = float(np.abs(change[touching]).max()) / float(nearer[touching].max())
-        if left <= max(_LAG, 10.0 * tolerance) and rough <= tolerance:
+        if left <= last and rough <= tolerance:
             residual = max(found.residual, left)
             return found._replace(residual=residual, iterations=iterations, passes=passes)
         lag = known.next(lag, change)
-        rough = max(tolerance, min(_FIRST, _AHEAD * left))
+        ahead = _AHEAD * left
+        rough = tolerance if ahead <= last else min(_FIRST, ahead)
     raise NotConverged(
         "the displacements by finite slopes",
         reason=f"they still change by {left:.1e} of the displacement",

@@ -1,4 +1,4 @@
-"""Stresses that a finite body adds to those of the half-space, in modes of the contact face."""
+"""Stresses in its top that a finite body adds to those of the half-space, in modes."""
 
 from __future__ import annotations
 
@@ -12,23 +12,28 @@ Array = NDArray[np.float64]
 
 
 class BodyStresses:
-    """Smooth stresses in a rectangular contact face, by moments of the pressures on its cells.
+    """Smooth stresses in the top of a body, by moments of the pressures on cells of it.
 
     Pressures with the moments b_n = ∫ p φ_n dA add the stresses Σ φ_m S_mn b_n, of which the cells
     have the means.
 
     Args:
-        lengths: Sides (Lx, Ly) of the face, which the cells fill [mm].
-        grid: Cells (nx, ny).
+        lengths: Sides (Lx, Ly) of the top [mm].
+        grid: Cells (nx, ny), which fill the top but a margin all around.
         matrix: S of σ_xx, σ_yy and σ_xy; mode k K + l varies as mode k along x and l along y, shape
             (3, K², K²) [1/mm²].
+        margin: Width of the margin [mm].
 
     Raises:
         InputError: When the matrix is not one of K² modes, or not finite.
     """
 
     def __init__(
-        self, lengths: tuple[float, float], grid: tuple[int, int], matrix: ArrayLike
+        self,
+        lengths: tuple[float, float],
+        grid: tuple[int, int],
+        matrix: ArrayLike,
+        margin: float = 0.0,
     ) -> None:
         self._matrix = np.asarray(matrix, float)
         count = int(np.sqrt(self._matrix.shape[-1]) + 0.5)
@@ -40,11 +45,14 @@ class BodyStresses:
             )
         if not np.all(np.isfinite(self._matrix)):
             raise InputError("the stresses are not finite", value="nan or inf", allowed="numbers")
-        self._x, self._y = (
-            mode_means(np.linspace(0.0, length, cells + 1), length, count)
+        borders = [
+            np.linspace(margin, length - margin, cells + 1)
             for length, cells in zip(lengths, grid, strict=True)
+        ]
+        self._x, self._y = (
+            mode_means(ticks, length, count) for ticks, length in zip(borders, lengths, strict=True)
         )
-        self._cell = lengths[0] * lengths[1] / (grid[0] * grid[1])
+        self._cell = float(np.prod([ticks[1] - ticks[0] for ticks in borders]))
 
     def stresses(self, pressure: Array) -> Array:
         """Return σ_xx, σ_yy and σ_xy on the cells, shape (3, nx, ny) [MPa].

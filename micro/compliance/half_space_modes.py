@@ -23,8 +23,8 @@ Array = NDArray[np.float64]
 Part = Callable[[Array, float, int], Array]
 """Function of shifts, the length and the number of modes, with values of shape (shifts, K, K)."""
 
-_MORE = 8
-"""Points across a triangle beyond the number of modes: with v = sinh w the rest is 1e-12."""
+_MORE = 12
+"""Points across a triangle beyond the number of modes: with v = sinh w they leave 1e-11."""
 
 
 def half_space_modes(lengths: tuple[float, float], count: int) -> Array:

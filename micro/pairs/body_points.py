@@ -57,6 +57,15 @@ class BodyPoints:
         """Return the compliance between some of the points."""
         return replace(self, values=self.values[:, index])
 
+    def elsewhere(self, x: Array, y: Array) -> Self:
+        """Return the compliance between other points of the same body.
+
+        Args:
+            x: Abscissae, shape (m,) [mm].
+            y: Ordinates, shape (m,) [mm].
+        """
+        return self.at(self.body, x, y, self.contact_modulus)
+
     def displacement(self, moment: Array) -> Array:
         """Return the displacements of the points by moments of force on them, (n,) [mm].
 
@@ -65,15 +74,13 @@ class BodyPoints:
         """
         return np.asarray(self.values.T @ self._amplitudes(moment))
 
-    def between(self, index: Indices) -> Array:
-        """Return the displacements of all points by unit moments at some, shape (n, m) [1/mm].
+    def by(self, loaded: BodyPoints) -> Array:
+        """Return the displacements of the points by unit moments on m others, (n, m) [1/mm].
 
         Args:
-            index: The m points with a force.
+            loaded: The points with a force, on the same body.
         """
-        return np.asarray(
-            self.values.T @ (self._modulus * self.body.matrix @ self.values[:, index])
-        )
+        return np.asarray(self.values.T @ (self._modulus * self.body.matrix @ loaded.values))
 
     def patch_means(self, patches: Partition, moment: Array) -> Array:
         """Return the mean displacements of patches, shape (N,) [mm].

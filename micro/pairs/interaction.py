@@ -61,6 +61,10 @@ class Lift(NamedTuple):
         """Derivative of the displacements by the indentations of the active, shape (n, m)."""
         return self.slope if self.body is None else self.slope + self.body
 
+    def product(self, change: Array) -> Array:
+        """Return the change of the displacements by one of the indentations, shape (n,) [mm]."""
+        return np.asarray(self.derivative @ change[self.active])
+
     @property
     def engulfed(self) -> int:
         """Number of ordered pairs (k, i) whose slope has reached c*."""

@@ -40,7 +40,7 @@ class BodyInteraction:
             found = self.interaction.lift(indentation)
         t, own = indentation[active], self.interaction.subset(active)
         moment = moments(t, own.size, own.integral, 1)[0]
-        between = self.body.between(active)
+        between = self.body.by(self.body.among(active))
         displacement, slope = between @ moment, np.zeros_like(between)
         if found is not None:
             displacement, slope = displacement + found.displacement, found.slope

@@ -146,7 +146,7 @@ class SummitContacts:
         """
         active = np.flatnonzero(own > 0.0)
         rate = 1.5 * self.hertz.force[active] * np.sqrt(own[active])
-        if len(active) > PAIR_SUMS["multipole"]:
+        if len(active) > PAIR_SUMS["multipole"]:  # balanced all the same, in more steps
             return contact_stiffness(lever[active], rate)
         coupling = np.zeros(2 * (len(active),))
         share = rate / (np.pi * self.contact_modulus)
@@ -157,7 +157,8 @@ class SummitContacts:
             nearest = share / MERGING_SLOPE
             coupling += share / np.maximum(apart, nearest)
         if self.points is not None:
-            coupling += self.points.among(active).between(np.arange(len(active))) * share
+            among = self.points.among(active)
+            coupling += among.by(among) * share
         return contact_stiffness(lever[active], rate, coupling)
 
     def _solution_among(self, reached: Indices, required: Array, start: Array) -> Solution:

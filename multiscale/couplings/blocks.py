@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.surface import Surface
 from micro import (
-    BodyModes,
-    BodyStresses,
     FiniteSlopes,
     FreeSides,
     HalfSpace,
@@ -19,13 +18,9 @@ from micro import (
     MicroModel,
     SurfaceStress,
     coarse_grid,
-    half_space_modes,
-    half_space_stress_modes,
-    influence_matrix,
-    side_modes,
-    side_stress_modes,
     side_stresses,
 )
+from multiscale.couplings.body import Body
 from multiscale.scene import Scene
 from multiscale.stage import Stage
 
@@ -33,6 +28,12 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FaceCompliance, Interface, Material
 
 Array = NDArray[np.float64]
+
+Models = Callable[[Surface, int], HalfSpaceModel]
+"""From cells of a surface and the order of finite slopes, 0 for none, to its half-space model."""
+
+SLOPES = 2
+"""Order of finite slopes where they are seen."""
 
 _REACH = 0.25
 """Reach of free sides in the micro model, of the shortest side of the block."""
@@ -51,43 +52,89 @@ def contact_model(stage: Stage, comm: Any) -> MicroModel:
     Note:
         Collective.
     """
-    model = _sharp(stage.model)
-    if stage.scene.coupling.kind == "isolated":
+    model = stage.model
+    embedded = stage.embedded and stage.scene.coupling.kind != "isolated"
+    if isinstance(model, HalfSpaceModel):
+        order = SLOPES if stage.finite_slopes else 0
+        return half_space_models(stage, comm, embedded=embedded)(model.surface, order)
+    if not embedded:
         return model
-    sides = free_sides(stage)
-    face = _face(stage, comm) if stage.embedded else None
-    body = None if face is None else _body_modes(stage, face, sides)
-    if not isinstance(model, HalfSpaceModel):
-        return replace(model, body=body) if body is not None else model  # type: ignore[type-var]
-    slopes = _finite_slopes(stage, sides, face) if stage.finite_slopes else None
-    return replace(model, sides=sides, body=body, slopes=slopes)
+    body = scene_body(stage)
+    return replace(model, body=body.term(body.face(comm)))  # type: ignore[type-var]
 
 
-def _sharp(model: MicroModel) -> MicroModel:
-    """Return a micro model whose own error is none beside the tolerances of what it goes into."""
-    return replace(model, tolerance=_SHARP) if isinstance(model, HalfSpaceModel) else model
+def half_space_models(
+    stage: Stage, comm: Any, *, embedded: bool, modes: int | None = None, coarse: bool = False
+) -> Models:
+    """Return what makes a scene's half-space model on any cells, its body solved for once.
+
+    Args:
+        stage: The scene's ingredients, with a half-space model.
+        comm: MPI communicator; None for this process alone.
+        embedded: Whether the surface lies on the scene's block, or on a half-space.
+        modes: Modes of the body along a side; by default those of its shape.
+        coarse: Whether to take coarser elements for the body.
+
+    Returns:
+        A function from the surface and the order of finite slopes, 0 for none, to the model. It is
+        not collective.
+
+    Note:
+        Collective.
+    """
+    given = stage.model
+    if not isinstance(given, HalfSpaceModel):
+        raise TypeError("the scene's micro model is no half-space")
+    body = scene_body(stage) if embedded else None
+    face = None if body is None else body.face(comm, modes=modes, coarse=coarse)
+    section = stage.scene.block
+    material = HalfSpace(section.young_modulus, section.poisson_ratio)
+
+    def made(surface: Surface, order: int) -> HalfSpaceModel:
+        model = replace(
+            given,
+            surface=surface,
+            highest=given.datum,
+            tolerance=_SHARP,
+        )
+        # heights count from the highest point, which is near the loads: slopes add least there;
+        # the flat body then reaches up to it, while the block's height is that of the mean plane
+        higher = surface.highest - surface.mean_height if order else 0.0
+        beside: list[SurfaceStress] = []
+        if body is not None and face is not None:
+            model = replace(model, sides=body.known, body=body.term(face, higher=higher))
+            beside = _stresses(body, face, surface) if order else []
+        if not order:
+            return model
+        plane = surface.highest if beside else None
+        slopes = FiniteSlopes(surface, material, order=order, plane=plane, beside=beside)
+        return replace(model, slopes=slopes)
+
+    return made
 
 
-def _finite_slopes(
-    stage: Stage, sides: FreeSides | None, face: FaceCompliance | None
-) -> FiniteSlopes:
-    """Return what finite slopes add on a scene's body, whose stresses are those in its face."""
-    surface, section = stage.surface, stage.scene.block
-    if isinstance(stage.model, HalfSpaceModel):
-        surface = stage.model.surface
-    half_space = HalfSpace(section.young_modulus, section.poisson_ratio)
-    if face is None:
-        return FiniteSlopes(surface, half_space)
-    grid, lengths = coarse_grid(surface), surface.lengths
-    count = round(np.sqrt(len(face.normal)))
-    known = half_space_stress_modes(lengths, section.poisson_ratio, count)
-    beside: list[SurfaceStress] = []
-    if sides is not None:
-        spacing = lengths[0] / grid[0], lengths[1] / grid[1]
-        beside.append(side_stresses(sides, spacing))
-        known = known + side_stress_modes(sides, count)
-    beside.append(BodyStresses(lengths, grid, face.stresses - known))
-    return FiniteSlopes(surface, half_space, beside=beside)
+def _stresses(body: Body, face: FaceCompliance, surface: Surface) -> list[SurfaceStress]:
+    """Return the stresses in a contact face beyond those of the half-space."""
+    grid = coarse_grid(surface)
+    found: list[SurfaceStress] = []
+    if body.known is not None:
+        spacing = surface.lengths[0] / grid[0], surface.lengths[1] / grid[1]
+        found.append(side_stresses(body.known, spacing))
+    return [*found, body.stresses(face, grid)]
+
+
+def scene_body(stage: Stage) -> Body:
+    """Return the block of a scene, some of whose free sides its micro model knows of itself.
+
+    Args:
+        stage: The scene's ingredients.
+    """
+    return Body(
+        shape=stage.shape,
+        material=block_material(stage),
+        sides=stage.scene.block.sides,
+        known=free_sides(stage),
+    )
 
 
 def free_sides(stage: Stage) -> FreeSides | None:
@@ -98,38 +145,18 @@ def free_sides(stage: Stage) -> FreeSides | None:
     Args:
         stage: The scene's ingredients.
     """
-    free = stage.embedded and stage.scene.block.sides == "free" and not stage.shape.margin
-    if not (free and isinstance(stage.model, HalfSpaceModel)):
+    return _block_sides(stage) if isinstance(stage.model, HalfSpaceModel) else None
+
+
+def _block_sides(stage: Stage) -> FreeSides | None:
+    """Return the free sides of a scene's block that end its interface; None without them."""
+    if not stage.embedded or stage.scene.block.sides != "free" or stage.shape.margin:
         return None
     return FreeSides(
         lengths=stage.surface.lengths,
         poisson_ratio=stage.scene.block.poisson_ratio,
         reach=_REACH * min(*stage.surface.lengths, stage.shape.height),
     )
-
-
-def _face(stage: Stage, comm: Any) -> FaceCompliance:
-    """Return what pressures do to the contact face of a scene's block; collective."""
-    from mpi4py import MPI
-
-    from macro import cached_face_compliance, mode_count
-
-    return cached_face_compliance(
-        stage.shape,
-        block_material(stage),
-        stage.scene.block.sides,
-        mode_count(stage.shape),
-        comm or MPI.COMM_SELF,
-    )
-
-
-def _body_modes(stage: Stage, face: FaceCompliance, sides: FreeSides | None) -> BodyModes:
-    """Return what a scene's block adds to the half-space, and to free sides known apart."""
-    lengths, count = stage.surface.lengths, round(np.sqrt(len(face.normal)))
-    known = half_space_modes(lengths, count)
-    if sides is not None:
-        known = known + side_modes(sides, count)
-    return BodyModes(lengths, face.normal - known / stage.model.contact_modulus)
 
 
 def patch_displacements(stage: Stage, comm: Any, *, dense: bool) -> Callable[[Array], Array]:
@@ -176,9 +203,8 @@ def patch_compliance(stage: Stage, comm: Any) -> Array:
         Collective.
     """
     if stage.scene.coupling.decomposed:
-        half_space = influence_matrix(stage.patches) / (np.pi * stage.model.contact_modulus)
-        body = _body_modes(stage, _face(stage, comm), None)
-        return np.asarray(half_space + body.patch_compliance(stage.patches))
+        body = replace(scene_body(stage), known=_block_sides(stage))
+        return body.patch_compliance(stage.patches, comm)
     from mpi4py import MPI
 
     from macro import plain_compliance

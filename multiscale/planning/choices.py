@@ -34,9 +34,6 @@ DEFAULT_ACCURACY = 0.02
 PATCHES_ACROSS = (8, 16)
 """Patches along the shorter side: enough for a map, and what laws may need more."""
 
-SMOOTH_CELLS = ((8, 8, 8), (16, 16, 12), (24, 24, 16))
-"""Cells of the smooth rest of a decomposed block."""
-
 MESH_CELLS = ((24, 24, 15), EMBEDDED_CELLS)
 """Cells of a mesh under laws."""
 
@@ -46,6 +43,8 @@ SETTLED_LATE = frozenset({"coupling.kind", "patches.grid", "block.cells"})
 
 def open_keys(scene: Scene) -> frozenset[str]:
     """Return the keys that are left to the plan: ``"auto"``, or not stated beside an accuracy.
+
+    The block's cells are one of them only under laws on its mesh.
 
     Args:
         scene: The scene as it was given.
@@ -64,6 +63,8 @@ def open_keys(scene: Scene) -> frozenset[str]:
             unstated = unstated and not section.model_fields_set
         if getattr(section, key) == "auto" or (unstated and name != "surface"):
             free.add(f"{name}.{key}")
+    if not scene.coupling.on_mesh:
+        free.discard("block.cells")
     return frozenset(free)
 
 
@@ -168,7 +169,7 @@ def _alternative(stage: Stage) -> Alternative:
     return Alternative(
         kind=stage.scene.coupling.kind,
         patches=stage.patches.grid,
-        cells=stage.shape.cells if stage.embedded else None,
+        cells=stage.shape.cells if stage.scene.coupling.on_mesh else None,
         error=sum(expected_errors(stage).values()),
         seconds=predicted_cost(stage, this_machine()).total,
     )
@@ -194,8 +195,8 @@ def _scenes(stage: Stage, given: Scene, free: frozenset[str]) -> Iterator[Scene]
             # patches gather results; only laws can become better with more of them
             across = PATCHES_ACROSS if coupling.kind == "consistent" else PATCHES_ACROSS[:1]
             grids = [_grid(stage, count) for count in across]
-        if "block.cells" in free and coupling.kind != "analytic":
-            cells = list(SMOOTH_CELLS if coupling.decomposed else MESH_CELLS)
+        if "block.cells" in free:
+            cells = list(MESH_CELLS)
         for grid, each in product(grids, cells):
             yield _changed(
                 stage.scene,

@@ -122,18 +122,16 @@ def coupling_error(scene: Scene, grid: tuple[int, int], size: float, at: Contact
 def block_error(
     scene: Scene, cells: tuple[int, int, int], grid: tuple[int, int], at: Contacts
 ) -> float:
-    """Return the bound of what the block's elements, and the loads that they see, leave.
+    """Return the bound of what the block's mesh leaves, or its body term of few modes.
 
     Args:
         scene: The scene.
-        cells: Cells under the interface in x and y, and in depth.
+        cells: Cells of a mesh under laws, under the interface in x and y, and in depth.
         grid: Patches in x and y.
         at: Its contacts.
     """
     if scene.coupling.decomposed:
-        fine = (8.0 / min(cells[0], cells[1], 4 * cells[2] / 3)) ** 2
-        loads = 0.005 * at.yielding + 0.015 * np.sqrt(at.border)
-        return float(loads + fine * (0.03 * at.yielding + 0.0125 * at.border))
+        return float(0.005 * at.yielding + 0.015 * np.sqrt(at.border))
     degree = int(scene.block.element[1])
     across = degree * min(c / n for c, n in zip(cells[:2], grid, strict=True))
     return at.yielding * min(2.4, 4.0 / across**2 + 0.5 / across)

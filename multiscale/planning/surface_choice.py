@@ -9,7 +9,7 @@ from micro import MODELS
 from micro.auto.errors import grid_error
 from micro.auto.measures import contact_measures
 from multiscale.ingredients import make_surface
-from multiscale.planning.choices import SMOOTH_CELLS, accuracy_of, open_keys
+from multiscale.planning.choices import accuracy_of, open_keys
 from multiscale.planning.contact_estimate import nearest
 from multiscale.planning.expected_errors import block_error, coupling_error
 from multiscale.planning.micro_choice import estimated_contacts, estimated_plane
@@ -63,10 +63,7 @@ def micro_tolerance(given: Scene, scene: Scene, surface: Surface) -> float:
     if alone or scene.coupling.kind == "analytic":
         return accuracy
     at = estimated_contacts(scene, surface)
-    cells = block_cells(scene)
-    if "block.cells" in open_keys(given) and scene.coupling.decomposed:
-        cells = SMOOTH_CELLS[-1]
-    rest = block_error(scene, cells, patch_grid(scene), at)
+    rest = block_error(scene, block_cells(scene), patch_grid(scene), at)
     rest += coupling_error(scene, patch_grid(scene), max(surface.lengths), at)
     return max(accuracy - rest, _LEAST_SHARE * accuracy)
 

@@ -132,6 +132,21 @@ class ReferenceRecord:
         )
         return replace(self, force=force, area=area)
 
+    def with_errors(self, steps: Sequence[LoadStep]) -> tuple[LoadStep, ...]:
+        """Return the load steps, which are the finest mesh's, with what they may be off by.
+
+        That is the way to mesh size zero and the error bar there.
+
+        Args:
+            steps: The load steps.
+        """
+        force = np.abs(self.force_N[-1] - self.force.value) + self.force.error
+        approach = np.abs(self.approach_mm[-1] - self.approach.value) + self.approach.error
+        return tuple(
+            replace(step, force_error_N=float(force[i]), approach_error_mm=float(approach[i]))
+            for i, step in enumerate(steps)
+        )
+
     @property
     def columns(self) -> tuple[str, ...]:
         """Columns of ``reference.csv``: the meshes' own values follow the extrapolated ones."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
@@ -86,8 +87,8 @@ def curve_cells(history: History) -> tuple[tuple[str, ...], list[tuple[str, ...]
     rows: list[tuple[str, ...]] = [
         (
             str(step.step),
-            f"{1e3 * step.approach_mm:.4g}",
-            f"{step.force_N:.6g}",
+            with_error(1e3 * step.approach_mm, 1e3 * step.approach_error_mm, digits=4),
+            with_error(step.force_N, step.force_error_N, digits=6),
             f"{step.mean_pressure_MPa:.5g}",
             f"{100 * step.contact_area_fraction:.4g}",
             f"{1e3 * step.mean_separation_mm:.4g}",
@@ -105,6 +106,20 @@ def curve_cells(history: History) -> tuple[tuple[str, ...], list[tuple[str, ...]
     return header, rows
 
 
+def with_error(value: float, error: float, *, digits: int) -> str:
+    """Return a value with its error, both to the error's second digit; alone where that is none.
+
+    Args:
+        value: The value.
+        error: Its error; 0 or NaN for none.
+        digits: Digits of a value alone.
+    """
+    if not error > 0.0:
+        return f"{value:.{digits}g}"
+    places = max(1 - math.floor(math.log10(error)), 0)
+    return f"{value:.{places}f} ± {error:.{places}f}"
+
+
 def _errors(made: Forecast) -> Iterable[tuple[str, str]]:
     yield from ((cause, bound_text(error)) for cause, error in made.errors.items())
     yield "altogether", bound_text(made.error)
@@ -118,9 +133,11 @@ def _headline(history: History) -> str:
     last, record = history.steps[-1], history.reference
     error = "" if record is None else f" Discretisation error: {escape(record.label)}."
     area = f"{100 * last.contact_area_fraction:.3g} % of the nominal area"
+    approach = with_error(1e3 * last.approach_mm, 1e3 * last.approach_error_mm, digits=4)
+    force = with_error(last.force_N, last.force_error_N, digits=5)
     return (
-        f"<p>At an approach of {1e3 * last.approach_mm:.4g} µm the plane carries "
-        f"<b>{last.force_N:.5g} N</b> ({last.mean_pressure_MPa:.4g} MPa) on {last.contacts} "
+        f"<p>At an approach of {approach} µm the plane carries "
+        f"<b>{force} N</b> ({last.mean_pressure_MPa:.4g} MPa) on {last.contacts} "
         f"contacts covering {area}.{error}</p>"
     )
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
+from multiscale.couplings.concurrent import ConcurrentCoupling
 
 from geometry import (
     BlockShape,
@@ -18,7 +19,6 @@ from geometry import (
 from geometry.control import Control
 from macro import Block, Material, ObstacleBlock, make_correction, rough_block_mesh
 from micro import FreeSides, HalfSpace, HalfSpaceModel, finite_slope_effect
-from multiscale.couplings.concurrent import ConcurrentCoupling
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 RADIUS, APPROACH = 25.0, 8e-4  # a = 0.14 mm: small slopes, a block that is felt
