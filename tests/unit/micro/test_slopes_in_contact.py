@@ -40,11 +40,11 @@ def test_solves_the_fixed_point(control):
     grid = ElasticGrids(periodic=False).at(SURFACE.grid, SURFACE.spacing, Box.whole(SURFACE.grid))
     moved = grid.displacement(state.pressure / E_STAR) + SLOPES.displacement(state.pressure)
     gap = moved - state.required
-    slack = 2e-9 * state.required.max()  # slopes are lagged until they change by 1e-9
+    slack = 4e-9 * state.required.max()  # slopes are lagged until they change by 3e-9
     assert np.abs(gap[state.in_contact]).max() <= slack
     assert gap.min() >= -slack
     assert state.gap == pytest.approx(gap, abs=1e-15)
-    assert state.residual <= 1e-9
+    assert state.residual <= 3e-9
     # and they matter: a plane that may turn leans on what yields least
     small = replace(MODEL, slopes=None).equilibrium(control)
     if control.force is None:
