@@ -8,8 +8,9 @@ from dense_contact import dense_contact, matrix_of
 
 from geometry import Control, InputError, NotConverged, Spectrum, Surface, synthesise
 from micro import HalfSpaceModel
+from micro.cells.conjugate_gradients import ContactCells
 from micro.cells.contact_pressure import contact_pressure
-from micro.cells.elastic_grid import ElasticGrid, ElasticGrids, HalfSpaceGrid
+from micro.cells.elastic_grid import Cells, ElasticGrid, ElasticGrids, HalfSpaceGrid
 from micro.cells.motions import Motions
 from micro.cells.pressing import Pressing
 
@@ -135,35 +136,52 @@ def test_mirrors_and_turns(model, turn, given):
     assert same.pressure == pytest.approx(field(one.pressure), abs=1e-7 * one.pressure.max())
 
 
-def test_one_problem_takes_no_more_than_a_level_plane(model):
-    """Sixty scenes that hardly touch: all converge, without moments, in few iterations.
+def hardly_touching(seed, part=None):
+    """Return a scene and a force, a part of the force at some depth (1e-5 … 1e-3 by default)."""
+    dice = np.random.default_rng(seed)
+    nx, ny = dice.choice([32, 48, 64, 96], 2)
+    spectrum = Spectrum(
+        hurst=dice.uniform(0.3, 1.0),
+        waves=(1 + (seed % 3 > 0), int(dice.integers(4, 16))),
+        rms_slope=dice.uniform(0.02, 0.5),
+        seed=seed,
+    )
+    surface = synthesise(spectrum, grid=(nx, ny), lengths=(1.0, float(ny / nx)))
+    scene = HalfSpaceModel(surface=surface, contact_modulus=4000.0, tolerance=1e-9)
+    deep = dice.uniform(0.2, 3.0) * surface.heights.std()
+    largest = replace(scene, tolerance=1e-2).solve(deep).force
+    return scene, largest * (part or 10 ** dice.uniform(-5.0, -3.0))
 
-    Measured on these: 0.9 of the level plane's iterations in the median, 3.6 at most, both with
-    one on top for the evaluation that a start costs.
-    """
-    shares = []
-    for seed in range(60):
-        dice = np.random.default_rng(seed)
-        nx, ny = dice.choice([32, 32, 48, 64, 96], 2)
-        spectrum = Spectrum(
-            hurst=dice.uniform(0.3, 1.0),
-            waves=(1 + (seed % 3 > 0), int(dice.integers(4, 16))),
-            rms_slope=dice.uniform(0.02, 0.5),
-            seed=seed,
-        )
-        surface = synthesise(spectrum, grid=(nx, ny), lengths=(1.0, float(ny / nx)))
-        scene = HalfSpaceModel(surface=surface, contact_modulus=4000.0, tolerance=1e-9)
-        deep = dice.uniform(0.2, 3.0) * surface.heights.std()
-        largest = replace(scene, tolerance=1e-2).solve(deep).force
-        level = scene.solve_force(1e-4 * largest)
-        turned = scene.solve_force(1e-4 * largest, tilt=None)
-        moments = [abs(np.sum(turned.pressure * arm)) for arm in arms(surface)]
-        assert max(moments) < 1e-8 * turned.pressure.sum(), seed
-        assert turned.residual <= 1e-9 and turned.force == pytest.approx(1e-4 * largest, rel=1e-9)
-        shares.append(turned.iterations / level.iterations)
+
+def turned_share(scene, force):
+    """Return the iterations of a free plane over those of a level one; it has no moment."""
+    level, turned = scene.solve_force(force), scene.solve_force(force, tilt=None)
+    moments = [abs(np.sum(turned.pressure * arm)) for arm in arms(scene.surface)]
+    assert max(moments) < 1e-8 * turned.pressure.sum()
+    assert turned.residual <= 1e-9 and turned.force == pytest.approx(force, rel=1e-9)
+    return turned.iterations / level.iterations
+
+
+def test_planes_that_hardly_touch():
+    """Of the level plane's iterations: 1.2 in the median, 2.8 in nine of ten, 5.3 at most."""
+    shares = [turned_share(*hardly_touching(seed, 1e-4)) for seed in range(60)]
     assert np.median(shares) <= 2.0
     assert max(shares) <= 10.0
-    print(np.percentile(shares, [0, 25, 50, 75, 90, 95, 100]))
+
+
+@pytest.mark.parametrize("seed", [230, 266, 277, 296, 343, 353, 383])
+def test_the_hardest_of_three_hundred(seed):
+    """Contacts in line with the middle, cells that touch without pressure, bad first sets."""
+    assert turned_share(*hardly_touching(seed)) <= 10.0
+
+
+def test_what_motions_take_up_leaves_no_gap():
+    """Two cells hold two motions: nothing is left for pressures, to double precision."""
+    grid = ElasticGrid(HalfSpaceGrid((20, 20), (0.05, 0.05), periodic=False))
+    flat = np.array([43, 310])
+    levers = Motions.turning(np.linspace(-0.7, 0.7, 20), np.linspace(-0.6, 0.6, 20), None)
+    contact = ContactCells.among(grid, Cells.of(flat, (20, 20)), levers.among(flat))
+    assert contact.balanced(np.array([1.0, -0.3])) == pytest.approx(0.0, abs=1e-13)
 
 
 def test_no_plane_turns_on_a_period():
