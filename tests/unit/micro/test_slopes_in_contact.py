@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry import Control, Spectrum, synthesise
+from geometry import Control, NotConverged, Spectrum, synthesise
 from micro import HalfSpace, HalfSpaceModel
+from micro.cells import lagged_slopes
 from micro.cells.elastic_grid import ElasticGrids
 from micro.cells.reach import Box
 from micro.compliance.finite_slopes import FiniteSlopes
@@ -72,6 +73,13 @@ def test_costs_less_than_two_more_solutions(control):
     """Each starts from the last: measured 1.4 … 1.8 times the iterations without slopes."""
     without = replace(MODEL, slopes=None).equilibrium(control)
     assert MODEL.equilibrium(control).iterations < 2.5 * without.iterations
+
+
+def test_slopes_that_do_not_agree_are_told(monkeypatch):
+    monkeypatch.setattr(lagged_slopes, "_MOST_LAGS", 1)
+    message = r"the displacements by finite slopes did not converge: they still change by .*e-02"
+    with pytest.raises(NotConverged, match=message):
+        MODEL.solve(8e-3)
 
 
 def test_nothing_touches():
