@@ -53,8 +53,8 @@ class HalfSpaceModel:
         upper: Upper bound of the pressures [MPa]; none when not given.
 
     Raises:
-        InputError: When the modulus or the tolerance is not positive, a periodic model is asked
-            of a surface that is not, or with free sides, or these are not the surface's.
+        InputError: When the modulus, the tolerance or the bound is not positive, a periodic model
+            is asked of a surface that is not, or with free sides, or these are not the surface's.
 
     Source:
         Polonsky & Keer 1999, doi 10.1016/S0043-1648(99)00113-1.
@@ -76,6 +76,10 @@ class HalfSpaceModel:
             if not (np.isfinite(value) and value > 0.0):
                 problem = f"the {what.replace('_', ' ')} must be positive and finite"
                 raise InputError(problem, value=value, allowed="> 0")
+        if not self.upper > 0.0:
+            raise InputError(
+                "the upper bound of the pressures must be positive", value=self.upper, allowed="> 0"
+            )
         if self.periodic and not self.surface.periodic:
             raise InputError(
                 "a periodic half-space needs a periodic surface", value=self.surface.source

@@ -44,6 +44,6 @@ class Anderson:
             return moved
         changes = np.stack([change.ravel() for _, change in self._steps])
         shares = np.linalg.lstsq(changes.T, residual.ravel(), rcond=_DEPENDENT)[0]
-        for share, (step, change) in zip(shares, self._steps, strict=True):
-            moved = moved - share * (step + change)
+        for share, (moving, changing) in zip(shares, self._steps, strict=True):
+            moved = moved - share * (moving + changing)
         return moved

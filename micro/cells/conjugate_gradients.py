@@ -54,7 +54,8 @@ class ContactCells:
         """Subtract from gaps the part that free motions of the body take up."""
         if not len(self.levers):
             return gap
-        return gap - (self.inverse @ (self.resistance @ gap)) @ self.levers
+        # transposed: the approximate resistance is symmetric to single precision alone
+        return gap - (self.inverse.T @ (self.resistance @ gap)) @ self.levers
 
     def preconditioned(self, gap: Array) -> Array:
         """Return roughly the pressures that make these gaps, without loads on free motions."""

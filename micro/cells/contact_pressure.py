@@ -1,9 +1,8 @@
 """Pressures of a rigid body on an elastic one: p ≥ 0, gap ≥ 0, p · gap = 0 on every cell.
 
-Passes of a primal-dual active set: cells with a pressure or a negative gap are taken as the
-contact, its linear system is solved roughly by conjugate gradients, tensile pressures are dropped.
-Pressures may be bounded from above: where p = H the gap may be negative, as material yields.
-Motions of the body that are free are unknowns of the same problem (`micro.cells.motions`).
+The set of cells in contact is sought step by step (`micro.cells.contact_search`). Pressures may be
+bounded from above: where p = H the gap may be negative, as material yields. Motions of the body
+that are free are unknowns of the same problem (`micro.cells.motions`).
 """
 
 from __future__ import annotations
@@ -14,27 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import NotConverged
-from micro.cells.clear_plane import clearance
-from micro.cells.conjugate_gradients import ContactCells
-from micro.cells.elastic_grid import Cells, ElasticGrid
+from micro.cells.contact_search import ContactSearch
+from micro.cells.elastic_grid import ElasticGrid
+from micro.cells.first_pressure import first_pressure
+from micro.cells.limits import Limits
 from micro.cells.motions import Motions
 
 Array = NDArray[np.float64]
 
 _MOST_PASSES = 200
-_MOST_ITERATIONS = 100
-"""Iterations in a pass; an exact solution of a wrong set is of no use."""
 _TRUSTING_PASSES = 20
 """Passes in which a step may raise the energy when it lowers the residual."""
-_MOST_HALVINGS = 12
-_HELD = 1e-8
-"""Weight of cells that touch without pressure, of the largest pressure, in the body's motions."""
-_ROUNDING = 4.0 * float(np.finfo(float).eps)
-"""Part of the largest distance of a plane free to turn that its gaps are known to."""
-_LEAST_EVEN, _MOST_EVEN = 1e-3, 1e6
-"""Shares of even pressure that are tried with a start which cannot meet the loads."""
-_FORCING = (0.2, 0.01)
-"""Parts of the present error that a pass leaves of the gaps in a new set and in a set kept."""
 
 
 class Pressures(NamedTuple):
@@ -89,8 +78,8 @@ def contact_pressure(
         doi 10.1016/S0043-1648(99)00113-1.
     """
     used = grid.products
-    search = _Search(grid, required, motions, upper)
-    search.begin(start)
+    limits = Limits(motions=motions, upper=upper)
+    search = ContactSearch(grid, required, limits, *first_pressure(grid, required, start, limits))
     for passes in range(_MOST_PASSES):
         if search.residual <= max(tolerance, search.rounding):
             return Pressures(
@@ -107,171 +96,3 @@ def contact_pressure(
         iterations=grid.products - used,
         remedy="raise the tolerance or take smaller steps of the approach",
     )
-
-
-class _Search:
-    """Pressures, gaps and errors while the set of cells in contact is sought."""
-
-    def __init__(
-        self, grid: ElasticGrid, required: Array, motions: Motions | None, upper: float
-    ) -> None:
-        self.grid, self.required, self.motions, self.upper = grid, required, motions, upper
-        self.motion = np.zeros(0 if motions is None else len(motions.loads))
-        self.unloaded = motions is not None and not motions.loads.any()
-        self.careful = False
-        self.held: NDArray[np.intp] = np.zeros(0, np.intp)
-        self.mask: NDArray[np.bool_] = np.zeros(required.shape, bool)
-
-    def begin(self, start: Array) -> None:
-        """Evaluate the start; where it cannot meet the loads, with a share of even pressure."""
-        if self.unloaded:
-            self._begin_unloaded(start)
-            return
-        share = 0.0
-        while True:
-            even = share * (float(start.max()) or 1.0)
-            pressure = self._admissible(start + even if share else start)
-            if pressure is not None:
-                self.accept(pressure)
-                return
-            if share > _MOST_EVEN:
-                raise NotConverged(
-                    "the pressures to start from",
-                    reason="no pressures within their bounds meet the loads on these cells",
-                    iterations=0,
-                    remedy="give a smaller force",
-                )
-            share = 10.0 * share or _LEAST_EVEN
-
-    def _begin_unloaded(self, start: Array) -> None:
-        """Start a body that turns without load where pressures already lower the energy.
-
-        Without pressure the energy is 0, a point that a body which cannot turn clear must not come
-        to: no single contact can carry it from there.
-        """
-        assert self.motions is not None
-        pressure = self._admissible(start)
-        if pressure is None or float(np.vdot(pressure, self.required)) <= 0.0:
-            found = clearance(self.required, self.motions)
-            if found.overlap <= 0.0:
-                self.motion = found.motion
-                self.accept(np.zeros(start.shape))
-                return
-            pressure = found.support
-        work = float(np.vdot(pressure, self.grid.displacement(pressure)))
-        balanced = self._admissible(pressure * (float(np.vdot(pressure, self.required)) / work))
-        self.accept(pressure if balanced is None else balanced)
-
-    def accept(self, pressure: Array) -> None:
-        """Evaluate pressures within their bounds that meet the loads."""
-        self.pressure = pressure
-        gap = self.grid.displacement(pressure)
-        work = float(np.vdot(pressure, gap))
-        asked = float(np.vdot(pressure, self.required))
-        self.energy = work - 2.0 * asked  # twice the elastic less the external one
-        gap -= self.required
-        highest = self.required
-        if self.motions is not None:
-            if pressure.any():
-                weights = pressure
-                if self.held.size:
-                    weights = pressure.copy()
-                    weights.ravel()[self.held] += _HELD * float(pressure.max())
-                self.motion = self.motions.best(weights, gap)
-            nearer = self.motions.nearer(self.motion)
-            gap -= nearer
-            highest = self.required + nearer
-        self.gap = gap  # within the memory of the displacement
-        self.scale = float(highest.max())
-        lowest = gap.min() if self.upper == np.inf else gap[pressure < self.upper].min(initial=0.0)
-        worst = max(-float(lowest), float(gap[pressure > 0.0].max(initial=0.0)))
-        self.residual = max(0.0, worst) / self.scale if self.scale > 0.0 else 0.0
-        self.rounding = 0.0
-        if self.motions is not None and self.motions.turns and self.scale > 0.0:
-            self.rounding = _ROUNDING * float(np.abs(highest).max()) / self.scale
-
-    def step(self, tolerance: float, *, cautious: bool) -> None:
-        """Solve on the present set and accept what it gives, shortened while that is no gain.
-
-        Steps that lower the energy cannot return to where they were: a cautious search takes no
-        others. It is needed where cells of very different sides meet the periodic kernel, whose
-        inverse is then far from an M-matrix, for which the sets are known to converge.
-        """
-        mask = (self.pressure > 0.0) | (self.gap < 0.0)
-        if self.upper < np.inf:
-            mask &= (self.pressure < self.upper) | (self.gap > 0.0)
-        mask.ravel()[self.held] = True
-        kept = np.array_equal(mask, self.mask)
-        if not kept:
-            self.mask, self.contact = mask, self._among(np.flatnonzero(mask))
-        cells = self.contact.cells.flat
-        stop = max(_FORCING[kept] * self.residual, 0.25 * tolerance) * self.scale
-        if self.careful:
-            self.accept(self._cell_by_cell(self.pressure, cells, stop))
-            return
-        change = self.contact.close(self.gap.ravel()[cells], stop=stop, limit=_MOST_ITERATIONS)
-        old, residual, energy = self.pressure, self.residual, self.energy
-        cautious = cautious or self.unloaded
-        for halving in range(_MOST_HALVINGS):
-            moved = self._moved(old, cells, 0.5**halving * change)
-            if moved is None:
-                continue
-            self.accept(moved)
-            gain = self.energy < energy or (self.residual < residual and not cautious)
-            if gain or self.residual <= max(tolerance, self.rounding):
-                return
-        if self.motions is not None and self.motions.turns:
-            self.careful = True
-            self.accept(old)
-            self.accept(self._cell_by_cell(old, cells, stop))
-
-    def _cell_by_cell(self, old: Array, cells: NDArray[np.intp], stop: float) -> Array:
-        """Close the gaps of some cells, dropping one at a time that would come under tension.
-
-        Each move keeps the loads and lowers the energy, however few cells carry the body: what
-        drops many at once may leave it on a single contact, which cannot hold it. Cells that touch
-        without pressure tell how a body turns that lies on two contacts and the middle between.
-        """
-        pressure, gap = old.ravel()[cells], self.gap.ravel()[cells]
-        for _ in range(len(cells)):
-            contact = self._among(cells)
-            change = contact.close(gap, stop=stop, limit=_MOST_ITERATIONS)
-            falling = change < 0.0
-            stuck = falling & (pressure <= 0.0)
-            if stuck.any():
-                first = int(np.argmin(np.where(stuck, change, 0.0)))
-                part = 0.0
-            else:
-                ways = np.divide(pressure, -change, out=np.full_like(change, np.inf), where=falling)
-                first = int(np.argmin(ways))
-                part = min(1.0, float(ways[first]))
-                pressure = np.maximum(pressure + part * change, 0.0)
-                gap = gap + part * self.grid.comply(contact.cells, change)
-                if part == 1.0:
-                    break
-            pressure[first] = 0.0
-            left = np.arange(len(cells)) != first
-            cells, pressure, gap = cells[left], pressure[left], gap[left]
-        new = np.zeros(old.shape)
-        new.ravel()[cells] = pressure
-        self.held = cells[pressure <= 0.0]
-        found = self._admissible(new)
-        return old if found is None else found
-
-    def _among(self, flat: NDArray[np.intp]) -> ContactCells:
-        cells = Cells.of(flat, self.required.shape)
-        levers = np.empty((0, flat.size))
-        if self.motions is not None:
-            levers = self.motions.among(flat)
-        return ContactCells.among(self.grid, cells, levers)
-
-    def _moved(self, old: Array, cells: NDArray[np.intp], change: Array) -> Array | None:
-        new = np.zeros(old.shape) if self.upper == np.inf else np.where(old < self.upper, 0.0, old)
-        new.ravel()[cells] = np.maximum(old.ravel()[cells] + change, 0.0)
-        return self._admissible(new)
-
-    def _admissible(self, pressure: Array) -> Array | None:
-        """Return pressures within their bounds that meet the loads; None where there are none."""
-        if self.motions is not None:
-            return self.motions.balanced(pressure, self.upper)
-        return pressure if self.upper == np.inf else np.minimum(pressure, self.upper)

@@ -83,7 +83,9 @@ class HalfSpaceState:
         """
         whole = Box.whole(self.pressure.shape)
         grid = self.grids.at(self.pressure.shape, self.spacing, whole)
-        return grid.displacement(np.divide(self.pressure, self.contact_modulus))
+        pressure = np.divide(self.pressure, self.contact_modulus)
+        found = grid.displacement(pressure)
+        return found if self.grids.slopes is None else found + self.grids.by_slopes(pressure)
 
     @property
     def gap(self) -> Array:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +17,14 @@ from micro.cells.reach import Box
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
+Flags = NDArray[np.bool_]
 
 _MOST_STEPS = 100
 _LONGEST = 1.5  # change of an exponent in one step
 _FARTHEST = 60.0  # largest exponent: pressures do not come into balance on these cells
 _MOST_HALVINGS = 8
-_LEFT = 0.9  # part of the slope along a step by which it may rise beyond its end
+_AT_BOUND = 1e-13  # of the bound: pressures no further below it are taken for it
+_BEYOND = 0.9  # part of its first slope that the function may have beyond its lowest point
 _ROUNDING, _ENOUGH = 1e-14, 1e-12
 """What pressures may miss of the loads, of what they could do on the longest lever; the second
 where steps gain no more."""
@@ -82,8 +84,12 @@ class Motions:
         """Return the motion that closes gaps best, weighted with the pressures, shape (k,) [mm]."""
         cells = np.flatnonzero(pressure)
         root = np.sqrt(pressure.ravel()[cells] / pressure.max())
-        levers = self.among(cells) * root
-        return np.asarray(np.linalg.lstsq(levers.T, gap.ravel()[cells] * root, rcond=1e-10)[0])
+        levers, left = self.among(cells), gap.ravel()[cells]
+        found = np.zeros(len(self.loads))
+        for _ in range(2 if self.turns else 1):  # again for what rounding leaves of light cells
+            change = np.linalg.lstsq((levers * root).T, left * root, rcond=1e-10)[0]
+            found, left = found + change, left - change @ levers
+        return found
 
     def on(self, box: Box) -> Motions:
         """Return the motions on a part of the cells, which carries all loads."""
@@ -101,14 +107,17 @@ class Motions:
             loads=self.loads / np.prod(factors),
         )
 
-    def balanced(self, pressure: Array, upper: float = np.inf) -> Array | None:
+    def balanced(
+        self, pressure: Array, upper: float = np.inf, fixed: Flags | None = None
+    ) -> Array | None:
         """Return pressures that meet the loads, p exp(Σ μ_i ℓ_i) and at most the upper bound.
 
-        The multipliers μ minimise a convex function, by damped Newton steps.
+        The multipliers μ minimise a convex function, by Newton steps.
 
         Args:
             pressure: Pressures / E* ≥ 0, shape (nx, ny).
             upper: Upper bound / E*.
+            fixed: Cells whose pressures stay as they are, shape (nx, ny).
 
         Returns:
             The pressures, zero where they were; None where no such pressures meet the loads.
@@ -116,67 +125,77 @@ class Motions:
         if len(self.loads) == 1 and upper == np.inf:
             total = float(pressure.sum())
             return pressure * (self.loads[0] / total) if total > 0.0 else None
-        cells = np.flatnonzero(pressure)
-        if not cells.size:
-            return None if self.loads.any() else pressure
-        values = self._scaled(pressure.ravel()[cells], self.among(cells), upper)
+        cells, loads, acting = np.flatnonzero(pressure), self.loads, 0.0
+        if fixed is not None:
+            cells = np.flatnonzero(np.where(fixed, 0.0, pressure))
+            stay = np.flatnonzero(fixed)
+            loads = loads - self.among(stay) @ pressure.ravel()[stay]
+            acting = float(pressure.ravel()[stay].sum())
+        if not cells.size and loads.any():
+            return None
+        longest = np.abs(self.along_x).max(axis=1) * np.abs(self.along_y).max(axis=1)
+        scaled = _Scaled(
+            np.minimum(pressure.ravel()[cells], upper), self.among(cells), loads, upper
+        )
+        values = scaled.solution(longest, acting)
         if values is None:
             return None
-        found = np.zeros(pressure.shape)
+        found = np.zeros(pressure.shape) if fixed is None else np.where(fixed, pressure, 0.0)
         found.ravel()[cells] = values
         return found
 
-    def _scaled(self, start: Array, levers: Array, upper: float) -> Array | None:
-        """Minimise Σ ψ(p_i) − f · μ over μ, where ψ' = p_i = min(p_i⁰ exp(μ · ℓ_i), upper)."""
-        exponents = np.zeros(len(self.loads))
-        values = start = np.minimum(start, upper)
+
+class _Scaled(NamedTuple):
+    """Pressures p_i = min(p_i⁰ exp(μ · ℓ_i), upper) that meet loads f.
+
+    They minimise Σ ψ_i − f · μ, where ψ_i is the integral of p_i in μ · ℓ_i.
+    """
+
+    start: Array
+    levers: Array
+    loads: Array
+    upper: float
+
+    def solution(self, longest: Array, acting: float) -> Array | None:
+        """Return the pressures; None where there are none.
+
+        Args:
+            longest: Longest lever of each motion, shape (k,).
+            acting: Sum of pressures that act beside these.
+        """
+        exponents, values = np.zeros(len(self.loads)), self.start
         for _ in range(_MOST_STEPS):
-            off, error = self._missed(levers, values)
+            off = self.levers @ values - self.loads
+            scale = np.maximum(longest * (acting + values.sum()), np.abs(self.loads))
+            error = float(np.max(np.abs(off) / np.where(scale > 0.0, scale, 1.0)))
             if error <= _ROUNDING:
                 return values
-            found = None
             # cells at the bound do not resist, unless they are to leave it
-            for resisting in (values < upper, np.ones(len(values), bool)):
-                found = self._step(start, levers, upper, exponents, off, values * resisting)
-                if found is not None:
-                    break
+            found = self._step(exponents, off, np.where(values < self.upper, values, 0.0))
+            found = self._step(exponents, off, values) if found is None else found
             if found is None or np.abs(found).max() > _FARTHEST:
-                return values if error <= _ENOUGH else None
-            exponents = found
-            values = np.minimum(start * np.exp(exponents @ levers), upper)
-        return values if self._missed(levers, values)[1] <= _ENOUGH else None
+                break
+            exponents, values = found, self.at(found)
+        return values if error <= _ENOUGH else None
 
-    def _missed(self, levers: Array, values: Array) -> tuple[Array, float]:
-        """Return what pressures miss of the loads, and the largest part of what could act."""
-        off = levers @ values - self.loads
-        longest = np.abs(self.along_x).max(axis=1) * np.abs(self.along_y).max(axis=1)
-        scale = np.maximum(longest * values.sum(), np.abs(self.loads))
-        return off, float(np.max(np.abs(off) / np.where(scale > 0.0, scale, 1.0)))
+    def at(self, exponents: Array) -> Array:
+        """Return the pressures for multipliers μ."""
+        found = self.start * np.exp(exponents @ self.levers)
+        return np.where(found < (1.0 - _AT_BOUND) * self.upper, found, self.upper)
 
-    def _step(
-        self,
-        start: Array,
-        levers: Array,
-        upper: float,
-        exponents: Array,
-        off: Array,
-        weights: Array,
-    ) -> Array | None:
-        """Return the exponents after a Newton step, shortened where it goes too far."""
-        curvature = (levers * weights) @ levers.T
+    def _step(self, exponents: Array, off: Array, weights: Array) -> Array | None:
+        """Return the multipliers after a Newton step, shortened where it goes too far."""
+        curvature = (self.levers * weights) @ self.levers.T
         if not np.isfinite(curvature).all() or not curvature.any():
             return None
         step = -np.linalg.lstsq(curvature, off, rcond=1e-14)[0]
-        change = float(np.abs(step @ levers).max())
+        change = float(np.abs(step @ self.levers).max())
         step *= min(1.0, _LONGEST / change) if change > 0.0 else 1.0
-        slope = float(off @ step)
         for _ in range(_MOST_HALVINGS):
-            further = exponents + step
-            values = np.minimum(start * np.exp(further @ levers), upper)
-            left, error = self._missed(levers, values)
-            if float(left @ step) < -_LEFT * slope or error <= _ROUNDING:
-                return further
-            step, slope = 0.5 * step, 0.5 * slope
+            left = self.levers @ self.at(exponents + step) - self.loads
+            if float(left @ step) <= -_BEYOND * float(off @ step):
+                return exponents + step
+            step = 0.5 * step
         return None
 
 

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import NotConverged
-from micro.cells.anderson import Anderson
 from micro.cells.coarse_start import coarse_pressure, coarsened, nested_pressure
 from micro.cells.contact_pressure import Pressures, contact_pressure
 from micro.cells.elastic_grid import ElasticGrids
+from micro.cells.lagged_slopes import Solve, with_slopes
 from micro.cells.motions import Motions
 from micro.cells.reach import Box
 
@@ -20,18 +18,8 @@ Array = NDArray[np.float64]
 
 _MARGIN = 1.1
 """Factor on an estimated approach, so that the cells in its reach hold the contact."""
-_MOST_LAGS = 30
-_FIRST = 1e-2
-"""Residual of the first solution, before finite slopes are known."""
-_AHEAD = 2e-2
-"""Residual of a solution, of the last change by finite slopes: what the next change will be."""
-_LAG = 3e-9
-"""Change by finite slopes that is let be, of the largest displacement."""
 _FEW_CELLS = 32
 """Cells per side on which the approach is estimated."""
-
-
-Solve = Callable[[Array, Motions | None, Pressures | None, float], Pressures]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -56,7 +44,7 @@ class Pressing:
 
     def by_approach(self, required: Array, start: Pressures | None) -> Pressures:
         """Solve with given displacements d, as `contact_pressure`; pressures on all cells."""
-        return self._with_slopes(self._by_approach, required, None, start)
+        return self._agreed(self._by_approach, required, None, start)
 
     def by_force(self, required: Array, total: float, start: Pressures | None) -> Pressures:
         """Solve with a given sum of pressures / E*; ``required`` holds up to a constant.
@@ -67,49 +55,16 @@ class Pressing:
             start: A solution nearby, its motion the approach.
         """
         motions = Motions.approach(required.shape, total)
-        return self._with_slopes(self._by_force, required, motions, start)
+        return self._agreed(self._by_force, required, motions, start)
 
     def by_turning(self, required: Array, motions: Motions, start: Pressures | None) -> Pressures:
         """Solve with free slopes; ``required`` holds up to the free motions."""
-        return self._with_slopes(self._by_turning, required, motions, start)
+        return self._agreed(self._by_turning, required, motions, start)
 
-    def _with_slopes(
+    def _agreed(
         self, solve: Solve, required: Array, motions: Motions | None, start: Pressures | None
     ) -> Pressures:
-        """Solve, displacements by finite slopes taken from the solution before, until both agree.
-
-        They are a few per cent of all, and change by a hundredth of that in the second solution.
-        """
-        if self.grids.slopes is None:
-            return solve(required, motions, start, self.tolerance)
-        known = Anderson()
-        lag = np.zeros(required.shape)
-        if start is not None and start.pressure.any():
-            lag = self.grids.by_slopes(start.pressure)
-        tolerance, iterations, passes = max(self.tolerance, _FIRST), 0, 0
-        last = max(_LAG, 10.0 * self.tolerance)
-        for _ in range(_MOST_LAGS):
-            found = start = solve(required - lag, motions, start, tolerance)
-            iterations, passes = iterations + found.iterations, passes + found.passes
-            touching = found.pressure > 0.0
-            if not touching.any():
-                return found
-            change = self.grids.by_slopes(found.pressure) - lag
-            nearer = required if motions is None else required + motions.nearer(found.motion)
-            scale = float(nearer[touching].max())
-            left = float(np.abs(change[touching]).max()) / scale
-            if left <= last and tolerance <= self.tolerance:
-                residual = max(found.residual, left)
-                return found._replace(residual=residual, iterations=iterations, passes=passes)
-            lag = known.next(lag, change)
-            ahead = _AHEAD * left
-            tolerance = self.tolerance if ahead <= last else min(_FIRST, ahead)
-        raise NotConverged(
-            "the displacements by finite slopes",
-            reason=f"they still change by {left:.1e} of the displacement",
-            iterations=iterations,
-            remedy="set micro.finite_slopes = false, or smooth the surface",
-        )
+        return with_slopes(solve, self.grids, required, motions, start, self.tolerance)
 
     def _by_approach(
         self,

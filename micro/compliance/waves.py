@@ -61,6 +61,9 @@ class Waves:
         ky = 2.0 * np.pi * fft.rfftfreq(self.padded[1], self.spacing[1])
         self.wave_number = np.hypot(kx, ky).astype(np.float64)
         self.directions = _directions(kx, ky).astype(np.float64)
+        for axis, count in enumerate(self.padded):
+            if count % 2 == 0:  # waves of two cells run either way
+                self.directions[2].swapaxes(0, axis)[count // 2] = 0.0
         self._filter = _filter(self.coarse)
 
     def coarsened(self, field: Array) -> Array:

@@ -91,7 +91,7 @@ def test_fewer_modes_are_the_first_ones(body):
         np.moveaxis(cut, axis, 0)[2] = 0.0
     same = BodyModes(LENGTHS, cut.reshape(9, 9))
     np.testing.assert_allclose(body.fewer(2).between(x, y), same.between(x, y), rtol=1e-12)
-    with pytest.raises(InputError, match=r"not there .*1 … 3"):
+    with pytest.raises(InputError, match=r"so many modes are not there .*1 … 3"):
         body.fewer(4)
 
 
@@ -99,9 +99,9 @@ def test_fewer_modes_are_the_first_ones(body):
     ("lengths", "matrix", "problem"),
     [
         ((0.0, 1.0), np.eye(4), "lengths must be positive"),
-        ((1.0, 1.0), np.eye(5), "not one of K × K modes"),
-        ((1.0, 1.0), np.full((4, 4), np.nan), "not finite"),
-        ((1.0, 1.0), np.triu(np.ones((4, 4))), "not symmetric"),
+        ((1.0, 1.0), np.eye(5), "the compliance is not one of K × K modes"),
+        ((1.0, 1.0), np.full((4, 4), np.nan), "the compliance is not finite"),
+        ((1.0, 1.0), np.triu(np.ones((4, 4))), "the compliance is not symmetric"),
     ],
 )
 def test_what_is_no_compliance_is_refused(lengths, matrix, problem):

@@ -149,7 +149,7 @@ def test_summit_outside_the_patches(surface):
     small = PatchGrid(grid=(1, 1), lengths=(1.0, 0.5))
     for model in models(surface):
         with pytest.raises(InputError, match="lie outside the patches"):
-            model.respond([np.ptp(surface.heights)], patches=small, mean_heights=[0.0])
+            model.respond([0.5 * np.ptp(surface.heights)], patches=small, mean_heights=[0.0])
 
 
 def test_one_summit_outside_the_patches():

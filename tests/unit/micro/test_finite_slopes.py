@@ -1,5 +1,7 @@
 """The finite-slope term: symmetry, invariance, orders against a solution without expansion."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rough_half_space import displaced
@@ -86,6 +88,19 @@ def test_second_order_counts_heights_from_anywhere():
     there = slopes.displacement(pressure)
     # but for what is cut off far away
     assert there == pytest.approx(here, abs=5e-3 * np.abs(here).max())
+
+
+@pytest.mark.parametrize("around", ["nothing", "periodic", "block"])
+@pytest.mark.parametrize("grid", [(18, 15), (20, 24)])
+def test_a_mirrored_surface_moves_as_in_a_mirror(grid, around):
+    """Down to waves of two cells, which run neither way."""
+    surface = rough(grid)
+    pressure = pressed(surface, around == "periodic")
+    found = term(surface, around).displacement(pressure)
+    for axis in (0, 1):
+        mirrored = replace(surface, heights=np.flip(surface.heights, axis))
+        other = term(mirrored, around).displacement(np.flip(pressure, axis))
+        assert np.flip(other, axis) == pytest.approx(found, abs=1e-9 * np.abs(found).max())
 
 
 def test_displacement_counts_from_the_mean_of_a_periodic_surface():

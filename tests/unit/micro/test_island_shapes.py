@@ -52,10 +52,11 @@ def test_lift_leaves_out_the_own_island():
     relief = Relief.of(bumps((0.3, 0.5, 0.0, 0.2, 0.2, 0.0), (0.7, 0.5, 0.0, 0.2, 0.2, 0.0)))
     height = np.where(relief.z > -1e-6, 2e-3, -1.0)
     found = islands(relief, height, np.arange(len(relief)))
-    lift = found.lift(relief.x, relief.y)[height > 0.0]
+    lift = (found.kernel(relief.x, relief.y) @ found.force)[height > 0.0]
     assert lift == pytest.approx(found.force / (np.pi * 0.4), rel=1e-4)
     # At its own centre an island displaces by its depth, no more.
-    alone = found.lift(np.full(len(relief), found.x[0]), np.full(len(relief), found.y[0]))
+    middle = np.full(len(relief), found.x[0]), np.full(len(relief), found.y[0])
+    alone = found.kernel(*middle) @ found.force
     other = np.flatnonzero((height > 0.0) & (found.member == 1))
     beyond = alone[other][0]
     assert beyond == pytest.approx(found.depth[0], rel=1e-12)
@@ -64,4 +65,4 @@ def test_lift_leaves_out_the_own_island():
 def test_nothing_above():
     relief = Relief.of(bumps((0.5, 0.5, 0.0, 0.2, 0.2, 0.0)))
     found = islands(relief, np.full(len(relief), -1.0), np.zeros(len(relief), dtype=int))
-    assert len(found) == 0 and found.lift(relief.x, relief.y).tolist() == [0.0] * len(relief)
+    assert len(found) == 0 and found.kernel(relief.x, relief.y).shape == (len(relief), 0)

@@ -89,6 +89,15 @@ def test_best_motion_closes_the_gaps_of_a_motion(pressure):
     assert motions.best(pressure, wild) == pytest.approx(asked, rel=1e-12)
 
 
+def test_best_motion_is_exact_for_light_cells_too():
+    """Cells that touch without pressure have a weight of 1e-8 of the others."""
+    motions, cells = Motions.turning(X, Y, 1.0), np.array([3, 60, 29])
+    weights, gap = np.zeros(GRID), motions.nearer(np.array([1.0, -0.3, 0.7]))
+    weights.ravel()[cells] = [1.0, 0.8, 1e-8]
+    left = gap - motions.nearer(motions.best(weights, gap))
+    assert np.abs(left.ravel()[cells]).max() < 1e-15
+
+
 def test_a_box_carries_all_loads(pressure):
     motions, box = Motions.turning(X, Y, 3.0), Box(slice(2, 9), slice(0, 5))
     part = motions.on(box)

@@ -180,6 +180,7 @@ def test_refuses_approaches_that_are_no_finite_list(model, approaches, problem):
         (MEANS[:-1], r"\(5,\): every patch needs one mean height"),
         (MEANS.reshape(PATCHES.grid), r"\(3, 2\): every patch needs one mean height"),
         (0.0, r"\(\): every patch needs one mean height"),
+        (["low"] * PATCHES.count, "the mean heights are no numbers"),
     ],
 )
 def test_refuses_mean_heights_that_do_not_fit(model, means, problem):

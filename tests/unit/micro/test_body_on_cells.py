@@ -1,0 +1,120 @@
+"""A body's compliance on cells: symmetry, boxes, cells that the body lifts into contact."""
+
+import numpy as np
+import pytest
+
+from geometry import Control, Surface
+from micro import HalfSpaceModel
+from micro.cells.elastic_grid import Cells, ElasticGrids
+from micro.cells.pressing import Pressing
+from micro.cells.reach import Box
+from micro.compliance.body_modes import BodyModes
+
+E_STAR = 4000.0
+GRID, SPACING = (64, 48), (1.0 / 64, 0.75 / 48)
+LENGTHS = (1.0, 0.75)
+
+
+def seesaw(size):
+    """Return a body that turns under a load beside the middle: what it raises is far from it."""
+    matrix = np.zeros((9, 9))
+    matrix[3, 3] = size  # the first mode along x, even along y
+    return BodyModes(LENGTHS, matrix)
+
+
+def random_body(seed=0, size=1e-3):
+    half = np.random.default_rng(seed).standard_normal((9, 9))
+    return BodyModes(LENGTHS, size * half @ half.T)
+
+
+def two_bumps(lower):
+    x = (np.arange(GRID[0]) + 0.5) * SPACING[0]
+    y = (np.arange(GRID[1]) + 0.5) * SPACING[1]
+    right = -((x[:, None] - 0.85) ** 2 + (y - 0.37) ** 2) / 0.4
+    left = -((x[:, None] - 0.1) ** 2 + (y - 0.3) ** 2) / 0.4 - lower
+    return Surface(heights=np.maximum(right, left), lengths=LENGTHS)
+
+
+def test_is_symmetric_on_cells():
+    grid = ElasticGrids(periodic=False, modulus=E_STAR, body=random_body()).at(
+        GRID, SPACING, Box.whole(GRID)
+    )
+    p, q = np.random.default_rng(1).standard_normal((2, *GRID))
+    one, other = np.vdot(p, grid.displacement(q)), np.vdot(q, grid.displacement(p))
+    scale = np.linalg.norm(p) * np.linalg.norm(grid.displacement(q))
+    assert abs(one - other) < 1e-12 * scale
+
+
+def test_some_cells_and_a_box_are_a_part_of_all():
+    grids = ElasticGrids(periodic=False, modulus=E_STAR, body=random_body())
+    alone = ElasticGrids(periodic=False)
+    box = Box(slice(8, 40), slice(16, 48))
+    dice = np.random.default_rng(2)
+    p = np.zeros(GRID)
+    p[box] = np.where(dice.random(box.shape) > 0.7, dice.random(box.shape), 0.0)
+    added = [given.at(GRID, SPACING, Box.whole(GRID)).displacement(p) for given in (grids, alone)]
+    body = added[0] - added[1]
+    part = grids.at(box.shape, SPACING, box)
+    inside = part.displacement(p[box]) - alone.at(box.shape, SPACING, box).displacement(p[box])
+    assert inside == pytest.approx(body[box], abs=1e-12 * np.abs(body).max())
+    cells = Cells.of(np.flatnonzero(p[box]), box.shape)
+    rough = part.comply(cells, p[box].ravel()[cells.flat])
+    fine = part.displacement(p[box]).ravel()[cells.flat]
+    assert rough == pytest.approx(fine, abs=1e-5 * np.abs(fine).max())  # single precision
+    assert grids.risen(p, SPACING) == pytest.approx(body, abs=1e-11 * np.abs(body).max())
+
+
+@pytest.mark.parametrize(
+    ("control", "lower"),
+    [
+        (Control(approach=5e-3), 6e-3),
+        (Control(force=0.1), 2e-3),
+        (Control(approach=5e-3, tilt=(1e-3, 1e-3)), 6e-3),
+    ],
+    ids=["approach", "force", "tilted"],
+)
+def test_cells_lifted_into_contact_are_found(control, lower):
+    """The lower bump lies outside of all that the plane overlaps; the body turns it up."""
+    surface = two_bumps(lower)
+    model = HalfSpaceModel(
+        surface=surface, contact_modulus=E_STAR, body=seesaw(3e-3), tolerance=1e-9
+    )
+    state = model.equilibrium(control)
+    overlap = state.required > 0.0
+    left = surface.x < 0.5
+    assert not overlap[left].any()
+    assert state.in_contact[left].any() and state.in_contact[~left].any()
+    slack = 1.1e-9 * state.required.max()
+    assert state.gap.min() >= -slack
+    assert np.abs(state.gap[state.in_contact]).max() <= slack
+    # the same on all cells at once, where no box can hide any
+    required = state.required
+    whole = Box.whole(GRID)
+    pressing = Pressing(
+        grids=ElasticGrids(periodic=False, modulus=E_STAR, body=seesaw(3e-3)),
+        spacing=SPACING,
+        tolerance=1e-10,
+    )
+    every = pressing._on(whole, required, None, None, 1e-10)
+    assert state.pressure / E_STAR == pytest.approx(every.pressure, abs=1e-6 * every.pressure.max())
+
+
+def test_a_stiff_body_lifts_nothing():
+    model = HalfSpaceModel(surface=two_bumps(8e-3), contact_modulus=E_STAR, body=seesaw(1e-6))
+    state = model.solve(5e-3)
+    assert not state.in_contact[model.surface.x < 0.5].any()
+    assert state.gap.min() >= -1.1e-8 * 5e-3
+
+
+def test_a_body_under_a_free_plane():
+    surface = two_bumps(1e-3)
+    model = HalfSpaceModel(
+        surface=surface, contact_modulus=E_STAR, body=random_body(3, 1e-4), tolerance=1e-10
+    )
+    state = model.solve_force(2.0, tilt=None)
+    area = np.prod(SPACING)
+    for arm in (surface.x[:, None] - 0.5, surface.y - 0.375):
+        assert abs(np.sum(state.pressure * arm) * area) < 1e-10 * 2.0
+    assert state.gap.min() >= -1.1e-10 * state.required.max()
+    fixed = model.solve(state.approach, tilt=state.plane.tilt)
+    assert fixed.force == pytest.approx(2.0, rel=1e-8)
