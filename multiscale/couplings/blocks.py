@@ -178,6 +178,7 @@ def patch_displacements(stage: Stage, comm: Any, *, dense: bool) -> Callable[[Ar
         compliance = patch_compliance(stage, comm)
         return lambda pressures: np.asarray(pressures @ compliance.T)
     interface = embedding(stage, comm)
+    work = interface.block.stiffness.createVecRight()
 
     def solved(pressures: Array) -> Array:
         rows = []
@@ -185,8 +186,8 @@ def patch_displacements(stage: Stage, comm: Any, *, dense: bool) -> Callable[[Ar
             if not row.any():
                 rows.append(np.zeros(len(row)))
                 continue
-            field = interface.block.solve(interface.load(row))
-            rows.append(interface.patch_displacements(field.x.array[: interface.block.owned_dofs]))
+            work.array[:] = interface.block.solve(interface.load(row)).x.array[: work.local_size]
+            rows.append(interface.patch_displacements(work))
         return np.array(rows)
 
     return solved
