@@ -16,7 +16,7 @@ CONTROLS = {
 HALF = 0.5 * np.sqrt(2.0)
 
 
-@pytest.mark.parametrize("scale", [0.3, 1.0, 10.0])
+@pytest.mark.parametrize("scale", [-0.3, 1.0, 10.0])
 @pytest.mark.parametrize("name", CONTROLS)
 def test_the_coupling_finds_the_solution_of_the_whole_problem(name, scale):
     control = CONTROLS[name]
