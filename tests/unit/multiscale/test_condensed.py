@@ -1,16 +1,15 @@
 """The condensed block against the full Newton on the same mesh and laws."""
 
-import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from petsc4py import PETSc
 
-from geometry.errors import InputError, NotConverged
+from geometry.errors import NotConverged
 from multiscale import Run, Scene, run
 from multiscale.couplings.blocks import patch_compliance
-from multiscale.plan import statements, warnings
+from multiscale.plan import statements
 from multiscale.planning.newton_choice import newton_choice
 from multiscale.staging import make_stage
 
