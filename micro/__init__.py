@@ -35,7 +35,7 @@ from micro.hertz import HertzContact, contact_modulus
 from micro.influence import influence_matrix, mutual_influence
 from micro.love import love_centre, love_integral, love_mean, love_mutual
 from micro.model import MicroModel
-from micro.models import MODEL_NAMES, micro_model
+from micro.models import MODEL_NAMES, START_KINDS, micro_model
 from micro.plane import RigidPlane
 from micro.regions.island_state import IslandState
 from micro.regions.islands import IslandModel
@@ -51,6 +51,7 @@ __all__ = [
     "MODEL_NAMES",
     "PAIR_SUMS",
     "SOLVERS",
+    "START_KINDS",
     "AsperityModel",
     "AsperityState",
     "BodyModes",

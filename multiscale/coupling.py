@@ -12,7 +12,7 @@ from geometry.collective import on_root
 from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
-from micro import MicroModel, Response, RigidPlane
+from micro import START_KINDS, MicroModel, Response, RigidPlane
 from multiscale.law_tables.law_files import LawTable
 from multiscale.load_step import LoadStep, PatchState
 from multiscale.loading import BeyondLaws, described
@@ -64,7 +64,7 @@ class ContactCoupling:
 
     def restore(self, state: Arrays) -> None:
         """Go on from a solution; see `Restorable`."""
-        self._start = unpacked(state, (RigidPlane,))
+        self._start = unpacked(state, START_KINDS)
 
 
 class EmbeddedCoupling:

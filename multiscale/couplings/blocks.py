@@ -64,7 +64,13 @@ def contact_model(stage: Stage, comm: Any) -> MicroModel:
 
 
 def half_space_models(
-    stage: Stage, comm: Any, *, embedded: bool, modes: int | None = None, coarse: bool = False
+    stage: Stage,
+    comm: Any,
+    *,
+    embedded: bool,
+    modes: int | None = None,
+    coarse: bool = False,
+    face: FaceCompliance | None = None,
 ) -> Models:
     """Return what makes a scene's half-space model on any cells, its body solved for once.
 
@@ -74,6 +80,7 @@ def half_space_models(
         embedded: Whether the surface lies on the scene's block, or on a half-space.
         modes: Modes of the body along a side; by default those of its shape.
         coarse: Whether to take coarser elements for the body.
+        face: What pressures do to the body's top, where that is known; then it is not collective.
 
     Returns:
         A function from the surface and the order of finite slopes, 0 for none, to the model. It is
@@ -86,7 +93,8 @@ def half_space_models(
     if not isinstance(given, HalfSpaceModel):
         raise TypeError("the scene's micro model is no half-space")
     body = scene_body(stage) if embedded else None
-    face = None if body is None else body.face(comm, modes=modes, coarse=coarse)
+    if body is not None and face is None:
+        face = body.face(comm, modes=modes, coarse=coarse)
     section = stage.scene.block
     material = HalfSpace(section.young_modulus, section.poisson_ratio)
 
@@ -178,6 +186,7 @@ def patch_displacements(stage: Stage, comm: Any, *, dense: bool) -> Callable[[Ar
         compliance = patch_compliance(stage, comm)
         return lambda pressures: np.asarray(pressures @ compliance.T)
     interface = embedding(stage, comm)
+    work = interface.block.stiffness.createVecRight()
 
     def solved(pressures: Array) -> Array:
         rows = []
@@ -185,8 +194,8 @@ def patch_displacements(stage: Stage, comm: Any, *, dense: bool) -> Callable[[Ar
             if not row.any():
                 rows.append(np.zeros(len(row)))
                 continue
-            field = interface.block.solve(interface.load(row))
-            rows.append(interface.patch_displacements(field.x.array[: interface.block.owned_dofs]))
+            work.array[:] = interface.block.solve(interface.load(row)).x.array[: work.local_size]
+            rows.append(interface.patch_displacements(work))
         return np.array(rows)
 
     return solved

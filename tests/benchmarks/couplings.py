@@ -8,28 +8,22 @@ import os
 os.environ["OMP_NUM_THREADS"] = "1"
 os.environ["PATCHLAW_CACHE"] = "off"
 
-import math
 import statistics
 import time
+from dataclasses import replace
 
 from mpi4py import MPI
 
 from geometry import BlockShape, Control, PatchGrid, Spectrum, patch_means, synthesise
-from macro import Material, make_correction
-from micro import HalfSpace, HalfSpaceModel, influence_matrix
-from multiscale import (
-    ConcurrentCoupling,
-    CondensedCoupling,
-    Programme,
-    SpreadLoads,
-    consistent_laws,
-    load_steps,
-)
+from macro import Material
+from micro import FreeSides, HalfSpaceModel
+from multiscale import CondensedCoupling, Programme, consistent_laws, load_steps
+from multiscale.coupling import ContactCoupling
+from multiscale.couplings.body import Body
 
 REPEATS = 5
 APPROACH = 8e-3
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
-LOADS = PatchGrid(grid=(16, 16), lengths=(1.0, 1.0))
 
 
 def median(action, *given, **options):
@@ -42,10 +36,20 @@ def median(action, *given, **options):
     return statistics.median(times), result
 
 
-def correction():
-    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(16, 16, 12))
-    half_space = HalfSpace(MATERIAL.young_modulus, MATERIAL.poisson_ratio)
-    return make_correction(shape, MATERIAL, "free", LOADS, half_space, MPI.COMM_SELF)
+def block():
+    """Return the compliance of the cube's top in modes."""
+    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(1, 1, 1))
+    sides = FreeSides(lengths=(1.0, 1.0), poisson_ratio=MATERIAL.poisson_ratio, reach=0.25)
+    body = Body(shape=shape, material=MATERIAL, sides="free", known=sides)
+    return body, body.face(MPI.COMM_SELF)
+
+
+def models(cells, body, face):
+    """Return the contact problems of a surface on a half-space and on the cube."""
+    alone = HalfSpaceModel(
+        surface=surface_of(cells), contact_modulus=MATERIAL.contact_modulus, tolerance=1e-10
+    )
+    return alone, replace(alone, sides=body.known, body=body.term(face))
 
 
 def surface_of(cells):
@@ -53,62 +57,56 @@ def surface_of(cells):
     return synthesise(spectrum, grid=(cells, cells), lengths=(1.0, 1.0))
 
 
-def condensed(table, yielding):
+def condensed(table, compliance):
     """Press a hundred steps."""
     programme = Programme(quantity="approach", points=(APPROACH,), steps=100)
-    return list(load_steps(CondensedCoupling(table, yielding), programme))
+    return list(load_steps(CondensedCoupling(table, compliance), programme))
 
 
-def by_laws(rest, count):
+def by_laws(body, face, count):
     """Print the times of laws and of load steps with them."""
-    surface = surface_of(256)
-    model = HalfSpaceModel(surface=surface, contact_modulus=MATERIAL.contact_modulus)
-    patches = PatchGrid(grid=(count, count), lengths=surface.lengths)
-    given = {"mean_heights": patch_means(surface, patches), "approach_end": 1.2 * APPROACH}
-    for block, where in ((None, "half-space"), (rest, "block")):
-        for rows in (33, 65):
-            more = given | {"most_rows": rows, "sinking": block}
-            spent, table = median(consistent_laws, model, patches, **more)
-            used = max(law.approach.size for law in table.laws)
-            print(f"laws of {count**2} patches on a {where}, 256², {used} rows: {spent:.2f} s")
-    table = consistent_laws(model, patches, **given)
-    under_patches = influence_matrix(patches) / (math.pi * model.contact_modulus)
-    on_block = consistent_laws(model, patches, sinking=rest, **given)
-    for name, laws, yielding in (
-        ("mean over patches", table, under_patches + rest.patch_compliance(patches)),
-        ("where contacts are", on_block, SpreadLoads(under_patches, on_block.spread)),
-    ):
-        spent, _ = median(condensed, laws, yielding)
-        print(f"100 condensed load steps, {count**2} patches, rest {name}: {spent:.3f} s")
+    _, model = models(256, body, face)
+    patches = PatchGrid(grid=(count, count), lengths=model.surface.lengths)
+    compliance = body.patch_compliance(patches, MPI.COMM_SELF)
+    for rows in (33, 65):
+        spent, table = median(
+            consistent_laws,
+            model,
+            patches,
+            mean_heights=patch_means(model.surface, patches),
+            largest=Control(approach=APPROACH),
+            displacements=lambda pressures: pressures @ compliance.T,
+            most_rows=rows,
+        )
+        used = max(law.approach.size for law in table.laws)
+        print(f"laws of {count**2} patches on the block, 256², {used} rows: {spent:.2f} s")
+    spent, _ = median(condensed, table, compliance)
+    print(f"100 condensed load steps, {count**2} patches: {spent:.3f} s")
 
 
-def together(rest, model, patches, means):
-    """Press eight steps; return how often contacts were solved for in each."""
-    coupling = ConcurrentCoupling(model, patches, means, rest)
-    steps = [coupling.press(Control(approach=APPROACH * k / 8)) for k in range(1, 9)]
-    return [step.newton_iterations for step in steps]
+def together(model):
+    """Press eight steps."""
+    patches = PatchGrid(grid=(4, 4), lengths=model.surface.lengths)
+    coupling = ContactCoupling(model, patches, patch_means(model.surface, patches))
+    return [coupling.press(Control(approach=APPROACH * k / 8)) for k in range(1, 9)]
 
 
-def by_contacts(rest, cells):
-    """Print the times of the concurrent coupling, and of its contacts alone."""
-    surface, patches = surface_of(cells), PatchGrid(grid=(4, 4), lengths=(1.0, 1.0))
-    modulus = MATERIAL.contact_modulus
-    model = HalfSpaceModel(surface=surface, contact_modulus=modulus, tolerance=1e-10)
-    alone, _ = median(model.solve, APPROACH)
-    spent, presses = median(together, rest, model, patches, patch_means(surface, patches))
+def by_contacts(body, face, cells):
+    """Print the times of load steps on the half-space and on the block."""
+    alone, block = (median(together, model)[0] for model in models(cells, body, face))
     print(
-        f"8 concurrent load steps, {cells}² heights: {spent:.2f} s, presses {presses}; "
-        f"contacts alone, one cold solution: {alone:.3f} s"
+        f"8 load steps, {cells}² heights: analytic {alone:.2f} s, concurrent {block:.2f} s, "
+        f"{block / alone:.2f} times as much"
     )
 
 
 def main():
-    spent, rest = median(correction)
-    print(f"smooth rest of the block, 256 loads, 16 × 16 × 12 cells: {spent:.2f} s")
+    spent, (body, face) = median(block)
+    print(f"compliance of the block's top: {spent:.2f} s")
     for count in (4, 16):
-        by_laws(rest, count)
+        by_laws(body, face, count)
     for cells in (64, 128, 256):
-        by_contacts(rest, cells)
+        by_contacts(body, face, cells)
 
 
 if __name__ == "__main__":

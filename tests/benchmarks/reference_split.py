@@ -8,7 +8,7 @@ it knows its own force. What c = 1 differs by is the effect of finite slopes, of
 and no error of either: at c = 0.1 it is still 0.3 %.
 
 Contacts beside the block's free sides, as on seeds 1 and 6, feel them on their own scale: the
-half-space knows these sides, and the rectangles of load and the elements only what is left.
+half-space knows these sides, and the body's modes only what is left.
 """
 
 import os
@@ -20,22 +20,19 @@ import time
 
 import numpy as np
 from mpi4py import MPI
-from multiscale.couplings.concurrent import ConcurrentCoupling
 
 from geometry import (
     BlockShape,
     Control,
-    PatchGrid,
     Spectrum,
-    UnevenPartition,
     characteristic_size,
-    patch_means,
     reference_shapes,
     suggested_fine,
     synthesise,
 )
-from macro import Block, Material, ObstacleBlock, make_correction, rough_block_mesh
-from micro import FreeSides, HalfSpace, HalfSpaceModel
+from macro import Block, Material, ObstacleBlock, rough_block_mesh
+from micro import FreeSides, HalfSpaceModel
+from multiscale.couplings.body import Body
 from multiscale.reference.extrapolation import extrapolated
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
@@ -49,28 +46,18 @@ def rough(seed, grid=256):
     return synthesise(spectrum, grid=(grid, grid), lengths=(SIDE, SIDE))
 
 
-def graded(count):
-    """Return rectangles of load, halved towards the free sides as in scenes."""
-    ticks = np.linspace(0.0, SIDE, count + 1)
-    ticks = np.concatenate([[0.0], ticks[1:2] / 2, ticks[1:-1], SIDE - ticks[1:2] / 2, [SIDE]])
-    return UnevenPartition(ticks_x=tuple(ticks), ticks_y=tuple(ticks))
-
-
-def rest_of(count):
+def body_of():
     """Return what the block adds to the half-space with its sides, which serves every surface."""
-    shape = BlockShape(interface=(SIDE, SIDE), height=SIDE, cells=(24, 24, 16))
-    half_space = HalfSpace(MATERIAL.young_modulus, MATERIAL.poisson_ratio)
-    found = make_correction(shape, MATERIAL, "free", graded(count), half_space, COMM)
-    beside = SIDES.top(found.x, found.y, found.loads)
-    return found.less(beside / MATERIAL.contact_modulus)
+    shape = BlockShape(interface=(SIDE, SIDE), height=SIDE, cells=(1, 1, 1))
+    body = Body(shape=shape, material=MATERIAL, sides="free", known=SIDES)
+    return body.term(body.face(COMM))
 
 
-def concurrent(surface, approach, rest):
-    """Return the force of the half-space whose plane follows the block's smooth rest."""
-    model = HalfSpaceModel(surface=surface, contact_modulus=MATERIAL.contact_modulus, sides=SIDES)
-    patches = PatchGrid(grid=(4, 4), lengths=(SIDE, SIDE))
-    coupling = ConcurrentCoupling(model, patches, patch_means(surface, patches), rest)
-    return coupling.press(Control(approach=approach)).force_N
+def concurrent(surface, approach, body):
+    """Return the force of the contact problem on the block."""
+    modulus = MATERIAL.contact_modulus
+    model = HalfSpaceModel(surface=surface, contact_modulus=modulus, sides=SIDES, body=body)
+    return model.solve(approach).force
 
 
 def meshed(surface, approach, scale, edges, meshes):
@@ -97,10 +84,9 @@ def main():
     parser.add_argument("--meshes", type=int, default=3)
     parser.add_argument("--edges", type=float, default=3.0)
     parser.add_argument("--approach", type=float, default=APPROACH)
-    parser.add_argument("--loads", type=int, nargs=2, default=[16, 32])
     parser.add_argument("--grids", type=int, nargs=2, default=[256, 512])
     choice = parser.parse_args()
-    rests = [rest_of(count) for count in choice.loads]
+    body = body_of()
     say("seed      c   F/c of each mesh [N]         size zero ± bar      rate  unknowns   CPU [s]")
     for seed in choice.seeds:
         surface = rough(seed)
@@ -116,18 +102,13 @@ def main():
                 f"{seed:4d} {scale:6.2f} {told}   {value:8.4f} ± {error:.4f} ({error / value:.2%}) "
                 f"{rate:5.2f} {unknowns[-1]:9d} {time.process_time() - began:8.1f}"
             )
-        coarse, finer, fine = (
-            concurrent(rough(seed, grid), choice.approach, rest)
-            for grid, rest in (
-                (choice.grids[0], rests[0]),
-                (choice.grids[0], rests[1]),
-                (choice.grids[1], rests[1]),
-            )
+        coarse, fine = (
+            concurrent(rough(seed, grid), choice.approach, body) for grid in choice.grids
         )
         inside = "inside" if abs(fine - value) <= error else "outside"
         say(
-            f"     concurrent {fine:.4f} N, of which finer loads {finer - coarse:+.4f} and cells "
-            f"{fine - finer:+.4f}; {fine / value - 1.0:+.2%} of the meshes' limit at heights × "
+            f"     concurrent {fine:.4f} N, of which finer cells {fine - coarse:+.4f}; "
+            f"{fine / value - 1.0:+.2%} of the meshes' limit at heights × "
             f"{scale:g}: {inside} the bar"
         )
 

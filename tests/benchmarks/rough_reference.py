@@ -17,17 +17,15 @@ from mpi4py import MPI
 from geometry import (
     BlockShape,
     Control,
-    PatchGrid,
     Spectrum,
     characteristic_size,
-    patch_means,
     reference_shapes,
     suggested_fine,
     synthesise,
 )
-from macro import Block, Material, ObstacleBlock, make_correction, rough_block_mesh
-from micro import HalfSpace, HalfSpaceModel, finite_slope_effect
-from multiscale import ConcurrentCoupling
+from macro import Block, Material, ObstacleBlock, rough_block_mesh
+from micro import FreeSides, HalfSpaceModel, finite_slope_effect
+from multiscale.couplings.body import Body
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 SPECTRUM = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1)
@@ -56,18 +54,21 @@ def report(surface, name, shape, scale):
     return forces
 
 
-def concurrent(surface, count):
-    shape = BlockShape(interface=surface.lengths, height=1.0, cells=(24, 24, 12))
-    loads = PatchGrid(grid=(count, count), lengths=surface.lengths)
-    half_space = HalfSpace(MATERIAL.young_modulus, MATERIAL.poisson_ratio)
-    rest = make_correction(shape, MATERIAL, "free", loads, half_space, COMM)
-    model = HalfSpaceModel(surface=surface, contact_modulus=MATERIAL.contact_modulus)
-    patches = PatchGrid(grid=(4, 4), lengths=surface.lengths)
-    coupling = ConcurrentCoupling(model, patches, patch_means(surface, patches), rest)
-    forces = [coupling.press(Control(approach=approach)).force_N for approach in APPROACHES]
+def concurrent(surface):
+    nu, side = MATERIAL.poisson_ratio, surface.lengths[0]
+    sides = FreeSides(lengths=surface.lengths, poisson_ratio=nu, reach=0.25 * side)
+    shape = BlockShape(interface=surface.lengths, height=1.0, cells=(1, 1, 1))
+    body = Body(shape=shape, material=MATERIAL, sides="free", known=sides)
+    model = HalfSpaceModel(
+        surface=surface,
+        contact_modulus=MATERIAL.contact_modulus,
+        sides=sides,
+        body=body.term(body.face(COMM)),
+    )
+    forces = [model.solve(approach).force for approach in APPROACHES]
     if COMM.rank == 0:
         told = ", ".join(f"{force:.4f}" for force in forces)
-        print(f"concurrent, contacts on {count} × {count} rectangles: F = {told} N", flush=True)
+        print(f"concurrent: F = {told} N", flush=True)
 
 
 def main():
@@ -81,8 +82,7 @@ def main():
     if COMM.rank == 0:
         told = ", ".join(f"{effect:+.1%}" for effect in effects)
         print(f"finite slopes change the force by {told}", flush=True)
-    for count in (8, 16, 32) if choice.large else (8, 16):
-        concurrent(surface, count)
+    concurrent(surface)
     families(surface, choice.large)
 
 

@@ -32,7 +32,7 @@ SCENES = {
     "concurrent": [
         "block.cells=[8, 8, 5]", "coupling.kind=concurrent", "micro.model=half-space",
     ],
-    "concurrent, coarse half-space ahead, balanced": [
+    "concurrent, free to turn": [
         "surface.grid=[96, 96]", "block.cells=[8, 8, 5]", "coupling.kind=concurrent",
         "micro.model=half-space", "load.tilt=free",
     ],

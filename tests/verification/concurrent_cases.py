@@ -1,15 +1,15 @@
-"""A surface of few cells, a made-up smooth correction, and both together as one dense problem."""
+"""A surface of few cells, a made-up body, and both together as one dense problem."""
 
 import numpy as np
-from multiscale.couplings.concurrent import ConcurrentCoupling
+from numpy.polynomial import legendre
 
 from geometry import PatchGrid, Spectrum, patch_means, synthesise
-from micro import micro_model
+from micro import BodyModes, HalfSpaceModel
+from multiscale.coupling import ContactCoupling
 
 MODULUS = 4000.0
 CELLS = 16
 SCENE = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
-LOADS = PatchGrid(grid=(4, 4), lengths=(1.0, 1.0))
 SURFACE = synthesise(
     Spectrum(hurst=0.95, waves=(2, 6), rms_slope=0.215, seed=3),
     grid=(CELLS, CELLS),
@@ -18,32 +18,20 @@ SURFACE = synthesise(
 MEANS = patch_means(SURFACE, SCENE)
 
 
-class Cosines:
-    """Yields by its mean and five cosines; ``scale`` 1 is the half-space's own mean compliance."""
-
-    def __init__(self, scale, loads=LOADS):
-        self.loads = loads
-        self.compliances = scale * 0.946 / MODULUS * np.array([1.0, 0.3, 0.3, 0.1, 0.05, 0.05])
-
-    @staticmethod
-    def modes(x, y):
-        """Return the six modes at points, shape (6, ...)."""
-        x, y = np.broadcast_arrays(np.pi * np.asarray(x), np.pi * np.asarray(y))
-        cos = np.cos
-        return np.array([x * 0 + 1, cos(x), cos(y), cos(x) * cos(y), cos(2 * x), cos(2 * y)])
-
-    def sag(self, forces):
-        """Return the displacement by forces on the load rectangles."""
-        parts = self.compliances * (self.modes(*self.loads.centres.T) @ forces)
-        return lambda x, y: np.tensordot(parts, self.modes(x, y), 1)
+def body(scale):
+    """Return a soft body of 3 × 3 modes; ``scale`` 1 gives about as much as the half-space."""
+    random = np.random.default_rng(4).normal(size=(9, 9))
+    softness = np.diag([1.0, 0.3, 0.05, 0.3, 0.1, 0.02, 0.05, 0.02, 0.01])
+    coupled = softness + 0.01 * random @ random.T
+    return BodyModes((1.0, 1.0), scale * 0.946 / MODULUS * coupled)
 
 
-def coupling(scale, name="half-space", **options):
-    """Return a coupling of the surface with the made-up correction."""
-    model = micro_model(name, SURFACE, contact_modulus=MODULUS)
-    if name == "half-space":
-        model = type(model)(surface=SURFACE, contact_modulus=MODULUS, tolerance=1e-11)
-    return ConcurrentCoupling(model, SCENE, MEANS, Cosines(scale), **options)
+def coupling(scale):
+    """Return a coupling of the surface with the made-up body."""
+    model = HalfSpaceModel(
+        surface=SURFACE, contact_modulus=MODULUS, tolerance=1e-11, body=body(scale)
+    )
+    return ContactCoupling(model, SCENE, MEANS)
 
 
 def dense_forces(scale, approach, tilt):
@@ -61,9 +49,13 @@ def dense_forces(scale, approach, tilt):
             v = y[:, None] - y + 0.5 * j / CELLS
             matrix += i * j * (u * np.arcsinh(v / np.abs(u)) + v * np.arcsinh(u / np.abs(v)))
     matrix *= CELLS**2 / (np.pi * MODULUS)
-    block = Cosines(scale)
-    owner = block.loads.centres[block.loads.index_of(x, y)].T
-    matrix += block.modes(x, y).T @ (block.compliances[:, None] * block.modes(*owner))
+    # means of Legendre's polynomials over cells, by another quadrature than the project's
+    nodes, weights = legendre.leggauss(4)
+    places = 2.0 * (centres[:, None] + 0.5 * nodes / CELLS) - 1.0
+    means = np.array([legendre.Legendre.basis(k)(places) @ weights / 2.0 for k in range(3)])
+    means *= np.sqrt(2.0 * np.arange(3) + 1.0)[:, None]
+    modes = np.einsum("ki,lj->klij", means, means).reshape(9, CELLS**2)
+    matrix += modes.T @ body(scale).matrix @ modes
     wanted = approach + tilt[0] * (x - 0.5) + tilt[1] * (y - 0.5)
     wanted = wanted - (SURFACE.highest - SURFACE.heights.ravel())
     on, forces = wanted > 0.0, np.zeros_like(x)

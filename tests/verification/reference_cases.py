@@ -6,13 +6,15 @@ import numpy as np
 from mpi4py import MPI
 from scipy.special import gamma
 
-from geometry import BlockShape, Control, PatchGrid, Surface, reference_shapes
-from macro import Block, Material, ObstacleBlock, make_correction, rough_block_mesh
-from micro import HalfSpace, HertzContact
+from geometry import BlockShape, Control, Surface, reference_shapes
+from macro import Block, Material, ObstacleBlock, rough_block_mesh
+from micro import FreeSides, HalfSpaceModel, HertzContact
+from multiscale.couplings.body import Body
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 MODULUS = MATERIAL.contact_modulus
 COMM = MPI.COMM_SELF
+SQUARE = (1.0, 1.0)
 
 
 def body(profile, points=129):
@@ -26,13 +28,32 @@ def ellipsoid(major, minor):
     return body(lambda x, y: 0.5 * (x**2 / major + y**2 / minor))
 
 
+def block_body(height=1.0, sides="free", *, known=True):
+    """Return the block under a square of 1 mm, whose free sides the half-space may know of."""
+    shape = BlockShape(interface=SQUARE, height=height, cells=(1, 1, 1))
+    free = None
+    if known and sides == "free":
+        nu, reach = MATERIAL.poisson_ratio, 0.25 * min(1.0, height)
+        free = FreeSides(lengths=SQUARE, poisson_ratio=nu, reach=reach)
+    return Body(shape=shape, material=MATERIAL, sides=sides, known=free)
+
+
 @cache
-def block_rest(count=8):
-    """Return what the block adds to the half-space, for loads on count × count squares."""
-    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(16, 16, 8))
-    loads = PatchGrid(grid=(count, count), lengths=(1.0, 1.0))
-    half_space = HalfSpace(MATERIAL.young_modulus, MATERIAL.poisson_ratio)
-    return make_correction(shape, MATERIAL, "free", loads, half_space, COMM)
+def body_term(height=1.0, sides="free", known=True):
+    """Return what the block adds to the half-space and the sides it knows of."""
+    block = block_body(height, sides, known=known)
+    return block.term(block.face(COMM))
+
+
+def on_block(surface, *, height=1.0, sides="free", known=True, tolerance=1e-8):
+    """Return the half-space model of a surface on the block; slopes count as small."""
+    return HalfSpaceModel(
+        surface=surface,
+        contact_modulus=MODULUS,
+        tolerance=tolerance,
+        sides=block_body(height, sides, known=known).known,
+        body=body_term(height, sides, known),
+    )
 
 
 @cache
@@ -41,8 +62,8 @@ def give():
 
     It varies by a hundredth over a contact in the middle, whose shape it does not change.
     """
-    near = np.linalg.norm(block_rest().loads.centres - 0.5, axis=1) < 0.1
-    return float(block_rest().sag(near / near.sum())(np.array([0.5]), np.array([0.5]))[0])
+    middle = np.array([0.5])
+    return float(body_term(known=False).between(middle, middle)[0, 0])
 
 
 def on_the_block(force_of, approach):

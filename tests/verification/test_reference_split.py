@@ -8,23 +8,17 @@ from functools import cache
 
 import numpy as np
 import pytest
-from multiscale.couplings.concurrent import ConcurrentCoupling
-from reference_cases import COMM, MATERIAL, MODULUS
+from reference_cases import COMM, MATERIAL, on_block
 
 from geometry import (
-    BlockShape,
     Control,
-    PatchGrid,
     Spectrum,
-    UnevenPartition,
     characteristic_size,
-    patch_means,
     reference_shapes,
     suggested_fine,
     synthesise,
 )
-from macro import Block, ObstacleBlock, make_correction, rough_block_mesh
-from micro import HalfSpace, HalfSpaceModel
+from macro import Block, ObstacleBlock, rough_block_mesh
 from multiscale.reference.extrapolation import extrapolated
 
 APPROACH, FLAT = 8e-3, 0.01
@@ -49,25 +43,9 @@ def forces(seed, scale, edges):
     return np.array(found), [characteristic_size(shape) for shape in shapes]
 
 
-@pytest.fixture(scope="module")
-def rest():
-    """What the block adds to the half-space, for loads that are finer at its sides."""
-    ticks = np.concatenate([[0.0, 1 / 64, 1 / 32], np.arange(1, 16) / 16])
-    ticks = tuple(np.union1d(ticks, 1.0 - ticks))
-    loads = UnevenPartition(ticks_x=ticks, ticks_y=ticks)
-    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(16, 16, 8))
-    half_space = HalfSpace(MATERIAL.young_modulus, MATERIAL.poisson_ratio)
-    return make_correction(shape, MATERIAL, "free", loads, half_space, COMM)
-
-
-# surfaces that bear little at the block's sides, where the half-space's rest is not smooth
 @pytest.mark.parametrize("seed", [2, 3, 4])
-def test_concurrent_lies_within_the_error_bar_of_flat_meshes(rest, seed):
-    model = HalfSpaceModel(surface=rough(seed), contact_modulus=MODULUS)
-    patches = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
-    means = patch_means(rough(seed), patches)
-    concurrent = ConcurrentCoupling(model, patches, means, rest)
-    force = concurrent.press(Control(approach=APPROACH)).force_N
+def test_concurrent_lies_within_the_error_bar_of_flat_meshes(seed):
+    force = on_block(rough(seed)).solve(APPROACH).force
     found, sizes = forces(seed, FLAT, 2.0)
     estimate = extrapolated(found[:, None], sizes, 3.0)
     value, bar = float(estimate.value[0]), float(estimate.error[0])

@@ -3,22 +3,20 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
-from multiscale.couplings.concurrent import ConcurrentCoupling
+from reference_cases import on_block
 
 from geometry import (
     BlockShape,
-    PatchGrid,
     RefinedShape,
     Spectrum,
     Surface,
-    patch_means,
     places_in_reach,
     reference_shapes,
     synthesise,
 )
 from geometry.control import Control
-from macro import Block, Material, ObstacleBlock, make_correction, rough_block_mesh
-from micro import FreeSides, HalfSpace, HalfSpaceModel, finite_slope_effect
+from macro import Block, Material, ObstacleBlock, rough_block_mesh
+from micro import FreeSides, HalfSpaceModel, finite_slope_effect
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 RADIUS, APPROACH = 25.0, 8e-4  # a = 0.14 mm: small slopes, a block that is felt
@@ -34,14 +32,8 @@ def sphere():
 
 @pytest.fixture(scope="module")
 def expected(sphere):
-    """Force on a half-space model that yields like the block: no node of the sphere is meshed."""
-    loads = PatchGrid(grid=(8, 8), lengths=(1.0, 1.0))
-    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(16, 16, 8))
-    half_space = HalfSpace(MATERIAL.young_modulus, MATERIAL.poisson_ratio)
-    correction = make_correction(shape, MATERIAL, "free", loads, half_space, MPI.COMM_SELF)
-    model = HalfSpaceModel(surface=sphere, contact_modulus=MATERIAL.contact_modulus)
-    coupling = ConcurrentCoupling(model, loads, patch_means(sphere, loads), correction)
-    return coupling.press(Control(approach=APPROACH)).force_N
+    """Force of the contact problem on the block: no node of the sphere is meshed."""
+    return on_block(sphere).solve(APPROACH).force
 
 
 def pressed(sphere, element, refinement):

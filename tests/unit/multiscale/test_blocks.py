@@ -1,26 +1,27 @@
-"""Which contacts know of the block's free sides, and what loads its smooth rest then needs."""
+"""What the contact problem sees of a scene's block: sides, body, finite slopes."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from micro import FreeSides
+from micro import BodyModes, FiniteSlopes, FreeSides
 from multiscale import Scene, make_stage
-from multiscale.couplings.blocks import contact_model, fine_loads, free_sides
+from multiscale.couplings.blocks import contact_model, free_sides, patch_displacements
 from multiscale.planning.press_work import press_work
 
 
-def stage(kind="concurrent", model="half-space", patches=4, coupling=None, **block):
+def stage(kind="concurrent", model="half-space", patches=4, coupling=None, slopes=None, **block):
     spectrum = {"hurst": 0.95, "waves": [2, 8], "rms_slope": 0.215, "seed": 1}
-    material = {"height": 0.8, "young_modulus": 4000.0, "poisson_ratio": 0.15}
+    material = {"height": 0.8, "young_modulus": 4000.0, "poisson_ratio": 0.15, "cells": [8, 8, 5]}
+    micro = {"model": model} | ({} if slopes is None else {"finite_slopes": slopes})
     return make_stage(
         Scene.from_dict(
             {
                 "surface": {"spectrum": spectrum, "grid": [32, 32], "lengths": [1.0, 1.0]},
                 "block": material | block,
                 "patches": {"grid": [patches, patches]},
-                "micro": {"model": model},
+                "micro": micro,
                 "coupling": {"kind": kind} | (coupling or {}),
                 "load": {"approach": 0.008},
             }
@@ -28,41 +29,68 @@ def stage(kind="concurrent", model="half-space", patches=4, coupling=None, **blo
     )
 
 
-@pytest.mark.parametrize("kind", ["concurrent", "consistent"])
-def test_cells_know_the_free_sides_of_a_decomposed_block(kind):
-    found = stage(kind)
+@pytest.mark.parametrize(
+    ("kind", "coupling"),
+    [
+        ("concurrent", {}),
+        ("consistent", {}),
+        ("consistent", {"compliance": "finite-element"}),
+    ],
+)
+def test_cells_know_the_free_sides_of_their_block(kind, coupling):
+    found = stage(kind, coupling=coupling)
     # a quarter of the block's height, its shortest side
     expected = FreeSides(lengths=(1.0, 1.0), poisson_ratio=0.15, reach=0.2)
     assert free_sides(found) == expected
-    assert contact_model(found).sides == expected
-    assert found.model.sides is None
-    borders = fine_loads(found).borders_x
-    np.testing.assert_allclose(borders[:4], [0.0, 1 / 32, 1 / 16, 1 / 8], rtol=1e-13)
+    model = contact_model(found, None)
+    assert model.sides == expected
+    assert isinstance(model.body, BodyModes)
+    assert isinstance(model.slopes, FiniteSlopes)
+    assert (found.model.sides, found.model.body, found.model.slopes) == (None, None, None)
 
 
 @pytest.mark.parametrize(
     "given",
-    [
-        {"sides": "roller"},
-        {"margin": 0.5, "margin_cells": 2},
-        {"model": "islands"},
-        {"kind": "isolated"},
-        {"kind": "consistent", "coupling": {"compliance": "finite-element"}},
-    ],
+    [{"sides": "roller"}, {"margin": 0.5, "margin_cells": 2}, {"model": "islands"}],
 )
-def test_other_contacts_know_of_none(given):
-    found = stage(**given)
+def test_other_bodies_have_their_sides_in_the_body_term(given):
+    found = stage(slopes=False, **given)
     assert free_sides(found) is None
-    assert contact_model(found) is found.model
+    model = contact_model(found, None)
+    assert isinstance(model.body, BodyModes)
+    assert getattr(model, "sides", None) is None
 
 
-def test_loads_are_finer_at_sides_that_contacts_do_not_know():
-    borders = fine_loads(stage(model="islands")).borders_x
-    np.testing.assert_allclose(borders[:4], [0.0, 1 / 64, 1 / 32, 1 / 16], rtol=1e-13)
-    even = fine_loads(stage(sides="roller")).borders_y
-    np.testing.assert_allclose(np.diff(even), 1 / 16, rtol=1e-12)
+def test_patches_alone_lie_on_a_half_space():
+    model = contact_model(stage("isolated"), None)
+    assert (model.sides, model.body, model.slopes) == (None, None, None)
 
 
-def test_sides_are_more_work():
-    known, unknown = stage(), stage(sides="roller")
-    assert press_work(known, sagging=True) == 2.0 * press_work(unknown, sagging=True)
+@pytest.mark.parametrize("kind", ["analytic", "concurrent", "consistent"])
+@pytest.mark.parametrize("slopes", [None, True, False])
+def test_slopes_are_finite_unless_the_scene_says_otherwise(kind, slopes):
+    found = stage(kind, slopes=slopes)
+    model = contact_model(found, None)
+    assert (model.slopes is not None) == (slopes is not False)
+    assert (model.body is not None) == (kind != "analytic")
+
+
+def test_slopes_and_bodies_are_more_work():
+    flat, rough = stage(slopes=False), stage()
+    assert press_work(rough).transform > 2.0 * press_work(flat).transform
+    assert press_work(flat).transform > press_work(stage("analytic", slopes=False)).transform
+
+
+@pytest.mark.parametrize("way", ["decomposed", "finite-element"])
+def test_displacements_of_patches_are_those_of_the_macro_model(way):
+    found = stage("consistent", patches=2, coupling={"compliance": way, "newton": "condensed"})
+    dense = patch_displacements(found, None, dense=True)
+    pressures = np.array([[0.0, 0.0, 0.0, 0.0], [1.0, 2.0, 0.0, 4.0]])
+    sunk = dense(pressures)
+    assert not sunk[0].any()
+    # a loaded patch sinks by its own compliance and more
+    assert np.all(sunk[1] > 0.0)
+    if way == "finite-element":
+        # the linear solver's tolerance
+        solved = patch_displacements(found, None, dense=False)(pressures)
+        np.testing.assert_allclose(solved, sunk, rtol=1e-7)

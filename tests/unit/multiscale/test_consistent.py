@@ -8,9 +8,11 @@ from geometry.control import Control
 from micro import influence_matrix, micro_model
 from multiscale.couplings.condensed import CondensedCoupling
 from multiscale.law_tables.consistent import consistent_laws
+from multiscale.law_tables.whole_surface import WholeSurface
 
 MODULUS = 4000.0
 END = 9e-3
+LARGEST = Control(approach=END, tilt=(0.0, 0.0))
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +26,7 @@ def parts(surface, grid, name="circular", tolerance=1e-4):
     patches = PatchGrid(grid=grid, lengths=surface.lengths)
     means = patch_means(surface, patches)
     table = consistent_laws(
-        model, patches, mean_heights=means, approach_end=END, tolerance=tolerance, most_rows=400
+        model, patches, mean_heights=means, largest=LARGEST, tolerance=tolerance, most_rows=400
     )
     half_space = influence_matrix(patches) / (np.pi * MODULUS)
     return model, patches, means, table, CondensedCoupling(table, half_space)
@@ -74,34 +76,71 @@ def test_surface_out_of_reach_stays_open(surface):
     end = 0.5 * model.first_touch
     if end <= 0.0:  # the highest summit is touched at once: lower all others out of reach
         end = 1e-9
-    table = consistent_laws(model, patches, mean_heights=means, approach_end=end)
+    largest = Control(approach=end, tilt=(0.0, 0.0))
+    table = consistent_laws(model, patches, mean_heights=means, largest=largest)
     assert sum(not law.is_open for law in table.laws) <= 1
 
 
-class Leaning:
-    """A block that yields all at once: above a force it leans to a side."""
+@pytest.mark.parametrize("tilt", [(0.0, 0.0), (5e-3, -2e-3), None], ids=["level", "tilted", "free"])
+@pytest.mark.parametrize("macro", ["half-space", "too stiff", "made up"])
+def test_any_macro_model_finds_the_rows_again(surface, macro, tilt):
+    """Closures count in the compliance of the model that the laws are for, right or wrong."""
+    model = micro_model("circular", surface, contact_modulus=MODULUS)
+    patches = PatchGrid(grid=(3, 2), lengths=surface.lengths)
+    means = patch_means(surface, patches)
+    compliance = influence_matrix(patches) / (np.pi * MODULUS)
+    if macro == "too stiff":  # as a coarse mesh is
+        compliance = 0.8 * compliance
+    elif macro == "made up":
+        random = np.random.default_rng(2).normal(size=compliance.shape)
+        compliance = compliance + 0.02 * compliance.max() * random @ random.T
+    table = consistent_laws(
+        model,
+        patches,
+        mean_heights=means,
+        largest=Control(force=2.0, tilt=tilt),
+        displacements=lambda pressures: pressures @ compliance.T,
+        tolerance=1e-3,
+    )
+    coupling, start = CondensedCoupling(table, compliance), None
+    assert table.made_by["tilt"] == ("free" if tilt is None else f"{tilt[0]:g}, {tilt[1]:g}")
+    for force in (0.2, 0.7, 1.3, 2.0):
+        control = Control(force=force, tilt=tilt)
+        whole, plane, start = model.press(control, patches=patches, mean_heights=means, start=start)
+        step = coupling.press(control)
+        assert step.force_N == pytest.approx(force, rel=1e-9)
+        # the tables' tolerance of the force, of which the approach takes two thirds (Hertz)
+        touch = table_touch(table)
+        assert step.approach_mm - touch == pytest.approx(plane.approach - touch, rel=1e-3)
+        np.testing.assert_allclose(
+            step.patches.pressure_MPa,
+            whole.patch_pressure[0],
+            atol=3e-3 * whole.patch_pressure.max(),
+        )
+        if tilt is None:
+            largest_turn = max(map(abs, plane.tilt))
+            np.testing.assert_allclose(step.tilt, plane.tilt, atol=3e-3 * largest_turn)
 
-    def __init__(self, loads, enough, lean):
-        self.loads, self._enough, self._lean = loads, enough, lean
 
-    def sag(self, forces):
-        lean = self._lean if forces.sum() > self._enough else 0.0
-        return lambda x, y: lean * (x - 0.5)
-
-    def patch_compliance(self, patches):
-        return np.zeros((patches.count, patches.count))
+def table_touch(table):
+    """Return an approach below which nothing is in contact."""
+    return min(law.approach[0] for law in table.laws if not law.is_open)
 
 
-@pytest.mark.parametrize("lower", [0, 1])
-def test_patches_may_fall_behind_on_a_block_that_yields_all_at_once(surface, lower):
+def test_rows_where_a_patch_falls_behind_are_left_out(surface):
+    """A plane that turns may leave a patch while it comes nearer."""
     model = micro_model("circular", surface, contact_modulus=MODULUS)
     patches = PatchGrid(grid=(2, 1), lengths=surface.lengths)
-    means = patch_means(surface, patches)
-    force = model.respond([0.5 * END], patches=patches, mean_heights=means).force[0]
-    loads = PatchGrid(grid=(4, 4), lengths=surface.lengths)
-    block = Leaning(loads, force, (-1e-3, 1e-3)[lower])
-    table = consistent_laws(
-        model, patches, mean_heights=means, approach_end=END, tolerance=1e-3, sinking=block
+    whole = WholeSurface(
+        model=model,
+        patches=patches,
+        mean_heights=patch_means(surface, patches),
+        displacements=lambda pressures: 0.0 * pressures,
+        tilt=None,
     )
-    waits = (np.diff(table.spread.approach, axis=0) == 0.0).any(axis=0)
-    assert waits[lower] and not waits[1 - lower]  # its rows behind those before are left out
+    approaches = np.linspace(0.1, 0.9, 6) * END
+    rows = whole.rows(approaches)
+    rows[3, 1, :2] = rows[1, 1, :2]
+    kept, fell = whole.laws(rows)
+    assert len(fell.approach) == len(kept.approach) - 1
+    assert np.all(np.diff(fell.approach) > 0.0)

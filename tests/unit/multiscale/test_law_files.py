@@ -1,14 +1,10 @@
 """Laws survive a file bit for bit, and anything else is refused."""
 
-from dataclasses import replace
-
 import h5py
 import numpy as np
 import pytest
-from multiscale.law_tables.spread import ContactSpread
 
 from geometry.errors import InputError
-from geometry.partition import UnevenPartition
 from geometry.patches import PatchGrid
 from multiscale.law_tables.law_files import LawTable, read_laws, write_laws
 from multiscale.laws import PatchLaw
@@ -56,26 +52,6 @@ def test_round_trip_is_exact(table, tmp_path):
             assert getattr(law, name) == getattr(copy, name)
 
 
-def test_places_of_the_contacts_survive_too(table, tmp_path):
-    random = np.random.default_rng(6)
-    lx, ly = table.patches.lengths
-    loads = UnevenPartition(
-        ticks_x=(0.0, 0.1 * lx, 0.5 * lx, 0.7 * lx, lx), ticks_y=tuple(np.linspace(0.0, ly, 4))
-    )
-    spread = ContactSpread(
-        patches=table.patches,
-        loads=loads,
-        approach=np.sort(random.random((5, 6)), axis=0),
-        forces=random.random((5, 12)),
-        correction=random.random((12, 12)),
-    )
-    write_laws(tmp_path / "laws.h5", replace(table, spread=spread))
-    back = read_laws(tmp_path / "laws.h5").spread
-    assert (back.patches, back.loads) == (spread.patches, spread.loads)
-    for name in ("approach", "forces", "correction"):
-        assert getattr(back, name).tobytes() == getattr(spread, name).tobytes()
-
-
 def test_every_column_says_its_unit(table, tmp_path):
     write_laws(tmp_path / "laws.h5", table)
     with h5py.File(tmp_path / "laws.h5") as file:
@@ -92,6 +68,15 @@ def test_other_files_are_refused(tmp_path):
     with pytest.raises(InputError, match=r"laws.h5: is not a readable law file: "):
         read_laws(path)
     path.write_bytes(sealed(lambda file: file.create_dataset("x", data=1)))
+    with pytest.raises(InputError, match=r"laws.h5: is not a law file of patchlaw"):
+        read_laws(path)
+
+
+def test_files_of_an_earlier_format_are_refused(table, tmp_path):
+    """Their closures were taken with another compliance."""
+    path = tmp_path / "laws.h5"
+    write_laws(path, table)
+    change(path, lambda file: file.attrs.modify("format", "patchlaw laws 2"))
     with pytest.raises(InputError, match=r"laws.h5: is not a law file of patchlaw"):
         read_laws(path)
 

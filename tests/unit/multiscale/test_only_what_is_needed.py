@@ -89,20 +89,20 @@ def test_only_the_force_curve(monkeypatch, tmp_path):
 def presses(monkeypatch):
     """Cells of every grid that the half-space is solved on."""
     made: list[int] = []
-    pressed = HalfSpaceModel._pressed
+    state = HalfSpaceModel._state
 
-    def counted(self, plane, start):
+    def counted(self, plane, found):
         made.append(self.surface.heights.size)
-        return pressed(self, plane, start)
+        return state(self, plane, found)
 
-    monkeypatch.setattr(HalfSpaceModel, "_pressed", counted)
+    monkeypatch.setattr(HalfSpaceModel, "_state", counted)
     return made
 
 
 @pytest.mark.parametrize("kind", ["analytic", "isolated", "consistent", "concurrent"])
 def test_a_plan_solves_nothing_of_the_scene(monkeypatch, presses, kind):
     monkeypatch.setattr("multiscale.couplings.blocks.embedding", never)
-    monkeypatch.setattr("multiscale.couplings.blocks.smooth_correction", never)
+    monkeypatch.setattr("multiscale.couplings.body.Body.face", never)
     monkeypatch.setattr("multiscale.assemble.make_table", never)
     given = data(kind, grid=128)
     stage = make_stage(Scene.from_dict(given))
@@ -119,13 +119,13 @@ def test_patches_out_of_reach_build_no_law(monkeypatch):
     reached = run.stage.reached_patches
     assert 0 < reached < 16
     solved = set()
-    pressed = HalfSpaceModel._pressed
+    state = HalfSpaceModel._state
 
-    def counted(self, plane, start):
+    def counted(self, plane, found):
         solved.add(self.surface.heights.tobytes())
-        return pressed(self, plane, start)
+        return state(self, plane, found)
 
-    monkeypatch.setattr(HalfSpaceModel, "_pressed", counted)
+    monkeypatch.setattr(HalfSpaceModel, "_state", counted)
     laws = run.make_laws().laws
     assert len(solved) == reached
     assert sum(law.pressure.size > 0 for law in laws) == reached

@@ -39,7 +39,7 @@ COUPLINGS = {
     | {"load": {"approach": "8 um", "steps": 2, "force_change": 0.4}},
     "consistent laws": CUBE
     | {"micro": {"model": "half-space"}, "coupling": {"kind": "consistent"}},
-    "concurrent, a coarse half-space ahead": CUBE
+    "concurrent": CUBE
     | {"surface": {"grid": [72, 72]}, "coupling": {"kind": "concurrent"}}
     | {"micro": {"model": "half-space"}},
     "on the mesh": CUBE | {"coupling": {"kind": "isolated", "newton": "full"}},
@@ -103,7 +103,8 @@ def test_checkpoint_keeps_every_bit(tmp_path):
     for one, other in zip(found.steps, kept.steps, strict=True):
         for field in fields(one):
             if field.name != "patches":
-                assert getattr(one, field.name) == getattr(other, field.name)
+                mine, its = (getattr(step, field.name) for step in (one, other))
+                assert mine == its or (mine != mine and its != its)  # errors not measured are nan
         for field in fields(one.patches):
             mine, its = (getattr(step.patches, field.name) for step in (one, other))
             np.testing.assert_array_equal(mine, its)

@@ -7,7 +7,7 @@ import pytest
 
 from geometry.errors import NotConverged
 from multiscale import Scene, make_stage, run
-from multiscale.coupling import AnalyticCoupling
+from multiscale.coupling import ContactCoupling
 from multiscale.plan import statements, warnings
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
@@ -87,7 +87,7 @@ def test_the_plan_tells_of_flat_summits_that_carry_nothing(tmp_path, micro, told
     assert len(said) == told
 
 
-class Shy(AnalyticCoupling):
+class Shy(ContactCoupling):
     """Presses no further than by a micrometre at once."""
 
     reached = 0.0
@@ -102,7 +102,7 @@ class Shy(AnalyticCoupling):
 def test_free_plane_that_is_not_found_at_once_is_found_in_smaller_steps(monkeypatch):
     asked = scene(coupling="concurrent", approach=3e-3, tilt="free")
     known = make_stage(asked).furthest
-    monkeypatch.setattr("multiscale.planning.micro_choice.AnalyticCoupling", Shy)
+    monkeypatch.setattr("multiscale.planning.micro_choice.ContactCoupling", Shy)
     approach, tilt = make_stage(asked).furthest
     assert approach == known[0]
     np.testing.assert_allclose(tilt, known[1], rtol=1e-5)  # moments to 1e-8 of force times length

@@ -1,21 +1,22 @@
 """What a micro model says about its range reaches the history of a run, whatever the coupling."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from multiscale.couplings.concurrent import ConcurrentCoupling
 
 from geometry import PatchGrid, Spectrum, patch_means, synthesise
 from geometry.control import Control
-from micro import micro_model
-from multiscale.coupling import AnalyticCoupling
+from micro import BodyModes, micro_model
+from multiscale.coupling import ContactCoupling
 from multiscale.law_tables.consistent import consistent_laws
 from multiscale.law_tables.isolated import isolated_laws
 from multiscale.reporting.validity import range_notes
 
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
 END = 40e-3
+LARGEST = Control(approach=END, tilt=(0.0, 0.0))
 
 
 @pytest.fixture(scope="module")
@@ -35,19 +36,11 @@ def step(number, *pressures, warnings=()):
     return SimpleNamespace(step=number, patches=state, warnings=warnings)
 
 
-def unyielding(loads=PATCHES):
-    """Return the correction of a block that is the half-space itself."""
-    return SimpleNamespace(loads=loads, sag=lambda forces: lambda x, y: 0.0 * (x + y))
-
-
-@pytest.mark.parametrize("concurrent", [False, True])
-def test_a_model_solved_at_every_step_speaks_for_itself(parts, concurrent):
+@pytest.mark.parametrize("body", [None, BodyModes((1.0, 1.0), [[1e-4]])], ids=["alone", "body"])
+def test_a_model_solved_at_every_step_speaks_for_itself(parts, body):
     _, model, means = parts
-    coupling = (
-        ConcurrentCoupling(model, PATCHES, means, unyielding())
-        if concurrent
-        else AnalyticCoupling(model, PATCHES, means)
-    )
+    model = replace(model, body=body)
+    coupling = ContactCoupling(model, PATCHES, means)
     few, many = (coupling.press(Control(approach=approach)) for approach in (4e-3, END))
     whole = model.respond([4e-3, END], patches=PATCHES, mean_heights=means)
     assert few.warnings == () and many.warnings == whole.warnings != ()
@@ -61,7 +54,7 @@ def test_a_model_solved_at_every_step_speaks_for_itself(parts, concurrent):
 def test_laws_know_from_where_on_they_were_warned_of(parts, coupling):
     _, model, means = parts
     if coupling == "consistent":
-        table = consistent_laws(model, PATCHES, mean_heights=means, approach_end=END, tolerance=0.1)
+        table = consistent_laws(model, PATCHES, mean_heights=means, largest=LARGEST, tolerance=0.1)
         models = [(model, PATCHES, means)] * PATCHES.count
     else:
         ends = np.full(PATCHES.count, END)
@@ -77,7 +70,7 @@ def test_laws_know_from_where_on_they_were_warned_of(parts, coupling):
 
 def test_steps_are_counted_from_the_first_patch_beyond_its_law(parts):
     _, model, means = parts
-    table = consistent_laws(model, PATCHES, mean_heights=means, approach_end=END, tolerance=0.1)
+    table = consistent_laws(model, PATCHES, mean_heights=means, largest=LARGEST, tolerance=0.1)
     limit = np.array([law.warned_from for law in table.laws])
     below = 0.99 * limit
     beyond = np.where(np.arange(4) < 3, limit, below)
@@ -90,6 +83,6 @@ def test_steps_are_counted_from_the_first_patch_beyond_its_law(parts):
 def test_models_that_see_cells_have_no_range(parts):
     surface, _, means = parts
     model = micro_model("half-space", surface, contact_modulus=4000.0)
-    table = consistent_laws(model, PATCHES, mean_heights=means, approach_end=END, tolerance=0.1)
+    table = consistent_laws(model, PATCHES, mean_heights=means, largest=LARGEST, tolerance=0.1)
     assert all(law.warned_from == np.inf for law in table.laws)
     assert noted([step(1, *(law.pressure[-1] for law in table.laws))], table) == []
