@@ -177,19 +177,10 @@ def patch_displacements(stage: Stage, comm: Any, *, dense: bool) -> Callable[[Ar
     if dense:
         compliance = patch_compliance(stage, comm)
         return lambda pressures: np.asarray(pressures @ compliance.T)
+    from macro import displacements_under
+
     interface = embedding(stage, comm)
-
-    def solved(pressures: Array) -> Array:
-        rows = []
-        for row in pressures:
-            if not row.any():
-                rows.append(np.zeros(len(row)))
-                continue
-            field = interface.block.solve(interface.load(row))
-            rows.append(interface.patch_displacements(field.x.array[: interface.block.owned_dofs]))
-        return np.array(rows)
-
-    return solved
+    return lambda pressures: displacements_under(interface, pressures)
 
 
 def patch_compliance(stage: Stage, comm: Any) -> Array:
