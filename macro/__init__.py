@@ -9,7 +9,7 @@ BlockShape → block_mesh → Block (with a Material) → Interface (with a Patc
 
 from macro.block import Block
 from macro.body.face_compliance import FaceCompliance, cached_face_compliance, face_compliance
-from macro.compliance import plain_compliance
+from macro.compliance import displacements_under, plain_compliance
 from macro.elasticity import Material
 from macro.interface import ContactLaw, Interface
 from macro.mesh import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
@@ -35,6 +35,7 @@ __all__ = [
     "PressedBlock",
     "block_mesh",
     "cached_face_compliance",
+    "displacements_under",
     "face_compliance",
     "plain_compliance",
     "rough_block_mesh",

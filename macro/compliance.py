@@ -29,12 +29,28 @@ def plain_compliance(interface: Interface) -> Array:
     Note:
         Collective.
     """
-    block, columns = interface.block, []
-    work = block.stiffness.createVecRight()
-    for pressures in np.eye(interface.patches.count):
-        displacement = block.solve(interface.load(pressures))
-        work.array[:] = displacement.x.array[: block.owned_dofs]
-        columns.append(interface.patch_displacements(work))
-        compat.free_dropped(work.comm)
-    compliance = np.column_stack(columns)
+    compliance = displacements_under(interface, np.eye(interface.patches.count))
     return np.asarray(0.5 * (compliance + compliance.T))
+
+
+def displacements_under(interface: Interface, pressures: Array) -> Array:
+    """Return the mean displacements of patches under pressures on them, shape (m, N) [mm].
+
+    Args:
+        interface: Patches on the block's top.
+        pressures: Pressures of all patches, the same on every rank, shape (m, N) [MPa].
+
+    Raises:
+        NotConverged: When a linear solve fails.
+
+    Note:
+        Collective.
+    """
+    block, rows = interface.block, []
+    work = block.stiffness.createVecRight()
+    for row in pressures:
+        displacement = block.solve(interface.load(row))
+        work.array[:] = displacement.x.array[: block.owned_dofs]
+        rows.append(interface.patch_displacements(work))
+        compat.free_dropped(work.comm)
+    return np.array(rows)

@@ -110,9 +110,8 @@ def _omitted(level: Level, left: float | None) -> LevelResult | None:
         return LevelResult(key=level.key, status="refused", message=level.refusal)
     if left is None or level.cost <= left:
         return None
-    if left <= 0.0:
-        return LevelResult(key=level.key, status="not started")
-    why = f"it is predicted to take {level.cost:.2g} s, and the budget leaves {left:.2g} s"
+    rest = f"{left:.2g} s" if left > 0.0 else "nothing"
+    why = f"it is predicted to take {level.cost:.2g} s, and the budget leaves {rest}"
     return LevelResult(key=level.key, status="not started", message=why)
 
 

@@ -185,20 +185,10 @@ def patch_displacements(stage: Stage, comm: Any, *, dense: bool) -> Callable[[Ar
     if dense:
         compliance = patch_compliance(stage, comm)
         return lambda pressures: np.asarray(pressures @ compliance.T)
+    from macro import displacements_under
+
     interface = embedding(stage, comm)
-    work = interface.block.stiffness.createVecRight()
-
-    def solved(pressures: Array) -> Array:
-        rows = []
-        for row in pressures:
-            if not row.any():
-                rows.append(np.zeros(len(row)))
-                continue
-            work.array[:] = interface.block.solve(interface.load(row)).x.array[: work.local_size]
-            rows.append(interface.patch_displacements(work))
-        return np.array(rows)
-
-    return solved
+    return lambda pressures: displacements_under(interface, pressures)
 
 
 def patch_compliance(stage: Stage, comm: Any) -> Array:

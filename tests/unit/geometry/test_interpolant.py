@@ -112,6 +112,22 @@ def test_what_heights_count_from_does_not_matter(periodic):
     np.testing.assert_allclose(high.maximum()[:2], low.maximum()[:2], atol=1e-8)
 
 
+@pytest.mark.parametrize("periodic", [False, True])
+@pytest.mark.parametrize("far", [1.0, 1.7])
+@pytest.mark.parametrize(("dx", "dy"), [(0, 0), (1, 0), (1, 1)])
+def test_lattices_are_evaluated_like_points(periodic, far, dx, dy):
+    heights = np.random.default_rng(7).normal(size=(9, 12))
+    h = Interpolant(heights, (1.0, 2.0), periodic=periodic)
+    if not periodic:
+        far = 1.0
+    # falling ones, and those that go around a periodic surface, are points like others
+    for x in (np.linspace(0.0, far, 30), np.linspace(far, 0.0, 30)):
+        y = np.linspace(0.0, 2.0 * far, 21)
+        points = h(*np.meshgrid(x, y, indexing="ij"), dx=dx, dy=dy)
+        lattice = h(x[:, None], y[None, :], dx=dx, dy=dy)
+        np.testing.assert_allclose(lattice, points, atol=1e-12 * np.abs(points).max())  # rounding
+
+
 def test_derivatives_are_not_pickled():
     heights = np.random.default_rng(6).normal(size=(64, 64))
     h = Interpolant(heights, (1.0, 1.0))

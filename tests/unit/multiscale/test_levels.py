@@ -1,5 +1,6 @@
 """Which levels a scene has, in which order, and what tells them apart."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ COLUMNS = (
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 
 
+@cache
 def made(*overrides, ranks=1):
     return levels(Scene.load(PAPER, overrides), ranks)
 

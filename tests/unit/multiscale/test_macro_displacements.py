@@ -1,0 +1,35 @@
+"""Displacements of patches in the macro model that laws are calibrated to."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from multiscale import Scene, make_stage, run
+from multiscale.couplings.blocks import patch_displacements
+
+PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
+SMALL = [
+    "surface.grid=[32, 32]", "block.cells=[8, 8, 5]", "patches.grid=[4, 2]", "load.steps=2",
+    "micro.model=half-space", "coupling.kind=consistent", "coupling.compliance=finite-element",
+]  # fmt: skip
+
+
+def test_the_mesh_gives_those_of_its_compliance():
+    stage = make_stage(Scene.load(PAPER, SMALL))
+    pressures = np.random.default_rng(1).uniform(0.0, 50.0, (3, 8))
+    pressures[1] = 0.0  # before the first touch
+    dense, meshed = (
+        patch_displacements(stage, None, dense=dense)(pressures) for dense in (True, False)
+    )
+    np.testing.assert_allclose(meshed, dense, rtol=1e-8, atol=1e-12)  # linear solves to 1e-10
+    assert np.all(meshed[1] == 0.0)
+
+
+def test_laws_on_the_mesh_are_those_of_the_condensed_block():
+    condensed, full = (
+        run(Scene.load(PAPER, [*SMALL, f"coupling.newton={newton}"])).force_N
+        for newton in ("condensed", "full")
+    )
+    np.testing.assert_allclose(full, condensed, rtol=1e-6)
+    assert condensed[-1] == pytest.approx(3.0, rel=0.1)
