@@ -14,17 +14,11 @@ as many cells along a side: the grid's error was within 1.5 × the measured one 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import TypeAlias
 
-from geometry import Control, Surface
+from geometry import Control
 from micro import BodyModes, HalfSpaceModel, HalfSpaceState, resampled
-
-Models: TypeAlias = Callable[[Surface, int], HalfSpaceModel]
-"""The model of a scene with its surface on other cells, and finite slopes up to an order or, with
-0, without."""
+from multiscale.couplings.blocks import OnBody
 
 _FINER, _COARSER, _TWICE = 1.3, 1 / 4, 1 / 12
 """Error of the grid over the difference to one twice as fine, to one twice as coarse, and between
@@ -76,14 +70,14 @@ class ErrorProbe:
     """Measures the errors of load steps of one scene.
 
     Args:
-        models: The half-space model on the scene's body.
-        surface: The surface, on the cells of the run.
+        model: The half-space model, on the cells of the run.
+        on_body: Puts it on the scene's body.
         order: Order of finite slopes in the run; 0 where they are left out.
         by_laws: Whether load steps come from laws instead of the model.
     """
 
-    models: Models
-    surface: Surface
+    model: HalfSpaceModel
+    on_body: OnBody
     order: int
     by_laws: bool = False
 
@@ -112,11 +106,13 @@ class ErrorProbe:
         parts = {}
         if self.by_laws:
             free = Control(approach=approach, tilt=None if turns else tilt)
-            found = self.models(self.surface, self.order).equilibrium(free)
+            found = self.on_body(self.model, self.order).equilibrium(free)
             parts["laws"] = abs(force - found.force)
             force, tilt = found.force, found.plane.tilt
         problems = _Problems(self, Control(approach=approach, tilt=tilt))
-        parts["body"] = problems.body_error
+        body = problems.body_error
+        if body is not None:
+            parts["body"] = body
         parts["slopes"] = problems.slopes_error
         parts["grid"] = problems.grid_error(force, beside=sum(parts.values()))
         change = problems.stiffness if stiffness else math.nan
@@ -128,7 +124,7 @@ class _Problems:
 
     def __init__(self, probe: ErrorProbe, control: Control) -> None:
         self._probe, self._control = probe, control
-        self._grid = probe.surface.grid
+        self._grid = probe.model.surface.grid
         self._half, self._quarter = (_coarser(self._grid, times) for times in (2, 4))
         self._states: dict[tuple[tuple[int, int], int], HalfSpaceState] = {}
 
@@ -145,11 +141,11 @@ class _Problems:
         return _BEYOND * abs(whole - self.force(self._half, 1))
 
     @property
-    def body_error(self) -> float:
-        """Error by the modes of the body [N]; none without a body."""
+    def body_error(self) -> float | None:
+        """Error by the modes of the body [N]; None on a half-space."""
         model, flat = self._model(self._half, 0), self._state(self._half, 0)
         if not isinstance(model.body, BodyModes):
-            return 0.0
+            return None
         fewer = model.body.fewer(math.ceil(_FEWER_MODES * model.body.count))
         found = replace(model, body=fewer).equilibrium(self._control, start=flat)
         return abs(found.force - flat.force)
@@ -192,8 +188,9 @@ class _Problems:
         return self._states[grid, order]
 
     def _model(self, grid: tuple[int, int], order: int) -> HalfSpaceModel:
-        model = self._probe.models(resampled(self._probe.surface, grid), order)
-        return replace(model, tolerance=_RESIDUAL)
+        model = self._probe.model
+        cells = replace(model, surface=resampled(model.surface, grid), highest=model.datum)
+        return replace(self._probe.on_body(cells, order), tolerance=_RESIDUAL)
 
 
 def _coarser(grid: tuple[int, int], times: int) -> tuple[int, int]:

@@ -8,24 +8,24 @@ from typing import Any
 
 from geometry.collective import on_root
 from micro import HalfSpaceModel
-from multiscale.couplings.blocks import SLOPES, Models
+from multiscale.couplings.blocks import SLOPES, OnBody
 from multiscale.load_step import LoadStep
 from multiscale.loading import Programme
 from multiscale.measured_errors import ErrorProbe, MeasuredErrors
 from multiscale.stage import Stage
 
 
-def error_probe(stage: Stage, models: Models) -> ErrorProbe:
+def error_probe(stage: Stage, body: OnBody) -> ErrorProbe:
     """Return what measures the errors of a scene's load steps.
 
     Args:
         stage: The scene's ingredients, with a half-space model.
-        models: Makes this model on the scene's body, see `half_space_models`.
+        body: Puts this model on the scene's body, see `on_body`.
     """
     assert isinstance(stage.model, HalfSpaceModel)
     return ErrorProbe(
-        models=models,
-        surface=stage.model.surface,
+        model=stage.model,
+        on_body=body,
         order=SLOPES if stage.finite_slopes else 0,
         by_laws=stage.by_laws,
     )

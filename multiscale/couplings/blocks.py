@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.surface import Surface
 from micro import (
     BodyModes,
     FiniteSlopes,
@@ -31,8 +30,8 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
 
 Array = NDArray[np.float64]
 
-Models = Callable[[Surface, int], HalfSpaceModel]
-"""From cells of a surface and the order of finite slopes, 0 for none, to its half-space model."""
+OnBody = Callable[[HalfSpaceModel, int], HalfSpaceModel]
+"""Puts a half-space model on a body; with finite slopes up to an order, 0 for none."""
 
 SLOPES = 2
 """Order of finite slopes where they are seen."""
@@ -54,56 +53,46 @@ def contact_model(stage: Stage, comm: Any) -> MicroModel:
     Note:
         Collective.
     """
-    model = stage.model
+    model, alone = stage.model, stage.scene.coupling.kind == "isolated"
     if isinstance(model, HalfSpaceModel):
         order = SLOPES if stage.finite_slopes else 0
-        alone = stage.scene.coupling.kind == "isolated"
-        return half_space_models(stage, comm, body=stage.embedded and not alone)(
-            model.surface, order
-        )
-    if stage.embedded and stage.scene.coupling.kind != "isolated":
-        return replace(model, body=body_modes(stage, None, comm))  # type: ignore[type-var]
-    return model
+        return on_body(stage, comm, half_space=alone or not stage.embedded)(model, order)
+    if alone or not stage.embedded:
+        return model
+    return replace(model, body=body_modes(stage, None, comm))  # type: ignore[type-var]
 
 
-def half_space_models(stage: Stage, comm: Any, *, body: bool) -> Models:
-    """Return what makes a scene's half-space model on any cells, its body solved for once.
+def on_body(stage: Stage, comm: Any, *, half_space: bool = False) -> OnBody:
+    """Return what puts half-space models on a scene's body, which is solved for once.
 
     Args:
         stage: The scene's ingredients, with a half-space model.
         comm: MPI communicator; None for this process alone.
-        body: Whether the surface lies on the scene's block, or on a half-space.
+        half_space: Whether the body is a half-space instead of the scene's block.
 
     Returns:
-        A function from the surface and the order of finite slopes, 0 for none, to the model. It is
-        not collective.
+        A function from a model and the order of finite slopes, 0 for none, to the model on the
+        body. It is not collective.
 
     Note:
         Collective.
     """
-    sides = free_sides(stage) if body else None
-    modes = body_modes(stage, sides, comm) if body else None
+    sides = None if half_space else free_sides(stage)
+    body = None if half_space else body_modes(stage, sides, comm)
     material = _half_space(stage)
 
-    def made(surface: Surface, order: int) -> HalfSpaceModel:
-        model = replace(
-            stage.model,  # type: ignore[type-var]
-            surface=surface,
-            highest=stage.model.datum,
-            tolerance=_SHARP,
-            sides=sides,
-            body=modes,
-        )
+    def put(model: HalfSpaceModel, order: int) -> HalfSpaceModel:
+        placed = replace(model, tolerance=_SHARP, sides=sides, body=body)
         if not order:
-            return model
-        beside = []
+            return placed
+        surface, beside = model.surface, []
         if sides is not None:
             cells = coarse_grid(surface)
             spacing = surface.lengths[0] / cells[0], surface.lengths[1] / cells[1]
             beside = [SideStresses(sides, spacing)]
-        return replace(model, slopes=FiniteSlopes(surface, material, order=order, beside=beside))
+        return replace(placed, slopes=FiniteSlopes(surface, material, order=order, beside=beside))
 
-    return made
+    return put
 
 
 def free_sides(stage: Stage) -> FreeSides | None:

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
 from multiscale.history import History
-from multiscale.planning.decision import bound_text
-from multiscale.planning.forecast import Forecast, comparison
 
 _STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto;
@@ -33,7 +31,6 @@ def report_html(
     warnings: Sequence[str],
     history: History,
     figures: Mapping[str, Path],
-    made: Forecast,
 ) -> str:
     """Compose the page.
 
@@ -43,7 +40,6 @@ def report_html(
         warnings: What a user should know about validity.
         history: The run.
         figures: PNG files by caption; embedded into the page.
-        made: What was predicted.
 
     Returns:
         A complete HTML document.
@@ -58,9 +54,8 @@ def report_html(
         table(*curve_cells(history)),
         *(figure_element(caption, path) for caption, path in figures.items()),
         "<h2>What it took</h2>",
-        table(("what", "predicted", "real"), comparison(made, history.seconds)),
-        "<h2>What the force may be off by</h2>",
-        table(("cause", "at most"), _errors(made)),
+        table(("phase", "wall time [s]"), _times(history)),
+        *_errors(history),
         *(f'<p class="note">{escape(note)}</p>' for note in history.notes),
     ]
     return page(title, parts)
@@ -120,11 +115,26 @@ def with_error(value: float, error: float, *, digits: int) -> str:
     return f"{value:.{places}f} ± {error:.{places}f}"
 
 
-def _errors(made: Forecast) -> Iterable[tuple[str, str]]:
-    yield from ((cause, bound_text(error)) for cause, error in made.errors.items())
-    yield "altogether", bound_text(made.error)
-    if made.slopes:
-        yield "finite slopes, outside of it, about", bound_text(made.slopes)
+def _times(history: History) -> Iterator[tuple[str, str]]:
+    for phase, seconds in history.seconds.items():
+        yield phase, f"{seconds:.2f}"
+
+
+def _errors(history: History) -> Iterator[str]:
+    """Yield a heading and a table of the latest errors that were measured by cause."""
+    measured = [step for step in history if step.errors]
+    if not measured:
+        return
+    step, rows = measured[-1], dict(measured[-1].errors)
+    rows["altogether"] = sum(rows.values())
+    yield f"<h2>What the force may be off by, measured at load step {step.step}</h2>"
+    yield table(
+        ("cause", "force [N]", "of the force [%]"),
+        [
+            (cause, f"{error:.2g}", f"{100 * error / step.force_N:.2g}" if step.force_N else "–")
+            for cause, error in rows.items()
+        ],
+    )
 
 
 def _headline(history: History) -> str:
