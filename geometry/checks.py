@@ -32,6 +32,30 @@ def positive_lengths(value: Any, what: str) -> tuple[float, float]:
     return pair
 
 
+def check_scale(heights: NDArray[np.float64]) -> None:
+    """Refuse roughness so fine that squares of its curvatures leave double precision.
+
+    Heights that are equal but for rounding are flat, and pass.
+
+    Args:
+        heights: Heights [mm]; those that are not finite are none of this function's business.
+
+    Raises:
+        InputError: When they differ by less than `SMALLEST`.
+    """
+    finite = heights[np.isfinite(heights)]
+    if not finite.size:
+        return
+    low, high = float(finite.min()), float(finite.max())
+    rounding = 64.0 * float(np.finfo(float).eps) * max(abs(low), abs(high))
+    if rounding < high - low < SMALLEST:
+        raise InputError(
+            "the heights differ by less than any roughness",
+            value=high - low,
+            allowed=f"equal heights, or differences of at least {SMALLEST:g} mm",
+        )
+
+
 def cell_counts(value: Any, what: str, *, dimension: int = 2, smallest: int = 1) -> tuple[int, ...]:
     """Return whole numbers of cells per direction as a tuple of int.
 

@@ -102,7 +102,7 @@ def _shortened(value: Any) -> str:
     """Return what stands for a value in a message: a line, however long the value is."""
     try:
         text = repr(value)
-    except (ValueError, RecursionError):  # of thousands of digits, or levels
+    except Exception:  # of thousands of digits or levels, or of a class that has no text
         return f"<{type(value).__name__}>"
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
 

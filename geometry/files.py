@@ -13,7 +13,7 @@ from typing import Any, BinaryIO, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.checks import LARGEST, cell_counts, positive_lengths
+from geometry.checks import LARGEST, cell_counts, check_scale, positive_lengths
 from geometry.errors import InputError
 from geometry.instruments import read_instrument
 from geometry.missing import filled
@@ -83,6 +83,7 @@ def read_surface(
                 value=float("nan"),
                 allowed="finite heights in mm; missing = 'fill' closes gaps by a membrane",
             )
+        check_scale(heights)
         surface = Surface(heights=heights, lengths=sides, periodic=periodic, source=source)
         if grid is not None and surface.grid != cell_counts(grid, "the grid of the surface"):
             raise InputError(

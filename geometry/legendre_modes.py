@@ -27,6 +27,25 @@ def mode_values(points: ArrayLike, length: float, count: int) -> Array:
     return np.asarray(legendre.legvander(t, count - 1).T * _norms(count))
 
 
+def mode_slopes(points: ArrayLike, length: float, count: int) -> Array:
+    """Return the derivatives of the modes at points.
+
+    Args:
+        points: Abscissae on [0, L], shape (n,) [mm].
+        length: L [mm].
+        count: Number of modes.
+
+    Returns:
+        Shape (count, n) [1/mm]; from P_{k+1}' = P_{k−1}' + (2k + 1) P_k.
+    """
+    t = 2.0 * np.asarray(points, float) / length - 1.0
+    values = legendre.legvander(t, count - 1).T * (2.0 * np.arange(count) + 1.0)[:, None]
+    slopes = np.zeros_like(values)
+    for k in range(1, count):
+        slopes[k] = values[k - 1] + (slopes[k - 2] if k > 1 else 0.0)
+    return np.asarray(slopes * _norms(count) * (2.0 / length))
+
+
 def mode_means(borders: ArrayLike, length: float, count: int) -> Array:
     """Return the means of the modes over intervals.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -72,6 +72,15 @@ class RefinedShape:
         """Polynomial degree of the element."""
         return int(self.element[1])
 
+    @property
+    def unit(self) -> float:
+        """Length that gmsh meshes the block in, its largest side [mm].
+
+        Its CAD kernel takes what is shorter than 1e-7 for nothing. Blocks of one shape have one
+        mesh, whatever their size.
+        """
+        return max(*self.interface, self.height)
+
     def _check_places(self) -> None:
         places = np.asarray(self.places, float)
         object.__setattr__(self, "places", places)
@@ -90,15 +99,23 @@ class RefinedShape:
     def meshed(self) -> Iterator[Any]:
         """Mesh the block in gmsh for as long as the context lasts; faces as in `flat_block`.
 
-        The geometry has the order of the element.
+        The geometry has the order of the element, and its lengths are in `unit`.
         """
+        shape = replace(
+            self,
+            interface=(self.interface[0] / self.unit, self.interface[1] / self.unit),
+            height=self.height / self.unit,
+            places=self.places / self.unit,
+            fine=self.fine / self.unit,
+            coarse=self.coarse / self.unit,
+        )
         with gmsh_session("patchlaw refined block") as gmsh:
-            box = gmsh.model.occ.addBox(0.0, 0.0, -self.height, *self.interface, self.height)
+            box = gmsh.model.occ.addBox(0.0, 0.0, -shape.height, *shape.interface, shape.height)
             gmsh.model.occ.synchronize()
-            _name_faces(gmsh, box, self.height)
-            _set_sizes(gmsh, self)
-            _generate(gmsh, self)
-            gmsh.model.mesh.setOrder(self.degree)
+            _name_faces(gmsh, box, shape.height)
+            _set_sizes(gmsh, shape)
+            _generate(gmsh, shape)
+            gmsh.model.mesh.setOrder(shape.degree)
             yield gmsh.model
 
 

@@ -10,11 +10,14 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from geometry.checks import cell_counts, finite_pair, positive_lengths
+from geometry.checks import cell_counts, check_scale, finite_pair, positive_lengths
 from geometry.errors import InputError
 from geometry.surface import Surface
 
 Array = NDArray[np.float64]
+
+LARGEST_SEED = 2**128 - 1
+"""What numpy draws from the system when it needs a seed has as many bits."""
 
 _BANDS = ("waves", "waves_x", "waves_y")
 _AMPLITUDES = ("rms_slope", "rms_height", "s0")
@@ -61,8 +64,10 @@ class Spectrum:
             raise InputError(
                 "the Hurst exponent is out of range", value=self.hurst, allowed="0 … 1"
             )
-        if not isinstance(self.seed, int | np.integer) or self.seed < 0:
-            raise InputError("the seed does not fit", value=self.seed, allowed="a whole number ≥ 0")
+        if not isinstance(self.seed, int | np.integer) or not 0 <= self.seed <= LARGEST_SEED:
+            raise InputError(
+                "the seed does not fit", value=self.seed, allowed="a whole number, 0 … 2^128 − 1"
+            )
         bands = self._given(_BANDS)
         if bands not in (["waves"], ["waves_x", "waves_y"]):
             raise InputError(
@@ -167,6 +172,7 @@ def synthesise(
         value = coefficient if sign > 0 else coefficient.conj()
         half[sign * waves.kx[kept], sign * waves.ky[kept]] = value[kept]
     heights = scipy.fft.irfft2(half, s=(nx, ny), norm="forward")
+    check_scale(heights)
     return Surface(heights=heights, lengths=lengths, periodic=True, source=str(spectrum))
 
 

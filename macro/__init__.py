@@ -9,7 +9,6 @@ BlockShape → block_mesh → Block (with a Material) → Interface (with a Patc
 
 from macro.block import Block
 from macro.body.face_compliance import FaceCompliance, cached_face_compliance, face_compliance
-from macro.body.mode_count import mode_count
 from macro.compliance import plain_compliance
 from macro.elasticity import Material
 from macro.interface import ContactLaw, Interface
@@ -37,7 +36,6 @@ __all__ = [
     "block_mesh",
     "cached_face_compliance",
     "face_compliance",
-    "mode_count",
     "plain_compliance",
     "rough_block_mesh",
     "write_fields",

@@ -1,4 +1,7 @@
-"""Keeps what the elastic block was solved for on disk, under a key of all that it depends on."""
+"""Keeps what the elastic block was solved for on disk, under a key of all that it depends on.
+
+That includes the code: files made by other sources of the packages that make them are not found.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ import tempfile
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import fields, is_dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +27,10 @@ VARIABLE = "PATCHLAW_CACHE"
 MOST_BYTES = 500_000_000
 """Size of all files together, beyond which those go that were not used for longest [B]."""
 
-_FORMAT = 2  # raise it when the numbers behind a key change
+_FORMAT = 3  # of the files; the code that fills them counts by itself
+
+_SOURCES = "macro", "geometry"
+"""Packages that make what is kept."""
 
 
 def cache_directory() -> Path | None:
@@ -90,9 +97,21 @@ def is_kept(kind: str, key: tuple[object, ...]) -> bool:
         return False
 
 
+@cache
+def sources_digest() -> str:
+    """Return a digest of the sources of the packages that make what is kept."""
+    found = hashlib.sha256()
+    top = Path(__file__).resolve().parent.parent
+    for package in _SOURCES:
+        for path in sorted((top / package).rglob("*.py")):
+            found.update(path.relative_to(top).as_posix().encode() + b"\0" + path.read_bytes())
+    return found.hexdigest()
+
+
 def _place(kind: str, key: tuple[object, ...]) -> Path | None:
     directory = cache_directory()
-    digest = hashlib.sha256(repr(_spelt((_FORMAT, kind, key))).encode()).hexdigest()[:32]
+    words = repr(_spelt((_FORMAT, sources_digest(), kind, key)))
+    digest = hashlib.sha256(words.encode()).hexdigest()[:32]
     return directory / f"{kind}-{digest}.npz" if directory else None
 
 

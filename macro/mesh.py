@@ -100,7 +100,11 @@ def _from_gmsh(shape: BlockShape | RefinedShape, comm: Any) -> BlockMesh:
         models: list[Any] = []
         on_root(comm, lambda: models.append(gmsh_session.enter_context(shape.meshed())))
         mesh, facet_tags = compat.mesh_from_gmsh(models[0] if models else None, comm)
-    planes = _onto_planes(shape, mesh.geometry.x) if isinstance(shape, BlockShape) else None
+    planes = None
+    if isinstance(shape, BlockShape):
+        planes = _onto_planes(shape, mesh.geometry.x)
+    else:
+        mesh.geometry.x[:] *= shape.unit
     return BlockMesh(mesh=mesh, facet_tags=facet_tags, shape=shape, planes=planes)
 
 

@@ -13,11 +13,14 @@ from micro.boussinesq import HalfSpace
 from micro.cells.contacts import Contacts, find_contacts
 from micro.cells.free_sides import FreeSides
 from micro.cells.half_space_state import HalfSpaceState
-from micro.cells.side_stresses import SideStresses
+from micro.cells.side_stresses import SideStresses, side_stresses
 from micro.compliance.body_modes import BodyModes
+from micro.compliance.body_stresses import BodyStresses
 from micro.compliance.finite_slopes import FiniteSlopes, coarse_grid
-from micro.compliance.half_space_modes import half_space_modes
-from micro.compliance.side_modes import side_modes
+from micro.compliance.half_space_modes import half_space_modes, half_space_stress_modes
+from micro.compliance.side_modes import side_modes, side_stress_modes
+from micro.compliance.side_patches import side_patches
+from micro.compliance.surface_stress import SurfaceStress
 from micro.ellipse import (
     area_factor,
     axis_factor,
@@ -26,6 +29,7 @@ from micro.ellipse import (
     eccentricity_approximate,
     force_factor,
 )
+from micro.finite_slope import finite_slope_effect
 from micro.half_space import HalfSpaceModel
 from micro.hertz import HertzContact, contact_modulus
 from micro.influence import influence_matrix, mutual_influence
@@ -50,6 +54,7 @@ __all__ = [
     "AsperityModel",
     "AsperityState",
     "BodyModes",
+    "BodyStresses",
     "Candidate",
     "Choice",
     "Contacts",
@@ -68,6 +73,7 @@ __all__ = [
     "RigidPlane",
     "ScaledModel",
     "SideStresses",
+    "SurfaceStress",
     "area_factor",
     "asperity_model",
     "axis_factor",
@@ -78,8 +84,10 @@ __all__ = [
     "eccentricity",
     "eccentricity_approximate",
     "find_contacts",
+    "finite_slope_effect",
     "force_factor",
     "half_space_modes",
+    "half_space_stress_modes",
     "influence_matrix",
     "love_centre",
     "love_integral",
@@ -89,4 +97,7 @@ __all__ = [
     "mutual_influence",
     "resampled",
     "side_modes",
+    "side_patches",
+    "side_stress_modes",
+    "side_stresses",
 ]

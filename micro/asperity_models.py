@@ -16,23 +16,33 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry import Asperities, Partition, PatchGrid
+from geometry import Asperities, Control, Partition, PatchGrid
 from geometry.errors import InputError
-from micro.curve import PatchSums, checked_approaches
-from micro.hertz import HertzContact
-from micro.pairs.interaction import Interaction
+from micro.compliance.body_modes import BodyModes
+from micro.curve import PatchSums, checked_approaches, checked_means
 from micro.plane import RigidPlane
+from micro.plane_equilibrium import Held, Peaks, balanced
 from micro.response import Pressed, Response
-from micro.summits.active_set import active_set
-from micro.summits.asperity_state import AsperityState, HertzCoefficients
-from micro.summits.contact_problem import ContactProblem, Method, Solution, solve
-from micro.summits.many_summits import PAIR_SUMS, ManySummits, pair_sum
-from micro.summits.truncated_newton import truncated_newton
+from micro.summits.asperity_state import AsperityState
+from micro.summits.contact_problem import Solution
+from micro.summits.many_summits import PAIR_SUMS
+from micro.summits.summit_contacts import SOLVERS, SummitContacts
 
 Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 _LEVEL = (0.0, 0.0)
+
+
+class Balanced(NamedTuple):
+    """Contacts in equilibrium with a plane.
+
+    Attributes:
+        plane: The plane.
+        solution: The contacts.
+    """
+
+    plane: RigidPlane
+    solution: Solution
 
 
 class ModelKind(NamedTuple):
@@ -57,11 +67,6 @@ MODELS: Mapping[str, ModelKind] = MappingProxyType(
 )
 """The models (1) to (4) of Waddad et al. 2016, section 2.2, by name."""
 
-SOLVERS: Mapping[str, Method] = MappingProxyType(
-    {"active-set": active_set, "truncated-newton": truncated_newton}
-)
-"""Solvers of the models with interaction, by name."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AsperityModel:
@@ -78,6 +83,8 @@ class AsperityModel:
         interacting: Whether contacts displace each other's summits.
         solver: Solver of the models with interaction, a name in `SOLVERS`.
         pairs: How to sum over pairs, a name in `PAIR_SUMS`, or ``"auto"`` by their number.
+        body: What a finite body with its sides adds to the half-space, between all contacts, also
+            those of the models without interaction; a half-space when not given.
 
     Raises:
         InputError: When the modulus is not positive, the solver or the sum unknown, or the
@@ -93,12 +100,13 @@ class AsperityModel:
     interacting: bool
     solver: str = "active-set"
     pairs: str = "auto"
+    body: BodyModes | None = None
 
     def __post_init__(self) -> None:
         _known(self.solver, SOLVERS, "solver")
         allowed = ("auto", *PAIR_SUMS) if self.solver == "active-set" else ("auto", "direct")
         _known(self.pairs, allowed, f"sum over pairs with the solver {self.solver}")
-        _ = self._hertz  # checks the modulus
+        _ = self.contacts.hertz  # checks the modulus
 
     @property
     def name(self) -> str:
@@ -120,7 +128,21 @@ class AsperityModel:
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
         """Return the model of the summits of one patch; see `MicroModel.of_patch`."""
         own = patches.index_of(self.asperities.x, self.asperities.y) == index
-        return replace(self, asperities=self.asperities.subset(own)), patches.single(index)
+        alone = replace(self, asperities=self.asperities.subset(own), body=None)
+        return alone, patches.single(index)
+
+    @cached_property
+    def contacts(self) -> SummitContacts:
+        """The contacts that the summits can make."""
+        return SummitContacts(
+            asperities=self.asperities,
+            contact_modulus=self.contact_modulus,
+            elliptic=self.elliptic,
+            interacting=self.interacting,
+            solver=self.solver,
+            pairs=self.pairs,
+            body=self.body,
+        )
 
     def solve(
         self,
@@ -141,22 +163,21 @@ class AsperityModel:
             NotConverged: When the contact conditions cannot be met to 1e-10.
         """
         plane = RigidPlane.above(self.asperities, approach, tilt)
-        required = plane.required(self.asperities)
-        first = np.zeros(len(required)) if start is None else start.indentation
-        return self.state(plane, self.solution(required, first))
+        first = np.zeros(len(self.asperities)) if start is None else start.indentation
+        return self.state(plane, self.contacts.solution(plane.overlap(self.asperities), first))
 
     def state(self, plane: RigidPlane, solution: Solution) -> AsperityState:
         """Return the contacts of a solution under a plane."""
-        own = solution.indentation
+        own, hertz = solution.indentation, self.contacts.hertz
         return AsperityState(
             approach=plane.approach,
             required=plane.required(self.asperities),
-            displacement=own + self._lift(own),
+            displacement=own + self.contacts.lift(own),
             indentation=own,
-            semi_axes=self._hertz.semi_axes * np.sqrt(own)[:, None],
-            contact_area=self._hertz.area * own,
-            force=self._hertz.force * own**1.5,
-            peak_pressure=self._hertz.peak_pressure * np.sqrt(own),
+            semi_axes=hertz.semi_axes * np.sqrt(own)[:, None],
+            contact_area=hertz.area * own,
+            force=hertz.force * own**1.5,
+            peak_pressure=hertz.peak_pressure * np.sqrt(own),
             engulfed=solution.engulfed,
             iterations=solution.iterations,
             residual=solution.residual,
@@ -180,31 +201,92 @@ class AsperityModel:
             plane = RigidPlane.above(self.asperities, given[index], tilt)
             # Going on as before is right to second order when the steps are equal.
             start = np.maximum(2.0 * own - before, 0.0)
-            found = self.solution(plane.required(self.asperities), start)
+            found = self.contacts.solution(plane.overlap(self.asperities), start)
             own, before = found.indentation, own
             rows[int(index)] = sums.row(plane, found)
         return sums.response(self.name, [rows[index] for index in range(len(given))])
 
     def press(
         self,
-        plane: RigidPlane,
+        control: Control,
         *,
         patches: Partition,
         mean_heights: ArrayLike,
         start: Any = None,
     ) -> Pressed:
-        """Solve under one plane; see `MicroModel.press`."""
-        first = np.zeros(len(self.asperities)) if start is None else start
-        if np.shape(first) != (len(self.asperities),):
+        """Solve one load step; see `MicroModel.press`."""
+        sums = self.sums(patches, mean_heights)
+        found = self.equilibrium(control, start)
+        response = sums.response(self.name, [sums.row(found.plane, found.solution)])
+        return Pressed(response, found.plane, found)
+
+    def equilibrium(self, control: Control, start: Balanced | None = None) -> Balanced:
+        """Solve the contacts, and the motions of the plane that are free.
+
+        Without force the plane touches first, under the slopes of the start where they are free.
+
+        Args:
+            control: What is prescribed of the plane.
+            start: A solution nearby, of these or as many asperities.
+
+        Raises:
+            InputError: When the start is of other asperities.
+            NotConverged: When the contact conditions cannot be met to 1e-10, or no plane is in
+                balance.
+        """
+        own, spent = np.zeros(len(self.asperities)), 0
+        if start is not None:
+            own = start.solution.indentation
+        if own.shape != (len(self.asperities),):
             raise InputError(
                 "the solution to start from is of other asperities",
-                value=np.shape(first),
+                value=own.shape,
                 allowed=f"({len(self.asperities)},)",
             )
-        found = self.solution(plane.required(self.asperities), first)
-        sums = self.sums(patches, mean_heights)
-        rows = [sums.row(plane, found)]
-        return Pressed(sums.response(self.name, rows), found.indentation)
+        peaks, first = self._peaks, self.first_plane(control, start)
+
+        def evaluate(motion: Array) -> tuple[Held, Balanced]:
+            nonlocal own, spent
+            plane = self._plane(motion)
+            found = self.contacts.solution(plane.overlap(self.asperities), own)
+            own, spent = found.indentation, spent + found.iterations
+            loads = peaks.lever.T @ (self.contacts.hertz.force * own**1.5)
+            known = Balanced(plane, found._replace(iterations=spent))
+            return Held(loads, self.contacts.stiffness(own, peaks.lever)), known
+
+        motion = np.array([first.approach, *first.tilt])
+        return balanced(evaluate, control, motion, peaks)[1]
+
+    def first_plane(self, control: Control, start: Balanced | None = None) -> RigidPlane:
+        """Return the plane that an equilibrium is looked for from.
+
+        Args:
+            control: What is prescribed of the plane.
+            start: A solution nearby; without, contacts that do not see each other tell.
+
+        Raises:
+            NotConverged: When no plane can be in balance.
+        """
+        near = None
+        if start is not None and (start.solution.indentation.any() or control.force == 0.0):
+            near = start.plane
+        return self._plane(self._peaks.first_plane(control, near))
+
+    def _plane(self, motion: Array) -> RigidPlane:
+        approach, *tilt = map(float, motion)
+        return RigidPlane.above(self.asperities, approach, (tilt[0], tilt[1]))
+
+    @cached_property
+    def _peaks(self) -> Peaks:
+        a = self.asperities
+        middle, sides = 0.5 * np.asarray(a.lengths), np.hypot(*a.lengths)
+        lever = np.stack([np.ones(len(a)), a.x - middle[0], a.y - middle[1]], axis=1)
+        force = self.contacts.hertz.force
+
+        def alone(overlap: Array) -> float:
+            return float(force @ np.maximum(overlap, 0.0) ** 1.5)
+
+        return Peaks(lever=lever, below=a.highest - a.z, force=alone, half=0.5 * sides)
 
     def surface_displacement(self, state: AsperityState, x: ArrayLike, y: ArrayLike) -> Array:
         """Return the normal displacement of the surface at points, by all contacts [mm].
@@ -219,36 +301,11 @@ class AsperityModel:
         total = np.zeros(np.broadcast_shapes(np.shape(x), np.shape(y)))
         a = self.asperities
         for k in np.flatnonzero(state.in_contact):  # one field at a time bounds the memory
-            contact = self._contact(state.indentation[k], int(k))
+            contact = self.contacts.contact(state.indentation[k], int(k))
             dx, dy = np.asarray(x, float) - a.x[k], np.asarray(y, float) - a.y[k]
             cos, sin = np.cos(a.angle[k]), np.sin(a.angle[k])
             total += contact.displacement(cos * dx + sin * dy, cos * dy - sin * dx)
         return total
-
-    def _contact(self, indentation: ArrayLike, index: int | slice = slice(None)) -> HertzContact:
-        a = self.asperities
-        return HertzContact(
-            contact_modulus=self.contact_modulus,
-            radius_major=(a.radius_major if self.elliptic else a.radius)[index],
-            radius_minor=(a.radius_minor if self.elliptic else a.radius)[index],
-            indentation=indentation,
-        )
-
-    @cached_property
-    def _hertz(self) -> HertzCoefficients:
-        return HertzCoefficients.of(self._contact(1.0))
-
-    @cached_property
-    def _interaction(self) -> Interaction:
-        shape = self._contact(0.0).factors
-        return Interaction.among(self.asperities, shape, circular=not self.elliptic)
-
-    def _lift(self, own: Array) -> Array | float:
-        if not self.interacting:
-            return 0.0
-        if pair_sum(len(own)) == "mesh":
-            return self._many.lift(own)
-        return self._interaction.lift(own).displacement
 
     def sums(
         self, patches: Partition, mean_heights: ArrayLike, home: Asperities | None = None
@@ -267,43 +324,11 @@ class AsperityModel:
             asperities=self.asperities,
             home=self.asperities if home is None else home,
             patches=patches,
-            mean_heights=np.asarray(mean_heights, float),
-            hertz=self._hertz,
+            mean_heights=checked_means(mean_heights, patches),
+            hertz=self.contacts.hertz,
             contact_modulus=self.contact_modulus,
+            body=self.contacts.points,
         )
-
-    def solution(self, required: Array, start: Array) -> Solution:
-        """Solve for the summits in reach; the displacement of the others is left at 0.
-
-        Args:
-            required: Displacements d_k that the plane requires, shape (n,) [mm].
-            start: First guess of the own indentations, shape (n,) [mm].
-
-        Raises:
-            NotConverged: When the contact conditions cannot be met to 1e-10.
-        """
-        if not self.interacting:
-            return Solution(required, required, 0, 0.0, 0)
-        reached = np.flatnonzero(required > 0.0)
-        own, displacement = np.zeros_like(required), np.zeros_like(required)
-        if reached.size == 0:
-            return Solution(own, displacement, 0, 0.0, 0)
-        found = self._solution_among(reached, required[reached], start[reached])
-        own[reached], displacement[reached] = found.indentation, found.displacement
-        return found._replace(indentation=own, displacement=displacement)
-
-    def _solution_among(self, reached: Indices, required: Array, start: Array) -> Solution:
-        way = pair_sum(len(reached)) if self.pairs == "auto" else self.pairs
-        if way == "direct" or self.solver != "active-set":
-            problem = ContactProblem(
-                interaction=self._interaction.subset(reached), required=required
-            )
-            return solve(problem, SOLVERS[self.solver], start)
-        return self._many.solve(way, reached, required, start)
-
-    @cached_property
-    def _many(self) -> ManySummits:
-        return ManySummits(interaction=self._interaction)
 
 
 def asperity_model(
@@ -313,6 +338,7 @@ def asperity_model(
     contact_modulus: float,
     solver: str = "active-set",
     pairs: str = "auto",
+    body: BodyModes | None = None,
 ) -> AsperityModel:
     """Return the model of a given name on some asperities.
 
@@ -322,6 +348,7 @@ def asperity_model(
         contact_modulus: E* [MPa].
         solver: A name in `SOLVERS`, for the models with interaction.
         pairs: A name in `PAIR_SUMS` or ``"auto"``, for the models with interaction.
+        body: What a finite body adds to the half-space.
 
     Raises:
         InputError: When a name is unknown or the modulus not positive.
@@ -332,6 +359,7 @@ def asperity_model(
         contact_modulus=contact_modulus,
         solver=solver,
         pairs=pairs,
+        body=body,
         **MODELS[name]._asdict(),
     )
 

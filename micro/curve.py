@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from geometry import Asperities, Partition, PatchGrid, Surface
 from geometry.errors import InputError
+from micro.pairs.body_points import BodyPoints
 from micro.patch_displacement import patch_displacements
 from micro.plane import RigidPlane
 from micro.response import Response
@@ -40,9 +41,10 @@ class PatchSums:
         mean_heights: Mean heights of the patches, shape (N,) [mm].
         hertz: Coefficients of the asperities.
         contact_modulus: E* [MPa].
+        body: Compliance of a finite body between the asperities; None on a half-space.
 
     Raises:
-        InputError: When a summit lies outside the patches, or not every patch has a mean height.
+        InputError: When a summit lies outside the patches.
     """
 
     asperities: Asperities
@@ -51,10 +53,9 @@ class PatchSums:
     mean_heights: Array
     hertz: HertzCoefficients
     contact_modulus: float
+    body: BodyPoints | None = None
 
     def __post_init__(self) -> None:
-        means = checked_means(self.mean_heights, self.patches)
-        object.__setattr__(self, "mean_heights", means)
         _ = self.owner  # refuses summits outside
 
     @cached_property
@@ -112,7 +113,7 @@ class PatchSums:
         return np.stack([self.asperities.x[on], self.asperities.y[on]], axis=1)
 
     def _displacement(self, on: NDArray[np.intp], axes: Array, force: Array) -> Array:
-        return patch_displacements(
+        found = patch_displacements(
             self.patches,
             self._positions(on),
             axes,
@@ -120,6 +121,10 @@ class PatchSums:
             force,
             self.contact_modulus,
         )
+        if self.body is None:
+            return found
+        moment = force / (np.pi * self.contact_modulus)
+        return found + self.body.among(on).patch_means(self.patches, moment)
 
 
 def whole_patch(surface: Surface) -> PatchGrid:
@@ -156,12 +161,18 @@ def checked_means(mean_heights: ArrayLike, patches: Partition) -> Array:
     Raises:
         InputError: When there is not one finite number for every patch.
     """
-    means = np.asarray(mean_heights, float)
+    allowed = f"shape ({patches.count},)"
+    try:
+        means = np.asarray(mean_heights, float)
+    except (TypeError, ValueError):
+        raise InputError(
+            "the mean heights are no numbers", value=mean_heights, allowed=allowed
+        ) from None
     if means.shape != (patches.count,):
         raise InputError(
             "every patch needs one mean height",
             value=means.shape,
-            allowed=f"shape ({patches.count},)",
+            allowed=allowed,
         )
     if not np.isfinite(means).all():
         raise InputError("a mean height is not finite", value=means.tolist(), allowed="mm")

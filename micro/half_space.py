@@ -19,7 +19,7 @@ from micro.cells.half_space_curve import CellSums
 from micro.cells.half_space_state import HalfSpaceState
 from micro.cells.motions import Motions
 from micro.cells.pressing import Pressing
-from micro.curve import checked_approaches, whole_patch
+from micro.curve import checked_approaches, checked_means, whole_patch
 from micro.plane import RigidPlane
 from micro.response import Pressed, Response
 
@@ -116,8 +116,15 @@ class HalfSpaceModel:
         little smaller than those. The patch has a half-space of its own.
         """
         piece = self.surface.piece(*patches.bounds(index))
-        alone = {"periodic": False, "sides": None, "body": None, "slopes": None}
-        model = replace(self, surface=piece, highest=self.datum, **alone)
+        model = replace(
+            self,
+            surface=piece,
+            highest=self.datum,
+            periodic=False,
+            sides=None,
+            body=None,
+            slopes=None,
+        )
         return model, whole_patch(piece)
 
     def solve(
@@ -272,7 +279,7 @@ class HalfSpaceModel:
         return Pressed(response, state.plane, (state.pressure, state.plane))
 
     def _sums(self, patches: Partition, mean_heights: ArrayLike) -> CellSums:
-        means = np.asarray(mean_heights, float)
+        means = checked_means(mean_heights, patches)
         return CellSums(
             surface=self.surface, patches=patches, mean_heights=means, highest=self.datum
         )

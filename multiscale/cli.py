@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import itertools
+import os
 import sys
 import time
 import traceback
@@ -11,14 +13,18 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NoReturn
 
-from geometry.errors import InputError, PatchlawError
+from geometry.errors import InputError, NotWritten, PatchlawError
 from multiscale import commands
 from multiscale.comparing import command as compare_command
 from multiscale.doctor import command as doctor_command
-from multiscale.mpi_job import world
+from multiscale.mpi_job import petsc_leaves_signals, world
 from multiscale.reporting import terminal
+from multiscale.reporting.streams import sturdy_streams
+from multiscale.restart.interruption import Ended, ended_by_signals
 
 _MOST_PATIENT = 5.0  # with other ranks, at the end [s]
+_OPTION_FILES = ("-options_file", "-options_file_yaml")
+_SIGNALLED = (129, 130, 143)
 _SOLVER_OPTIONS = ("-snes_", "-ksp_", "-pc_", "-mg_")
 
 
@@ -38,20 +44,40 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Returns:
         0 done; 2 the input is wrong and nothing was written; 3 not converged, the state up to
-        there kept; 4 stopped in time; 5 a file cannot be written; 130 and 143 stopped by SIGINT
-        and SIGTERM; 1 a bug. After 3, 4, 5, 130 and 143 ``patchlaw run --resume`` goes on from the
-        last load step.
+        there kept; 4 stopped in time; 5 a file cannot be written, or what was to be printed; 129,
+        130 and 143 stopped by SIGHUP, SIGINT and SIGTERM; 1 a bug. After all but 0, 1 and 2
+        ``patchlaw run --resume`` goes on from the last load step.
 
     Note:
         Collective over all processes of the MPI job.
     """
+    with sturdy_streams() as (output, errors), ended_by_signals():
+        try:
+            code = _run(arguments)
+        except SystemExit:  # of --help and --version
+            code = 0
+        except KeyboardInterrupt:
+            code = 130
+        except Ended as told:
+            code = told.exit_code
+        output.flush()
+        failure = output.failure or errors.failure
+        if failure is None or isinstance(failure, BrokenPipeError) or code in (1, *_SIGNALLED):
+            return code  # whoever closed a pipe has read enough
+        name = "standard output" if failure is output.failure else "standard error"
+        problem = failure.strerror or failure
+        terminal.complain(None, NotWritten(f"{name}: cannot be written: {problem}"))
+        return NotWritten.exit_code
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    """Run one command and return its exit code."""
+    petsc_leaves_signals()
     try:
         comm = world()
     except InputError as error:
         terminal.complain(None, error)
         return error.exit_code
-    except KeyboardInterrupt:
-        return 130
     meeting = None if comm is None else comm.Dup()  # none else must send anything through it
     words = list(sys.argv[1:] if arguments is None else arguments)
     cut = words.index("--") if "--" in words else len(words)
@@ -66,9 +92,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _ended(comm, error.exit_code)
     except KeyboardInterrupt:
         return _ended(comm, 130)
-    except BrokenPipeError:  # whoever read our output has enough
-        sys.stderr.close()
-        return 0
+    except Ended as told:
+        return _ended(comm, told.exit_code)
     except Exception:
         if comm is not None:
             time.sleep(min(comm.rank, _MOST_PATIENT))  # of ranks with the same error, one tells it
@@ -164,8 +189,8 @@ def _add_interruption(parser: argparse.ArgumentParser) -> None:
 
 
 def _summary(command: Any) -> str:
-    """Return the first line of a command's docstring."""
-    return command.__doc__.partition("\n")[0]
+    """Return the first line of a command's docstring, which ``python -OO`` leaves out."""
+    return (command.__doc__ or "").partition("\n")[0]
 
 
 def _given_to_petsc(options: list[str]) -> list[str]:
@@ -177,6 +202,19 @@ def _given_to_petsc(options: list[str]) -> list[str]:
     prefixed = [
         f"-patchlaw_{word[1:]}" if word.startswith(_SOLVER_OPTIONS) else word for word in options
     ]
-    # a misspelt option is no error for PETSc; at the end it names those that nobody asked for
-    petsc4py.init(["patchlaw", *prefixed, "-options_left"])
+    _check_files(options)
+    try:
+        # a misspelt option is no error for PETSc; at the end it names those that nobody asked for
+        petsc4py.init(["patchlaw", *prefixed, "-options_left"])
+    except Exception as error:
+        raise InputError(
+            "PETSc does not start with these options", key="--", value=" ".join(options)
+        ) from error
     return prefixed
+
+
+def _check_files(options: list[str]) -> None:
+    """Refuse files of options that PETSc could not read: it would not start, at great length."""
+    for name, value in itertools.pairwise([*options, ""]):
+        if name in _OPTION_FILES and not os.access(value, os.R_OK):
+            raise InputError("this file of options cannot be read", key=name, value=value)

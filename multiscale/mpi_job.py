@@ -14,6 +14,16 @@ from geometry.errors import InputError
 _SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS")
 
 
+def petsc_leaves_signals() -> None:
+    """Keep PETSc from taking SIGHUP, and without Open MPI SIGTERM, from who watches for them.
+
+    Its handlers end the process with exit code 59. It must be told before it starts.
+    """
+    option, given = "-no_signal_handler", os.environ.get("PETSC_OPTIONS", "")
+    if option not in given.split():
+        os.environ["PETSC_OPTIONS"] = f"{given} {option}".strip()
+
+
 def world() -> Any:
     """Return the communicator of an MPI job, or None for a process on its own.
 

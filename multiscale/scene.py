@@ -8,12 +8,13 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
-from geometry.spectrum import Spectrum
+from geometry.spectrum import LARGEST_SEED, Spectrum
 from multiscale.scenes.left_open import Open, OrAuto
 from multiscale.scenes.quantities import Length, Pressure, Slope, SpectralAmplitude
 from multiscale.scenes.refusals import first_refusal
 from multiscale.scenes.scene_files import override, read_scene_file
 from multiscale.scenes.sections import (
+    Count,
     CouplingSection,
     LoadSection,
     Number,
@@ -23,7 +24,6 @@ from multiscale.scenes.sections import (
 
 Flag = Annotated[bool, Field(strict=True)]
 PositiveLength = Annotated[Length, Field(gt=0)]
-Count = Annotated[int, Field(ge=1, le=1_000_000_000, strict=True)]
 Pair = Annotated[tuple[Count, Count], Field(description="x, y")]
 Heights = Annotated[
     int, Field(ge=4, le=1_000_000_000, strict=True)
@@ -41,7 +41,7 @@ class SpectrumSection(Section):
     rms_slope: Annotated[Slope, Field(gt=0)] | None = None
     rms_height: PositiveLength | None = None
     s0: Annotated[SpectralAmplitude, Field(gt=0)] | None = None
-    seed: Annotated[int, Field(ge=0, strict=True)] = 0
+    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED, strict=True)] = 0
 
     @model_validator(mode="after")
     def _makes_a_spectrum(self) -> Self:
@@ -90,7 +90,12 @@ class SurfaceSection(Section):
 
 
 class BlockSection(Section):
-    """The elastic block below the interface, pressed by a rigid plane."""
+    """The elastic block below the interface, pressed by a rigid plane.
+
+    ``cells`` and the keys after it are about the mesh of the flat block, which is made under laws
+    (``coupling.compliance = "finite-element"``) and for fields (``output.fields``); nothing else
+    depends on it.
+    """
 
     height: PositiveLength = 1.0
     young_modulus: Annotated[Pressure, Field(gt=0)]
@@ -100,7 +105,7 @@ class BlockSection(Section):
         Annotated[
             tuple[Count, Count, Count] | Open,
             OrAuto(tuple[Count, Count, Count]),
-            Field(description="cells in x, y, z; by default as fine as the coupling needs"),
+            Field(description="cells in x, y, z of the mesh under laws and of fields"),
         ]
         | None
     ) = None
@@ -173,9 +178,9 @@ class Scene(Section):
     The section ``[load]`` is the attribute `loading`, for `Scene.load` reads a file.
 
     ``accuracy`` is the error of the force that may be left. Of ``surface.grid``, ``micro.model``,
-    ``coupling.kind``, ``patches.grid`` and ``block.cells``, those that are ``"auto"`` become what
-    is predicted to keep it at the least cost; with an accuracy so do those that are not stated.
-    Without one, ``"auto"`` means 2 %.
+    ``coupling.kind``, ``patches.grid`` and, under laws on a mesh, ``block.cells``, those that are
+    ``"auto"`` become what is predicted to keep it at the least cost; with an accuracy so do those
+    that are not stated. Without one, ``"auto"`` means 2 %.
     """
 
     accuracy: Annotated[Number, Field(gt=0, lt=0.5)] | None = None

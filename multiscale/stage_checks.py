@@ -32,24 +32,29 @@ BYTES_PER_STATE = 24
 EMBEDDED_CELLS = (40, 40, 25)
 """Cells of a block that carries the laws itself: those of Waddad et al. 2016."""
 
-DECOMPOSED_CELLS = (20, 20, 12)
-"""Cells of a block that only corrects the half-space: a cube's compliance to 0.05 %."""
-
+FIELD_CELLS = (20, 20, 12)
+"""Cells of a block that is meshed for its fields alone, after the load."""
 
 PROVISIONAL_PATCHES = (4, 4)
 """Patches of a scene that leaves them open, until they are chosen."""
 
 
 def block_cells(scene: Scene) -> tuple[int, int, int]:
-    """Return the cells of the block: those asked for, or as many as its part needs.
+    """Return the cells of the flat block's mesh: those asked for, or as many as its part needs.
 
-    Laws on the plain mesh need it fine under every patch; the smooth correction of the half-space
-    does not.
+    Laws need it fine under every patch; fields do not.
     """
     cells = scene.block.cells
     if cells is None or cells == "auto":
-        return DECOMPOSED_CELLS if scene.coupling.decomposed else EMBEDDED_CELLS
+        return EMBEDDED_CELLS if scene.coupling.on_mesh else FIELD_CELLS
     return cells
+
+
+def meshes_block(scene: Scene) -> bool:
+    """Tell whether the flat block is meshed: under laws, or for fields after the load."""
+    return scene.coupling.on_mesh or (
+        scene.output.fields and scene.coupling.kind not in ("analytic", "reference")
+    )
 
 
 def patch_grid(scene: Scene) -> tuple[int, int]:
@@ -92,20 +97,18 @@ def needs(scene: Scene) -> Iterator[tuple[str, object, str, Need]]:
         kept = math.prod(grid) * BYTES_PER_SENT_HEIGHT
         made = math.prod(grid) * BYTES_PER_HEIGHT - kept
         yield "surface.grid", grid, "", Need(held=kept, once=made)
-    meshed = scene.coupling.kind not in ("analytic", "reference")  # which checks its meshes itself
-    if meshed and scene.block.cells != "auto":
-        cells = block_cells(scene)
-        yield "block.cells", cells, "", _of_cells(scene, math.prod(cells))
-    if meshed and scene.block.margin:
-        more = 2 * scene.block.margin_cells
+    if meshes_block(scene):  # a reference checks its meshes itself
         nx, ny, nz = block_cells(scene)
-        need = _of_cells(scene, (nx + more) * (ny + more) * nz)
-        yield "block.margin_cells", scene.block.margin_cells, "", need
+        yield "block.cells", (nx, ny, nz), "", Need(shared=nx * ny * nz * BYTES_PER_CELL)
+        if scene.block.margin:
+            more = 2 * scene.block.margin_cells
+            need = Need(shared=(nx + more) * (ny + more) * nz * BYTES_PER_CELL)
+            yield "block.margin_cells", scene.block.margin_cells, "", need
     if not isinstance(patches, tuple):
         return
     count, steps = math.prod(patches), scene.loading.steps * len(scene.loading.programme.points)
     yield "patches.grid", patches, "", Need(held=count * BYTES_PER_HEIGHT)
-    if meshed:
+    if scene.coupling.kind not in ("analytic", "reference"):
         what = "the interaction of all patches with each other "
         yield "patches.grid", patches, what, Need(held=count**2 * BYTES_PER_PAIR)
     if scene.coupling.kind in ("isolated", "consistent"):
@@ -118,17 +121,10 @@ def needs(scene: Scene) -> Iterator[tuple[str, object, str, Need]]:
     yield "load.steps", scene.loading.steps, what, need
 
 
-def _of_cells(scene: Scene, cells: int) -> Need:
-    """Return what cells of a block take: the smooth rest of a decomposed one is every rank's."""
-    needed = cells * BYTES_PER_CELL
-    return Need(held=needed) if scene.coupling.decomposed else Need(shared=needed)
-
-
 def check_patches(scene: Scene, surface: Surface) -> None:
     """Refuse patches that no element or no height can resolve."""
     limits: list[tuple[str, Sequence[int]]] = [("heights of the surface", surface.grid)]
-    on_mesh = not scene.coupling.decomposed or scene.output.fields
-    if scene.coupling.kind not in ("analytic", "reference") and on_mesh:
+    if meshes_block(scene):
         limits.append(("cells of the interface (block.cells)", block_cells(scene)[:2]))
     grid = patch_grid(scene)
     for what, limit in limits:

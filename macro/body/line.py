@@ -102,18 +102,19 @@ class Sampled(NamedTuple):
     slopes: Array
 
 
-def mode_integrals(line: Line, length: float, count: int) -> Array:
+def mode_integrals(line: Line, length: float, count: int, *, slopes: bool = False) -> Array:
     """Return the integrals of Legendre modes times shapes, shape (modes, n) [mm].
 
     Args:
-        line: Elements from the middle of the modes on; those beyond their end do not count.
+        line: Elements from the middle to the end of the modes, its parity given.
         length: Length L of the modes, from 0 [mm].
         count: Modes K, of which those of the line's parity are taken.
+        slopes: Whether the slopes of shapes are taken instead, whose parity is the other one.
     """
     rule = line.sampled((max(line.degrees) + count) // 2 + 1)
-    modes = mode_values(rule.points, length, count)[line.parity or 0 :: 2]
-    inside = np.where(rule.points < length, rule.weights, 0.0)
-    return np.asarray((modes * inside) @ rule.values.T)
+    parity = ((line.parity or 0) + slopes) % 2
+    modes = mode_values(rule.points, length, count)[parity::2]
+    return np.asarray((modes * rule.weights) @ (rule.slopes if slopes else rule.values).T)
 
 
 def _shapes(t: Array, degree: int) -> tuple[Array, Array]:

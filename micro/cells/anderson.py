@@ -7,7 +7,11 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_MEMORY = 3
+_MEMORY = 2
+_NOISE = 2.0
+"""Change of a residual over the step: more is not the step's doing."""
+_DEPENDENT = 1e-2
+"""Changes that differ less in direction, times their length, are taken for one."""
 
 
 class Anderson:
@@ -18,8 +22,8 @@ class Anderson:
     """
 
     def __init__(self) -> None:
-        self._points: list[Array] = []
-        self._residuals: list[Array] = []
+        self._last: tuple[Array, Array] | None = None
+        self._steps: list[tuple[Array, Array]] = []
 
     def next(self, point: Array, residual: Array) -> Array:
         """Return the next point.
@@ -28,15 +32,18 @@ class Anderson:
             point: Where the iteration is, of any shape.
             residual: What a plain step would change, of the same shape.
         """
-        self._points = [*self._points, point][-_MEMORY:]
-        self._residuals = [*self._residuals, residual][-_MEMORY:]
-        if len(self._points) == 1:
-            return point + residual
-        changes = np.stack([residual - earlier for earlier in self._residuals[:-1]]).reshape(
-            len(self._points) - 1, -1
-        )
-        share = np.linalg.lstsq(changes @ changes.T, changes @ residual.ravel(), rcond=1e-12)[0]
+        if self._last is not None:
+            step, change = point - self._last[0], residual - self._last[1]
+            size = float(np.linalg.norm(change))
+            if 0.0 < size <= _NOISE * float(np.linalg.norm(step)):
+                pair = step / size, change / size  # they shrink by orders of magnitude
+                self._steps = [*self._steps, pair][-_MEMORY:]
+        self._last = point, residual
         moved = point + residual
-        for part, earlier, change in zip(share, self._points, changes, strict=False):
-            moved = moved - part * (point - earlier + change.reshape(point.shape))
+        if not self._steps:
+            return moved
+        changes = np.stack([change.ravel() for _, change in self._steps])
+        shares = np.linalg.lstsq(changes.T, residual.ravel(), rcond=_DEPENDENT)[0]
+        for share, (step, change) in zip(shares, self._steps, strict=True):
+            moved = moved - share * (step + change)
         return moved

@@ -259,6 +259,7 @@ class ElasticGrids:
         self.periodic, self.modulus = periodic, modulus
         self.sides, self.body, self.slopes = sides, body, slopes
         self._known: dict[tuple[object, ...], HalfSpaceGrid] = {}
+        self._last: tuple[Array, Array] | None = None
 
     def at(
         self, grid: tuple[int, ...], spacing: tuple[float, float], box: Box | None = None
@@ -289,6 +290,23 @@ class ElasticGrids:
             origin: Corner of the first cell [mm].
         """
         return ElasticGrid(self._half_space(grid, spacing), self._of_body(grid, spacing, origin))
+
+    def by_slopes(self, pressure: Array) -> Array:
+        """Return what finite slopes add to the displacements of all cells, shape (nx, ny) [mm].
+
+        The last ones are kept: a load step begins where the one before it ended.
+
+        Args:
+            pressure: Pressures / E* of all cells of the surface, shape (nx, ny).
+
+        Raises:
+            ValueError: When no finite slopes are to be seen.
+        """
+        if self.slopes is None:
+            raise ValueError("these grids see no finite slopes")
+        if self._last is None or not np.array_equal(self._last[0], pressure):
+            self._last = pressure, self.slopes.displacement(pressure * self.modulus)
+        return self._last[1]
 
     def risen(self, pressure: Array, spacing: tuple[float, float]) -> Array:
         """Return what the body alone adds to the displacements of all cells, shape (nx, ny) [mm].

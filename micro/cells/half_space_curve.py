@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from geometry import Partition, Surface, overlaps, patch_means
 from micro.cells.contacts import true_area
 from micro.cells.half_space_state import HalfSpaceState
-from micro.curve import checked_means
 from micro.plane import RigidPlane
 
 Array = NDArray[np.float64]
@@ -33,18 +32,12 @@ class CellSums:
         patches: The N patches, within the surface's rectangle.
         mean_heights: Mean heights of the patches, shape (N,) [mm].
         highest: Height z_M that approaches count from [mm].
-
-    Raises:
-        InputError: When not every patch has a mean height.
     """
 
     surface: Surface
     patches: Partition
     mean_heights: Array
     highest: float
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "mean_heights", checked_means(self.mean_heights, self.patches))
 
     def row(self, plane: RigidPlane, state: HalfSpaceState) -> dict[str, Any]:
         """Return the fields of a response for one approach."""

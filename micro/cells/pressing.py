@@ -80,29 +80,30 @@ class Pressing:
 
         They are a few per cent of all, and change by a hundredth of that in the second solution.
         """
-        slopes = self.grids.slopes
-        if slopes is None:
+        if self.grids.slopes is None:
             return solve(required, motions, start, self.tolerance)
-        modulus, known = self.grids.modulus, Anderson()
+        known = Anderson()
         lag = np.zeros(required.shape)
         if start is not None and start.pressure.any():
-            lag = slopes.displacement(start.pressure * modulus)
+            lag = self.grids.by_slopes(start.pressure)
         tolerance, iterations, passes = max(self.tolerance, _FIRST), 0, 0
+        last = max(_LAG, 10.0 * self.tolerance)
         for _ in range(_MOST_LAGS):
             found = start = solve(required - lag, motions, start, tolerance)
             iterations, passes = iterations + found.iterations, passes + found.passes
             touching = found.pressure > 0.0
             if not touching.any():
                 return found
-            change = slopes.displacement(found.pressure * modulus) - lag
+            change = self.grids.by_slopes(found.pressure) - lag
             nearer = required if motions is None else required + motions.nearer(found.motion)
             scale = float(nearer[touching].max())
             left = float(np.abs(change[touching]).max()) / scale
-            if left <= _LAG and tolerance <= self.tolerance:
+            if left <= last and tolerance <= self.tolerance:
                 residual = max(found.residual, left)
                 return found._replace(residual=residual, iterations=iterations, passes=passes)
             lag = known.next(lag, change)
-            tolerance = max(self.tolerance, min(_FIRST, _AHEAD * left))
+            ahead = _AHEAD * left
+            tolerance = self.tolerance if ahead <= last else min(_FIRST, ahead)
         raise NotConverged(
             "the displacements by finite slopes",
             reason=f"they still change by {left:.1e} of the displacement",

@@ -1,4 +1,4 @@
-"""What a finite body adds to the half-space: a smooth compliance in few modes of the contact face.
+"""What a finite body adds to the half-space: a smooth compliance in few modes of its top.
 
 Pressures p have the moments b_n = ∫ p φ_n dA with the modes φ_n, and displace by Σ φ_m D_mn b_n.
 Modes are products of Legendre modes along x and y (`geometry.legendre_modes`): all evaluations are
@@ -22,12 +22,13 @@ Indices = NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyModes:
-    """Compliance of a rectangular contact face in its Legendre modes.
+    """Compliance of the top of a body in its Legendre modes.
 
     Args:
-        lengths: Sides (Lx, Ly) of the face, which starts at the origin [mm].
+        lengths: Sides (Lx, Ly) of the top [mm].
         matrix: D, symmetric; mode k K + l varies as mode k along x and l along y, shape (K², K²)
             [mm/N].
+        origin: Corner of the top, where the contact face does not start with it [mm].
 
     Raises:
         InputError: When a length is not positive, or the matrix not one of K² modes, not finite or
@@ -36,6 +37,7 @@ class BodyModes:
 
     lengths: tuple[float, float]
     matrix: Array
+    origin: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         matrix = np.asarray(self.matrix, float)
@@ -63,15 +65,17 @@ class BodyModes:
         """Return the compliance of cells of pressure, by means over the cells.
 
         Args:
-            borders_x: Borders of the cells along x, ascending within the face, (nx + 1,) [mm].
+            borders_x: Borders of the cells along x, ascending within the top, (nx + 1,) [mm].
             borders_y: Borders along y, shape (ny + 1,) [mm].
         """
-        borders = np.asarray(borders_x, float), np.asarray(borders_y, float)
-        means = [
-            mode_means(ticks, length, self.count)
-            for ticks, length in zip(borders, self.lengths, strict=True)
-        ]
-        return ModesOnCells(self.matrix, *means, *map(np.diff, borders))
+        x, y = self._placed(borders_x, borders_y)
+        return ModesOnCells(
+            self.matrix,
+            mode_means(x, self.lengths[0], self.count),
+            mode_means(y, self.lengths[1], self.count),
+            np.diff(x),
+            np.diff(y),
+        )
 
     def between(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Return displacements of points by unit forces at points, shape (n, n) [mm/N].
@@ -80,6 +84,7 @@ class BodyModes:
             x: Abscissae, shape (n,) [mm].
             y: Ordinates, shape (n,) [mm].
         """
+        x, y = self._placed(x, y)
         along_x = mode_values(x, self.lengths[0], self.count)
         along_y = mode_values(y, self.lengths[1], self.count)
         modes = (along_x[:, None] * along_y).reshape(len(self.matrix), -1)
@@ -107,7 +112,11 @@ class BodyModes:
                 "so many modes are not there", value=count, allowed=f"1 … {self.count}"
             )
         some = self.matrix.reshape(4 * (self.count,))[:count, :count, :count, :count]
-        return BodyModes(self.lengths, some.reshape(count**2, count**2))
+        return BodyModes(self.lengths, some.reshape(count**2, count**2), self.origin)
+
+    def _placed(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+        """Return places counted from the corner of the top."""
+        return np.asarray(x, float) - self.origin[0], np.asarray(y, float) - self.origin[1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,23 +1,30 @@
-"""Compliance of the half-space in the Legendre modes of a rectangle.
+"""Compliance and surface stresses of the half-space in the Legendre modes of a rectangle.
 
 With A(s) = ∫ φ_k(x) φ_k'(x + s) dx, and B likewise along y, the moments of a displacement with the
 kernel g(s, t) are ∫∫ A B g. Kernels of the half-space are homogeneous: on the triangles s Ly > t Lx
 and s Ly < t Lx, with s the length along one and t = s v along the other, they leave polynomials of
 s and smooth functions of v, to which Gauss' rules converge at once.
+
+The stresses in the surface are σ_αβ = −2ν p δ_αβ − (1 − 2ν) ∂_α ∂_β φ, with φ the convolution of p
+with ln ρ/2π. Integrated by parts once, the moments of ∂_α ∂_β φ are −∫∫ A' B ∂_β ln ρ/2π.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from geometry.legendre_modes import mode_values
+from geometry.legendre_modes import mode_slopes, mode_values
 
 Array = NDArray[np.float64]
+Part = Callable[[Array, float, int], Array]
+"""Function of shifts, the length and the number of modes, with values of shape (shifts, K, K)."""
 
-_MORE = 8
-"""Points across a triangle beyond the number of modes: with v = sinh w the rest is 1e-12."""
+_MORE = 12
+"""Points across a triangle beyond the number of modes: with v = sinh w they leave 1e-11."""
 
 
 def half_space_modes(lengths: tuple[float, float], count: int) -> Array:
@@ -30,37 +37,113 @@ def half_space_modes(lengths: tuple[float, float], count: int) -> Array:
     Returns:
         (1/A²) ∫∫ φ_m(x) φ_n(x') / (π |x − x'|) dA dA', symmetric, shape (K², K²) [1/mm].
     """
+    matrix = 4.0 / np.pi * _integrated(lengths, count, (_even, _even), lambda x, _: np.ones_like(x))
+    return np.asarray(0.5 * (matrix + matrix.T))
+
+
+def half_space_stress_modes(
+    lengths: tuple[float, float], poisson_ratio: float, count: int
+) -> Array:
+    """Return the stresses in the half-space's surface by modes of pressure, in modes.
+
+    Args:
+        lengths: Sides (Lx, Ly) of the rectangle [mm].
+        poisson_ratio: ν.
+        count: Modes K along a side; mode k K + l is k along x, l along y.
+
+    Returns:
+        (1/A²) ∫ φ_m σ_αβ[φ_n] dA of xx, yy and xy, shape (3, K², K²) [1/mm²].
+    """
+    side = 1.0 - 2.0 * poisson_ratio
+    xx = _integrated(lengths, count, (_even_slopes, _even), lambda x, _: x) * (-2.0 / np.pi)
+    xy = _integrated(lengths, count, (_odd_slopes, _odd), lambda _, y: y) * (-2.0 / np.pi)
+    pressure = np.eye(count**2) / (lengths[0] * lengths[1])
+    straight = -2.0 * poisson_ratio * pressure - side * xx
+    return np.stack([straight, -(1.0 + 2.0 * poisson_ratio) * pressure - straight, -side * xy])
+
+
+def _integrated(
+    lengths: tuple[float, float],
+    count: int,
+    parts: tuple[Part, Part],
+    weight: Callable[[Array, Array], Array],
+) -> Array:
+    """Integrate over a quarter of all shifts between two points of the rectangle.
+
+    Args:
+        lengths: Sides of the rectangle [mm].
+        count: Modes along a side.
+        parts: Factors that depend on the shift along x, and along y.
+        weight: Function of the shift's direction (cos, sin), times 1/ρ.
+
+    Returns:
+        Shape (K², K²), over the square of the area.
+    """
     total = np.zeros(4 * (count,))
     for along, across, flip in ((0, 1, False), (1, 0, True)):
         # s = L u, t = s v, ρ = s √(1 + v²), ds dt / ρ = ds dv / √(1 + v²) = ds dw
         steep = np.arcsinh(lengths[across] / lengths[along])
-        s, weights = _gauss(lengths[along], count)
+        s, weights = _gauss(lengths[along], 2 * count)  # of degree 4 K − 2 in s
         w, others = _gauss(steep, count + _MORE)
-        first = _even(_products(s, lengths[along], count)) * weights[:, None, None]
+        direction = 1.0 / np.cosh(w), np.tanh(w)
+        others = others * weight(*(reversed(direction) if flip else direction))
+        first = parts[along](s, lengths[along], count) * weights[:, None, None]
         t = np.multiply.outer(s, np.sinh(w))
-        second = _even(_products(t.ravel(), lengths[across], count))
+        second = parts[across](t.ravel(), lengths[across], count)
         second = np.einsum("w,swkl->skl", others, second.reshape(*t.shape, count, count))
         part = np.tensordot(first, second, axes=(0, 0))  # k, k', l, l'
         total += part.transpose(2, 0, 3, 1) if flip else part.transpose(0, 2, 1, 3)
     area = lengths[0] * lengths[1]
-    matrix = total.reshape(count**2, count**2) * (4.0 / (np.pi * area**2))
-    return np.asarray(0.5 * (matrix + matrix.T))
+    return np.asarray(total.reshape(count**2, count**2) / area**2)
+
+
+def _even(shifts: Array, length: float, count: int) -> Array:
+    """Return the part of the products that keeps its value with the shift's sign."""
+    products = _products(shifts, length, count)
+    return np.asarray(0.5 * (products + products.transpose(0, 2, 1)))
+
+
+def _odd(shifts: Array, length: float, count: int) -> Array:
+    """Return the part of the products that changes its sign with the shift's."""
+    products = _products(shifts, length, count)
+    return np.asarray(0.5 * (products - products.transpose(0, 2, 1)))
+
+
+def _even_slopes(shifts: Array, length: float, count: int) -> Array:
+    """Return the derivative of `_even` to the shift."""
+    slopes = _product_slopes(shifts, length, count)
+    return np.asarray(0.5 * (slopes + slopes.transpose(0, 2, 1)))
+
+
+def _odd_slopes(shifts: Array, length: float, count: int) -> Array:
+    """Return the derivative of `_odd` to the shift."""
+    slopes = _product_slopes(shifts, length, count)
+    return np.asarray(0.5 * (slopes - slopes.transpose(0, 2, 1)))
 
 
 def _products(shifts: Array, length: float, count: int) -> Array:
     """Return ∫ φ_k(x) φ_l(x + s) dx, shape (shifts, K, K) [mm]."""
+    return _overlaps(shifts, length, mode_values, count)
+
+
+def _product_slopes(shifts: Array, length: float, count: int) -> Array:
+    """Return the derivatives of `_products` to the shift, shape (shifts, K, K)."""
+    ends = mode_values(length - shifts, length, count).T[:, :, None]
+    last = mode_values(np.array([length]), length, count)[:, 0]
+    return _overlaps(shifts, length, mode_slopes, count) - ends * last
+
+
+def _overlaps(
+    shifts: Array, length: float, there: Callable[[Array, float, int], Array], count: int
+) -> Array:
+    """Return ∫ φ_k(x) ψ_l(x + s) dx where both are on the interval, shape (shifts, K, K)."""
     nodes, weights = legendre.leggauss(count)
     half = 0.5 * (length - shifts)[:, None]
     x = half * (1.0 + nodes)
     shape = count, len(shifts), count
-    here = mode_values(x.ravel(), length, count).reshape(shape).transpose(1, 0, 2)
-    there = mode_values((x + shifts[:, None]).ravel(), length, count).reshape(shape)
-    return np.asarray((here * (half * weights)[:, None]) @ there.transpose(1, 2, 0))
-
-
-def _even(products: Array) -> Array:
-    """Return the part that does not change with the shift's sign: of modes of one parity."""
-    return np.asarray(0.5 * (products + products.transpose(0, 2, 1)))
+    first = mode_values(x.ravel(), length, count).reshape(shape).transpose(1, 0, 2)
+    second = there((x + shifts[:, None]).ravel(), length, count).reshape(shape)
+    return np.asarray((first * (half * weights)[:, None]) @ second.transpose(1, 2, 0))
 
 
 def _gauss(length: float, count: int) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""Compliance that free sides add to the half-space, in the Legendre modes of the rectangle."""
+"""Compliance and stresses that free sides add to the half-space, in modes of the rectangle."""
 
 from __future__ import annotations
 
@@ -36,19 +36,73 @@ def side_modes(sides: FreeSides, count: int) -> Array:
     return np.asarray(0.5 * (matrix + matrix.T))
 
 
+def side_stress_modes(sides: FreeSides, count: int) -> Array:
+    """Return the stresses in the surface that free sides add by modes of pressure, in modes.
+
+    Args:
+        sides: The free sides.
+        count: Modes K along a side; mode k K + l is k along x, l along y.
+
+    Returns:
+        (1/A²) ∫ φ_m σ_αβ[φ_n] dA of xx, yy and xy, shape (3, K², K²) [1/mm²].
+    """
+    normal, parallel, shear = (part.transpose(0, 2, 1, 3) for part in _stresses(sides, 0, count))
+    total = np.stack([normal, parallel, shear])
+    normal, parallel, shear = (part.transpose(2, 0, 3, 1) for part in _stresses(sides, 1, count))
+    total += np.stack([parallel, normal, shear])
+    area = sides.lengths[0] * sides.lengths[1]
+    return np.asarray(total.reshape(3, count**2, count**2) / area**2)
+
+
 def _by_two(sides: FreeSides, axis: int, count: int) -> Array:
     """Return what two opposite sides add, by modes across them and along, shape (k, k', l, l')."""
-    length, along = sides.lengths[axis], sides.lengths[1 - axis]
-    nodes = distance_nodes(_NEAREST * length / count**2, length)
-    waves = np.arange(_WAVES * count)
-    loads = _integrals(nodes, length, count)
+    nodes, waves, loads = _lines(sides, axis, count)
     lines = loads @ sides.compliance(axis, nodes, waves) @ loads.T
+    return _along(sides, axis, lines, far=1.0)
+
+
+def _stresses(sides: FreeSides, axis: int, count: int) -> tuple[Array, Array, Array]:
+    """Return stresses normal to two opposite sides, along them and in shear, as `_by_two`."""
+    nodes, waves, loads = _lines(sides, axis, count)
+    normal, parallel, shear = loads @ sides.stresses(axis, nodes, waves) @ loads.T
+    return (
+        _along(sides, axis, normal, far=1.0),
+        _along(sides, axis, parallel, far=1.0),
+        _along(sides, axis, shear, far=-1.0),
+    )
+
+
+def _lines(sides: FreeSides, axis: int, count: int) -> tuple[Array, NDArray[np.intp], Array]:
+    """Return nodes of the distance from a side, waves along it, and modes' integrals at nodes."""
+    length = sides.lengths[axis]
+    nodes = distance_nodes(_NEAREST * length / count**2, length)
+    return nodes, np.arange(_WAVES * count), _integrals(nodes, length, count)
+
+
+def _along(sides: FreeSides, axis: int, lines: Array, *, far: float) -> Array:
+    """Sum waves along two opposite sides.
+
+    Args:
+        sides: The free sides.
+        axis: 0 for sides across x, 1 across y.
+        lines: By waves, modes across the sides and modes of loads across them, shape (w, k, k').
+        far: 1 for what the opposite side does as this one; −1 for shear, which changes its sign
+            there, and is a sine where the load is a cosine, and −cos where it is a sine.
+
+    Returns:
+        Shape (k, k', l, l').
+    """
+    length, count = sides.lengths[1 - axis], lines.shape[1]
+    waves = np.arange(len(lines))
     # cosine series of period 2 L, of which the load takes one half
-    lines *= np.where(waves == 0, 0.5, 1.0)[:, None, None] / along
+    lines = lines * np.where(waves == 0, 0.5, 1.0)[:, None, None] / length
     parity = np.arange(count) % 2
-    lines *= 2.0 * (parity[:, None] == parity)  # the far side mirrors the near one
-    across = _waves(waves, count) * along
-    both = np.einsum("ckw,clw->wkl", across, across)
+    lines *= 1.0 + far * np.where(parity[:, None] == parity, 1.0, -1.0)
+    cosines, sines = _waves(waves, count) * length
+    seen = (cosines, sines) if far > 0.0 else (sines, -cosines)
+    both = sum(
+        np.einsum("kw,lw->wkl", one, load) for one, load in zip(seen, (cosines, sines), strict=True)
+    )
     return np.tensordot(lines, both, axes=(0, 0))
 
 

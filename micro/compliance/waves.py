@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 Spectrum = NDArray[np.complex128]
 Around = Literal["copies", "mirrored", "nothing"]
 
@@ -59,8 +59,8 @@ class Waves:
         self.shown = coarse if around == "nothing" else self.padded
         kx = 2.0 * np.pi * fft.fftfreq(self.padded[0], self.spacing[0])[:, None]
         ky = 2.0 * np.pi * fft.rfftfreq(self.padded[1], self.spacing[1])
-        self.wave_number = np.hypot(kx, ky)
-        self.directions = _directions(kx, ky)
+        self.wave_number = np.hypot(kx, ky).astype(np.float64)
+        self.directions = _directions(kx, ky).astype(np.float64)
         self._filter = _filter(self.coarse)
 
     def coarsened(self, field: Array) -> Array:
@@ -74,18 +74,19 @@ class Waves:
         Returns:
             Shape (cx, cy).
         """
-        cosines = fft.dctn(field, norm="ortho")[: self.coarse[0], : self.coarse[1]]
-        return np.asarray(fft.idctn(cosines * (self._filter * self._scale), norm="ortho"))
+        rows = fft.dct(field.astype(np.float64), axis=1, norm="ortho")[:, : self.coarse[1]]
+        cosines = fft.dct(rows, axis=0, norm="ortho")[: self.coarse[0]] * self._filter
+        return np.asarray(fft.idctn(cosines * self._scale, norm="ortho"))
 
     def refined(self, field: Array) -> Array:
         """Return a field on the cells of the rectangle by one on the coarse cells, (cx, cy).
 
         It is the transpose of `coarsened`, times the number of cells per coarse cell.
         """
-        cosines = np.zeros(self.grid)
-        kept = fft.dctn(field, norm="ortho") * (self._filter / self._scale)
-        cosines[: self.coarse[0], : self.coarse[1]] = kept
-        return np.asarray(fft.idctn(cosines, norm="ortho", overwrite_x=True))
+        cosines = fft.dctn(field.astype(np.float64), norm="ortho") * (self._filter / self._scale)
+        columns = fft.idct(cosines, n=self.grid[0], axis=0, norm="ortho")
+        rows = fft.idct(columns, n=self.grid[1], axis=1, norm="ortho")
+        return np.asarray(rows, np.float64)
 
     def continued(self, field: Array) -> Array:
         """Return a field on the coarse cells as it is continued around them, shape (sx, sy)."""
@@ -119,4 +120,5 @@ def _directions(kx: Array, ky: Array) -> Array:
 def _filter(coarse: tuple[int, int]) -> Array:
     """Fall from one to zero between two radii of the plane of wave numbers."""
     radius = np.hypot(np.arange(coarse[0])[:, None] / coarse[0], np.arange(coarse[1]) / coarse[1])
-    return np.clip((_DROPPED - radius) / (_DROPPED - _KEPT), 0.0, 1.0)
+    falling = (_DROPPED - radius) / (_DROPPED - _KEPT)
+    return np.clip(falling, 0.0, 1.0).astype(np.float64)

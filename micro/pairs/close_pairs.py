@@ -51,6 +51,22 @@ class ClosePairs:
         x, y = interaction.local(apart[:, 0], apart[:, 1], column)
         return cls(interaction=interaction, row=row, column=column, x_squared=x**2, y_squared=y**2)
 
+    @classmethod
+    def none(cls, interaction: Interaction) -> Self:
+        """Return no pairs, of contacts that do not displace each other's summits.
+
+        Args:
+            interaction: The n asperities.
+        """
+        nobody, nowhere = np.empty(0, dtype=np.intp), np.empty(0)
+        return cls(
+            interaction=interaction,
+            row=nobody,
+            column=nobody,
+            x_squared=nowhere,
+            y_squared=nowhere,
+        )
+
     def lift(self, indentation: Array) -> tuple[Array, Array]:
         """Return the displacements, shape (n,) [mm], and the slopes of all pairs, shape (m,).
 

@@ -47,11 +47,23 @@ class Lift(NamedTuple):
         active: Indices of the m asperities with positive indentation, shape (m,).
         displacement: Displacement of every summit by the others, shape (n,) [mm].
         slope: c_ki = dU_ki/dt_i ≤ c*, 0 for k = i, shape (n, m).
+        body: What a finite body adds to the slopes, k = i included, shape (n, m); None on a
+            half-space.
     """
 
     active: NDArray[np.intp]
     displacement: Array
     slope: Array
+    body: Array | None = None
+
+    @property
+    def derivative(self) -> Array:
+        """Derivative of the displacements by the indentations of the active, shape (n, m)."""
+        return self.slope if self.body is None else self.slope + self.body
+
+    def product(self, change: Array) -> Array:
+        """Return the change of the displacements by one of the indentations, shape (n,) [mm]."""
+        return np.asarray(self.derivative @ change[self.active])
 
     @property
     def engulfed(self) -> int:

@@ -24,7 +24,9 @@ Indices = NDArray[np.intp]
 class FarField(Protocol):
     """Displacements of n summits by moments of the n contacts, close pairs left out."""
 
-    terms: int
+    @property
+    def terms(self) -> int:
+        """Moments of a contact that count."""
 
     def displacement(self, moments: Array) -> Array:
         """Return the displacements by all moments (terms, n), shape (n,) [mm]."""

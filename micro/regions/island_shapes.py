@@ -11,7 +11,7 @@ gives R = V/(π w²), the ratio of the principal moments gives R'/R'', their dir
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -50,6 +50,7 @@ class Islands:
 
     Args:
         member: Island of each of the n peaks, −1 below the plane, shape (n,).
+        top: The highest peak of each island, shape (m,).
         depth: Heights w of the highest peaks above their level, shape (m,) [mm].
         x: Abscissae of the centroids of volume, shape (m,) [mm].
         y: Ordinates, shape (m,) [mm].
@@ -59,6 +60,7 @@ class Islands:
     """
 
     member: Indices
+    top: Indices
     depth: Array
     x: Array
     y: Array
@@ -69,8 +71,8 @@ class Islands:
     def __len__(self) -> int:
         return len(self.depth)
 
-    def lift(self, x: Array, y: Array) -> Array:
-        """Return the displacement of every peak by the islands that it is not part of [mm].
+    def kernel(self, x: Array, y: Array) -> Array:
+        """Return the displacements of peaks by the forces that they are not part of, (n, m) [1/mm].
 
         A point force for each island, at most the displacement of its own centre.
 
@@ -81,7 +83,17 @@ class Islands:
         distance = np.hypot(x[:, None] - self.x, y[:, None] - self.y)
         apart = self.member[:, None] != np.arange(len(self))
         limit = self.force / (np.pi * self.depth)
-        return (apart / np.maximum(distance, limit)) @ self.force / np.pi
+        return np.asarray((apart / np.maximum(distance, limit)) / np.pi)
+
+    def under(self, depth: Array) -> Islands:
+        """Return islands of the same shapes and other depths, shape (m,) [mm]."""
+        share = depth / self.depth
+        return replace(
+            self,
+            depth=depth,
+            semi_axes=self.semi_axes * np.sqrt(share)[:, None],
+            force=self.force * share**1.5,
+        )
 
 
 def islands(relief: Relief, height: Array, region: Indices) -> Islands:
@@ -100,6 +112,9 @@ def islands(relief: Relief, height: Array, region: Indices) -> Islands:
     count = int(member.max(initial=-1)) + 1
     depth = np.zeros(count)
     np.maximum.at(depth, island, height[on])
+    top = np.zeros(count, dtype=np.intp)
+    order = np.argsort(height[on], kind="stable")  # the highest is written last
+    top[island[order]] = on[order]
     moments = from_origin(caps[:, on], relief.x[on], relief.y[on])
     total: Array = np.stack([np.bincount(island, part, count) for part in moments])
     found = equivalent(total, depth)
@@ -107,6 +122,7 @@ def islands(relief: Relief, height: Array, region: Indices) -> Islands:
     major = shape.axis * np.sqrt(found.radius * depth)
     return Islands(
         member=member,
+        top=top,
         depth=depth,
         x=found.x,
         y=found.y,
@@ -114,6 +130,17 @@ def islands(relief: Relief, height: Array, region: Indices) -> Islands:
         semi_axes=np.stack([major, major * np.sqrt(shape.axis_ratio_squared)], axis=1),
         force=4.0 / 3.0 * np.sqrt(found.radius) * shape.force * depth**1.5,
     )
+
+
+def total_force(relief: Relief, height: Array) -> float:
+    """Return the force over E* of islands that do not displace each other [mm²].
+
+    Args:
+        relief: The n catchments.
+        height: Heights of the peaks above a plane, negative below, shape (n,) [mm].
+    """
+    region = relief.regions(relief.open_passes(relief.z - height))
+    return float(islands(relief, height, region).force.sum())
 
 
 def equivalent(moments: Array, depth: Array) -> Paraboloids:

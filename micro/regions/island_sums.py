@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Partition, overlaps
+from micro.compliance.body_modes import BodyModes
+from micro.pairs.body_points import BodyPoints
 from micro.patch_displacement import patch_displacements
 from micro.plane import RigidPlane
 from micro.regions.island_passes import Settled
@@ -34,6 +36,7 @@ class IslandSums:
         patches: Patches; every peak above the plane lies in one.
         mean_heights: Mean heights of the patches, shape (N,) [mm].
         contact_modulus: E* [MPa].
+        body: What a finite body adds to the half-space; None on a half-space.
     """
 
     relief: Relief
@@ -42,6 +45,7 @@ class IslandSums:
     patches: Partition
     mean_heights: Array
     contact_modulus: float
+    body: BodyModes | None = None
 
     def row(self, plane: RigidPlane, settled: Settled, state: IslandState) -> dict[str, Any]:
         """Return the fields of a response for one approach.
@@ -74,14 +78,9 @@ class IslandSums:
 
     def _tops(self, settled: Settled) -> tuple[Array, Indices]:
         """Return the places of the highest peaks of the islands, (m, 2) [mm], and their patches."""
-        member = settled.islands.member
-        peaks = np.flatnonzero(member >= 0)
-        owner = self.patches.index_of(self.relief.x[peaks], self.relief.y[peaks])
-        order = np.argsort(settled.height[peaks], kind="stable")  # the highest is written last
-        top = np.zeros(len(settled.islands), dtype=np.intp)
-        top[member[peaks][order]] = order
-        place = np.stack([self.relief.x[peaks], self.relief.y[peaks]], axis=1)
-        return place[top], owner[top]
+        top = settled.islands.top
+        x, y = self.relief.x[top], self.relief.y[top]
+        return np.stack([x, y], axis=1), self.patches.index_of(x, y)
 
     def _shares(self, settled: Settled, tops: Array) -> tuple[Array, Array]:
         """Return the shares of each patch in the force and in the area of each island, (m, N).
@@ -145,7 +144,7 @@ class IslandSums:
         return list(zip(inside, parts, strict=True))
 
     def _displacement(self, state: IslandState) -> Array:
-        return patch_displacements(
+        found = patch_displacements(
             self.patches,
             np.stack([state.x, state.y], axis=1),
             state.semi_axes,
@@ -153,3 +152,8 @@ class IslandSums:
             state.force,
             self.contact_modulus,
         )
+        if self.body is None:
+            return found
+        points = BodyPoints.at(self.body, state.x, state.y, self.contact_modulus)
+        moment = state.force / (np.pi * self.contact_modulus)
+        return found + points.patch_means(self.patches, moment)

@@ -18,16 +18,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry import Partition, PatchGrid, Surface
+from geometry import Control, Partition, PatchGrid, Surface
+from micro.compliance.body_modes import BodyModes
 from micro.curve import checked_approaches, checked_means, whole_patch
 from micro.hertz import checked_modulus
+from micro.pairs.body_points import BodyPoints
 from micro.plane import RigidPlane
+from micro.plane_equilibrium import Peaks
+from micro.regions.island_contact import IslandContact
 from micro.regions.island_passes import Settled, settle
+from micro.regions.island_shapes import total_force
 from micro.regions.island_state import IslandState
 from micro.regions.island_sums import IslandSums
 from micro.regions.relief import Relief
@@ -37,7 +42,16 @@ Array = NDArray[np.float64]
 
 _LEVEL = (0.0, 0.0)
 _MOST_KEPT = 2**20
+_FIRST = 0.1  # of the surface's heights: a plane to start from where none is known
+_TURN = 1e-4
+_MOST_CUTS = 8
 _MARGIN = 1.2  # keeps the samples that give small caps their shape
+
+
+class _Cut(NamedTuple):
+    relief: Relief
+    plane: RigidPlane
+    settled: Settled
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -51,6 +65,8 @@ class IslandModel:
         surface: The surface.
         contact_modulus: E* [MPa].
         highest: Height z_M that the approach counts from [mm]; the surface's own when not given.
+        body: What a finite body with its sides adds to the half-space, between the centres of the
+            islands and the peaks; a half-space when not given.
 
     Raises:
         InputError: When the modulus is not positive.
@@ -59,6 +75,7 @@ class IslandModel:
     surface: Surface
     contact_modulus: float
     highest: float | None = None
+    body: BodyModes | None = None
 
     def __post_init__(self) -> None:
         checked_modulus(self.contact_modulus)
@@ -81,7 +98,7 @@ class IslandModel:
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
         """Return the model of one patch cut out along its borders; see `MicroModel.of_patch`."""
         piece = self.surface.piece(*patches.bounds(index))
-        return replace(self, surface=piece, highest=self.datum), whole_patch(piece)
+        return replace(self, surface=piece, highest=self.datum, body=None), whole_patch(piece)
 
     def solve(self, approach: float, *, tilt: tuple[float, float] = _LEVEL) -> IslandState:
         """Solve the contact at one approach of the plane.
@@ -95,7 +112,8 @@ class IslandModel:
             NotConverged: When islands and displacements do not agree to 1e-6.
         """
         plane = RigidPlane.above(self.surface, approach, tilt)
-        return self._state(plane, self._settled(self._relief(plane), plane))
+        given = Control(approach=approach, tilt=tilt)
+        return self._state(self._settled(self._relief(plane), plane, given))
 
     def respond(
         self,
@@ -117,66 +135,128 @@ class IslandModel:
             RigidPlane.above(self.surface, approach, tilt)
             for approach in checked_approaches(approaches)
         ]
-        return self._response(planes, patches, mean_heights)
+        means = checked_means(mean_heights, patches)
+        relief = self._relief(max(planes, key=lambda plane: plane.approach))
+        rows = []
+        for plane in planes:
+            given = Control(approach=plane.approach, tilt=tilt)
+            rows.append(self._row(self._settled(relief, plane, given), patches, means))
+        return Response.of(rows, self.name, self.contact_modulus, patches)
 
     def press(
         self,
-        plane: RigidPlane,
+        control: Control,
         *,
         patches: Partition,
         mean_heights: ArrayLike,
         start: Any = None,
     ) -> Pressed:
-        """Solve under one plane; see `MicroModel.press`.
+        """Solve one load step; see `MicroModel.press`.
 
-        Islands are found anew under every plane: there is no start to go on from.
+        Islands are found anew at every load step: the start tells the plane alone. A plane that
+        turns leans on the catchments of the slopes before, peak by peak, until it turns no more
+        than by 1e-4 of the deepest contact.
         """
-        return Pressed(self._response([plane], patches, mean_heights), None)
-
-    def _response(
-        self, planes: list[RigidPlane], patches: Partition, mean_heights: ArrayLike
-    ) -> Response:
-        """Solve under planes that differ in their approach alone."""
         means = checked_means(mean_heights, patches)
+        found = self._pressed(control, start)
+        rows = [self._row(found, patches, means)]
+        response = Response.of(rows, self.name, self.contact_modulus, patches)
+        return Pressed(response, found.plane, found.plane)
+
+    def _pressed(self, control: Control, near: RigidPlane | None) -> _Cut:
+        """Find the plane, and what the catchments under its slopes are."""
+        approach = _FIRST * float(np.ptp(self.surface.heights))
+        if near is not None:
+            approach = near.approach
+        if control.approach is not None:
+            approach = control.approach
+        turned = control.tilt or (_LEVEL if near is None else near.tilt)
+        plane = RigidPlane.above(self.surface, approach, turned)
+        for _ in range(_MOST_CUTS):
+            found = self._settled(self._relief(plane), plane, control, near)
+            turn = np.hypot(*np.subtract(found.plane.tilt, plane.tilt)) * 0.5
+            deepest = float(found.settled.islands.depth.max(initial=0.0))
+            reached = self._is_kept or found.plane.approach <= plane.approach
+            if turn * np.hypot(*self.surface.lengths) <= _TURN * deepest and reached:
+                break
+            near = found.plane
+            plane = replace(near, approach=_MARGIN * near.approach)
+        return found
+
+    def _settled(
+        self,
+        relief: Relief,
+        leant: RigidPlane,
+        control: Control,
+        near: RigidPlane | None = None,
+    ) -> _Cut:
+        """Solve on catchments under the slopes of one plane, for another."""
+        middle, half = 0.5 * np.asarray(self.surface.lengths), 0.5 * np.hypot(*self.surface.lengths)
+        lever = np.stack([np.ones(len(relief)), relief.x - middle[0], relief.y - middle[1]], axis=1)
+        lean = np.array([0.0, *leant.tilt])
+        peaks = Peaks(
+            lever=lever,
+            below=self.datum - relief.z + lever @ lean,
+            force=lambda over: self.contact_modulus * total_force(relief, over),
+            half=half,
+        )
+        motion = peaks.first_plane(control, near)
+        level = self.datum - motion[0] - lever @ (motion * [0.0, 1.0, 1.0] - lean)
+        body = None
+        if self.body is not None:
+            body = BodyPoints.at(self.body, relief.x, relief.y, self.contact_modulus)
+        contact = IslandContact(
+            relief=relief,
+            peaks=peaks,
+            control=control,
+            level=level,
+            motion=motion,
+            contact_modulus=self.contact_modulus,
+            body=body,
+        )
+        settled = settle(relief, level, motion, contact.answer)
+        approach, *tilt = map(float, settled.motion)
+        plane = RigidPlane.above(self.surface, approach, (tilt[0], tilt[1]))
+        return _Cut(relief, plane, settled)
+
+    def _row(self, found: _Cut, patches: Partition, means: Array) -> dict[str, Any]:
         sums = IslandSums(
-            relief=self._relief(max(planes, key=lambda plane: plane.approach)),
+            relief=found.relief,
             lengths=self.surface.lengths,
             highest=self.datum,
             patches=patches,
             mean_heights=means,
             contact_modulus=self.contact_modulus,
+            body=self.body,
         )
-        rows = []
-        for plane in planes:
-            settled = self._settled(sums.relief, plane)
-            rows.append(sums.row(plane, settled, self._state(plane, settled)))
-        return Response.of(rows, self.name, self.contact_modulus, patches)
-
-    def _settled(self, relief: Relief, plane: RigidPlane) -> Settled:
-        return settle(relief, self.datum - plane.approach)
+        return sums.row(found.plane, found.settled, self._state(found))
 
     def _relief(self, plane: RigidPlane) -> Relief:
         """Return the catchments that a plane and all above it need."""
-        surface, small = self.surface, self.surface.heights.size <= _MOST_KEPT
-        lean = None
-        level = plane.tilt == _LEVEL and plane.sag is None
-        if level and small:
+        surface, level = self.surface, plane.tilt == _LEVEL
+        if level and self._is_kept:
             return self._whole
+        lean = None
         if not level:
             # apart from the heights, which may continue where a lean does not
             heights = plane.at(surface.x[:, None], surface.y) - plane.approach
             lean = replace(surface, heights=heights, periodic=False)
         floor = self.datum - _MARGIN * max(plane.approach, 0.0)
-        return Relief.of(surface, lean=lean, floor=-np.inf if small else floor)
+        return Relief.of(surface, lean=lean, floor=-np.inf if self._is_kept else floor)
+
+    @property
+    def _is_kept(self) -> bool:
+        return self.surface.heights.size <= _MOST_KEPT
 
     @cached_property
     def _whole(self) -> Relief:
         return Relief.of(self.surface, ceiling=self.surface.highest)
 
-    def _state(self, plane: RigidPlane, settled: Settled) -> IslandState:
+    def _state(self, cut: _Cut) -> IslandState:
+        settled = cut.settled
         found = settled.islands
         return IslandState(
-            approach=plane.approach,
+            approach=cut.plane.approach,
             x=found.x,
             y=found.y,
             angle=found.angle,

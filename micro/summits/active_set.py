@@ -36,14 +36,14 @@ def active_set(problem: ContactProblem[Lift], start: Array) -> Solution:
 
 def _newton_step(lift: Lift, error: Array) -> Array:
     """Solve (I + C) step = −error; rows outside the active set follow from those in it."""
-    active = lift.active
-    matrix = lift.slope[active]
+    active, derivative = lift.active, lift.derivative
+    matrix = derivative[active]
     matrix[np.diag_indices(len(active))] += 1.0
     try:
         inside = np.linalg.solve(matrix, -error[active])
     except np.linalg.LinAlgError:
         raise _failure("SINGULAR_JACOBIAN", 1) from None
-    step = -error - lift.slope @ inside
+    step = -error - derivative @ inside
     step[active] = inside
     return step
 

@@ -14,18 +14,20 @@ off. So large are contacts that have long merged.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from micro.pairs.body_points import BodyPoints
 from micro.pairs.close_pairs import ClosePairs
 from micro.pairs.far_mesh import FarMesh, Neighbourhood
 from micro.pairs.far_pairs import REACH, FarPairs
 from micro.pairs.interaction import Interaction
 from micro.pairs.split_interaction import SplitInteraction
+from micro.summits.body_lift import BodyFarField
 from micro.summits.contact_problem import ContactProblem, Solution, solve
 from micro.summits.newton_krylov import newton_krylov
 
@@ -54,9 +56,13 @@ class ManySummits:
 
     Args:
         interaction: The n asperities.
+        interacting: Whether contacts displace each other's summits through the half-space.
+        body: What a finite body adds between the summits; None on a half-space.
     """
 
     interaction: Interaction
+    interacting: bool = True
+    body: BodyPoints | None = None
 
     def solve(self, way: str, reached: Indices, required: Array, start: Array) -> Solution:
         """Solve for the summits in reach.
@@ -67,14 +73,16 @@ class ManySummits:
         Args:
             way: ``"multipole"`` or ``"mesh"``.
             reached: The m summits in reach, ascending.
-            required: d_k > 0, shape (m,) [mm].
+            required: d_k, shape (m,) [mm]; some are > 0.
             start: First guess of the own indentations, shape (m,) [mm].
 
         Raises:
             NotConverged: When even small load steps fail.
         """
         among, spent = self.interaction.subset(reached), 0
-        bound = np.clip(_GROWTH * start, _LEAST_SHARE * required, required)
+        # a body can lift summits: their contacts then indent more than the plane requires
+        most = required if self.body is None else np.full(len(reached), np.inf)
+        bound = np.clip(_GROWTH * start, _LEAST_SHARE * np.maximum(required, 0.0), most)
         while True:
             parts = self._parts(way, reached, among, bound)
             problem = ContactProblem(interaction=parts, required=required)
@@ -84,7 +92,7 @@ class ManySummits:
             if not beyond.any():
                 return found._replace(iterations=spent)
             start = found.indentation
-            bound = np.where(beyond, np.minimum(_GROWTH * start, required), bound)
+            bound = np.where(beyond, np.minimum(_GROWTH * start, most), bound)
 
     def lift(self, indentation: Array) -> Array:
         """Return the displacement of all n summits by the other contacts, through the mesh [mm].
@@ -97,6 +105,19 @@ class ManySummits:
         return parts.lift(indentation).displacement
 
     def _parts(
+        self, way: str, reached: Indices, among: Interaction, bound: Array
+    ) -> SplitInteraction:
+        if self.body is None:
+            return self._between(way, reached, among, bound)
+        body = self.body.among(reached)
+        if not self.interacting:
+            none = ClosePairs.none(among)
+            far = BodyFarField(far=None, body=body)
+            return SplitInteraction(interaction=among, close=none, far=far)
+        parts = self._between(way, reached, among, bound)
+        return replace(parts, far=BodyFarField(far=parts.far, body=body))
+
+    def _between(
         self, way: str, reached: Indices, among: Interaction, bound: Array
     ) -> SplitInteraction:
         semi_major = np.sqrt(among.size * bound)

@@ -7,11 +7,14 @@ step pays.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from geometry.errors import NotConverged
+from micro.pairs.interaction import Lift
 from micro.pairs.split_interaction import SplitLift
 from micro.summits.contact_problem import ContactProblem, Solution
 from micro.summits.normal_map import newton_on_normal_map
@@ -23,11 +26,11 @@ _FORCING = 1e-2
 _RESTART = 40
 
 
-def newton_krylov(problem: ContactProblem[SplitLift], start: Array) -> Solution:
+def newton_krylov(problem: ContactProblem[Any], start: Array) -> Solution:
     """Solve a contact problem by damped, inexact Newton steps on the normal map.
 
     Args:
-        problem: The contact problem, with a split interaction.
+        problem: The contact problem.
         start: First guess of the own indentations, shape (n,) [mm].
 
     Raises:
@@ -45,7 +48,7 @@ def newton_krylov(problem: ContactProblem[SplitLift], start: Array) -> Solution:
     )
 
 
-def _inexact_step(lift: SplitLift, error: Array) -> Array:
+def _inexact_step(lift: SplitLift | Lift, error: Array) -> Array:
     """Reduce (I + C) step + error on the active set to a hundredth; the other rows follow."""
     active, step = lift.active, np.zeros_like(error)
 

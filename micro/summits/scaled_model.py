@@ -17,9 +17,10 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry import Asperities, Partition, PatchGrid, Surface
+from geometry import Asperities, Control, Partition, PatchGrid, Surface
 from geometry.errors import InputError, NotConverged
-from micro.asperity_models import MODELS, AsperityModel, asperity_model
+from micro.asperity_models import MODELS, AsperityModel, Balanced, asperity_model
+from micro.compliance.body_modes import BodyModes
 from micro.curve import checked_approaches, checked_means
 from micro.plane import RigidPlane
 from micro.relaxation import Relaxation
@@ -38,13 +39,16 @@ BORDERS = ("ignore", "include")
 
 _LEVEL = (0.0, 0.0)
 _TOLERANCE = 1e-6
+_ROUNDING = 64.0 * np.finfo(float).eps
 _MOST_PASSES = 100
 _MOST_KEPT = 2**20
 _MARGIN = 1.2
+_FURTHER = 1.1  # than the last plane, so that the next one need not be found twice
 
 
 class _Fitted(NamedTuple):
     model: AsperityModel
+    plane: RigidPlane
     solution: Solution
 
 
@@ -60,6 +64,7 @@ class ScaledModel:
         border: A name in `BORDERS`. The radii of border asperities are always fitted.
         solver: Solver of the models with interaction.
         pairs: How to sum over pairs.
+        body: What a finite body adds to the half-space, as for `AsperityModel`.
         within: Patches and the flat index of the one whose summits alone there are; all when not
             given.
 
@@ -74,6 +79,7 @@ class ScaledModel:
     border: str = "include"
     solver: str = "active-set"
     pairs: str = "auto"
+    body: BodyModes | None = None
     within: tuple[PatchGrid, int] | None = None
 
     def __post_init__(self) -> None:
@@ -104,7 +110,7 @@ class ScaledModel:
 
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
         """Return the model of the summits of one patch; see `MicroModel.of_patch`."""
-        return replace(self, within=(patches, index)), patches.single(index)
+        return replace(self, within=(patches, index), body=None), patches.single(index)
 
     @cached_property
     def asperities(self) -> Asperities:
@@ -134,7 +140,10 @@ class ScaledModel:
         """
         plane = RigidPlane.above(self.surface, approach, tilt)
         scaled = self._scaled(_highest_approach([plane], self.surface))
-        fitted = self._fitted(scaled, plane, None if start is None else start.indentation)
+        given, own = Control(approach=approach, tilt=tilt), None
+        if start is not None:
+            own = start.indentation
+        fitted = self._fitted(scaled, given, plane, own=own)
         return fitted.model.state(plane, fitted.solution)
 
     def respond(
@@ -155,46 +164,71 @@ class ScaledModel:
         rows: dict[int, dict[str, Any]] = {}
         own: Array | None = None
         for index in np.argsort([plane.approach for plane in planes], kind="stable"):
-            fitted = self._fitted(scaled, planes[index], own)
+            plane = planes[index]
+            given = Control(approach=plane.approach, tilt=tilt)
+            fitted = self._fitted(scaled, given, plane, own=own)
             own = fitted.solution.indentation
             sums = fitted.model.sums(patches, means, home=scaled.summits)
-            rows[int(index)] = sums.row(planes[index], fitted.solution)
+            rows[int(index)] = sums.row(plane, fitted.solution)
         return sums.response(self.name, [rows[index] for index in range(len(planes))])
 
     def press(
         self,
-        plane: RigidPlane,
+        control: Control,
         *,
         patches: Partition,
         mean_heights: ArrayLike,
         start: Any = None,
     ) -> Pressed:
-        """Solve under one plane; see `MicroModel.press`."""
-        scaled = self._scaled(_highest_approach([plane], self.surface))
-        own = start if start is not None and len(start) == len(scaled.summits) else None
-        fitted = self._fitted(scaled, plane, own)
+        """Solve one load step; see `MicroModel.press`."""
         means = checked_means(mean_heights, patches)
+        reach = None
+        while True:
+            scaled = self._scaled(reach or 0.0)
+            known = start is not None and len(start.solution.indentation) == len(scaled.summits)
+            near = start if known else None
+            plane = self._model(scaled.summits).first_plane(control, near)
+            # what a large surface keeps follows from the plane, which is not known before
+            before, reach = reach, _highest_approach([plane], self.surface)
+            if before is None and not self._is_kept:
+                continue
+            fitted = self._fitted(scaled, control, plane, near)
+            reach = _highest_approach([fitted.plane], self.surface)
+            if self._is_kept or reach <= (before or 0.0):
+                break
+            reach *= _FURTHER
         sums = fitted.model.sums(patches, means, home=scaled.summits)
-        response = sums.response(self.name, [sums.row(plane, fitted.solution)])
-        return Pressed(response, fitted.solution.indentation)
+        response = sums.response(self.name, [sums.row(fitted.plane, fitted.solution)])
+        return Pressed(response, fitted.plane, Balanced(fitted.plane, fitted.solution))
 
-    def _fitted(self, scaled: ScaledAsperities, plane: RigidPlane, own: Array | None) -> _Fitted:
+    def _fitted(
+        self,
+        scaled: ScaledAsperities,
+        control: Control,
+        plane: RigidPlane,
+        near: Balanced | None = None,
+        own: Array | None = None,
+    ) -> _Fitted:
         """Fit the curvatures to the contacts and solve for the contacts until both agree."""
         required = plane.required(scaled.summits)
-        scale = float(required.max(initial=0.0)) or 1.0
-        own = required if own is None or not own.any() else own
-        relaxed, spent, first = Relaxation(), 0, np.zeros_like(required)
+        nothing = np.zeros_like(required)
+        found = near or Balanced(plane, Solution(nothing, nothing, 0, 0.0, 0))
+        own = found.solution.indentation if own is None else own
+        own = own if own.any() else required
+        rounding = _ROUNDING * float(np.abs(scaled.summits.z).max(initial=0.0))
+        relaxed, spent = Relaxation(), 0
         for _ in range(_MOST_PASSES):
             model = self._model(scaled.at(own))
-            required = plane.required(model.asperities)
-            found = model.solution(required, first)
-            first, spent = found.indentation, spent + max(found.iterations, 1)
+            found = model.equilibrium(control, found)
+            first = found.solution.indentation
+            spent += max(found.solution.iterations, 1)
             change = first - own
-            if np.abs(change).max(initial=0.0) <= _TOLERANCE * scale:
-                return _Fitted(model, found._replace(iterations=spent))
+            scale = float(found.plane.required(scaled.summits).max(initial=0.0)) or 1.0
+            if np.abs(change).max(initial=0.0) <= max(_TOLERANCE * scale, rounding):
+                return _Fitted(model, found.plane, found.solution._replace(iterations=spent))
             own = np.maximum(relaxed.next(own, change), 0.0)
         raise NotConverged(
-            f"the fit of curvatures to contacts at an approach of {plane.approach:.4g} mm",
+            f"the fit of curvatures to contacts at an approach of {found.plane.approach:.4g} mm",
             reason="MAX_ITERATIONS",
             iterations=spent,
             remedy="lower load.approach, or take the curvature at the summits",
@@ -207,12 +241,17 @@ class ScaledModel:
             contact_modulus=self.contact_modulus,
             solver=self.solver,
             pairs=self.pairs,
+            body=self.body,
         )
 
     def _scaled(self, approach: float) -> ScaledAsperities:
-        if self.surface.heights.size <= _MOST_KEPT:
+        if self._is_kept:
             return self._whole
         return self._found(self.surface.highest - _MARGIN * max(approach, 0.0))
+
+    @property
+    def _is_kept(self) -> bool:
+        return self.surface.heights.size <= _MOST_KEPT
 
     @cached_property
     def _whole(self) -> ScaledAsperities:

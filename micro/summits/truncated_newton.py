@@ -83,7 +83,7 @@ def _minimise(
 def _inner_solve(lift: Lift, rows: NDArray[np.intp], error: Array, *, forcing: float) -> Array:
     """Reduce ‖J step + error‖ by conjugate gradients to ``forcing`` times ‖error‖."""
     jacobian = np.eye(len(rows))
-    jacobian[:, np.searchsorted(rows, lift.active)] += lift.slope[rows]
+    jacobian[:, np.searchsorted(rows, lift.active)] += lift.derivative[rows]
     return lsqr(jacobian, -error, atol=0.0, btol=forcing, conlim=0.0, iter_lim=4 * len(rows))[0]
 
 

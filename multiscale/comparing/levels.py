@@ -203,7 +203,7 @@ class _Family:
             content = content | {"surface": content["surface"] | {"grid": list(heights)}}
         try:
             scene = Scene.from_dict(content)
-            cost = predicted_cost(make_stage(scene), self._machine, cold=True).total
+            cost = predicted_cost(make_stage(scene), self._machine).total
         except (InputError, NotConverged):
             return None
         kind = scene.coupling.kind

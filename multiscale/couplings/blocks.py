@@ -9,24 +9,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.surface import Surface
 from micro import (
-    BodyModes,
     FiniteSlopes,
     FreeSides,
     HalfSpace,
     HalfSpaceModel,
     MicroModel,
-    SideStresses,
+    SurfaceStress,
     coarse_grid,
-    half_space_modes,
-    influence_matrix,
-    side_modes,
+    side_stresses,
 )
+from multiscale.couplings.body import Body
 from multiscale.scene import Scene
 from multiscale.stage import Stage
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import Interface, Material
+    from macro import FaceCompliance, Interface, Material
 
 Array = NDArray[np.float64]
 
@@ -53,22 +52,33 @@ def contact_model(stage: Stage, comm: Any) -> MicroModel:
     Note:
         Collective.
     """
-    model, alone = stage.model, stage.scene.coupling.kind == "isolated"
+    model = stage.model
+    embedded = stage.embedded and stage.scene.coupling.kind != "isolated"
     if isinstance(model, HalfSpaceModel):
         order = SLOPES if stage.finite_slopes else 0
-        return on_body(stage, comm, half_space=alone or not stage.embedded)(model, order)
-    if alone or not stage.embedded:
+        return on_body(stage, comm, half_space=not embedded)(model, order)
+    if not embedded:
         return model
-    return replace(model, body=body_modes(stage, None, comm))  # type: ignore[type-var]
+    body = scene_body(stage)
+    return replace(model, body=body.term(body.face(comm)))  # type: ignore[type-var]
 
 
-def on_body(stage: Stage, comm: Any, *, half_space: bool = False) -> OnBody:
+def on_body(
+    stage: Stage,
+    comm: Any,
+    *,
+    half_space: bool = False,
+    modes: int | None = None,
+    coarse: bool = False,
+) -> OnBody:
     """Return what puts half-space models on a scene's body, which is solved for once.
 
     Args:
         stage: The scene's ingredients, with a half-space model.
         comm: MPI communicator; None for this process alone.
         half_space: Whether the body is a half-space instead of the scene's block.
+        modes: Modes of the body along a side; by default those of its shape.
+        coarse: Whether to take coarser elements for the body.
 
     Returns:
         A function from a model and the order of finite slopes, 0 for none, to the model on the
@@ -77,22 +87,51 @@ def on_body(stage: Stage, comm: Any, *, half_space: bool = False) -> OnBody:
     Note:
         Collective.
     """
-    sides = None if half_space else free_sides(stage)
-    body = None if half_space else body_modes(stage, sides, comm)
-    material = _half_space(stage)
+    body = None if half_space else scene_body(stage)
+    face = None if body is None else body.face(comm, modes=modes, coarse=coarse)
+    section = stage.scene.block
+    material = HalfSpace(section.young_modulus, section.poisson_ratio)
 
     def put(model: HalfSpaceModel, order: int) -> HalfSpaceModel:
-        placed = replace(model, tolerance=_SHARP, sides=sides, body=body)
+        surface, model = model.surface, replace(model, tolerance=_SHARP)
+        # heights count from the highest point, which is near the loads: slopes add least there;
+        # the flat body then reaches up to it, while the block's height is that of the mean plane
+        higher = surface.highest - surface.mean_height if order else 0.0
+        beside: list[SurfaceStress] = []
+        if body is not None and face is not None:
+            model = replace(model, sides=body.known, body=body.term(face, higher=higher))
+            beside = _stresses(body, face, surface) if order else []
         if not order:
-            return placed
-        surface, beside = model.surface, []
-        if sides is not None:
-            cells = coarse_grid(surface)
-            spacing = surface.lengths[0] / cells[0], surface.lengths[1] / cells[1]
-            beside = [SideStresses(sides, spacing)]
-        return replace(placed, slopes=FiniteSlopes(surface, material, order=order, beside=beside))
+            return model
+        plane = surface.highest if beside else None
+        slopes = FiniteSlopes(surface, material, order=order, plane=plane, beside=beside)
+        return replace(model, slopes=slopes)
 
     return put
+
+
+def _stresses(body: Body, face: FaceCompliance, surface: Surface) -> list[SurfaceStress]:
+    """Return the stresses in a contact face beyond those of the half-space."""
+    grid = coarse_grid(surface)
+    found: list[SurfaceStress] = [body.stresses(face, grid)]
+    if body.known is not None:
+        spacing = surface.lengths[0] / grid[0], surface.lengths[1] / grid[1]
+        found.append(side_stresses(body.known, spacing))
+    return found
+
+
+def scene_body(stage: Stage) -> Body:
+    """Return the block of a scene, some of whose free sides its micro model knows of itself.
+
+    Args:
+        stage: The scene's ingredients.
+    """
+    return Body(
+        shape=stage.shape,
+        material=block_material(stage),
+        sides=stage.scene.block.sides,
+        known=free_sides(stage),
+    )
 
 
 def free_sides(stage: Stage) -> FreeSides | None:
@@ -103,41 +142,18 @@ def free_sides(stage: Stage) -> FreeSides | None:
     Args:
         stage: The scene's ingredients.
     """
-    free = stage.embedded and stage.scene.block.sides == "free" and not stage.shape.margin
-    if not (free and isinstance(stage.model, HalfSpaceModel)):
+    return _block_sides(stage) if isinstance(stage.model, HalfSpaceModel) else None
+
+
+def _block_sides(stage: Stage) -> FreeSides | None:
+    """Return the free sides of a scene's block that end its interface; None without them."""
+    if not stage.embedded or stage.scene.block.sides != "free" or stage.shape.margin:
         return None
     return FreeSides(
         lengths=stage.surface.lengths,
         poisson_ratio=stage.scene.block.poisson_ratio,
         reach=_REACH * min(*stage.surface.lengths, stage.shape.height),
     )
-
-
-def body_modes(stage: Stage, sides: FreeSides | None, comm: Any) -> BodyModes:
-    """Return what a scene's block adds to the half-space and to some free sides.
-
-    Args:
-        stage: The scene's ingredients.
-        sides: Free sides that are known apart, if there are any.
-        comm: MPI communicator; None for this process alone.
-
-    Note:
-        Collective.
-    """
-    from mpi4py import MPI
-
-    from macro import cached_face_compliance, mode_count
-
-    count = mode_count(stage.shape)
-    section = stage.scene.block
-    found = cached_face_compliance(
-        stage.shape, block_material(stage), section.sides, count, comm or MPI.COMM_SELF
-    )
-    lengths = stage.surface.lengths
-    known = half_space_modes(lengths, count)
-    if sides is not None:
-        known = known + side_modes(sides, count)
-    return BodyModes(lengths, found.normal - known / stage.model.contact_modulus)
 
 
 def patch_displacements(stage: Stage, comm: Any, *, dense: bool) -> Callable[[Array], Array]:
@@ -184,9 +200,8 @@ def patch_compliance(stage: Stage, comm: Any) -> Array:
         Collective.
     """
     if stage.scene.coupling.decomposed:
-        half_space = influence_matrix(stage.patches) / (np.pi * stage.model.contact_modulus)
-        body = body_modes(stage, None, comm)
-        return np.asarray(half_space + body.patch_compliance(stage.patches))
+        body = replace(scene_body(stage), known=_block_sides(stage))
+        return body.patch_compliance(stage.patches, comm)
     from mpi4py import MPI
 
     from macro import plain_compliance
@@ -242,11 +257,6 @@ def block_material(stage: Stage) -> Material:
 
     section = stage.scene.block
     return Material(young_modulus=section.young_modulus, poisson_ratio=section.poisson_ratio)
-
-
-def _half_space(stage: Stage) -> HalfSpace:
-    section = stage.scene.block
-    return HalfSpace(section.young_modulus, section.poisson_ratio)
 
 
 def final_field(stage: Stage, pressure: Array, comm: Any) -> tuple[Interface, Array]:

@@ -78,4 +78,4 @@ def _show(findings: list[Finding]) -> None:
 
 
 def _summary(command: Any) -> str:
-    return command.__doc__.partition("\n")[0]
+    return (command.__doc__ or "").partition("\n")[0]

@@ -73,12 +73,12 @@ def consistent_laws(
 
     def ends() -> tuple[float, float, tuple[float, float]]:
         touch = Control(force=0.0, tilt=largest.tilt)
-        known = {"patches": patches, "mean_heights": means}
         end, start = largest, None
         if largest.approach is None or largest.tilt is None:
-            _, plane, start = model.press(largest, start=None, **known)
+            _, plane, start = model.press(largest, patches=patches, mean_heights=means)
             end = Control(approach=plane.approach, tilt=plane.tilt)
-        first = model.press(touch, start=start, **known).plane.approach
+        touched = model.press(touch, patches=patches, mean_heights=means, start=start)
+        first = touched.plane.approach
         return first, float(end.approach or 0.0), end.tilt or (0.0, 0.0)
 
     first, end, tilt = on_root(comm, ends)

@@ -78,8 +78,6 @@ def reference_warnings(scene: Scene, meshes: ReferenceMeshes) -> Iterator[str]:
                 "cells, which see the contacts no better than cubes would: take more layers, or a "
                 "larger block.grading"
             )
-    elif scene.block.cells is not None:
-        yield "block.cells is not used: the reference is meshed with tetrahedra"
 
 
 def _listed(parts: Sequence[str]) -> str:

@@ -93,14 +93,6 @@ class ReferenceMeshes:
         return 0.0 if self.hexahedral else float(max(self.unknowns)) * _GMSH[self.degree]
 
 
-def is_hexahedral(scene: Scene) -> bool:
-    """Tell whether the reference of a scene is meshed by hexahedra."""
-    section = scene.reference
-    if section.mesh != "auto":
-        return section.mesh == "hexahedra"
-    return scene.block.cells is not None and section.fine is None
-
-
 def reference_meshes(
     scene: Scene, surface: Surface, furthest: Plane, nodes: Nodes
 ) -> ReferenceMeshes:
@@ -116,8 +108,8 @@ def reference_meshes(
         InputError: When they cannot be made or would not fit into memory; names file and key.
     """
     _check_block(scene)
-    hexahedral = is_hexahedral(scene)
-    key = "block.cells" if hexahedral else "reference.fine"
+    hexahedral = scene.reference.hexahedral
+    key = "reference.cells" if hexahedral else "reference.fine"
     approach, tilt = furthest
     given = scene.loading.force is None and scene.loading.tilt != "free"
     reach = approach if given else (1.0 + _RESERVE) * approach
@@ -127,7 +119,7 @@ def reference_meshes(
             _check_memory(scene, key, nodes, least)
         shapes = reference_shapes(
             surface, reach, scene.block.height, count=scene.reference.meshes, tilt=tilt,
-            **_asked(scene, hexahedral),
+            **_asked(scene),
         )  # fmt: skip
         radius = contact_radius(surface, approach, tilt=tilt)
     except InputError as error:
@@ -144,13 +136,13 @@ def reference_meshes(
     return meshes
 
 
-def _asked(scene: Scene, hexahedral: bool) -> dict[str, Any]:
+def _asked(scene: Scene) -> dict[str, Any]:
     """Return what the scene says of its cells."""
     block = scene.block
-    if hexahedral:
+    if scene.reference.hexahedral:
         return {
             "mesh": "hexahedra",
-            "cells": block.cells,
+            "cells": scene.reference.cells,
             "grading": block.grading,
             "element": block.element,
         }
@@ -159,7 +151,7 @@ def _asked(scene: Scene, hexahedral: bool) -> dict[str, Any]:
 
 
 def _check_block(scene: Scene) -> None:
-    block, hexahedral = scene.block, is_hexahedral(scene)
+    block, hexahedral = scene.block, scene.reference.hexahedral
     for wrong, key, value, problem, allowed in (
         (
             block.margin > 0.0,
@@ -167,13 +159,6 @@ def _check_block(scene: Scene) -> None:
             block.margin,
             "does not go with coupling.kind = 'reference', whose rough surface is the whole top",
             "0",
-        ),
-        (
-            hexahedral and block.cells is None,
-            "block.cells",
-            None,
-            "is needed by reference.mesh = 'hexahedra'",
-            "cells along x, y and z, or reference.mesh = 'tetrahedra'",
         ),
         (
             hexahedral and not block.element.startswith("Q"),
@@ -206,7 +191,7 @@ def _check_memory(
             raise InputError(
                 f"{what} needs about {need.alone / 1e9:.3g} GB of memory",
                 key=key,
-                value=scene.block.cells if key == "block.cells" else scene.reference.fine,
+                value=scene.reference.cells or scene.reference.fine,
                 allowed=f"what fits into {nodes.room(need)}; or fewer reference.meshes",
                 file=scene.file,
             )

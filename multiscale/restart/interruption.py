@@ -6,17 +6,21 @@ import os
 import signal
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import FrameType, TracebackType
 from typing import Any
 
 from geometry.errors import PatchlawError
 
-_WATCHED = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
-_TIME_OVER = 1  # beside the numbers of the signals: none of them has it
-_TOLD = {
+_WATCHED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
+_AT_ONCE = (signal.SIGTERM, signal.SIGHUP)
+_TIME_OVER = 0.5  # below the numbers of all signals
+_TOLD: dict[float, str] = {
     _TIME_OVER: "the time is nearly over",
     signal.SIGINT: "interrupted (SIGINT)",
     signal.SIGTERM: "terminated (SIGTERM)",
+    signal.SIGHUP: "hung up (SIGHUP)",
     signal.SIGUSR1: "told to stop (SIGUSR1)",
 }
 _LEAST_RESERVE, _MOST_RESERVE = 1.0, 20.0  # for writing results [s]
@@ -24,12 +28,48 @@ _RESERVE = 0.05  # likewise, of the limit
 _LONGER = 1.5  # than the one before it a load step may take
 
 
+class Ended(BaseException):
+    """This process was told by a signal to end now.
+
+    Args:
+        number: The signal.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.exit_code = 128 + number
+
+
+@contextmanager
+def ended_by_signals() -> Iterator[None]:
+    """Let SIGTERM and SIGHUP raise `Ended`: what was begun is cleared away, and children end too.
+
+    What ``nohup`` has ignored stays so.
+    """
+    former: dict[int, Any] = {}
+    if threading.current_thread() is threading.main_thread():  # no other can
+        former = {
+            number: signal.signal(number, _raise)
+            for number in _AT_ONCE
+            if signal.getsignal(number) == signal.SIG_DFL
+        }
+    try:
+        yield
+    finally:
+        for number, handler in former.items():
+            signal.signal(number, handler)
+
+
+def _raise(number: int, frame: FrameType | None) -> None:
+    raise Ended(number)
+
+
 class Stopped(PatchlawError, RuntimeError):
     """A run was stopped between two load steps and can go on from there.
 
     Args:
         message: Why, and where.
-        exit_code: 4 in time; 130 or 143 by SIGINT or SIGTERM, as shells have it.
+        exit_code: 4 in time; 129, 130 or 143 by SIGHUP, SIGINT or SIGTERM, as shells have it.
     """
 
     def __init__(self, message: str, exit_code: int) -> None:
@@ -41,10 +81,10 @@ class Stopped(PatchlawError, RuntimeError):
 
 
 class Interruption:
-    """Watches for SIGINT, SIGTERM and SIGUSR1 on any rank, and for the end of the time.
+    """Watches on any rank for SIGINT, SIGTERM, SIGHUP, SIGUSR1, and for the end of the time.
 
-    The first signal asks for a stop after the load step under way; a second SIGINT or SIGTERM
-    ends the process as if nobody had watched.
+    The first signal asks for a stop after the load step under way; a second one, but for SIGUSR1,
+    ends the process as if nobody had watched. What ``nohup`` has ignored stays so.
 
     Args:
         comm: MPI communicator, or None.
@@ -61,7 +101,11 @@ class Interruption:
     def __enter__(self) -> Interruption:
         """Begin to watch."""
         if threading.current_thread() is threading.main_thread():  # no other can
-            self._former = {number: signal.signal(number, self._see) for number in _WATCHED}
+            self._former = {
+                number: signal.signal(number, self._see)
+                for number in _WATCHED
+                if number == signal.SIGUSR1 or signal.getsignal(number) != signal.SIG_IGN
+            }
         return self
 
     def __exit__(
@@ -95,7 +139,7 @@ class Interruption:
         if reason:
             in_time = reason in (_TIME_OVER, signal.SIGUSR1)
             message = f"{_TOLD[reason]}: stopped {where}; go on with --resume"
-            raise Stopped(message, 4 if in_time else 128 + reason)
+            raise Stopped(message, 4 if in_time else 128 + int(reason))
 
     def _too_late(self, took: float) -> bool:
         if self._limit is None:

@@ -19,6 +19,7 @@ def _number(value: Any) -> Any:
 
 
 Number = Annotated[float, BeforeValidator(_number)]
+Count = Annotated[int, Field(ge=1, le=1_000_000_000, strict=True)]
 
 
 class Section(BaseModel):
@@ -113,37 +114,71 @@ class CouplingSection(Section):
 
     @property
     def decomposed(self) -> bool:
-        """Whether the block is the half-space and a smooth correction."""
+        """Whether the block is the half-space and what a finite body adds to it.
+
+        A kind that is left to the plan becomes consistent or concurrent, alike in this.
+        """
         if self.kind in ("analytic", "concurrent", "reference"):
             return self.kind == "concurrent"
         if self.compliance != "auto":
             return self.compliance == "decomposed"
-        return self.kind == "consistent" and self.interface != "pointwise" and self.newton != "full"
+        return self.kind != "isolated" and self.interface != "pointwise" and self.newton != "full"
+
+    @property
+    def on_mesh(self) -> bool:
+        """Whether laws lie on finite elements of the block, plain or condensed."""
+        return self.kind in ("isolated", "consistent", "auto") and not self.decomposed
 
 
 class ReferenceSection(Section):
     """The rough surface meshed, for ``coupling.kind = "reference"``; other couplings ignore it.
 
-    ``method``: how contact is found, see `macro.ObstacleBlock`. ``mesh``: ``hexahedra`` are those
-    of ``[block]``, ``tetrahedra`` small only where contact can occur; by default hexahedra where
-    ``block.cells`` is stated. ``meshes`` of falling size are pressed alike, and their results
-    extrapolated; one alone has no error bar. ``fine``: edge length of the finest tetrahedra where
-    contact can occur, by default from the surface and the load.
+    ``method``: how contact is found, see `macro.ObstacleBlock`. ``mesh``: ``tetrahedra`` are small
+    only where contact can occur, ``hexahedra`` are as many as ``cells`` says; by default
+    tetrahedra, unless ``cells`` is stated. ``meshes`` of falling size are pressed alike, and their
+    results extrapolated; one alone has no error bar. ``fine``: edge length of the finest
+    tetrahedra where contact can occur, by default from the surface and the load. ``cells``:
+    hexahedra of the finest mesh; their element and grading are those of ``[block]``.
     """
 
     method: Literal["active-set", "augmented-lagrangian"] = "active-set"
     mesh: Literal["auto", "hexahedra", "tetrahedra"] = "auto"
     meshes: Annotated[int, Field(ge=1, le=3, strict=True)] = 2
     fine: Annotated[Length, Field(gt=0)] | None = None
+    cells: Annotated[tuple[Count, Count, Count], Field(description="cells in x, y, z")] | None = (
+        None
+    )
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
-        if self.mesh == "hexahedra" and self.fine is not None:
-            raise ValueError(
-                f"fine = {self.fine:g} mm does not go with mesh = 'hexahedra' "
-                "(allowed: leave it out, and state block.cells; or mesh = 'tetrahedra')"
-            )
+        for clash, problem, allowed in self._clashes():
+            if clash:
+                raise ValueError(f"{problem} (allowed: {allowed})")
         return self
+
+    def _clashes(self) -> Iterator[tuple[bool, str, str]]:
+        """Yield whether keys contradict each other, how, and what would do."""
+        mesh, fine, cells = f"mesh = '{self.mesh}'", self.fine, self.cells
+        yield (
+            self.mesh == "hexahedra" and cells is None,
+            f"{mesh} needs cells",
+            "cells along x, y and z; or mesh = 'tetrahedra'",
+        )
+        yield (
+            self.mesh == "tetrahedra" and cells is not None,
+            f"cells does not go with {mesh}",
+            "leave it out, and state fine; or mesh = 'hexahedra'",
+        )
+        yield (
+            fine is not None and cells is not None,
+            f"fine = {fine or 0.0:g} mm, of tetrahedra, does not go with cells, of hexahedra",
+            "one of them",
+        )
+
+    @property
+    def hexahedral(self) -> bool:
+        """Whether the meshes are of hexahedra."""
+        return self.cells is not None
 
 
 class LoadSection(Section):

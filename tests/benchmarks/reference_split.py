@@ -20,6 +20,7 @@ import time
 
 import numpy as np
 from mpi4py import MPI
+from multiscale.couplings.concurrent import ConcurrentCoupling
 
 from geometry import (
     BlockShape,
@@ -35,7 +36,6 @@ from geometry import (
 )
 from macro import Block, Material, ObstacleBlock, make_correction, rough_block_mesh
 from micro import FreeSides, HalfSpace, HalfSpaceModel
-from multiscale.couplings.concurrent import ConcurrentCoupling
 from multiscale.reference.extrapolation import extrapolated
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)

@@ -80,7 +80,7 @@ def main():
     effects = [finite_slope_effect(model, at, poisson_ratio=nu) for at in APPROACHES]
     if COMM.rank == 0:
         told = ", ".join(f"{effect:+.1%}" for effect in effects)
-        print(f"finite slopes change the force, to first order, by {told}", flush=True)
+        print(f"finite slopes change the force by {told}", flush=True)
     for count in (8, 16, 32) if choice.large else (8, 16):
         concurrent(surface, count)
     families(surface, choice.large)

@@ -28,7 +28,7 @@ from multiscale import ReferenceCoupling, Run, Scene
 
 COMM = MPI.COMM_WORLD
 SCENE = Path(__file__).parents[2] / "demos" / "scenes" / "paper.toml"
-REFERENCE = ("coupling.kind=reference", "reference.mesh=hexahedra", "reference.meshes=1")
+REFERENCE = ("coupling.kind=reference", "reference.meshes=1", "block.grading=8")
 SHARES = ("finest", "coarser", "transfers", "coarsest", "CG's K", "CG's rest", "Newton, contact")
 
 
@@ -166,8 +166,9 @@ def main() -> None:
     PETSc.Log.begin()
     PETSc.Options(PREFIX)["pc_mg_log"] = None
     cells = choice.cells or ([48, 48, 12] if choice.reference else None)
-    words = [f"block.cells={cells}"] if cells else []
-    words += [*REFERENCE, "block.grading=8"] if choice.reference else ["coupling.newton=full"]
+    section = "reference" if choice.reference else "block"
+    words = [f"{section}.cells={cells}"] if cells else []
+    words += REFERENCE if choice.reference else ["coupling.newton=full"]
     stream = bandwidth(COMM)
     run = Run(Scene.load(SCENE, words), COMM)
     coupling = run.make_coupling()

@@ -180,11 +180,11 @@ simply of the wrong type or out of a key's range is told in pydantic's words: *m
 The load steps up to there are written. The whole message is
 `text did not converge: REASON after N iterations; remedy`.
 """,
-    4: """## 4, 130, 143: stopped
+    4: """## 4, 129, 130, 143: stopped
 
 The load steps up to there are written, and the last of them can be gone on from. With 4 ends what
-was told to stop in time (`--max-time`, SIGUSR1), with 130 what SIGINT and with 143 what SIGTERM
-stopped.
+was told to stop in time (`--max-time`, SIGUSR1), with 129 what SIGHUP, with 130 what SIGINT and
+with 143 what SIGTERM stopped.
 """,
     5: """## 5: a file cannot be written
 

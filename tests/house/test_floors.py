@@ -18,7 +18,7 @@ BELOW = {
 FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 # sub-packages from the ground up: each may import those before it
 ORDER = {
-    "micro": ["pairs", "regions", "summits", "cells", "auto"],
+    "micro": ["compliance", "pairs", "regions", "summits", "cells", "auto"],
     "multiscale": [
         "scenes", "law_tables", "couplings", "reference", "planning", "reporting", "restart",
         "doctor", "comparing",

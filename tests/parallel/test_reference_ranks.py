@@ -8,12 +8,12 @@ import pytest
 PAPER = "demos/scenes/paper.toml"
 SMALL = [
     "coupling.kind=reference", "surface.spectrum.waves=[1, 3]", "surface.grid=[32, 32]",
-    "block.cells=[12, 12, 4]", "block.grading=3", "patches.grid=[3, 2]", "load.steps=2",
+    "block.grading=3", "patches.grid=[3, 2]", "load.steps=2",
     "output.figures=false", "output.report=false",
 ]  # fmt: skip
 SCENES = {
     "hexahedra, up and down, with fields": [
-        "load.approach=['8 um', '2 um']", "output.fields=true",
+        "reference.cells=[12, 12, 4]", "load.approach=['8 um', '2 um']", "output.fields=true",
     ],
     "tetrahedra under a force, free to turn": [
         "reference.fine='60 um'", "load.tilt=free", "load.steps=1",

@@ -1,10 +1,10 @@
 """A surface of few cells, a made-up smooth correction, and both together as one dense problem."""
 
 import numpy as np
+from multiscale.couplings.concurrent import ConcurrentCoupling
 
 from geometry import PatchGrid, Spectrum, patch_means, synthesise
 from micro import micro_model
-from multiscale.couplings.concurrent import ConcurrentCoupling
 
 MODULUS = 4000.0
 CELLS = 16

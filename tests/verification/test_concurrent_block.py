@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from multiscale.couplings.concurrent import ConcurrentCoupling
 
 from geometry import PatchGrid, Spectrum, Surface, UnevenPartition, patch_means, synthesise
 from geometry.control import Control
@@ -10,7 +11,6 @@ from macro import Material, make_correction
 from micro import HalfSpaceModel, contact_modulus, influence_matrix
 from micro.boussinesq import HalfSpace
 from multiscale import Scene, run
-from multiscale.couplings.concurrent import ConcurrentCoupling
 from multiscale.couplings.condensed import CondensedCoupling
 from multiscale.law_tables.consistent import consistent_laws
 from multiscale.loading import Programme, load_steps

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from multiscale.couplings.concurrent import ConcurrentCoupling
 from reference_cases import COMM, MATERIAL, MODULUS
 from scipy.interpolate import RectBivariateSpline
 
@@ -23,7 +24,6 @@ from geometry import (
 )
 from macro import Block, Interface, ObstacleBlock, block_mesh, make_correction, rough_block_mesh
 from micro import FreeSides, HalfSpace, HalfSpaceModel
-from multiscale.couplings.concurrent import ConcurrentCoupling
 from multiscale.reference.extrapolation import extrapolated
 
 SQUARE = (1.0, 1.0)

@@ -45,8 +45,8 @@ def test_displacements(name, way, worst, mean, size):
     model = asperity_model(name, scattered(1500), contact_modulus=E_STAR)
     t = size * np.random.default_rng(1).random(1500)
     t[::3] = 0.0
-    exact = model._interaction.lift(t)
-    lift = split(model._interaction, way, t).lift(t)
+    exact = model.contacts.interaction.lift(t)
+    lift = split(model.contacts.interaction, way, t).lift(t)
     error = np.abs(lift.displacement - exact.displacement) / exact.displacement.mean()
     assert error.max() < worst and np.sqrt(np.mean(error**2)) < mean
     assert lift.engulfed == exact.engulfed
@@ -84,7 +84,7 @@ def test_state_of_very_many():
     many = scattered(2600, depth=5e-3)
     model = asperity_model("elliptic", many, contact_modulus=E_STAR)
     state = model.solve(1e-3)
-    exact = state.indentation + model._interaction.lift(state.indentation).displacement
+    exact = state.indentation + model.contacts.interaction.lift(state.indentation).displacement
     assert np.abs(state.displacement - exact).max() < 1e-5 * exact.mean()
     warm = model.solve(1.02e-3, start=state)
     assert warm.force.sum() > state.force.sum()
@@ -95,7 +95,7 @@ def test_closeness_is_corrected():
     model = asperity_model("circular", scattered(300), contact_modulus=E_STAR)
     required = np.maximum(4e-3 + model.asperities.z, 0.0)
     reached = np.flatnonzero(required > 0.0)
-    many = ManySummits(interaction=model._interaction)
+    many = ManySummits(interaction=model.contacts.interaction)
     cold = many.solve("multipole", reached, required[reached], np.zeros(len(reached)))
     exact = replace(model, pairs="direct").solve(4e-3).indentation[reached]
     assert cold.indentation == pytest.approx(exact, abs=1e-9 * 4e-3)

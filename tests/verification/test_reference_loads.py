@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from multiscale.couplings.concurrent import ConcurrentCoupling
 from reference_cases import COMM, MATERIAL, MODULUS, block_rest, body, give, pressed
 
 from geometry import BlockShape, Control, PatchGrid, RefinedShape, Surface, patch_means
 from macro import Block, ObstacleBlock, rough_block_mesh
 from micro import HalfSpaceModel, HertzContact
-from multiscale.couplings.concurrent import ConcurrentCoupling
 
 RADIUS, SIZE, APART = 100.0, 0.06, 0.16
 APPROACH = SIZE**2 / RADIUS

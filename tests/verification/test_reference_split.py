@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from multiscale.couplings.concurrent import ConcurrentCoupling
 from reference_cases import COMM, MATERIAL, MODULUS
 
 from geometry import (
@@ -24,7 +25,6 @@ from geometry import (
 )
 from macro import Block, ObstacleBlock, make_correction, rough_block_mesh
 from micro import HalfSpace, HalfSpaceModel
-from multiscale.couplings.concurrent import ConcurrentCoupling
 from multiscale.reference.extrapolation import extrapolated
 
 APPROACH, FLAT = 8e-3, 0.01

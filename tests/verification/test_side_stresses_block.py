@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import ufl
 from dolfinx import fem
+from love_stresses import love_stresses
 from reference_cases import COMM
 from scipy.interpolate import RectBivariateSpline
 
@@ -16,7 +17,6 @@ from geometry import RefinedShape
 from macro import Block, Material, block_mesh
 from micro import FreeSides, HalfSpace
 from micro.cells.side_stresses import SideStresses
-from micro.finite_slope import _convolved, _surface_stresses
 
 PLACE, WIDTH, FINE, CELLS = 0.05, 0.06, 0.012, 256
 TICKS = (np.arange(CELLS) + 0.5) / CELLS
@@ -86,8 +86,7 @@ def test_stresses_beside_a_side_are_those_of_a_meshed_block(nu):
     centres, areas, meshed = meshed_stresses(nu)
     spacing = (1.0 / CELLS,) * 2
     pressure = np.exp(hill(TICKS[:, None], TICKS)[0])
-    kernels = _surface_stresses(HalfSpace(1.0, nu), (CELLS, CELLS), spacing)
-    half_space = _convolved(kernels, pressure)
+    half_space = love_stresses(HalfSpace(1.0, nu), pressure, spacing)
     sides = FreeSides(lengths=(1.0, 1.0), poisson_ratio=nu, reach=0.25)
     both = half_space + SideStresses(sides, spacing).stresses(pressure)
     places = np.clip(centres, TICKS[0], TICKS[-1]).T

@@ -31,3 +31,20 @@ def test_text_survives_pickling(error, text):
 def test_location_is_added_once():
     error = InputError("is wrong").located(key="inner").located(key="outer", file="s.toml")
     assert str(error) == "s.toml: inner: is wrong"
+
+
+class Mute:
+    def __repr__(self):
+        raise RuntimeError("has no text")
+
+
+class Odd:
+    def __repr__(self):
+        return 5
+
+
+@pytest.mark.parametrize(
+    "value", [Mute(), Odd(), [Mute()], 10**5000], ids=["mute", "odd", "inside", "long"]
+)
+def test_values_without_a_text_are_named_by_their_type(value):
+    assert str(InputError("is wrong", value=value)) == f"<{type(value).__name__}>: is wrong"

@@ -167,3 +167,11 @@ def test_sizes_of_no_scale_are_refused(tmp_path):
     np.savetxt(tmp_path / "c.xyz", points() * (1e300, 1.0, 1.0))
     with pytest.raises(InputError, match=r"coordinates x, y are not finite, or beyond 1e\+15 mm"):
         read_surface(tmp_path / "c.xyz")
+
+
+def test_heights_below_any_scale_are_refused(tmp_path):
+    np.save(tmp_path / "h.npy", 1e-110 * HEIGHTS)
+    with pytest.raises(
+        InputError, match=r"h.npy: [0-9.]*e-110: the heights differ by less than any"
+    ):
+        read_surface(tmp_path / "h.npy", lengths=SIDES)

@@ -128,3 +128,20 @@ def test_depth_is_counted_from_the_tilted_plane():
 def test_impossible_shapes_are_refused(changes, text):
     with pytest.raises(InputError, match=text):
         shape(**changes)
+
+
+@pytest.mark.parametrize("size", [2.0**-40, 2.0**30])
+def test_blocks_of_any_size_have_the_same_mesh(size):
+    """The CAD kernel takes what is shorter than 1e-7 for nothing."""
+    other = shape(
+        interface=(size, 0.8 * size),
+        height=0.5 * size,
+        places=size * np.array([[0.3, 0.4]]),
+        fine=0.02 * size,
+        coarse=0.2 * size,
+    )
+    with shape().meshed() as model:
+        expected = model.mesh.getNodes()[1]
+    with other.meshed() as model:
+        np.testing.assert_array_equal(model.mesh.getNodes()[1], expected)
+    assert other.unit == size * shape().unit

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from geometry import InputError, Spectrum, roughness, synthesise
-from geometry.spectrum import random_waves
+from geometry.spectrum import LARGEST_SEED, random_waves
 
 RING = {"hurst": 0.8, "waves": (2, 6), "rms_slope": 0.2, "seed": 5}
 BOX = {"hurst": 0.95, "waves_x": (2, 7), "waves_y": (2, 12), "rms_height": 0.01, "seed": 5}
@@ -149,7 +149,7 @@ def test_an_empty_band_is_refused():
         ({"rms_slope": None}, "exactly one amplitude.*rms_slope, rms_height, s0"),
         ({"s0": 1.0}, r"\['rms_slope', 's0'\]: a spectrum needs exactly one amplitude"),
         ({"rms_slope": 0.0}, r"0\.0: rms_slope must be positive"),
-        ({"seed": -1}, "-1: the seed does not fit.*whole number ≥ 0"),
+        ({"seed": -1}, "-1: the seed does not fit.*whole number, 0 … 2"),
         ({"seed": 1.5}, "the seed does not fit"),
     ],
 )
@@ -162,3 +162,19 @@ def test_spectra_that_make_no_sense_are_refused(change, message):
 def test_grids_must_be_two_whole_numbers(grid):
     with pytest.raises(InputError, match="2 whole numbers"):
         synthesise(Spectrum(**RING), grid=grid, lengths=(1.0, 1.0))
+
+
+@pytest.mark.parametrize("seed", [-1, 2**128, 10**5000, 1.0], ids=["-1", "2^128", "long", "1.0"])
+def test_seeds_of_no_size_are_refused(seed):
+    with pytest.raises(InputError, match=r"the seed does not fit \(allowed: a whole number, 0 … 2"):
+        Spectrum(**RING | {"seed": seed})
+
+
+def test_largest_seed_makes_a_surface():
+    spectrum = Spectrum(**RING | {"seed": LARGEST_SEED})
+    assert str(LARGEST_SEED) in synthesise(spectrum, grid=(16, 16), lengths=(1.0, 1.0)).source
+
+
+def test_slopes_below_any_scale_are_refused():
+    with pytest.raises(InputError, match="differ by less than any roughness"):
+        synthesise(Spectrum(**RING | {"rms_slope": 1e-100}), grid=(16, 16), lengths=(1.0, 1.0))

@@ -146,3 +146,30 @@ def test_any_damaged_byte_costs_no_more_than_computing_anew(counted):
             cached("kind", (), compute, MPI.COMM_SELF)["c"], wanted, err_msg=f"byte {at}"
         )
     assert len(calls) > 2 + len(whole) // 12  # much of the damage is seen
+
+
+def test_other_sources_find_nothing(counted, monkeypatch):
+    calls, compute = counted
+    cached("kind", (1,), compute, MPI.COMM_SELF)
+    monkeypatch.setattr(compliance_cache, "sources_digest", lambda: "of another day")
+    cached("kind", (1,), compute, MPI.COMM_SELF)
+    assert len(calls) == 2
+
+
+def test_every_source_counts(monkeypatch, tmp_path):
+    for name in ("macro/body/line.py", "geometry/patches.py", "micro/love.py"):
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("one = 1\n")
+    (tmp_path / "macro/compliance_cache.py").write_text("")
+    monkeypatch.setattr(compliance_cache, "__file__", str(tmp_path / "macro/compliance_cache.py"))
+    digests = [compliance_cache.sources_digest.__wrapped__()]
+    for name, text in (
+        ("macro/body/line.py", "one = 2\n"),
+        ("geometry/patches.py", "one = 3\n"),
+        ("micro/love.py", "one = 4\n"),
+    ):
+        (tmp_path / name).write_text(text)
+        digests.append(compliance_cache.sources_digest.__wrapped__())
+    assert len(set(digests[:3])) == 3
+    assert digests[3] == digests[2]  # the block knows nothing of it

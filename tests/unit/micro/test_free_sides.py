@@ -75,7 +75,7 @@ def test_grids_know_their_sides_where_they_lie():
     every[box] = p
     added = whole(SideCells(SIDES, SPACING), every)[box]
     np.testing.assert_allclose(beside, inside + added, rtol=1e-12)
-    where = Cells.where(p > 1.0)
+    where = Cells.of(np.flatnonzero(p > 1.0), p.shape)
     few = np.where(p > 1.0, p, 0.0)
     rough = grids.at(p.shape, SPACING, box).comply(where, few.ravel()[where.flat])
     fine = grids.at(p.shape, SPACING, box).displacement(few).ravel()[where.flat]

@@ -5,12 +5,21 @@ import pytest
 from scipy import fft
 
 from micro import love_integral
+from micro.cells import elastic_grid
 from micro.cells.convolution import Convolution
-from micro.cells.elastic_grid import Cells, ElasticGrid, ElasticGrids
+from micro.cells.elastic_grid import Cells, ElasticGrid, ElasticGrids, HalfSpaceGrid
 from micro.cells.kernels import love_kernel, padded_spectrum, periodic_spectrum
 
 GRIDS = [(16, 16), (15, 22), (7, 1), (1, 30), (1, 1)]
 SPACING = (0.1, 0.13)
+
+
+def half_space(grid, spacing, *, periodic):
+    return ElasticGrid(HalfSpaceGrid(grid, spacing, periodic=periodic))
+
+
+def cells_where(mask):
+    return Cells.of(np.flatnonzero(mask), mask.shape)
 
 
 def direct(grid, pressure):
@@ -31,12 +40,12 @@ def test_kernel_is_loves_rectangle():
 @pytest.mark.parametrize("grid", GRIDS)
 def test_displacement_is_the_direct_sum(grid):
     pressure = np.random.default_rng(1).random(grid)
-    elastic = ElasticGrid(grid, SPACING, periodic=False)
+    elastic = half_space(grid, SPACING, periodic=False)
     assert elastic.displacement(pressure) == pytest.approx(direct(grid, pressure), rel=1e-12)
     mask = pressure > 0.4
     expected = direct(grid, np.where(mask, pressure, 0.0))[mask]
     # in single precision, also where the numbers themselves would not fit
-    some = elastic.comply(Cells.where(mask), 1e-60 * pressure[mask])
+    some = elastic.comply(cells_where(mask), 1e-60 * pressure[mask])
     assert some == pytest.approx(1e-60 * expected, rel=1e-5, abs=0.0)
 
 
@@ -48,7 +57,7 @@ def test_periodic_displacement_of_a_wave(waves):
     wave = np.cos(2.0 * np.pi * (waves[0] * i / grid[0] + waves[1] * j / grid[1]))
     lengths = np.multiply(grid, SPACING)
     q = 2.0 * np.pi * np.hypot(*(np.array(waves) / lengths))
-    elastic = ElasticGrid(grid, SPACING, periodic=True)
+    elastic = half_space(grid, SPACING, periodic=True)
     assert elastic.displacement(wave) == pytest.approx(2.0 / q * wave, abs=1e-14)
     assert elastic.displacement(np.ones(grid)) == pytest.approx(0.0, abs=1e-14)
 
@@ -65,9 +74,9 @@ def test_resistance_preconditions(periodic):
     # on a disc of cells the condition number falls, and does so the more the finer the grid
     ratios = []
     for n in (16, 32):
-        elastic = ElasticGrid((n, n), (1.0 / n, 1.0 / n), periodic=periodic)
+        elastic = half_space((n, n), (1.0 / n, 1.0 / n), periodic=periodic)
         i, j = np.indices((n, n)) - 0.5 * (n - 1)
-        cells = Cells.where(np.hypot(i, j) < 0.35 * n)
+        cells = cells_where(np.hypot(i, j) < 0.35 * n)
         identity = np.eye(cells.flat.size)
         compliance = np.array([elastic.comply(cells, row) for row in identity])
         resistance = np.array([elastic.resist(cells, row) for row in identity])
@@ -105,10 +114,59 @@ def test_convolution_of_some_rows():
     assert part == pytest.approx(convolution(field)[rows], rel=1e-12)
 
 
-def test_grids_are_kept_but_not_without_end():
+@pytest.fixture
+def made(monkeypatch):
+    """Sizes of the half-spaces that were prepared."""
+    sizes = []
+
+    class Counted(HalfSpaceGrid):
+        def __init__(self, grid, spacing, *, periodic):
+            sizes.append(grid)
+            super().__init__(grid, spacing, periodic=periodic)
+
+    monkeypatch.setattr(elastic_grid, "HalfSpaceGrid", Counted)
+    return sizes
+
+
+def test_half_spaces_are_kept_but_not_without_end(made):
     grids = ElasticGrids(periodic=False)
-    first = grids.at((4, 4), SPACING)
-    assert grids.at((4, 4), SPACING) is first
+    grids.at((4, 4), SPACING)
+    grids.coarse((4, 4), SPACING, (0.0, 0.0))
+    assert made == [(4, 4)]
     for n in range(5, 40):
         grids.at((4, n), SPACING)
-    assert grids.at((4, 4), SPACING) is not first
+    grids.at((4, 4), SPACING)
+    assert made.count((4, 4)) == 2
+
+
+def test_new_boxes_do_not_evict_half_spaces_in_use(made):
+    """Those are given up that were not used for longest, not those that were made first."""
+    grids = ElasticGrids(periodic=False)
+    for n in range(5, 60):
+        grids.at((4, n), SPACING)
+        grids.coarse((2, 2), SPACING, (0.0, 0.0))
+    assert made.count((2, 2)) == 1
+    assert len(made) == 56
+
+
+def test_terms_add_to_the_half_space():
+    class Doubled:
+        """A term, the diagonal 2."""
+
+        def displacement(self, pressure):
+            return 2.0 * pressure
+
+        def of_cells(self, cells, pressure):
+            return 2.0 * pressure
+
+    half = HalfSpaceGrid((6, 5), SPACING, periodic=False)
+    plain, more = ElasticGrid(half), ElasticGrid(half, [Doubled(), Doubled()])
+    pressure = np.random.default_rng(3).random((6, 5))
+    added = more.displacement(pressure) - plain.displacement(pressure)
+    assert added == pytest.approx(4.0 * pressure, rel=1e-12)
+    cells = cells_where(pressure > 0.5)
+    some = pressure.ravel()[cells.flat]
+    assert more.comply(cells, some) - plain.comply(cells, some) == pytest.approx(
+        4.0 * some, rel=1e-12
+    )
+    assert (plain.products, more.products) == (2, 2)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from geometry import (
+    Control,
     InputError,
     PatchGrid,
     Spectrum,
@@ -20,7 +21,6 @@ from micro import (
     CURVATURES,
     MODELS,
     IslandModel,
-    RigidPlane,
     ScaledModel,
     asperity_model,
     micro_model,
@@ -208,7 +208,7 @@ def test_refuses(surface):
 @pytest.mark.parametrize("make", [scaled, lambda s: IslandModel(surface=s, contact_modulus=E_STAR)])
 def test_large_surfaces_keep_less_but_find_the_same(surface, make, monkeypatch):
     """Beyond so many samples only those that a plane can reach are sorted, anew for every plane."""
-    lean = RigidPlane.above(surface, 1e-4, (1e-3, 0.0))
+    lean = Control(approach=1e-4, tilt=(1e-3, 0.0))
     means = patch_means(surface, PATCHES)
 
     def found():

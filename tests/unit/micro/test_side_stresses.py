@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from love_stresses import love_stresses
 
 from micro import FreeSides, HalfSpace
 from micro.cells.side_stresses import SideStresses
-from micro.finite_slope import _convolved, _surface_stresses
 
 SIDES = FreeSides(lengths=(1.0, 1.5), poisson_ratio=0.2, reach=0.25)
 GRID, SPACING = (20, 30), (0.05, 0.05)
@@ -68,8 +68,7 @@ def at_the_side(nu, n):
     spacing = 1.0 / n, 1.0 / n
     x = (np.arange(n) + 0.5) / n
     pressure = np.exp(-((x[:, None] - 0.05) ** 2 + (x - 0.5) ** 2) / 0.1**2)
-    kernels = _surface_stresses(HalfSpace(1.0, nu), (n, n), spacing)
-    alone = _convolved(kernels, pressure)
+    alone = love_stresses(HalfSpace(1.0, nu), pressure, spacing)
     fields = alone, alone + SideStresses(sides, spacing).stresses(pressure)
     near = np.abs(x - 0.5) < 0.2
     return [

@@ -132,6 +132,7 @@ KEYS = {
     "coupling.table_tolerance": st.one_of(st.floats(1e-9, 0.1), extreme),
     "reference.method": _words("active-set augmented-lagrangian"),
     "reference.mesh": _words("auto hexahedra tetrahedra"),
+    "reference.cells": st.lists(st.integers(1, 9), min_size=3, max_size=3),
     "reference.meshes": counts,
     "reference.fine": lengths,
     "load.approach": loads,

@@ -10,7 +10,7 @@ import pytest
 from geometry.errors import InputError
 from multiscale import Scene, make_stage
 from multiscale.plan import statements, warnings
-from multiscale.planning.choices import cheapest, open_keys
+from multiscale.planning.choices import MESH_CELLS, cheapest, open_keys
 from multiscale.planning.decision import Alternative, decided
 from multiscale.planning.forecast import Forecast, forecast, forecast_statements
 
@@ -83,10 +83,20 @@ def test_open_keys_become_values_and_isolated_laws_are_not_offered():
     assert settled.coupling.kind in ("concurrent", "consistent")
     assert settled.patches.grid in ((8, 8), (16, 16))
     assert settled.surface.grid == stage.surface.grid
-    assert settled.block.cells == stage.shape.cells
+    assert settled.block.cells == "auto"  # of no mesh
     assert {each.kind for each in stage.decision.alternatives} == {"concurrent", "consistent"}
     assert stage.decision.accuracy == 0.02
     assert dict(statements(stage))["choice"] == stage.decision.sentence
+
+
+def test_cells_are_left_to_the_plan_only_under_laws_on_a_mesh():
+    meshed = {"kind": "consistent", "compliance": "finite-element"}
+    for coupling, free in (({}, False), ({"kind": "concurrent"}, False), (meshed, True)):
+        given = scene(coupling=coupling, block=block(cells="auto"))
+        assert open_keys(given) == ({"block.cells"} if free else set())
+    decision = make_stage(given).decision
+    assert {each.cells for each in decision.alternatives} == set(MESH_CELLS)
+    assert decision.taken.cells in MESH_CELLS
 
 
 def test_few_steps_press_together_and_many_steps_make_laws():
@@ -134,9 +144,7 @@ def test_other_keys_narrow_the_couplings(coupling, kinds):
 
 def test_without_accuracy_and_auto_nothing_is_open():
     assert open_keys(scene()) == frozenset()
-    assert open_keys(scene(accuracy=0.1)) == {
-        "micro.model", "coupling.kind", "patches.grid", "block.cells",
-    }  # fmt: skip
+    assert open_keys(scene(accuracy=0.1)) == {"micro.model", "coupling.kind", "patches.grid"}
     assert make_stage(scene()).decision is None
 
 
@@ -221,7 +229,7 @@ def test_open_keys_survive_a_dump_and_are_in_the_schema():
     given = scene({"grid": "auto"}, accuracy=0.03, **OPEN)
     again = Scene.from_dict(given.model_dump(by_alias=True, mode="json"))
     assert open_keys(again) == open_keys(given) == {
-        "surface.grid", "micro.model", "coupling.kind", "patches.grid", "block.cells",
+        "surface.grid", "micro.model", "coupling.kind", "patches.grid",
     }  # fmt: skip
     patches = Scene.model_json_schema(by_alias=True)["$defs"]["PatchesSection"]
     assert {"const": "auto"} in patches["properties"]["grid"]["anyOf"]

@@ -12,7 +12,7 @@ import pytest
 from geometry.errors import InputError
 from multiscale import Run
 from multiscale.cli import main
-from multiscale.restart.interruption import Interruption, Stopped
+from multiscale.restart.interruption import Ended, Interruption, Stopped, ended_by_signals
 from multiscale.scenes.quantities import parse_duration
 
 PAPER = str(Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml")
@@ -52,6 +52,7 @@ def disturb(monkeypatch, change):
     [
         (signal.SIGINT, 130, "interrupted (SIGINT)"),
         (signal.SIGTERM, 143, "terminated (SIGTERM)"),
+        (signal.SIGHUP, 129, "hung up (SIGHUP)"),
         (signal.SIGUSR1, 4, "told to stop (SIGUSR1)"),
     ],
 )
@@ -64,7 +65,7 @@ def test_signal_stops_after_the_load_step(
         return step
 
     words = ["run", PAPER, "--out", str(tmp_path), *SMALL]
-    handlers = [signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)]
+    handlers = [signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)]
     with monkeypatch.context() as patch:
         disturb(patch, send)
         assert main(words) == code
@@ -73,7 +74,7 @@ def test_signal_stops_after_the_load_step(
     assert "report.html" in shown.out
     assert rows(tmp_path)[0] == undisturbed[0][:3]
     assert (tmp_path / "checkpoint.h5").exists()
-    assert [signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)] == handlers
+    assert [signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)] == handlers
     assert main([*words[:2], "--resume", *words[2:]]) == 0
     assert "goes on after load step 2" in capfd.readouterr().out
     assert rows(tmp_path) == undisturbed
@@ -143,3 +144,49 @@ def test_a_notice_after_the_end_does_not_kill():
         "os.kill(os.getpid(), signal.SIGUSR1)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_nohup_is_obeyed():
+    former = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with ended_by_signals(), Interruption(None) as interruption:
+            assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+            os.kill(os.getpid(), signal.SIGHUP)
+            interruption.check("here")
+    finally:
+        signal.signal(signal.SIGHUP, former)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_what_is_told_to_end_clears_away(number):
+    left = []
+    with pytest.raises(Ended) as ended, ended_by_signals():
+        try:
+            os.kill(os.getpid(), number)
+        finally:
+            left.append("cleared")
+    assert left == ["cleared"]
+    assert ended.value.exit_code == 128 + number
+    assert signal.getsignal(number) == signal.SIG_DFL
+
+
+HUNG_UP = """
+import os, signal, sys
+from multiscale import cli, commands
+
+def hung_up(choice, options, comm):
+    import macro
+    from petsc4py import PETSc
+    os.kill(os.getpid(), signal.SIGHUP)
+    print("went on")
+
+commands.print_schema = hung_up
+sys.exit(cli.main(["schema"]))
+"""
+
+
+def test_petsc_does_not_take_the_signals(root):
+    done = subprocess.run(
+        [sys.executable, "-c", HUNG_UP], cwd=root, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (129, "", "")

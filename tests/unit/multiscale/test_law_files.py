@@ -5,12 +5,12 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
+from multiscale.law_tables.spread import ContactSpread
 
 from geometry.errors import InputError
 from geometry.partition import UnevenPartition
 from geometry.patches import PatchGrid
 from multiscale.law_tables.law_files import LawTable, read_laws, write_laws
-from multiscale.law_tables.spread import ContactSpread
 from multiscale.laws import PatchLaw
 from multiscale.sealed_files import seal, sealed
 

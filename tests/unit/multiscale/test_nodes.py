@@ -10,7 +10,7 @@ from mpi4py import MPI
 from geometry.errors import InputError
 from multiscale import Scene, make_stage, nodes
 from multiscale.nodes import Need, Nodes, group_memory, node_memory, nodes_of
-from multiscale.planning.room import check_smooth_rest, shortages
+from multiscale.planning.room import shortages
 from multiscale.stage_checks import check_size, needs
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
@@ -133,7 +133,7 @@ def test_a_plan_says_what_nodes_a_run_needs():
 
 
 def test_the_reference_is_shared_but_for_gmsh():
-    hexahedra = ("coupling.kind=reference", "block.cells=[400, 400, 100]", "reference.meshes=1")
+    hexahedra = ("coupling.kind=reference", "reference.cells=[400, 400, 100]", "reference.meshes=1")
     with pytest.raises(InputError, match=r"the reference needs about .* such nodes would do"):
         make_stage(scene(*hexahedra), nodes=of(1))
     stage = make_stage(scene(*hexahedra), nodes=of(8))
@@ -149,15 +149,16 @@ def test_the_reference_is_shared_but_for_gmsh():
         make_stage(scene(*tetrahedra), nodes=many)
 
 
-def test_the_smooth_rest_is_every_ranks():
-    words = ("coupling.kind=concurrent", "micro.model=half-space", "block.cells=[40, 40, 25]")
-    stage = make_stage(scene(*words))
-    check_smooth_rest(stage, of(1, ranks=20))
-    text = r"block.cells = \[40, 40, 25\]: the smooth rest of the block needs .* ranks on a node wo"
-    with pytest.raises(InputError, match=text):
-        check_smooth_rest(stage, of(10, ranks=64))
-    assert "smooth rest of the block needs" in next(iter(shortages(stage, of(1, memory=1.0))))
-    assert not list(shortages(make_stage(scene("coupling.kind=analytic")), of(1, memory=1.0)))
+@pytest.mark.parametrize("kind", ["analytic", "concurrent", "consistent", "reference"])
+def test_cells_of_a_block_take_memory_only_where_it_is_meshed(kind):
+    words = (*LARGE, f"coupling.kind={kind}", "micro.model=half-space")
+    check_size(scene(*words), of(1))
+    fields = scene(*words, "output.fields=true")
+    if kind in ("analytic", "reference"):  # without a flat block
+        check_size(fields, of(1))
+        return
+    with pytest.raises(InputError, match=r"block.cells = \[500, 500, 200\]: needs about 250 GB"):
+        check_size(fields, of(1))
 
 
 @pytest.mark.parametrize(

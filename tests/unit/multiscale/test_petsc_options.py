@@ -66,6 +66,22 @@ def test_impossible_option_is_wrong_input(patchlaw):
     assert "Traceback" not in done.stderr
 
 
+def test_missing_file_of_options_is_wrong_input(patchlaw):
+    done = patchlaw("-options_file", "missing")
+    assert done.returncode == 2
+    assert done.stderr == (
+        "patchlaw: -options_file = 'missing': this file of options cannot be read\n"
+    )
+
+
+def test_file_of_options_that_makes_no_sense_is_wrong_input(patchlaw, tmp_path):
+    (tmp_path / "options").write_text("no option\n", encoding="utf-8")
+    done = patchlaw("-options_file", tmp_path / "options")
+    assert done.returncode == 2
+    assert "PETSc does not start with these options" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
 def test_failure_exits_3_and_names_step_and_remedy(patchlaw, tmp_path):
     done = patchlaw("-snes_max_it", "1", "-snes_rtol", "1e-14")
     assert done.returncode == 3

@@ -22,15 +22,15 @@ COARSE = [
     "coupling.kind=reference",
     "surface.spectrum.waves=[1, 3]",
     "surface.grid=[32, 32]",
-    "block.cells=[12, 12, 4]",
     "block.grading=3",
     "patches.grid=[3, 2]",
     "load.steps=2",
 ]
+HEXAHEDRA = "reference.cells=[12, 12, 4]"
 
 
-def scene(*more):
-    return Scene.load(PAPER, [*COARSE, *more])
+def scene(*more, cells=HEXAHEDRA):
+    return Scene.load(PAPER, [*COARSE, cells, *more])
 
 
 @pytest.fixture(scope="module")
@@ -186,7 +186,16 @@ def test_unloading_comes_back():
 
 
 def test_files(capsys, tmp_path):
-    words = ["run", str(PAPER), "--out", str(tmp_path), "--set", *COARSE, "output.fields=true"]
+    words = [
+        "run",
+        str(PAPER),
+        "--out",
+        str(tmp_path),
+        "--set",
+        *COARSE,
+        HEXAHEDRA,
+        "output.fields=true",
+    ]
     assert main(words) == 0
     shown = capsys.readouterr().out
     assert "keys of [micro] are not used" in shown
@@ -213,7 +222,16 @@ def test_files(capsys, tmp_path):
 
 
 def test_what_is_not_known_is_null_in_the_provenance(capsys, tmp_path):
-    words = ["run", str(PAPER), "--out", str(tmp_path), "--set", *COARSE, "reference.meshes=1"]
+    words = [
+        "run",
+        str(PAPER),
+        "--out",
+        str(tmp_path),
+        "--set",
+        *COARSE,
+        HEXAHEDRA,
+        "reference.meshes=1",
+    ]
     assert main([*words, "output.figures=false", "output.report=false", "load.steps=1"]) == 0
 
     def refused(constant):
@@ -225,7 +243,16 @@ def test_what_is_not_known_is_null_in_the_provenance(capsys, tmp_path):
 
 
 def test_fields_are_those_of_the_rough_block(capsys, tmp_path):
-    words = ["run", str(PAPER), "--out", str(tmp_path), "--set", *COARSE, "output.fields=true"]
+    words = [
+        "run",
+        str(PAPER),
+        "--out",
+        str(tmp_path),
+        "--set",
+        *COARSE,
+        HEXAHEDRA,
+        "output.fields=true",
+    ]
     assert main([*words, "output.figures=false", "output.report=false"]) == 0
     with h5py.File(tmp_path / "fields.h5") as file:
         points = file["Mesh/mesh/geometry"][:]
@@ -245,13 +272,22 @@ def test_fields_are_those_of_the_rough_block(capsys, tmp_path):
 
 
 def test_tetrahedra_are_small_where_contact_can_occur():
-    stage = make_stage(scene("reference.mesh=tetrahedra"))
-    statements, told = dict(plan.statements(stage)), list(plan.warnings(stage))
+    stage = make_stage(scene(cells="reference.mesh=tetrahedra"))
+    statements = dict(plan.statements(stage))
     assert "tetrahedra (P2)" in statements["block"]
     assert "across a typical contact" in statements["block"]
-    assert any("block.cells is not used" in warning for warning in told)
     with pytest.raises(ValueError, match="a reference has no micro model"):
         _ = stage.model
+
+
+def test_the_blocks_cells_are_not_the_references():
+    """Of the paper's scene, which states cells under laws, by its kind alone."""
+    given = Scene.load(PAPER, ["coupling.kind=reference"])
+    assert given.block.cells == (40, 40, 25)
+    stage = make_stage(given)
+    default = make_stage(Scene.load(PAPER, ["coupling.kind=reference", "block.cells=auto"]))
+    assert not stage.meshes.hexahedral
+    assert stage.meshes.unknowns == default.meshes.unknowns
 
 
 def test_plan_of_hexahedra():
@@ -261,21 +297,23 @@ def test_plan_of_hexahedra():
     assert f"{3 * 13 * 13 * 5} unknowns" in statements["block"]
     assert "no error bar" in told
     assert "larger block.grading" in told
-    assert "refine block.cells" in told
+    assert "refine reference.cells" in told
 
 
 REFUSED = {
     "margin": (["block.margin='1 mm'"], "block.margin = 1.0: does not go with coupling.kind"),
-    "no cells": (["reference.mesh=hexahedra", "block.cells=none"], "block.cells"),
+    "no cells": (["reference.mesh=tetrahedra"], "cells does not go with mesh = 'tetrahedra'"),
     "element": (["block.element=P1"], "block.element = 'P1': does not go with a reference of hex"),
-    "memory": (["block.cells=[3000, 3000, 100]"], "block.cells = (3000, 3000, 100): the reference"),
-    "fine": (["reference.fine='1 nm'"], ": the reference needs about"),
+    "memory": (
+        ["reference.cells=[3000, 3000, 100]"],
+        "reference.cells = (3000, 3000, 100): the reference needs about",
+    ),
     "meshes": (["reference.meshes=4"], "reference.meshes = 4: must be less than or equal to 3"),
     "unknown": (["reference.methods=penalty"], "unknown key; did you mean 'method'?"),
     "method": (["reference.method=penalty"], "must be 'active-set' or 'augmented-lagrangian'"),
     "fine cells": (
-        ["reference.mesh=hexahedra", "reference.fine='1 um'"],
-        "fine = 0.001 mm does not go with mesh = 'hexahedra'",
+        ["reference.fine='1 um'"],
+        "fine = 0.001 mm, of tetrahedra, does not go with cells, of hexahedra",
     ),
     "compliance": (["coupling.compliance=decomposed"], "compliance = 'decomposed' does not go wi"),
     "newton": (["coupling.newton=full"], "newton = 'full' does not go with kind = 'reference'"),
@@ -286,12 +324,13 @@ REFUSED = {
 
 
 def test_hexahedra_need_their_number():
-    data = scene("reference.mesh=hexahedra").model_dump(by_alias=True, exclude_none=True)
-    del data["block"]["cells"]
-    with pytest.raises(
-        InputError, match=r"block.cells = None: is needed by reference.mesh = 'hexahe"
-    ):
-        make_stage(Scene.from_dict(data))
+    with pytest.raises(InputError, match="reference: mesh = 'hexahedra' needs cells"):
+        scene(cells="reference.mesh=hexahedra")
+
+
+def test_tetrahedra_too_small_for_the_memory_are_refused():
+    with pytest.raises(InputError, match=r"reference\.fine = .*: the reference needs about"):
+        make_stage(scene(cells="reference.fine='1 nm'"))
 
 
 @pytest.mark.parametrize(("overrides", "text"), REFUSED.values(), ids=REFUSED)

@@ -43,8 +43,9 @@ COUPLINGS = {
     | {"surface": {"grid": [72, 72]}, "coupling": {"kind": "concurrent"}}
     | {"micro": {"model": "half-space"}},
     "on the mesh": CUBE | {"coupling": {"kind": "isolated", "newton": "full"}},
-    "rough blocks, balanced force": {"block": {"cells": [16, 16, 8], "grading": 4.0}}
-    | {"patches": {"grid": [2, 2]}, "coupling": {"kind": "reference"}, "load": FORCE},
+    "rough blocks, balanced force": {"block": {"grading": 4.0}}
+    | {"reference": {"cells": [16, 16, 8]}, "coupling": {"kind": "reference"}}
+    | {"patches": {"grid": [2, 2]}, "load": FORCE},
     "on the mesh, at points, balanced force": CUBE
     | {"coupling": {"kind": "isolated", "interface": "pointwise"}, "load": FORCE},
 }

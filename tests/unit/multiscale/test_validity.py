@@ -4,12 +4,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from multiscale.couplings.concurrent import ConcurrentCoupling
 
 from geometry import PatchGrid, Spectrum, patch_means, synthesise
 from geometry.control import Control
 from micro import micro_model
 from multiscale.coupling import AnalyticCoupling
-from multiscale.couplings.concurrent import ConcurrentCoupling
 from multiscale.law_tables.consistent import consistent_laws
 from multiscale.law_tables.isolated import isolated_laws
 from multiscale.reporting.validity import range_notes

@@ -1,0 +1,76 @@
+"""What a finite body and finite slopes cost in the contact problem, as ratios of one run.
+
+Run by hand: `.venv/bin/python tests/benchmarks/contact_steps.py [--grids 64 128 256 512 1024]`; two
+minutes on one core. Every row is one load step from 6 to 8 µm of Set 1 on the paper's cube, the
+median over repetitions in turn: half-space with the cube's free sides, the same with its body, and
+with body and finite slopes; core seconds, one thread.
+"""
+
+import os
+
+os.environ["OMP_NUM_THREADS"] = "1"
+
+import argparse
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from multiscale import Scene, make_stage
+from multiscale.couplings.blocks import contact_model
+
+
+def scene(grid, seed):
+    return Scene.from_dict(
+        {
+            "surface": {
+                "spectrum": {"hurst": 0.95, "waves": [2, 10], "rms_slope": 0.215, "seed": seed},
+                "grid": [grid, grid],
+                "lengths": ["1 mm", "1 mm"],
+            },
+            "block": {"young_modulus": "4 GPa", "poisson_ratio": 0.15},
+            "micro": {"model": "half-space"},
+            "coupling": {"kind": "concurrent"},
+            "load": {"approach": "8 um", "steps": 4},
+        }
+    )
+
+
+def step(model, start):
+    began = time.process_time()
+    found = model.solve(8e-3, start=start)
+    return time.process_time() - began, found.iterations
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--grids", type=int, nargs="+", default=[64, 128, 256, 512, 1024])
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
+    parser.add_argument("--repeat", type=int, default=3)
+    choice = parser.parse_args()
+    print("cells  seed  sides [s]  body/sides  slopes/sides  iterations: sides, body, slopes")
+    for grid in choice.grids:
+        ratios = []
+        for seed in choice.seeds:
+            whole = contact_model(make_stage(scene(grid, seed)), None)
+            small = replace(whole, slopes=None)
+            models = [replace(small, body=None), small, whole]
+            starts = [model.solve(6e-3) for model in models]
+            times = np.empty((choice.repeat, 3))
+            for turn in range(choice.repeat):
+                found = [step(*pair) for pair in zip(models, starts, strict=True)]
+                times[turn] = [seconds for seconds, _ in found]
+            median = np.median(times, axis=0)
+            ratios.append(median[1:] / median[0])
+            counts = ", ".join(str(count) for _, count in found)
+            print(
+                f"{grid:5d} {seed:5d} {median[0]:10.3f} {ratios[-1][0]:11.2f} "
+                f"{ratios[-1][1]:13.2f}  {counts}",
+                flush=True,
+            )
+        body, slopes = np.median(ratios, axis=0)
+        print(f"{grid:5d} median               {body:9.2f} {slopes:13.2f}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,114 @@
+"""Compliance of a block's top in modes: closed forms, symmetry, what a cache keeps."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from geometry.errors import InputError
+from macro.body import face_compliance as module
+from macro.body.division import division
+from macro.body.face_compliance import cached_face_compliance, face_compliance
+from macro.elasticity import Material
+
+SOFT = Material(young_modulus=1.0, poisson_ratio=0.3)
+
+
+def compliance(lengths, height, sides="free", count=4, material=SOFT, **options):
+    return face_compliance(lengths, height, material, sides, count, MPI.COMM_SELF, **options)
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.3, 0.45])
+@pytest.mark.parametrize("count", [1, 4, 5])
+def test_confined_block_shortens_by_its_confined_modulus(nu, count):
+    material = Material(young_modulus=2.0, poisson_ratio=nu)
+    found = compliance((1.0, 1.5), 0.8, "roller", count, material)
+    # exact up to rounding: the solution is a polynomial
+    exact = 0.8 / (material.confined_modulus * 1.5)
+    assert found.normal[0, 0] == pytest.approx(exact, rel=1e-12)
+    np.testing.assert_allclose(found.normal[1:, 0], 0.0, atol=1e-12 * exact)
+
+
+def test_slender_free_column_shortens_by_youngs_modulus():
+    short, tall = (compliance((1.0, 1.0), height).normal[0, 0] for height in (4.0, 6.0))
+    # the clamped end drops out of the difference, to 1e-7 here
+    assert tall - short == pytest.approx(2.0, rel=1e-6)
+
+
+def test_column_bends_as_a_beam():
+    """A moment on top, by the mode that is linear along x."""
+    short, tall = (compliance((1.0, 1.0), height, count=2).normal[2, 2] for height in (4.0, 6.0))
+    # φ = √3 (2x − 1): unit pressure φ has the moment √3/6, turns the top by 12 M Δh, whose
+    # displacement has the mean with φ of √3/6 of the turn
+    assert tall - short == pytest.approx(12.0 * (3.0 / 36.0) * 2.0, rel=1e-5)
+
+
+def test_exchanging_the_axes_exchanges_the_modes():
+    one = compliance((1.0, 1.4), 0.7, count=3)
+    other = compliance((1.4, 1.0), 0.7, count=3)
+    order = np.arange(9).reshape(3, 3).T.ravel()
+    np.testing.assert_allclose(
+        other.normal[np.ix_(order, order)], one.normal, rtol=0, atol=1e-11 * one.normal[0, 0]
+    )
+
+
+def test_a_square_is_the_limit_of_rectangles():
+    square = compliance((1.0, 1.0), 1.0, count=3)
+    nearly = compliance((1.0, 1.0 + 1e-9), 1.0, count=3)
+    np.testing.assert_allclose(nearly.normal, square.normal, atol=1e-8)
+
+
+def test_modes_do_not_depend_on_their_number():
+    few, many = (compliance((1.0, 1.0), 1.0, count=count) for count in (3, 7))
+    same = many.normal.reshape(4 * (7,))[:3, :3, :3, :3].reshape(9, 9)
+    # the elements differ: by 5e-5 of the mean compliance
+    np.testing.assert_allclose(few.normal, same, atol=2e-4 * same[0, 0])
+
+
+@pytest.mark.parametrize(
+    ("height", "nu", "mean", "summed"),
+    [
+        (1.0, 0.15, 4e-5, 0.02),
+        (1.0, 0.45, 2e-3, 0.02),
+        (0.1, 0.3, 1e-3, 0.1),
+        (10.0, 0.3, 1e-4, 2e-3),
+    ],
+)
+def test_coarser_elements_are_stiffer_and_tell_the_error(height, nu, mean, summed):
+    material = Material(young_modulus=1.0, poisson_ratio=nu)
+    usual, coarse = (
+        compliance((1.0, 1.0), height, count=8, material=material, coarse=coarse).normal
+        for coarse in (False, True)
+    )
+    lost = usual - coarse
+    assert np.linalg.eigvalsh(lost).min() > -1e-9 * usual[0, 0]  # nested spaces
+    assert 0.0 < lost[0, 0] < mean * usual[0, 0]
+    assert np.trace(lost) < summed * usual[0, 0]
+
+
+def test_elements_cover_the_block():
+    for height in (0.02, 0.1, 0.3, 0.7, 1.0, 2.0, 5.0, 50.0):
+        for count in (1, 8, 20):
+            z = division((1.0, 1.3), height, count).z
+            assert z.ticks[0] == -height and z.ticks[-1] == 0.0
+            assert np.all(np.diff(z.ticks) > 0.0)
+            assert len(z.degrees) == len(z.ticks) - 1
+
+
+def test_impossible_blocks_are_refused():
+    with pytest.raises(InputError, match="one mode at least"):
+        compliance((1.0, 1.0), 1.0, count=0)
+    with pytest.raises(InputError, match="no such size"):
+        compliance((1.0, 1.0), -1.0)
+
+
+def test_kept_compliance_is_the_one_computed(monkeypatch, tmp_path):
+    monkeypatch.setenv("PATCHLAW_CACHE", str(tmp_path))
+    every = ((1.0, 1.0), 1.0, SOFT, "free", 3, MPI.COMM_SELF)
+    first = cached_face_compliance(*every)
+    monkeypatch.setattr(module, "face_compliance", None)
+    second = cached_face_compliance(*every)
+    np.testing.assert_array_equal(second.normal, first.normal)
+    np.testing.assert_array_equal(second.growth, first.growth)
+    np.testing.assert_array_equal(second.stresses, first.stresses)
+    with pytest.raises(TypeError):  # another block is not found
+        cached_face_compliance((1.0, 1.0), 1.1, *every[2:])

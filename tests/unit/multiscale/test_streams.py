@@ -1,0 +1,135 @@
+"""Streams that are full, closed or cannot show a letter, and signals before anything has begun."""
+
+import io
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from multiscale.reporting.streams import SturdyStream, sturdy_streams
+
+PAPER = str(Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml")
+SMALL = [
+    "--set", "surface.grid=[32, 32]", "coupling.kind=analytic", "micro.model=half-space",
+    "load.steps=2", "output.figures=false",
+]  # fmt: skip
+COMMAND = [sys.executable, "-m", "patchlaw"]
+
+
+def shell(root, words, redirection, encoding="utf-8", **environment):
+    """Run the command from a shell, which closes and redirects streams."""
+    line = " ".join(f"'{word}'" for word in (*COMMAND, *words))
+    return subprocess.run(
+        f"{line} {redirection}",
+        shell=True,
+        cwd=root,
+        env=os.environ | environment,
+        capture_output=True,
+        encoding=encoding,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize("words", [["schema"], ["--version"], ["run", "--help"], ["plan", PAPER]])
+@pytest.mark.parametrize(
+    ("redirection", "why"),
+    [(">/dev/full", "No space left on device"), (">&-", "it is closed")],
+    ids=["full", "closed"],
+)
+def test_output_that_cannot_be_written_ends_with_5(root, words, redirection, why):
+    done = shell(root, words, redirection)
+    assert done.returncode == 5
+    assert done.stderr == f"patchlaw: standard output: cannot be written: {why}\n"
+
+
+@pytest.mark.parametrize("redirection", ["2>/dev/full", "2>&-", ">&- 2>&-"])
+def test_refusal_that_cannot_be_told_ends_with_5(root, redirection):
+    done = shell(root, ["run", "nowhere.toml"], redirection)
+    assert (done.returncode, done.stdout, done.stderr) == (5, "", "")
+
+
+@pytest.mark.parametrize("redirection", [">/dev/full", ">&-", ">&- 2>&- <&-"])
+def test_run_without_output_keeps_its_results(root, tmp_path, redirection):
+    done = shell(root, ["run", PAPER, "--out", str(tmp_path), *SMALL], redirection)
+    assert done.returncode == 5
+    assert len((tmp_path / "history.csv").read_text(encoding="utf-8").splitlines()) == 3
+    assert (tmp_path / "report.html").read_text(encoding="utf-8").endswith("</html>\n")
+
+
+def test_run_whose_reader_has_enough_comes_to_its_end(root, tmp_path):
+    done = shell(root, ["run", PAPER, "--out", str(tmp_path), *SMALL], "| true; exit ${PIPESTATUS}")
+    assert (tmp_path / "report.html").exists()
+    assert done.stderr == ""
+
+
+@pytest.mark.parametrize("words", [["plan", PAPER], ["run", "--help"], ["run", "missing_µ.toml"]])
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+def test_terminals_without_greek_letters(root, words, encoding):
+    done = shell(root, words, "", encoding, PYTHONIOENCODING=encoding)
+    assert done.returncode == (2 if words[0] == "run" and "--help" not in words else 0)
+    assert "Traceback" not in done.stderr
+    times = "256 x 256" if encoding == "ascii" else "256 × 256"  # latin-1 has it
+    assert (times in done.stdout) == (words[0] == "plan")
+
+
+def test_what_has_no_spelling_is_escaped():
+    inner = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    with sturdy_streams():
+        stream = SturdyStream(inner)
+    stream.write("8 µm × 2 → ¤ \udcff")
+    stream.flush()
+    assert inner.buffer.getvalue() == rb"8 um x 2 -> \xa4 \udcff"
+
+
+def test_optimised_python_runs_every_command(root):
+    for words in (["plan", PAPER], ["doctor", "--help"], ["run", "--help"]):
+        done = subprocess.run(
+            [sys.executable, "-OO", "-m", "patchlaw", *words],
+            cwd=root,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("seconds", [0.15, 0.3, 0.5])
+def test_interrupt_during_imports_is_quiet(root, seconds):
+    code = (
+        "import patchlaw, threading, os, signal\n"
+        f"threading.Timer({seconds}, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
+        "raise SystemExit(patchlaw.main())"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, "plan", PAPER],
+        cwd=root,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 130
+    assert "Traceback" not in done.stderr
+
+
+def is_level(number):
+    return b"level_process" in Path(f"/proc/{number}/cmdline").read_bytes()
+
+
+def test_levels_end_with_the_comparison_that_was_told_to(root, tmp_path):
+    words = ["compare", PAPER, "--out", str(tmp_path / "out")]
+    process = subprocess.Popen(
+        [*COMMAND, *words], cwd=root, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+    level = []
+    while not level and process.poll() is None:
+        time.sleep(0.1)
+        level = [each for each in children.read_text(encoding="ascii").split() if is_level(each)]
+    process.send_signal(signal.SIGTERM)
+    process.communicate()
+    assert process.returncode == 143
+    assert level and not Path(f"/proc/{level[0]}").exists()

@@ -1,0 +1,202 @@
+"""Random scenes with coarse grids, and the same scenes mirrored, turned, and in other units."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from geometry import Spectrum, Surface, synthesise
+from multiscale import Scene, run
+
+KINDS = ("isolated", "consistent", "concurrent", "analytic")
+MODELS = (
+    {"model": "half-space"},
+    {"model": "half-space"},
+    {"model": "islands"},
+    {"model": "elliptic"},
+    {"model": "circular-independent"},
+    {"model": "elliptic", "curvature": "contact", "border": "include"},
+)
+PLACES = ("anywhere", "anywhere", "middle", "border", "beside a side", "side", "corner")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """A scene with its heights, in mm, N and MPa.
+
+    Attributes:
+        heights: Heights, shape (nx, ny).
+        lengths: Sides of the surface.
+        block: Section of the block.
+        patches: Numbers of patches.
+        micro: Section of the micro model.
+        kind: The coupling.
+        approach: Largest approach.
+        tilt: Slopes of the plane.
+        story: What the heights are.
+        units: Units that lengths and pressures are written in, with their size in mm and MPa;
+            bare numbers without.
+    """
+
+    heights: np.ndarray
+    lengths: tuple
+    block: dict
+    patches: tuple
+    micro: dict
+    kind: str
+    approach: float
+    tilt: tuple
+    story: str
+    units: tuple = ()
+
+    def __str__(self):
+        micro, sides = ", ".join(self.micro.values()), self.block["sides"]
+        return (
+            f"{self.kind}, {micro}, {self.story}, heights {self.heights.shape}, patches"
+            f" {self.patches}, height {self.block['height']}, {sides}, tilt {self.tilt}"
+        )
+
+    def history(self, folder, **load):
+        """Run the scene.
+
+        Args:
+            folder: Where the heights are written.
+            load: Keys of the load other than the tilt, whose lengths are in mm, forces in N.
+        """
+        path = folder / "heights.npy"
+        np.save(path, self.heights)
+        load = {"tilt": list(self.tilt)} | load
+        if "approach" in load:
+            load["approach"] = [self._length(value) for value in load["approach"]]
+        block = self.block | {
+            "height": self._length(self.block["height"]),
+            "young_modulus": self._pressure(self.block["young_modulus"]),
+        }
+        data = {
+            "surface": {
+                "file": str(path),
+                "lengths": [self._length(side) for side in self.lengths],
+            },
+            "block": block,
+            "patches": {"grid": list(self.patches)},
+            "micro": self.micro,
+            "coupling": {"kind": self.kind},
+            "load": load,
+        }
+        return run(Scene.from_dict(data))
+
+    def mirrored(self):
+        """Return the scene mirrored along x."""
+        return replace(self, heights=self.heights[::-1], tilt=(-self.tilt[0], self.tilt[1]))
+
+    def turned(self):
+        """Return the scene turned by 90°: x becomes y, y becomes −x."""
+        nx, ny, nz = self.block["cells"]
+        return replace(
+            self,
+            heights=self.heights.T[::-1],
+            lengths=self.lengths[::-1],
+            patches=self.patches[::-1],
+            block=self.block | {"cells": [ny, nx, nz]},
+            tilt=(-self.tilt[1], self.tilt[0]),
+        )
+
+    def scaled(self, length, modulus):
+        """Return the scene with all lengths and the modulus multiplied; slopes stay."""
+        block = self.block | {
+            "height": self.block["height"] * length,
+            "young_modulus": self.block["young_modulus"] * modulus,
+        }
+        return replace(
+            self,
+            heights=self.heights * length,
+            lengths=tuple(side * length for side in self.lengths),
+            block=block,
+            approach=self.approach * length,
+        )
+
+    def _length(self, value):
+        unit, size = self.units[0] if self.units else ("", 1.0)
+        return f"{value / size!r} {unit}" if unit else value
+
+    def _pressure(self, value):
+        unit, size = self.units[1] if self.units else ("", 1.0)
+        return f"{value / size!r} {unit}" if unit else value
+
+
+def drawn(seed):
+    """Return a random scene."""
+    random = np.random.default_rng(seed)
+    grid = tuple(int(n) for n in random.integers(14, 34, 2))
+    if random.random() < 0.3:
+        grid = (grid[0], grid[0])
+    lengths = (1.0, round(float(grid[1] / grid[0] * random.choice([1.0, 1.0, 0.8, 1.3])), 6))
+    patches = tuple(int(n) for n in random.integers(1, 5, 2))
+    heights, story = _heights(random, grid, lengths, patches)
+    tilted = random.random() < 0.3
+    depth = float(np.ptp(heights))
+    cells = [max(4, patches[0]), max(4, patches[1]), 4]
+    return Case(
+        heights=heights,
+        lengths=lengths,
+        block={
+            "young_modulus": round(float(10 ** random.uniform(0, 5)), 3),
+            "poisson_ratio": round(float(random.uniform(0.0, 0.45)), 3),
+            "height": round(float(random.choice([1.0, random.uniform(0.2, 3.0)])), 3),
+            "sides": str(random.choice(["free", "free", "roller"])),
+            "cells": cells,
+        },
+        patches=patches,
+        micro=dict(MODELS[random.integers(len(MODELS))]),
+        kind=KINDS[random.integers(len(KINDS))],
+        approach=float(random.uniform(0.02, 0.2)) * depth,
+        tilt=tuple(float(t) for t in random.uniform(-0.1, 0.1, 2) * depth)
+        if tilted
+        else (0.0, 0.0),
+        story=story,
+    )
+
+
+def _heights(random, grid, lengths, patches):
+    story = str(random.choice(["spectrum", "spectrum", "spectrum", "caps", "steps"]))
+    if story == "caps":
+        return _caps(random, grid, lengths, patches)
+    spectrum = Spectrum(
+        hurst=float(random.uniform(0.3, 1.0)),
+        waves=(float(random.choice([1, 2])), float(random.uniform(3, min(grid) / 3))),
+        rms_slope=float(10 ** random.uniform(-2, -0.5)),
+        seed=int(random.integers(1 << 30)),
+    )
+    heights = synthesise(spectrum, grid=grid, lengths=lengths).heights
+    if story == "steps":
+        step = np.ptp(heights) / random.integers(8, 60)
+        heights = np.round(heights / step) * step
+    return np.array(heights), story
+
+
+def _caps(random, grid, lengths, patches):
+    """Return paraboloids over a floor, at places that decide something."""
+    flat = Surface(heights=np.zeros(grid), lengths=lengths)
+    x, y = flat.x[:, None], flat.y
+    radius, rise = float(10 ** random.uniform(-0.7, 0.5)), 0.0
+    heights, places = np.full(grid, -0.02 / radius), []
+    for _ in range(random.integers(1, 4)):
+        name = str(random.choice(PLACES))
+        at = [_place(random, name, length, n) for length, n in zip(lengths, patches, strict=True)]
+        if name == "side":
+            at[1] = float(random.uniform(0.0, lengths[1]))
+        cap = -rise - ((x - at[0]) ** 2 + (y - at[1]) ** 2) / (2.0 * radius)
+        heights, rise = np.maximum(heights, cap), float(random.uniform(0.0, 1e-3 / radius))
+        places.append(name)
+    return heights, "caps: " + ", ".join(places)
+
+
+def _place(random, name, length, patches):
+    if name == "middle":
+        return 0.5 * length
+    if name == "border":
+        return length * int(random.integers(patches + 1)) / patches
+    if name == "beside a side":
+        return float(random.choice([0.06, length - 0.06]))
+    if name in ("side", "corner"):
+        return float(random.choice([0.0, length]))
+    return float(random.uniform(0.0, length))

@@ -1,0 +1,71 @@
+"""The block's compliance in modes beside the half-space, against meshes that know of neither."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from geometry import BlockShape, PatchGrid
+from macro import Block, Interface, Material, block_mesh, plain_compliance
+from micro import FreeSides
+from multiscale.couplings.body import Body
+
+COMM = MPI.COMM_SELF
+
+
+def body(shape, nu=0.15, known=True, sides="free"):
+    reach = 0.25 * min(*shape.interface, shape.height)
+    free = FreeSides(lengths=shape.interface, poisson_ratio=nu, reach=reach) if known else None
+    material = Material(young_modulus=1.0, poisson_ratio=nu)
+    return Body(shape=shape, material=material, sides=sides, known=free)
+
+
+@pytest.mark.parametrize("margin", [{}, {"margin": 0.25, "margin_cells": 2}])
+def test_block_sinks_as_quadratic_elements_do(margin):
+    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(8, 8, 6), **margin)
+    patches = PatchGrid(grid=(4, 4), lengths=(1.0, 1.0))
+    whole = body(shape, known=not margin).patch_compliance(patches, COMM)
+    mesh = block_mesh(replace(shape, element="Q2"), COMM)
+    plain = Block(mesh, Material(young_modulus=1.0, poisson_ratio=0.15))
+    interface = Interface(plain, patches)
+    load = interface.load(np.ones(16))
+    load.array[:] = plain.solve(load).x.array[: plain.owned_dofs]
+    sunk = interface.patch_displacements(load).mean()
+    # with a margin, pressures end within the top: these elements leave 0.17 % there
+    assert whole.sum(axis=1).mean() == pytest.approx(sunk, rel=3e-3 if margin else 3e-4)
+
+
+def test_single_patches_are_the_limit_of_quadratic_elements():
+    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(8, 8, 6), element="Q2", grading=4.0)
+    patches = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
+    whole = body(shape, nu=0.3).patch_compliance(patches, COMM)
+    block = Block(block_mesh(shape, COMM), Material(young_modulus=1.0, poisson_ratio=0.3))
+    found = plain_compliance(Interface(block, patches))
+    # elements are stiff below a patch's own edges: 0.33 % here, 0.16 % with 16, 16, 8
+    assert np.all(np.diag(found) < np.diag(whole))
+    np.testing.assert_allclose(found, whole, atol=0.005 * whole.max())
+
+
+@pytest.mark.parametrize("count", [1, 2, 4, 8])
+def test_known_sides_leave_the_same_whole(count):
+    """What the sides' term knows and what is left to the modes is the block, on every grid."""
+    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(1, 1, 1))
+    patches = PatchGrid(grid=(count, count), lengths=(1.0, 1.0))
+    one = body(shape).patch_compliance(patches, COMM)
+    other = body(shape, known=False).patch_compliance(patches, COMM)
+    # 0.02 % on one patch, from the sides' interpolation; 0.11 % on 8 × 8, of 8 modes and of 16
+    np.testing.assert_allclose(one, other, atol=2e-3 * one.max())
+    np.testing.assert_allclose(one, one.T, atol=1e-12)
+
+
+@pytest.mark.parametrize(("height", "miss"), [(0.1, 5e-4), (1.0, 1e-3), (10.0, 1e-3)])
+def test_modes_of_a_shape_resolve_points(height, miss):
+    """What a fine contact of 0.02 mm feels of the body changes little with more modes."""
+    shape = BlockShape(interface=(1.0, 1.0), height=height, cells=(1, 1, 1))
+    block = body(shape)
+    places = np.array([0.5, 0.31, 0.02, 0.5, 0.9]), np.array([0.5, 0.44, 0.5, 0.97, 0.85])
+    usual = block.term(block.face(COMM)).between(*places)
+    more = block.term(block.face(COMM, modes=block.modes + 5)).between(*places)
+    own = 1.0 / (2.0 * 0.02 * block.material.contact_modulus)
+    assert np.abs(usual - more).max() < miss * 20 * own * 0.05 / 0.02

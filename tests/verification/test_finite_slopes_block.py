@@ -1,0 +1,78 @@
+"""Finite slopes of a block that is lower than wide: the contact problem against meshes."""
+
+from dataclasses import replace
+
+import pytest
+from mpi4py import MPI
+
+from geometry import RefinedShape, places_in_reach
+from geometry.control import Control
+from macro import Block, Material, ObstacleBlock, rough_block_mesh
+from micro import FiniteSlopes
+from multiscale import Scene, make_stage
+from multiscale.couplings.blocks import contact_model
+
+MATERIAL = {"young_modulus": 4000.0, "poisson_ratio": 0.15}
+HEIGHT, APPROACH, FINE, LOW = 0.3, 8e-3, 1.4e-2, 0.01
+
+
+def stage(*, slopes):
+    spectrum = {"hurst": 0.95, "waves": [2, 6], "rms_slope": 0.215, "seed": 2}
+    return make_stage(
+        Scene.from_dict(
+            {
+                "surface": {"spectrum": spectrum, "grid": [128, 128], "lengths": [1.0, 1.0]},
+                "block": MATERIAL | {"height": HEIGHT},
+                "patches": {"grid": [1, 1]},
+                "micro": {"model": "half-space", "finite_slopes": slopes},
+                "coupling": {"kind": "concurrent"},
+                "load": {"approach": APPROACH},
+            }
+        )
+    )
+
+
+def meshed(surface):
+    """Return what slopes change of the force, on two meshes alike but for their heights."""
+    shape = RefinedShape(
+        interface=(1.0, 1.0),
+        height=HEIGHT,
+        places=places_in_reach(surface, APPROACH, spacing=FINE),
+        fine=FINE,
+        coarse=0.12,
+        growth=0.3,
+        element="P2",
+    )
+    forces = []
+    for scale in (1.0, LOW):
+        scaled = surface.scaled(scale)
+        mesh, _ = rough_block_mesh(shape, scaled, MPI.COMM_SELF)
+        block = ObstacleBlock(
+            Block(mesh, Material(**MATERIAL)), scaled.highest - scaled.mean_height
+        )
+        forces.append(block.press(Control(approach=APPROACH * scale)).force / scale)
+    return forces[0] / forces[1] - 1.0
+
+
+def test_slopes_soften_a_low_block_as_its_mesh():
+    expected = meshed(stage(slopes=True).surface)  # −3.73, −3.94, −4.06 % with edges 20, 14, 10 µm
+    steep, flat = (contact_model(stage(slopes=slopes), None) for slopes in (True, False))
+    small = flat.solve(APPROACH).force
+    found = replace(steep, tolerance=1e-8).solve(APPROACH).force / small - 1.0
+    assert found == pytest.approx(expected, abs=2.5e-3)  # −4.13 %
+    # without the body's own stresses, and its height above the mean plane
+    half_space = steep.slopes.half_space
+    slopes = FiniteSlopes(steep.surface, half_space, beside=steep.slopes.beside[:-1])
+    alone = replace(flat, slopes=slopes, tolerance=1e-8).solve(APPROACH).force / small - 1.0
+    assert alone - expected > 8e-3  # −3.01 %
+
+
+def test_heights_count_from_the_highest_point_of_a_higher_block():
+    steep, flat = (contact_model(stage(slopes=slopes), None) for slopes in (True, False))
+    assert flat.slopes is None
+    assert len(steep.slopes.beside) == 2  # the sides' stresses, and the body's
+    surface = steep.surface
+    gained = steep.body.matrix - flat.body.matrix
+    # uniform pressure shortens a column without walls by p/E of its length; the bottom is clamped
+    expected = (surface.highest - surface.mean_height) / MATERIAL["young_modulus"]
+    assert gained[0, 0] == pytest.approx(expected, rel=5e-3)  # 0.2 %

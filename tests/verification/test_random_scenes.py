@@ -1,0 +1,39 @@
+"""A few of the random scenes of ``tests/benchmarks/scene_campaign.py``, with all invariants."""
+
+import numpy as np
+import pytest
+from random_scenes import KINDS, drawn
+from scene_invariants import Found, checks
+
+SEEDS = (3, 12, 42, 56, 74)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_what_must_hold_of_any_scene(seed, tmp_path, monkeypatch):
+    monkeypatch.setenv("PATCHLAW_CACHE", str(tmp_path))
+    found = list(checks(drawn(seed), tmp_path))
+    assert len(found) > 20
+    assert [one for one in found if not one.holds] == []
+
+
+def test_the_scenes_are_of_all_kinds():
+    assert {drawn(seed).kind for seed in SEEDS} == set(KINDS)
+    assert any(drawn(seed).story.startswith("caps") for seed in SEEDS)
+
+
+def test_a_scene_is_drawn_again():
+    one, other = drawn(3), drawn(3)
+    assert str(one) == str(other)
+    np.testing.assert_array_equal(one.heights, other.heights)
+
+
+def test_turned_four_times_is_the_scene():
+    case = drawn(5)
+    again = case.turned().turned().turned().turned()
+    np.testing.assert_array_equal(again.heights, case.heights)
+    assert again.tilt == case.tilt and again.lengths == case.lengths
+
+
+def test_what_is_missed_does_not_hold():
+    assert not Found("sums", 2e-12, 1e-12).holds
+    assert not Found("sums", float("nan"), 1e-12).holds
