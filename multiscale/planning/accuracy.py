@@ -187,14 +187,15 @@ class _Search:
         may_refine = self.given.reference.fine is None and not stage.meshes.hexahedral
         if may_refine and stage.scene.reference.fine is None:
             stage = self._with_meshes(stage.scene, self._first_size(stage))
-        if len(stage.meshes.shapes) == 1:  # which cannot tell of its error
+        if stage.meshes is None or len(stage.meshes.shapes) == 1:  # which cannot tell of its error
             return self._decided(stage, {})
         for _ in range(_TRIALS):
             error = self._of_meshes(stage)
             fine = stage.scene.reference.fine
             if error <= self._accuracy or not may_refine or fine is None:
                 break
-            step = min(max((error / self._accuracy) ** 0.5, _LEAST_STEP), _LARGEST_STEP)
+            finer = (error / self._accuracy) ** (1.0 / stage.meshes.force_order)
+            step = min(max(finer, _LEAST_STEP), _LARGEST_STEP)
             try:
                 stage = self._with_meshes(stage.scene, fine / step)
             except InputError:  # more memory than there is

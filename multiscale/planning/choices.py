@@ -27,6 +27,8 @@ REFERENCE = "reference"
 def open_keys(scene: Scene) -> frozenset[str]:
     """Return the keys that are left to the plan: ``"auto"``, or not stated beside an accuracy.
 
+    The block's cells are one of them only under laws on its mesh.
+
     Args:
         scene: The scene as it was given.
     """
@@ -44,6 +46,8 @@ def open_keys(scene: Scene) -> frozenset[str]:
             unstated = unstated and not section.model_fields_set
         if getattr(section, key) == "auto" or (unstated and name != "surface"):
             free.add(f"{name}.{key}")
+    if not scene.coupling.on_mesh:
+        free.discard("block.cells")
     return frozenset(free)
 
 

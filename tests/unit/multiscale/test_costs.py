@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 import pytest
-
-from geometry import BlockShape, PatchGrid
 from geometry.smooth_shape import smooth_shape
 from macro.side_loads import sides
+
+from geometry import BlockShape, PatchGrid
 from micro import HalfSpaceModel
 from multiscale import Run, Scene, make_stage
 from multiscale.loading import Programme
