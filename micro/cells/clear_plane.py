@@ -13,6 +13,9 @@ from micro.cells.motions import Motions
 Array = NDArray[np.float64]
 
 _MOST_CUTS = 500
+_MOST_MOTION = 100.0
+"""Of the largest displacement asked for; it bounds the programme while cells are few."""
+_ROUNDING = 1e-13
 
 
 class Clearance(NamedTuple):
@@ -42,22 +45,23 @@ def clearance(required: Array, motions: Motions) -> Clearance:
     """
     count = len(motions.loads)
     size = float(np.abs(required).max()) or 1.0
+    asked = required / size  # the programme's tolerances are absolute
     levers = np.empty((0, count))
     cells: list[int] = []
     motion, shares = np.zeros(count), np.zeros(0)
     bound = -np.inf
     for _ in range(_MOST_CUTS):
-        overlap = required + motions.nearer(motion)
+        overlap = asked + motions.nearer(motion)
         worst = int(np.argmax(overlap))
-        if worst in cells or overlap.ravel()[worst] <= bound * (1.0 + 1e-12) + 1e-14 * size:
+        if worst in cells or overlap.ravel()[worst] <= bound + _ROUNDING:
             break
         cells.append(worst)
         levers = np.vstack((levers, motions.among(np.array([worst])).T))
-        limits = [(-100.0 * size, 100.0 * size)] * count + [(None, None)]
+        limits = [(-_MOST_MOTION, _MOST_MOTION)] * count + [(None, None)]
         found = linprog(
             np.append(np.zeros(count), 1.0),
             A_ub=np.column_stack((levers, -np.ones(len(cells)))),
-            b_ub=-required.ravel()[cells],
+            b_ub=-asked.ravel()[cells],
             bounds=limits,
             method="highs-ds",
         )
@@ -65,5 +69,6 @@ def clearance(required: Array, motions: Motions) -> Clearance:
         shares = np.maximum(-np.asarray(found.ineqlin.marginals), 0.0)
     support = np.zeros(required.shape)
     support.ravel()[cells[: len(shares)]] = shares
+    motion = size * motion
     nearest = float((required + motions.nearer(motion)).max())
     return Clearance(motion, nearest, support)

@@ -18,10 +18,14 @@ from micro.cells.reach import Box
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-_MOST_STEPS = 60
+_MOST_STEPS = 100
 _LONGEST = 1.5  # change of an exponent in one step
 _FARTHEST = 60.0  # largest exponent: pressures do not come into balance on these cells
-_ROUNDING = 1e-14
+_MOST_HALVINGS = 8
+_LEFT = 0.9  # part of the slope along a step by which it may rise beyond its end
+_ROUNDING, _ENOUGH = 1e-14, 1e-12
+"""What pressures may miss of the loads, of what they could do on the longest lever; the second
+where steps gain no more."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -123,26 +127,57 @@ class Motions:
         return found
 
     def _scaled(self, start: Array, levers: Array, upper: float) -> Array | None:
-        values, exponents = np.minimum(start, upper), np.zeros(len(self.loads))
-        best = np.inf
+        """Minimise Σ ψ(p_i) − f · μ over μ, where ψ' = p_i = min(p_i⁰ exp(μ · ℓ_i), upper)."""
+        exponents = np.zeros(len(self.loads))
+        values = start = np.minimum(start, upper)
         for _ in range(_MOST_STEPS):
-            off = levers @ values - self.loads
-            scale = np.maximum(np.abs(levers) @ values, np.abs(self.loads))
-            error = float(np.max(np.abs(off) / np.where(scale > 0.0, scale, 1.0)))
-            if error <= _ROUNDING or (error <= 10.0 * _ROUNDING and error >= best):
+            off, error = self._missed(levers, values)
+            if error <= _ROUNDING:
                 return values
-            best = min(best, error)
-            weights = np.where(values < upper, values, 0.0)
-            curvature = (levers * weights) @ levers.T
-            if not np.isfinite(curvature).all() or not curvature.any():
-                return None
-            step = -np.linalg.lstsq(curvature, off, rcond=1e-14)[0]
-            change = float(np.abs(step @ levers).max())
-            exponents = exponents + step * min(1.0, _LONGEST / change if change > 0.0 else 1.0)
-            if np.abs(exponents).max() > _FARTHEST:
-                return None
+            found = None
+            # cells at the bound do not resist, unless they are to leave it
+            for resisting in (values < upper, np.ones(len(values), bool)):
+                found = self._step(start, levers, upper, exponents, off, values * resisting)
+                if found is not None:
+                    break
+            if found is None or np.abs(found).max() > _FARTHEST:
+                return values if error <= _ENOUGH else None
+            exponents = found
             values = np.minimum(start * np.exp(exponents @ levers), upper)
-        return values if best <= 1e-12 else None
+        return values if self._missed(levers, values)[1] <= _ENOUGH else None
+
+    def _missed(self, levers: Array, values: Array) -> tuple[Array, float]:
+        """Return what pressures miss of the loads, and the largest part of what could act."""
+        off = levers @ values - self.loads
+        longest = np.abs(self.along_x).max(axis=1) * np.abs(self.along_y).max(axis=1)
+        scale = np.maximum(longest * values.sum(), np.abs(self.loads))
+        return off, float(np.max(np.abs(off) / np.where(scale > 0.0, scale, 1.0)))
+
+    def _step(
+        self,
+        start: Array,
+        levers: Array,
+        upper: float,
+        exponents: Array,
+        off: Array,
+        weights: Array,
+    ) -> Array | None:
+        """Return the exponents after a Newton step, shortened where it goes too far."""
+        curvature = (levers * weights) @ levers.T
+        if not np.isfinite(curvature).all() or not curvature.any():
+            return None
+        step = -np.linalg.lstsq(curvature, off, rcond=1e-14)[0]
+        change = float(np.abs(step @ levers).max())
+        step *= min(1.0, _LONGEST / change) if change > 0.0 else 1.0
+        slope = float(off @ step)
+        for _ in range(_MOST_HALVINGS):
+            further = exponents + step
+            values = np.minimum(start * np.exp(further @ levers), upper)
+            left, error = self._missed(levers, values)
+            if float(left @ step) < -_LEFT * slope or error <= _ROUNDING:
+                return further
+            step, slope = 0.5 * step, 0.5 * slope
+        return None
 
 
 def _row(value: float) -> Array:

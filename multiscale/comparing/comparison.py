@@ -25,6 +25,7 @@ class Row:
         heights: Heights of its surface.
         patches: Its patches.
         cells: Elements of its block; empty where it has none, or as many as it needs.
+        finite_slopes: Whether it sees that slopes are finite.
         status: How it ended.
         is_measure: Whether the others are compared against it.
         unknowns: Degrees of freedom of a block that was pressed on its mesh.
@@ -54,6 +55,7 @@ class Row:
     patches: str
     cells: str
     status: str
+    finite_slopes: bool = False
     is_measure: bool = False
     unknowns: int | None = None
     ranks: int = 1

@@ -1,4 +1,4 @@
-"""One way to compute a scene, among those that are compared."""
+"""One way to compute a scene, among those that are compared; grids that they share."""
 
 from __future__ import annotations
 
@@ -8,17 +8,24 @@ from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
-from multiscale.comparing.level_grids import Grid
-from multiscale.scene import Scene
+from multiscale.scene import Scene, SpectrumSection
+from multiscale.stage_checks import patch_grid
 
-Content = dict[str, Any]
+Content: TypeAlias = dict[str, Any]
+Grid: TypeAlias = tuple[int, int]
 
 OWN = "the scene as it is"
 """How the name begins of the level that runs the scene as its file has it."""
 
 OPTIONS: Content = {"figures": False, "report": False, "fields": False}
+
+FEWEST_HEIGHTS = 32
+"""Heights along a side, at least, of coarser versions of a surface."""
+
+HEIGHTS_PER_WAVE = 3
+"""Heights per shortest wave of the spectrum, at least, of coarser versions."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,9 +38,9 @@ class Level:
         content: The complete scene, as `Scene.from_dict` takes it.
         heights: Heights of its surface.
         cost: Predicted wall time [s]; orders the levels.
-        slopes: Whether the effect of finite slopes is estimated after the run.
         ranks: Processes that it runs on.
         scale: Heights and load relative to those of the scene compared; results are divided by it.
+        refusal: Why it cannot be run; empty where it can.
     """
 
     name: str
@@ -41,9 +48,9 @@ class Level:
     content: Content
     heights: Grid
     cost: float
-    slopes: bool = False
     ranks: int = 1
     scale: float = 1.0
+    refusal: str = ""
 
     @cached_property
     def scene(self) -> Scene:
@@ -105,3 +112,32 @@ def flattened(content: Content, scale: float) -> Content | None:
     if load["tilt"] != "free":
         load["tilt"] = [scale * slope for slope in load["tilt"]]
     return content | {"surface": surface | {"spectrum": spectrum}, "load": load}
+
+
+def pressure_grid(scene: Scene) -> Grid:
+    """Return the patches that pressures are compared on: the scene's, divided to at least 4 × 4."""
+    nx, ny = (count * -(-4 // count) for count in patch_grid(scene))
+    return nx, ny
+
+
+def coarser_grids(heights: Grid, spectrum: SpectrumSection | None) -> list[Grid]:
+    """Return the grids that a surface can be made on, coarsest first.
+
+    Args:
+        heights: Its own grid, the last.
+        spectrum: What it is made from; heights from a file are taken as they are.
+    """
+    grids = [heights]
+    while spectrum is not None and all(count % 2 == 0 for count in grids[0]):
+        coarser = (grids[0][0] // 2, grids[0][1] // 2)
+        fewest = [max(FEWEST_HEIGHTS, HEIGHTS_PER_WAVE * count) for count in _shortest(spectrum)]
+        if any(count < least for count, least in zip(coarser, fewest, strict=True)):
+            break
+        grids.insert(0, coarser)
+    return grids
+
+
+def _shortest(spectrum: SpectrumSection) -> tuple[float, float]:
+    """Return the largest numbers of waves per side."""
+    x, y = (band or spectrum.waves or (0.0, 0.0) for band in (spectrum.waves_x, spectrum.waves_y))
+    return x[1], y[1]

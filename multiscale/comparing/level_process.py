@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from geometry.collective import on_root
-from geometry.errors import InputError, NotConverged, PatchlawError
-from micro import HalfSpaceModel, finite_slope_effect
+from geometry.errors import PatchlawError
 from multiscale.comparing.level_results import STATUS_OF_EXIT, LevelResult, curves_of, write_result
 from multiscale.mpi_job import world
 from multiscale.run import Run
@@ -32,8 +31,7 @@ def main(request: Path) -> int:
     """Run the level that a request describes, and write its result.
 
     Args:
-        request: JSON file with the level's scene, its key, whether to estimate the effect of
-            finite slopes, and where the result goes.
+        request: JSON file with the level's scene, its key, and where the result goes.
 
     Returns:
         0 done, 2 refused, 3 not converged.
@@ -46,20 +44,19 @@ def main(request: Path) -> int:
     comm = None
     if scene.coupling.kind != "analytic":  # the micro model alone needs neither MPI nor elements
         comm = world()
-        _rehearse(scene, comm)
-    result = level_result(scene, comm, key=asked["key"], slopes=asked["slopes"])
+    _rehearse(scene, comm)
+    result = level_result(scene, comm, key=asked["key"])
     on_root(comm, lambda: write_result(Path(asked["result"]), result))
     return result.exit_code or 0
 
 
-def level_result(scene: Scene, comm: Any, *, key: str, slopes: bool) -> LevelResult:
+def level_result(scene: Scene, comm: Any, *, key: str) -> LevelResult:
     """Run a level in this process.
 
     Args:
         scene: Its scene.
         comm: MPI communicator; None for this process alone.
         key: Its hash.
-        slopes: Whether to estimate the effect of finite slopes afterwards.
 
     Note:
         Collective.
@@ -86,28 +83,19 @@ def level_result(scene: Scene, comm: Any, *, key: str, slopes: bool) -> LevelRes
         peak_MB=memory if comm is None else sum(comm.allgather(memory)),
         unknowns=None if run is None else run.unknowns,
         curves=None if run is None else curves_of(run.history()),
-        finite_slopes=_finite_slopes(run) if run is not None and slopes else None,
+        finite_slopes=run is not None and run.stage.finite_slopes,
     )
-
-
-def _finite_slopes(run: Run) -> float | None:
-    """Estimate what finite slopes change in the force at the last load step, where possible."""
-    model = run.stage.model
-    if not isinstance(model, HalfSpaceModel) or not run.steps:
-        return None
-    last = run.steps[-1]
-    nu = run.scene.block.poisson_ratio
-    try:
-        return finite_slope_effect(model, last.approach_mm, poisson_ratio=nu, tilt=last.tilt)
-    except (InputError, NotConverged):
-        return None
 
 
 def _rehearse(scene: Scene, comm: Any) -> None:
     """Run the same coupling in small: imports and compiled forms are no part of a level's time."""
     content = scene.model_dump(by_alias=True, mode="json", exclude_none=True)
     block = {key: value for key, value in content["block"].items() if not key.startswith("margin")}
+    reference: dict[str, Any] = {"method": scene.reference.method, "meshes": 1}
+    if scene.reference.hexahedral:
+        reference["cells"] = [4, 4, 4]
     small = content | _SMALL | {"block": block | {"height": 1.0, "cells": [4, 4, 4]}}
+    small |= {"reference": reference}
     try:
         for _ in Run(Scene.from_dict(small), comm).load_steps():
             pass

@@ -38,8 +38,7 @@ class LevelResult:
         peak_MB: Largest memory in use, of all ranks together [MB]; NaN when unknown.
         unknowns: Degrees of freedom of the block that was pressed, where one was.
         curves: The load steps accepted; None when there are none.
-        finite_slopes: Relative change of the force by finite slopes at the last load step, where
-            it was estimated.
+        finite_slopes: Whether its micro model, if any, sees that slopes are finite.
     """
 
     key: str
@@ -52,7 +51,7 @@ class LevelResult:
     peak_MB: float = float("nan")
     unknowns: int | None = None
     curves: Curves | None = None
-    finite_slopes: float | None = None
+    finite_slopes: bool = False
 
     @property
     def settled(self) -> bool:

@@ -65,7 +65,8 @@ def run_levels(
 ) -> Iterator[tuple[Level, LevelResult, bool]]:
     """Run levels in their order, and yield each with its result when it ends.
 
-    Finished levels are kept on disk, one file each, and are not run again.
+    Finished levels are kept on disk, one file each, and are not run again. Levels that are
+    predicted to take more than the budget leaves, or more memory than there is, are left out.
 
     Args:
         levels: The levels.
@@ -87,14 +88,32 @@ def run_levels(
             yield level, kept, True
             continue
         left = None if end is None else end - clock()
-        if left is not None and left <= 0.0:
-            yield level, LevelResult(key=level.key, status="not started"), False
+        omitted = _omitted(level, left)
+        if omitted is not None:
+            yield level, omitted, False
             continue
         if begin is not None:
             begin(level)
         result = launch(level, left)
         write_result(path, result)
         yield level, result, False
+
+
+def _omitted(level: Level, left: float | None) -> LevelResult | None:
+    """Return the result of a level that is left out, with the reason; None of one to be run.
+
+    Args:
+        level: The level.
+        left: What the budget leaves [s]; None without one.
+    """
+    if level.refusal:
+        return LevelResult(key=level.key, status="refused", message=level.refusal)
+    if left is None or level.cost <= left:
+        return None
+    if left <= 0.0:
+        return LevelResult(key=level.key, status="not started")
+    why = f"it is predicted to take {level.cost:.2g} s, and the budget leaves {left:.2g} s"
+    return LevelResult(key=level.key, status="not started", message=why)
 
 
 def launch_process(level: Level, seconds: float | None) -> LevelResult:
@@ -105,7 +124,6 @@ def launch_process(level: Level, seconds: float | None) -> LevelResult:
         asked = {
             "scene": level.content,
             "key": level.key,
-            "slopes": level.slopes,
             "result": str(answer),
         }
         request.write_text(json.dumps(asked), encoding="utf-8")

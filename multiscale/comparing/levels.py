@@ -1,8 +1,8 @@
 """The levels at which a scene can be computed, from the micro model alone to the meshed roughness.
 
-All levels run the same surface under the same load programme. Steps are not halved
-(``load.force_change``), so that curves can be compared step by step. Couplings without laws sum
-their results over the patches that pressures are compared on (`pressure_grid`).
+All levels run the same surface, with its true heights, under the same load programme. Steps are not
+halved (``load.force_change``), so that curves can be compared step by step. Couplings without laws
+sum their results over the patches that pressures are compared on (`pressure_grid`).
 """
 
 from __future__ import annotations
@@ -12,10 +12,18 @@ from dataclasses import replace
 from typing import Any
 
 from geometry.errors import InputError, NotConverged
+from geometry.typical_contact import suggested_fine
 from micro import MODEL_NAMES
-from multiscale.comparing.level import OWN, Content, Level, content_of, flattened
-from multiscale.comparing.level_grids import Grid, coarser_grids, pressure_grid
-from multiscale.comparing.meshed_levels import meshed
+from multiscale.comparing.level import (
+    OWN,
+    Content,
+    Grid,
+    Level,
+    coarser_grids,
+    content_of,
+    flattened,
+    pressure_grid,
+)
 from multiscale.ingredients import make_surface
 from multiscale.planning.costs import predicted_cost
 from multiscale.planning.machine import Machine
@@ -24,7 +32,7 @@ from multiscale.stage_checks import EMBEDDED_CELLS, patch_grid
 from multiscale.staging import make_stage
 
 LAW_HEIGHTS = 128
-"""Heights along a side, at most, of the half-space behind consistent laws."""
+"""Heights along a side, at most, of half-spaces behind laws of several numbers of patches."""
 
 PATCHES = (1, 2, 4, 8, 16)
 """Patches along a side of the couplings by laws."""
@@ -32,15 +40,20 @@ PATCHES = (1, 2, 4, 8, 16)
 CELLS_PER_PATCH = 2
 """Elements along a patch, at least, of blocks that carry laws themselves."""
 
-SMOOTH_CELLS = ((8, 8, 6), (20, 20, 12), (24, 24, 16))
-"""Elements of blocks that only correct the half-space: coarse, as by default, fine."""
+SMALL_SLOPES = ", small slopes"
+"""What the name of a level has behind that of the same one with finite slopes."""
 
-FINE_LOADS = 32
-"""Rectangles along a side, at least, that tell a block of the contacts' forces where they are told
-finely; patches decide how many they are, and contacts next to the block's sides feel them."""
-
-SMALL = 0.1
+LOW = 0.1
 """Heights and load of a reference with small slopes, relative to the scene's."""
+
+LOW_HEIGHTS = f", heights × {LOW:g}"
+"""What the name of a level has behind that of the same one with true heights."""
+
+_HALF_SPACE: Content = {"model": "half-space"}
+_FITTED: Content = {"model": "elliptic", "curvature": "contact", "border": "include"}
+_MESHES = tuple((meshes, 1.0) for meshes in (1, 2, 3))
+_EDGES = ((1, 2.0), (1, 1.0), (2, 1.0), (3, 1.0), (3, 0.5**0.5))
+"""Numbers of meshes, and edges relative to those that fit the contacts."""
 
 
 def levels(scene: Scene, ranks: int = 1) -> tuple[Level, ...]:
@@ -55,8 +68,7 @@ def levels(scene: Scene, ranks: int = 1) -> tuple[Level, ...]:
     """
     found: dict[str, Level] = {}
     for level in _Family(scene, ranks).all():  # the scene itself comes first, and keeps its name
-        first = found.setdefault(level.key, level)
-        found[level.key] = replace(first, slopes=first.slopes or level.slopes)
+        found.setdefault(level.key, level)
     return tuple(sorted(found.values(), key=lambda level: level.cost))
 
 
@@ -98,26 +110,29 @@ class _Family:
         return self._level(f"{OWN}: {', '.join(parts)}", whole, self._heights)
 
     def _analytic(self) -> Iterator[Level | None]:
-        fitted = {"model": "elliptic", "curvature": "contact", "border": "include"}
+        alone = {"coupling": {"kind": "analytic"}, "block": self._block(None)}
         micros: dict[str, Content] = {
             name: {"model": name} for name in MODEL_NAMES if name != "half-space"
         }
-        for name, micro in (micros | {"elliptic, fitted": fitted}).items():
-            yield self._level(f"analytic, {name}", self._alone(micro), self._heights)
-        for grid in self._grids:
+        for name, micro in (micros | {"elliptic, fitted": _FITTED}).items():
             yield self._level(
-                f"analytic, half-space {_times(grid)}",
-                self._alone({"model": "half-space"}),
-                grid,
-                slopes=grid == self._law_grid,
+                f"analytic, {name}", self._base | alone | {"micro": micro}, self._heights
             )
+        for grid in self._grids:
+            yield from self._half_spaces(f"analytic, half-space {_times(grid)}", alone, grid)
 
-    def _alone(self, micro: Content) -> Content:
-        return self._base | {
-            "micro": micro,
-            "coupling": {"kind": "analytic"},
-            "block": self._block(None),
-        }
+    def _concurrent(self) -> Iterator[Level | None]:
+        changes = {"coupling": {"kind": "concurrent"}, "block": self._block(None)}
+        for grid in self._grids:
+            yield from self._half_spaces(f"concurrent, half-space {_times(grid)}", changes, grid)
+
+    def _half_spaces(self, name: str, changes: Content, grid: Grid) -> Iterator[Level | None]:
+        """Yield a level with the half-space; on one grid with small slopes too."""
+        content = self._base | changes | {"micro": _HALF_SPACE}
+        yield self._level(name, content, grid)
+        if grid == self._law_grid:
+            flat = content | {"micro": _HALF_SPACE | {"finite_slopes": False}}
+            yield self._level(name + SMALL_SLOPES, flat, grid)
 
     def _isolated(self) -> Iterator[Level | None]:
         micro = self._base["micro"]
@@ -129,25 +144,31 @@ class _Family:
         for grid, mesh in (*((grid, cells) for grid in self._patch_grids), (own, half)):
             if _carries(mesh, grid):
                 yield self._patched("isolated", micro, grid, love, mesh)
-        yield self._patched("isolated", {"model": "half-space"}, own, love, cells)
+        yield self._patched("isolated", _HALF_SPACE, own, love, cells)
 
     def _consistent(self) -> Iterator[Level | None]:
-        own, whole = self._patches, {"model": "half-space"}
-        decomposed = {"kind": "consistent", "compliance": "decomposed"}
+        own, coupling = self._patches, {"kind": "consistent", "compliance": "decomposed"}
         for grid in self._patch_grids:
-            yield self._patched("consistent", whole, grid, decomposed, None)
+            yield self._patched("consistent", _HALF_SPACE, grid, coupling, None)
+        for heights in self._grids:
+            name = f"consistent, {_times(own)} patches, half-space {_times(heights)}"
+            changes = {"coupling": coupling, "patches": {"grid": list(own)}}
+            yield from self._half_spaces(name, changes | {"block": self._block(None)}, heights)
         micro = self._base["micro"]
         if micro["model"] not in ("half-space", "auto"):
-            yield self._patched("consistent", micro, own, decomposed, None)
+            yield self._patched("consistent", micro, own, coupling, None)
         meshed = {"kind": "consistent", "compliance": "finite-element"}
         if _carries(self._cells, own):
-            yield self._patched("consistent", whole, own, meshed, self._cells)
+            yield self._patched("consistent", _HALF_SPACE, own, meshed, self._cells)
 
     def _patched(
         self, kind: str, micro: Content, grid: Grid, coupling: Content, cells: Any
     ) -> Level | None:
-        heights = self._law_grid if micro["model"] == "half-space" else self._heights
-        name = f"{kind}, {_times(grid)} patches, {micro['model']}"
+        heights, model = self._heights, micro["model"]
+        if model == "half-space":
+            heights = self._law_grid
+            model += f" {_times(heights)}"
+        name = f"{kind}, {_times(grid)} patches, {model}"
         changes: Content = {
             "micro": micro,
             "coupling": coupling,
@@ -158,54 +179,54 @@ class _Family:
             f"{name}, {_times(cells)} elements" if cells else name, self._base | changes, heights
         )
 
-    def _concurrent(self) -> Iterator[Level | None]:
-        coarse, usual, fine = SMOOTH_CELLS
-        pairs = [(grid, usual) for grid in self._grids]
-        pairs += [(self._law_grid, coarse), *((grid, fine) for grid in self._grids[-2:])]
-        for grid, cells in pairs:
-            changes: Content = {
-                "micro": {"model": "half-space"},
-                "coupling": {"kind": "concurrent"},
-                "block": self._block(cells),
-            }
-            name = f"concurrent, half-space {_times(grid)}, {_times(cells)} elements"
-            yield self._level(name, self._base | changes, grid)
-            if (grid, cells) == (self._grids[-1], usual):
-                nx, ny = (count * -(-FINE_LOADS // count) for count in self._patches)
-                loads = {"patches": {"grid": [nx, ny]}}
-                name = f"{name}, {_times((nx, ny))} loads"
-                yield self._level(name, self._base | changes | loads, grid)
-
     def _references(self) -> Iterator[Level | None]:
-        for mesh in meshed(self._scene, self._base, self._block(None)):
-            level = self._level(mesh.name, self._base | mesh.changes, self._heights)
+        """Yield levels with meshed roughness; one of them with low heights under a low load too."""
+        stated = self._base["reference"]
+        hexahedral = self._scene.reference.hexahedral
+        fine = None if hexahedral else stated.get("fine") or self._finest_edge()
+        for meshes, factor in _EDGES if fine else _MESHES:
+            section = stated | {"meshes": meshes}
+            name = f"reference, {meshes} mesh{'es' * (meshes > 1)}"
+            if fine:
+                section["fine"] = float(f"{factor * fine:.4g}")
+                name += f", {1e3 * section['fine']:.3g} µm"
+            changes = {"coupling": {"kind": "reference"}, "reference": section}
+            level = self._level(
+                name, self._base | changes | {"block": self._block(None)}, self._heights
+            )
             yield level
-            if mesh.small_slopes_too and level is not None:
-                yield self._small_slopes(level)
+            if fine and level is not None and (meshes, factor) == (1, 1.0):
+                low = flattened(level.content, LOW)
+                small = None if low is None else self._level(name + LOW_HEIGHTS, low, self._heights)
+                yield None if small is None else replace(small, scale=LOW)
 
-    def _small_slopes(self, level: Level) -> Level | None:
-        """Return a reference with low heights under a small load, on the same mesh."""
-        content = flattened(level.content, SMALL)
-        if content is None:
+    def _finest_edge(self) -> float | None:
+        """Return the edge of tetrahedra that fits the contacts; None where they are unknown."""
+        programme = self._scene.loading.programme
+        if programme.quantity == "force" or programme.tilt is None:
             return None
-        small = self._level(f"{level.name}, heights × {SMALL:g}", content, self._heights)
-        return None if small is None else replace(small, scale=SMALL)
+        surface = make_surface(self._scene)
+        return suggested_fine(surface, programme.largest, tilt=programme.tilt)
 
     def _block(self, cells: Any) -> Content:
         block = {key: value for key, value in self._base["block"].items() if key != "cells"}
         return block | {"cells": list(cells)} if cells else block
 
-    def _level(
-        self, name: str, content: Content, heights: Grid, *, slopes: bool = False
-    ) -> Level | None:
-        """Return a level; None when the scene does not allow it."""
+    def _level(self, name: str, content: Content, heights: Grid) -> Level | None:
+        """Return a level; None when the scene does not allow it.
+
+        A reference that does not fit into the memory is told instead.
+        """
         if heights != self._heights:
             content = content | {"surface": content["surface"] | {"grid": list(heights)}}
+        cost, refusal = float("inf"), ""
         try:
             scene = Scene.from_dict(content)
             cost = predicted_cost(make_stage(scene), self._machine).total
-        except (InputError, NotConverged):
-            return None
+        except (InputError, NotConverged) as error:
+            if content["coupling"]["kind"] != "reference" or "GB of memory" not in str(error):
+                return None
+            refusal = str(error)
         kind = scene.coupling.kind
         return Level(
             name=name,
@@ -213,17 +234,15 @@ class _Family:
             content=content_of(scene),
             heights=heights,
             cost=cost,
-            slopes=slopes,
             ranks=1 if kind == "analytic" else self._ranks,
+            refusal=refusal,
         )
 
     @property
     def _cells(self) -> tuple[int, int, int]:
-        """Elements of a block that carries laws itself; a decomposed one's are for less."""
+        """Elements of a block that carries laws itself."""
         stated = self._scene.block.cells
-        if self._scene.coupling.decomposed or not isinstance(stated, tuple):
-            return EMBEDDED_CELLS
-        return stated
+        return stated if isinstance(stated, tuple) else EMBEDDED_CELLS
 
     @property
     def _patches(self) -> Grid:

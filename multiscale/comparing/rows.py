@@ -7,14 +7,14 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from geometry.patches import PatchGrid
+from multiscale.comparing.causes import Split
 from multiscale.comparing.comparison import Comparison, Row
-from multiscale.comparing.level_grids import pressure_grid
+from multiscale.comparing.level import Level, pressure_grid
 from multiscale.comparing.measures import Measures, measures, uncertainty
-from multiscale.comparing.outcome_causes import Split
-from multiscale.comparing.outcome_rows import row_of
 from multiscale.comparing.outcomes import AGAINST, Against, Outcome, ranked, refinements
 from multiscale.scene import Scene
 
+_PHASES = {"laws": "seconds_laws", "load steps": "seconds_steps"}
 _IDLE = 0.7  # of the wall time: less work than that tells of a busy machine
 
 
@@ -42,7 +42,7 @@ def compared(
     }
     warnings = [*_missed(against, chosen), *_busy(outcomes)]
     if chosen is None:
-        rows = tuple(row_of(one) for one in outcomes)
+        rows = tuple(_row_of(one) for one in outcomes)
         return Comparison(rows=rows, warnings=tuple(warnings), **common)
     best = tops[chosen][0]
     pairs = [(coarse.curves, fine.curves) for coarse, fine in refinements(tops[chosen])]
@@ -70,7 +70,7 @@ def _rows(
             errors = own
         elif one.result.curves is not None:
             errors = measures(one.curves, best.curves, grid)
-        yield row_of(one, is_measure=one is best, errors=errors, causes=split.causes(one))
+        yield _row_of(one, is_measure=one is best, errors=errors, causes=split.causes(one))
 
 
 def _missed(against: Against | None, chosen: Against | None) -> Iterator[str]:
@@ -96,3 +96,62 @@ def _grid(scene: Scene, found: Sequence[Outcome]) -> PatchGrid:
     """Return the patches that pressures are compared on."""
     lengths = found[0].curves.patches.lengths if found else (1.0, 1.0)
     return PatchGrid(grid=pressure_grid(scene), lengths=lengths)
+
+
+def _row_of(one: Outcome, **found: Any) -> Row:
+    """Return the row of a level.
+
+    Args:
+        one: The level and how it ended.
+        **found: What the comparison adds: fields of a `Row`.
+    """
+    level, result = one.level, one.result
+    if result.curves is not None:
+        curves = one.curves
+        found |= {
+            "steps": len(curves),
+            "approach_mm": float(curves.approach[-1]),
+            "force_N": float(curves.force[-1]),
+            "contact_area_fraction": float(curves.area[-1]),
+            "mean_separation_mm": float(curves.separation[-1]),
+        }
+    if result.seconds:
+        found |= _times(result.seconds)
+    return Row(
+        name=level.name,
+        kind=level.kind,
+        model=level.model,
+        heights=_text(level.heights),
+        patches=_text(level.content["patches"]["grid"]),
+        cells=_text(_cells(level)),
+        finite_slopes=level.kind == "reference" or result.finite_slopes,
+        status=result.status,
+        unknowns=result.unknowns,
+        ranks=level.ranks,
+        seconds_start=result.start_s,
+        seconds_cpu=result.cpu_s,
+        peak_MB=result.peak_MB,
+        exit_code=result.exit_code,
+        message=result.message,
+        **found,
+    )
+
+
+def _cells(level: Level) -> Sequence[int]:
+    """Return the elements of a level's block, none where it has none, or as many as it needs."""
+    if level.kind == "reference":
+        return level.content["reference"].get("cells", ())
+    return level.content["block"].get("cells", ()) if level.scene.coupling.on_mesh else ()
+
+
+def _times(seconds: dict[str, float]) -> dict[str, float]:
+    """Sum phases of a run; what is neither laws nor load steps is set-up."""
+    told = {"seconds": sum(seconds.values()), "seconds_setup": 0.0}
+    for phase, spent in seconds.items():
+        name = _PHASES.get(phase, "seconds_setup")
+        told[name] = told.get(name, 0.0) + spent
+    return told
+
+
+def _text(counts: Sequence[int]) -> str:
+    return "x".join(map(str, counts))

@@ -113,11 +113,11 @@ def on_body(
 def _stresses(body: Body, face: FaceCompliance, surface: Surface) -> list[SurfaceStress]:
     """Return the stresses in a contact face beyond those of the half-space."""
     grid = coarse_grid(surface)
-    found: list[SurfaceStress] = [body.stresses(face, grid)]
+    found: list[SurfaceStress] = []
     if body.known is not None:
         spacing = surface.lengths[0] / grid[0], surface.lengths[1] / grid[1]
         found.append(side_stresses(body.known, spacing))
-    return found
+    return [*found, body.stresses(face, grid)]
 
 
 def scene_body(stage: Stage) -> Body:

@@ -52,7 +52,7 @@ def ended(dice, level, seconds):
         start_s=dice.uniform(0.0, 1.0),
         cpu_s=dice.choice([0.0, 1.0]),
         curves=curves if steps.size else None,
-        finite_slopes=dice.choice([None, 0.03]),
+        finite_slopes=dice.choice([True, True, False]),
     )
 
 

@@ -4,15 +4,26 @@ import itertools
 
 import pytest
 
-from multiscale.comparing.causes import Best, causes
+from multiscale.comparing.causes import Best, Value, causes
 
 ROUNDING = 1e-12  # sums of five doubles of order one
-BEST = Best(half_space=3.4, block=3.1, rough=3.0, slopes=-0.025)
-TOPS = {"analytic": 3.4, "concurrent": 3.1, "reference": 3.0}
+FIRST, WHOLE = -0.025, -0.03
+TOPS = {
+    "analytic": Value(value=3.4, slopes=FIRST),
+    "concurrent": Value(value=3.1, slopes=FIRST),
+    "reference": Value(value=3.0, slopes=WHOLE),
+}
+BEST = Best(
+    half_space=TOPS["analytic"],
+    block=TOPS["concurrent"],
+    rough=TOPS["reference"],
+    slopes=FIRST,
+)
 KINDS = ("analytic", "isolated", "consistent", "concurrent", "reference")
+TWIN = Value(value=3.2)
 
 
-def split(value, kind, against, *, twin=3.2, cells=False, best=BEST):
+def split(value, kind, against, *, twin=TWIN, cells=False, best=BEST):
     return causes(
         value, kind, against=TOPS[against], against_kind=against, best=best, twin=twin, cells=cells
     )
@@ -26,46 +37,60 @@ def total(found):
 @pytest.mark.parametrize(("kind", "against"), list(itertools.product(KINDS, TOPS)))
 @pytest.mark.parametrize("cells", [True, False])
 @pytest.mark.parametrize("known", [True, False])
-def test_shares_add_up(kind, against, cells, known):
+@pytest.mark.parametrize("slopes", [0.0, FIRST, WHOLE])
+def test_shares_add_up(kind, against, cells, known, slopes):
     best = BEST if known else Best(half_space=None, block=None, rough=None)
-    twin = 3.7 if kind == "analytic" else 3.2
-    found = split(3.7, kind, against, twin=twin, cells=cells, best=best)
-    assert total(found) == pytest.approx(3.7 / TOPS[against] - 1.0, abs=ROUNDING)
+    value = Value(value=3.7, slopes=slopes)
+    twin = value if kind == "analytic" else TWIN
+    found = split(value, kind, against, twin=twin, cells=cells, best=best)
+    right = TOPS[against].value
+    assert total(found) == pytest.approx(3.7 / right - 1.0, abs=ROUNDING)
 
 
-def test_micro_model_alone_against_the_meshed_roughness():
-    found = split(3.2, "analytic", "reference", twin=3.2)
-    assert found.micro == pytest.approx((3.2 - 3.4) / 3.0, rel=ROUNDING)
+def test_micro_model_of_small_slopes_against_the_meshed_roughness():
+    found = split(TWIN, "analytic", "reference")
+    assert found.micro == pytest.approx((3.2 * (1.0 + FIRST) - 3.4) / 3.0, rel=ROUNDING)
     assert found.block == pytest.approx((3.4 - 3.1) / 3.0, rel=ROUNDING)
-    assert found.slopes == pytest.approx(0.025 * 3.1 / 3.0, rel=ROUNDING)  # of the smooth block
-    rest = (3.1 - 3.0 - 0.025 * 3.1) / 3.0
-    assert found.discretisation == pytest.approx(rest, rel=1e-9)  # a difference
+    assert found.slopes == pytest.approx(-3.2 * WHOLE / 3.0, rel=ROUNDING)
     assert found.coupling == 0.0
 
 
-def test_laws_against_the_smooth_block():
-    found = split(2.5, "isolated", "concurrent", twin=3.2)
-    assert found.micro == pytest.approx((3.2 - 3.4) / 3.1, rel=ROUNDING)
-    assert found.coupling == pytest.approx((2.5 - 3.1 + 0.2) / 3.1, rel=ROUNDING)
-    assert (found.block, found.slopes) == (0.0, 0.0)
+def test_slopes_in_the_first_order_alone():
+    found = split(TOPS["concurrent"], "concurrent", "reference")
+    lost = 1.0 - (1.0 + WHOLE) / (1.0 + FIRST)
+    assert found.slopes == pytest.approx(3.1 * lost / 3.0, rel=1e-11)  # a difference
+    assert found.discretisation == pytest.approx(3.1 / 3.0 - 1.0 - found.slopes, rel=1e-11)
+    assert (found.micro, found.coupling, found.block) == (0.0, 0.0, 0.0)
+
+
+def test_laws_against_the_block():
+    found = split(Value(value=2.5), "isolated", "concurrent")
+    micro = (3.2 * (1.0 + FIRST) - 3.4) / 3.1
+    assert found.micro == pytest.approx(micro, rel=ROUNDING)
+    coupling = (2.5 * (1.0 + FIRST) - 3.1) / 3.1 - micro
+    assert found.coupling == pytest.approx(coupling, rel=ROUNDING)
+    assert found.block == 0.0
+    assert found.slopes == pytest.approx(-2.5 * FIRST / 3.1, rel=ROUNDING)
     assert found.discretisation == pytest.approx(0.0, abs=ROUNDING)
 
 
 def test_cells_of_the_half_space_are_discretisation():
-    found = split(3.38, "analytic", "analytic", twin=3.38, cells=True)
-    assert found.micro == 0.0
+    coarse = Value(value=3.38, slopes=FIRST)
+    found = split(coarse, "analytic", "analytic", twin=coarse, cells=True)
+    assert (found.micro, found.slopes) == (0.0, 0.0)
     assert found.discretisation == pytest.approx(-0.02 / 3.4, rel=1e-9)  # a difference
 
 
 def test_the_other_way_round():
-    found = split(3.0, "reference", "analytic", twin=None)
+    found = split(TOPS["reference"], "reference", "analytic", twin=None)
     assert found.block == pytest.approx(-(3.4 - 3.1) / 3.4, rel=ROUNDING)
-    assert found.slopes == pytest.approx(-0.025 * 3.1 / 3.4, rel=ROUNDING)
+    lost = 1.0 - (1.0 + FIRST) / (1.0 + WHOLE)
+    assert found.slopes == pytest.approx(3.0 * lost / 3.4, rel=1e-11)  # a difference
 
 
 def test_what_was_not_reached_cannot_be_told():
-    best = Best(half_space=3.4, block=None, rough=3.0)
-    found = split(3.2, "analytic", "reference", twin=3.2, best=best)
+    best = Best(half_space=TOPS["analytic"], block=None, rough=TOPS["reference"])
+    found = split(TWIN, "analytic", "reference", best=best)
     assert found.block is None
     assert found.slopes is None
-    assert split(3.0, "consistent", "reference", best=best).coupling is None
+    assert split(TOPS["concurrent"], "consistent", "reference", best=best).coupling is None

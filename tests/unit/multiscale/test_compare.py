@@ -15,6 +15,7 @@ from multiscale.cli import main
 from multiscale.comparing.command import budget_seconds, compare_scene
 from multiscale.comparing.level_process import level_result
 from multiscale.comparing.level_results import LevelResult
+from multiscale.comparing.levels import SMALL_SLOPES
 from multiscale.comparing.measures import Curves
 from multiscale.run import run
 from multiscale.scene import Scene
@@ -25,8 +26,8 @@ TINY = [
 ]  # fmt: skip
 OWN_NAME = "the scene as it is: isolated, 2 × 2 patches, circular"
 PICKED = (
-    "analytic, half-space", "analytic, elliptic", "concurrent, half-space 64 × 64, 8",
-    "concurrent, half-space 32 × 32, 8", "consistent, 2 × 2 patches, half-space",
+    "analytic, half-space", "analytic, elliptic", "concurrent, half-space",
+    "consistent, 2 × 2 patches, half-space 32 × 32",
 )  # fmt: skip
 
 
@@ -37,30 +38,20 @@ def launched(level, seconds):
     """Run some of the levels here; the others fail as a crash does."""
     if level.is_own or level.name.startswith(PICKED):
         if level.key not in RUN:
-            result = level_result(level.scene, None, key=level.key, slopes=level.slopes)
+            result = level_result(level.scene, None, key=level.key)
             RUN[level.key] = replace(result, cpu_s=sum(result.seconds.values()))
         return RUN[level.key]
     return LevelResult(key=level.key, status="failed", exit_code=-9, message="killed")
 
 
-@pytest.fixture(autouse=True)
-def few_elements(monkeypatch):
-    """Blocks of few elements: the numbers are not what is tested here."""
-    monkeypatch.setattr(
-        "multiscale.comparing.levels.SMOOTH_CELLS", ((4, 4, 4), (6, 6, 4), (8, 8, 6))
-    )
-
-
 @pytest.fixture(scope="module")
 def found():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("multiscale.comparing.levels.SMOOTH_CELLS", ((4, 4, 4), (6, 6, 4), (8, 8, 6)))
-        return compare(Scene.load(PAPER, TINY), launch=launched)
+    return compare(Scene.load(PAPER, TINY), launch=launched)
 
 
 def test_best_level_is_the_measure(found):
     assert (found.against, found.response) == ("concurrent", "force")
-    assert found.measure == "concurrent, half-space 64 × 64, 8 × 8 × 6 elements"
+    assert found.measure == "concurrent, half-space 64 × 64"
     measure = found[found.measure]
     assert measure.is_measure
     assert measure.errors == found.uncertainty
@@ -129,7 +120,7 @@ def test_prescribed_force_is_measured_by_the_approach():
     def analytic(level, seconds):
         assert level.scene.loading.tilt == "free"
         if level.name.startswith("analytic, half-space"):
-            return level_result(level.scene, None, key=level.key, slopes=level.slopes)
+            return level_result(level.scene, None, key=level.key)
         return LevelResult(key=level.key, status="not started")
 
     by_force = compare(Scene.from_dict(scene), launch=analytic)
@@ -140,6 +131,21 @@ def test_prescribed_force_is_measured_by_the_approach():
     expected = mine / right.approach_mm - 1.0
     assert coarse.errors.approach_last == pytest.approx(expected, rel=1e-9)  # a difference
     assert coarse.causes.discretisation == pytest.approx(expected, rel=1e-9)
+
+
+def test_small_slopes_are_a_cause_of_their_own(found):
+    """Of the same level with finite ones: the difference is theirs alone."""
+    for kind in ("concurrent", "analytic"):
+        steep, small = (found[f"{kind}, half-space 64 × 64{end}"] for end in ("", SMALL_SLOPES))
+        assert (steep.finite_slopes, small.finite_slopes) == (True, False)
+        assert 1.005 < small.force_N / steep.force_N < 1.06
+        assert small.causes.slopes > 0.005
+        if kind == "concurrent":  # the measure
+            assert small.errors.force_last == pytest.approx(small.causes.slopes, rel=1e-12)
+            continue
+        assert steep.causes.slopes == 0.0
+        assert small.causes.block == steep.causes.block
+    assert found["analytic, elliptic"].causes.slopes > 0.005
 
 
 def test_slopes_are_measured_by_a_reference_with_small_ones():
@@ -164,7 +170,7 @@ def test_slopes_are_measured_by_a_reference_with_small_ones():
     assert by_reference.measure.startswith("reference, 2 meshes")
     (small,) = [row for row in by_reference.rows if row.name.endswith("heights × 0.1")]
     assert small.force_N == pytest.approx(1.05 * 4.2, rel=1e-12)  # as if heights were the scene's
-    (concurrent, *_) = [row for row in by_reference.rows if row.kind == "concurrent"]
+    concurrent = by_reference["concurrent, half-space 64 × 64, small slopes"]
     lost = 1.0 - 1.0 / 1.05
     assert concurrent.causes.slopes == pytest.approx(lost * 4.6 / 4.0, rel=1e-12)
     assert small.causes.slopes is None

@@ -70,6 +70,30 @@ def test_budget_ends_one_level_and_starts_no_more(some, tmp_path):
     assert again.run == [level.name for level in some[1:]]
 
 
+def test_levels_beyond_the_budget_are_left_out_with_a_word(some, tmp_path):
+    dear = replace(some[1], cost=700.0)
+    fake = Fake(seconds=1.0)
+    found = list(
+        run_levels(
+            [some[0], dear, some[2]], folder=tmp_path, budget_s=60.0, launch=fake, clock=fake.clock
+        )
+    )
+    assert fake.run == [some[0].name, some[2].name]
+    assert found[1][1].status == "not started"
+    told = "it is predicted to take 7e+02 s, and the budget leaves 59 s"
+    assert found[1][1].message == told
+    # nothing is kept of it: with more time it is run
+    assert fake.all([dear], tmp_path) == [(dear.name, "done", False)]
+
+
+def test_levels_beyond_the_memory_are_refused_with_a_word(some, tmp_path):
+    fake = Fake()
+    large = replace(some[0], cost=float("inf"), refusal="needs about 70 GB of memory")
+    ((_, result, _),) = run_levels([large], folder=tmp_path, launch=fake, clock=fake.clock)
+    assert (result.status, result.message) == ("refused", "needs about 70 GB of memory")
+    assert fake.run == []
+
+
 def test_interrupted_runs_go_on_where_they_were(some, tmp_path):
     fake = Fake(ends={some[1].name: KeyboardInterrupt})
     with pytest.raises(KeyboardInterrupt):
@@ -108,7 +132,7 @@ def test_torn_files_are_run_again(some, tmp_path):
 
 def test_result_survives_its_file(some, tmp_path):
     level = named(some, "analytic")
-    result = level_process.level_result(level.scene, None, key=level.key, slopes=True)
+    result = level_process.level_result(level.scene, None, key=level.key)
     again = read_result(write_result(tmp_path / "level.json", result))
     assert replace(again, curves=None, start_s=0.0) == replace(result, curves=None, start_s=0.0)
     for name in result.curves.__slots__:
@@ -120,7 +144,7 @@ def test_result_survives_its_file(some, tmp_path):
 
 def test_level_is_the_scene_run(some):
     level = named(some, "analytic")
-    result = level_process.level_result(level.scene, None, key=level.key, slopes=False)
+    result = level_process.level_result(level.scene, None, key=level.key)
     history = run(level.scene)
     assert (result.status, result.exit_code, result.message) == ("done", 0, "")
     np.testing.assert_array_equal(result.curves.force, history.force_N)
@@ -136,14 +160,14 @@ def test_level_that_stops_keeps_its_steps(some, monkeypatch):
         raise NotConverged("load step 2", reason="LAW_RANGE", iterations=4, remedy="take care")
 
     monkeypatch.setattr(Run, "load_steps", stopping)
-    result = level_process.level_result(some[0].scene, None, key="some", slopes=False)
+    result = level_process.level_result(some[0].scene, None, key="some")
     assert (result.status, result.exit_code, len(result.curves)) == ("not converged", 3, 1)
     assert result.message.startswith("load step 2 did not converge: LAW_RANGE after 4 iterations")
 
 
 def test_refused_level_tells_why():
     scene = Scene.load(PAPER, ["patches.grid=[64, 64]", "block.cells=[8, 8, 4]"])
-    result = level_process.level_result(scene, None, key="some", slopes=False)
+    result = level_process.level_result(scene, None, key="some")
     assert (result.status, result.exit_code, result.curves) == ("refused", 2, None)
     assert "more patches than cells of the interface" in result.message
 
@@ -153,7 +177,7 @@ def test_process_of_its_own_gives_the_same_and_its_own_memory(some):
     ballast = np.ones(40_000_000)  # 320 MB that the parent has, and the level has not
     result = launch_process(level, 60.0)
     assert result.status == "done", result.message
-    here = level_process.level_result(level.scene, None, key=level.key, slopes=False)
+    here = level_process.level_result(level.scene, None, key=level.key)
     np.testing.assert_array_equal(result.curves.force, here.curves.force)
     assert 20.0 < result.peak_MB < 8e-6 * ballast.size
     assert result.start_s > 0.0

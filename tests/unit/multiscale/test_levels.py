@@ -7,11 +7,11 @@ import pytest
 
 from geometry.patches import PatchGrid
 from multiscale.compare import settled_scene
-from multiscale.comparing.level_grids import pressure_grid
+from multiscale.comparing.level import pressure_grid
 from multiscale.comparing.level_results import LevelResult
-from multiscale.comparing.levels import levels
+from multiscale.comparing.levels import SMALL_SLOPES, levels
 from multiscale.comparing.measures import Curves
-from multiscale.comparing.outcomes import Outcome, ranked
+from multiscale.comparing.outcomes import Outcome, ranked, refinements
 from multiscale.planning.choices import open_keys
 from multiscale.scene import Scene
 from multiscale.stage_checks import EMBEDDED_CELLS
@@ -53,10 +53,10 @@ def test_cheapest_come_first_and_none_twice():
 
 
 def test_coarser_surfaces_still_carry_the_band():
-    halves = [level.heights[0] for level in made() if level.name.startswith("analytic, half-space")]
+    halves = {level.heights[0] for level in made() if level.name.startswith("analytic, half-space")}
     assert sorted(halves) == [32, 64, 128, 256]
     waves = made("surface.spectrum.waves=[2, 30]")
-    halves = [level.heights[0] for level in waves if level.name.startswith("analytic, half-space")]
+    halves = {level.heights[0] for level in waves if level.name.startswith("analytic, half-space")}
     assert sorted(halves) == [128, 256]  # three heights per wave
 
 
@@ -149,20 +149,61 @@ def test_scene_that_leaves_all_open_has_levels_that_stand(tmp_path):
     assert EMBEDDED_CELLS in meshed  # laws on a mesh are not left with what a smooth rest needs
 
 
-def test_heights_count_before_elements():
-    # with 5 % of the force at stake, against a tenth of that
-    names = ["32 × 32, 20 × 20 × 12 elements", "128 × 128, 8 × 8 × 6 elements"]
-    picked = [level for level in made() if level.name.endswith(tuple(names))]
+def ended(level, *, finite_slopes=True):
     ones = np.ones(2)
     curves = Curves(
         patches=PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)),
         patch_pressure=ones[:, None],
         **{key: ones for key in COLUMNS},
     )
-    ended = [
-        Outcome(level, LevelResult(key=level.key, status="done", curves=curves))
-        for level in picked
-        if level.kind == "concurrent"
+    result = LevelResult(key=level.key, status="done", curves=curves, finite_slopes=finite_slopes)
+    return Outcome(level, result)
+
+
+def test_the_best_has_finite_slopes_and_then_the_most_heights():
+    concurrent = [level for level in made() if level.kind == "concurrent"]
+    found = [
+        ended(level, finite_slopes=not level.name.endswith(SMALL_SLOPES)) for level in concurrent
     ]
-    assert len(ended) == 2
-    assert ranked(ended, "concurrent")[0].level.heights == (128, 128)
+    best = [one.level.name.removeprefix("concurrent, half-space ") for one in found]
+    assert sorted(best) == sorted(
+        ["32 × 32", "64 × 64", "128 × 128", "256 × 256", f"128 × 128{SMALL_SLOPES}"]
+    )
+    best = ranked(found, "concurrent")
+    assert best[0].level.heights == (256, 256)
+    assert best[-1].level.name.endswith(SMALL_SLOPES)
+    ((coarse, fine),) = refinements(best)
+    assert (coarse.level.heights, fine.level.heights) == ((128, 128), (256, 256))
+
+
+def test_all_levels_but_one_of_low_heights_see_the_true_ones():
+    found = made()
+    slopes = {level.scene.surface.spectrum.rms_slope for level in found if level.scale == 1.0}
+    assert slopes == {0.215}
+    for kind in ("analytic", "consistent", "concurrent"):
+        half_spaces = [one for one in found if one.kind == kind and one.model == "half-space"]
+        assert len({level.heights for level in half_spaces}) == 4
+        small = [one for one in half_spaces if one.scene.micro.finite_slopes is False]
+        assert [level.name.endswith(SMALL_SLOPES) for level in small] == [True]
+        names = [level.name for level in half_spaces]
+        assert small[0].name.removesuffix(SMALL_SLOPES) in names
+
+
+def test_cells_of_the_block_are_stated_by_laws_on_its_mesh_alone():
+    for level in made():
+        assert (level.scene.block.cells is None) != level.scene.coupling.on_mesh
+        assert level.scene.reference.cells is None
+    hexahedra = made("reference.cells=[16, 16, 8]")
+    assert {level.scene.reference.cells for level in hexahedra} == {(16, 16, 8)}
+    assert len([level for level in hexahedra if level.kind == "reference"]) == 3
+
+
+def test_references_that_fit_no_memory_are_told(monkeypatch):
+    pages = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 30_000}  # 0.12 GB
+    monkeypatch.setattr("multiscale.nodes.os.sysconf", pages.__getitem__)
+    refused = {
+        level.name: level.refusal for level in made("block.cells=[8, 8, 4]") if level.refusal
+    }
+    assert "reference, 3 meshes, 7.37 µm" in refused
+    assert all(name.startswith("reference") for name in refused)
+    assert all("GB of memory" in text for text in refused.values())
