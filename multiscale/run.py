@@ -236,7 +236,7 @@ class Run:
         if imbalances:
             notes.append(f"force against the support's reaction: equal to {max(imbalances):.1e}")
         notes += range_notes(self.steps, self.table)
-        notes += [*self._unchecked, *error_notes(self.steps)]
+        notes += [*self._unchecked, *error_notes(self.steps, self.given.accuracy)]
         if self._resumed:
             count = len(self._resumed.steps)
             notes.append(f"resumed after load step {count}; times of phases are those since then")

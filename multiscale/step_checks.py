@@ -66,11 +66,12 @@ def checked(step: LoadStep, probe: ErrorProbe, programme: Programme, comm: Any) 
     )
 
 
-def error_notes(steps: list[LoadStep]) -> Iterator[str]:
-    """Yield what the errors of the last load step that has any are.
+def error_notes(steps: list[LoadStep], accuracy: float | None) -> Iterator[str]:
+    """Yield what the errors of the last load step that has any are, and whether they are too large.
 
     Args:
         steps: The load steps.
+        accuracy: Relative error of the force that was asked for; None when it was not.
     """
     measured = [step for step in steps if step.errors]
     if not measured:
@@ -83,3 +84,9 @@ def error_notes(steps: list[LoadStep]) -> Iterator[str]:
     if step.approach_error_mm > 0.0:
         text += f", and under its force the approach within {1e3 * step.approach_error_mm:.2g} µm"
     yield f"{text}{share}: {causes}"
+    if accuracy is not None and whole > accuracy * step.force_N:
+        largest = max(step.errors, key=lambda each: each[1])[0]
+        yield (
+            f"an accuracy of {100 * accuracy:.3g} % was asked for, and the last load step keeps "
+            f"{100 * whole / step.force_N:.2g} %, most of it by {largest}"
+        )

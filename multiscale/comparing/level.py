@@ -19,7 +19,8 @@ Grid: TypeAlias = tuple[int, int]
 OWN = "the scene as it is"
 """How the name begins of the level that runs the scene as its file has it."""
 
-OPTIONS: Content = {"figures": False, "report": False, "fields": False}
+OPTIONS: Content = {"figures": False, "report": False, "fields": False, "check": "none"}
+"""Levels write nothing, and measure no errors: the comparison does."""
 
 FEWEST_HEIGHTS = 32
 """Heights along a side, at least, of coarser versions of a surface."""

@@ -18,11 +18,10 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 
-import macro
 from geometry.control import Control
 from geometry.spectrum import synthesise
 from multiscale import Run, Scene
-from multiscale.couplings.blocks import SLOPES, on_body
+from multiscale.couplings.blocks import SLOPES, on_body, scene_body
 
 SCENES, MESHED = 40, 4
 MORE_MODES, FINER, MOST_CELLS = 4, 3, 384
@@ -80,12 +79,8 @@ def meshed_force(data):
 def finer_force(run):
     """Return the force on more cells and with more modes, under the last load step's plane [N]."""
     stage, step = run.stage, run.steps[-1]
-    ordinary = macro.mode_count
-    macro.mode_count = lambda shape: ordinary(shape) + MORE_MODES
-    try:
-        body = on_body(stage, None, half_space=not stage.embedded)
-    finally:
-        macro.mode_count = ordinary
+    modes = scene_body(stage).modes + MORE_MODES
+    body = on_body(stage, None, half_space=not stage.embedded, modes=modes)
     grid = [min(FINER * count, MOST_CELLS) for count in stage.model.surface.grid]
     spectrum = stage.scene.surface.spectrum.spectrum()
     surface = synthesise(spectrum, grid=tuple(grid), lengths=stage.surface.lengths)
