@@ -81,7 +81,7 @@ def error_notes(steps: list[LoadStep], accuracy: float | None) -> Iterator[str]:
     share = f" ({100 * whole / step.force_N:.2g} %)" if step.force_N else ""
     causes = ", ".join(f"{cause} {error:.2g} N" for cause, error in step.errors)
     text = f"measured at load step {step.step}: at its approach the force is within {whole:.2g} N"
-    if step.approach_error_mm > 0.0:
+    if step.approach_error_mm:
         text += f", and under its force the approach within {1e3 * step.approach_error_mm:.2g} µm"
     yield f"{text}{share}: {causes}"
     if accuracy is not None and whole > accuracy * step.force_N:

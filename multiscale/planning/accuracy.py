@@ -210,10 +210,11 @@ class _Search:
         (found,) = recorded(stage, coupling, [step]).with_errors([step])
         if not step.force_N > 0.0:
             return 0.0
+        if found.force_error_N is None or found.approach_error_mm is None:
+            return 1.0
         if programme.quantity == "force":
             return 1.5 * found.approach_error_mm / abs(found.approach_mm)  # F grows as δ^1.5
-        error = found.force_error_N / found.force_N
-        return 1.0 if math.isnan(error) else error
+        return found.force_error_N / found.force_N
 
     def _first_size(self, stage: Stage) -> float:
         """Return the edge length to begin with [mm], from the one that is taken by default."""

@@ -82,7 +82,7 @@ def curve_cells(history: History) -> tuple[tuple[str, ...], list[tuple[str, ...]
     rows: list[tuple[str, ...]] = [
         (
             str(step.step),
-            with_error(1e3 * step.approach_mm, 1e3 * step.approach_error_mm, digits=4),
+            with_error(1e3 * step.approach_mm, 1e3 * (step.approach_error_mm or 0.0), digits=4),
             with_error(step.force_N, step.force_error_N, digits=6),
             f"{step.mean_pressure_MPa:.5g}",
             f"{100 * step.contact_area_fraction:.4g}",
@@ -101,15 +101,15 @@ def curve_cells(history: History) -> tuple[tuple[str, ...], list[tuple[str, ...]
     return header, rows
 
 
-def with_error(value: float, error: float, *, digits: int) -> str:
+def with_error(value: float, error: float | None, *, digits: int) -> str:
     """Return a value with its error, both to the error's second digit; alone where that is none.
 
     Args:
         value: The value.
-        error: Its error; 0 or NaN for none.
+        error: Its error; 0 or None for none.
         digits: Digits of a value alone.
     """
-    if not error > 0.0:
+    if not error:
         return f"{value:.{digits}g}"
     places = max(1 - math.floor(math.log10(error)), 0)
     return f"{value:.{places}f} ± {error:.{places}f}"
@@ -143,7 +143,7 @@ def _headline(history: History) -> str:
     last, record = history.steps[-1], history.reference
     error = "" if record is None else f" Discretisation error: {escape(record.label)}."
     area = f"{100 * last.contact_area_fraction:.3g} % of the nominal area"
-    approach = with_error(1e3 * last.approach_mm, 1e3 * last.approach_error_mm, digits=4)
+    approach = with_error(1e3 * last.approach_mm, 1e3 * (last.approach_error_mm or 0.0), digits=4)
     force = with_error(last.force_N, last.force_error_N, digits=5)
     return (
         f"<p>At an approach of {approach} µm the plane carries "

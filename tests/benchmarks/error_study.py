@@ -5,7 +5,7 @@ Run by hand, about ten minutes on an idle core: `.venv/bin/python tests/benchmar
 
 Scenes are random: hurst, waves, slopes up to 0.25, blocks 0.3, 1 and 3 mm high, tilts, loads; every
 fourth has its roughness meshed as its truth, which all causes are measured against. The truth of
-the others is the contact problem on three times as many cells along a side with four more modes of
+the others is the contact problem on four times as many cells along a side with four more modes of
 the body: it has the same finite slopes, and what was measured for them is left out.
 """
 
@@ -24,7 +24,7 @@ from multiscale import Run, Scene
 from multiscale.couplings.blocks import SLOPES, on_body, scene_body
 
 SCENES, MESHED = 40, 4
-MORE_MODES, FINER, MOST_CELLS = 4, 3, 384
+MORE_MODES, FINER, MOST_CELLS = 4, 4, 512
 BANDS = ((2, 10), (1, 6), (2, 8), (3, 12), (2, 14))
 KINDS = ("concurrent", "concurrent", "analytic", "concurrent", "consistent", "concurrent")
 

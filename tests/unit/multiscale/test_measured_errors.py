@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -204,7 +203,7 @@ def test_report_and_provenance_hold_the_errors(tmp_path):
         (5.36912, 1.26, "5.4 ± 1.3"),
         (123.4, 21.0, "123 ± 21"),
         (5.36912, 0.0, "5.36912"),
-        (5.36912, math.nan, "5.36912"),
+        (5.36912, None, "5.36912"),
     ],
 )
 def test_values_are_rounded_to_their_errors(value, error, told):
