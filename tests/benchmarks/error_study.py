@@ -1,6 +1,6 @@
 """Are measured errors those that runs have, and is the accuracy kept that was asked for?
 
-Run by hand, about ten minutes on an idle core: `.venv/bin/python tests/benchmarks/error_study.py
+Run by hand, ten minutes on an idle core: `.venv/bin/python tests/benchmarks/error_study.py
 [measured] [accuracy] [--first N] [--last N]`.
 
 Scenes are random: hurst, waves, slopes up to 0.25, blocks 0.3, 1 and 3 mm high, tilts, loads; every
