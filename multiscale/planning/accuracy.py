@@ -39,6 +39,8 @@ _ORDER = 1.5
 _LEAST_STEP, _LARGEST_STEP = 1.3, 2.0
 """Between two grids that are tried."""
 _TRIALS = 6
+_COARSE, _FINE = 8, 16
+"""Heights along the shortest wave that are tried first, and that show summits and meshes enough."""
 _FIRST_CELLS = 4
 """Parts of a given grid that are tried first, along a side."""
 _LEAST_CELLS = 48
@@ -62,10 +64,18 @@ def accurate_stage(given: Scene, start: Scene, build: Build) -> Stage:
         InputError: When nothing that the scene allows can be made.
         NotConverged: When a contact problem cannot be solved.
     """
-    search = _Search(given, build)
-    if start.coupling.kind == "reference":
-        return search.reference(build(start))
-    return search.of_contacts(start)
+    search, free = _Search(given, build), open_keys(given)
+    if "surface.grid" in free:
+        by_cells = start.micro.model == "half-space" and start.coupling.kind != "reference"
+        start = on_waves(start, _COARSE if by_cells else _FINE)
+    stage = build(start)
+    if "patches.grid" in free:
+        patches = start.patches.model_copy(update={"grid": map_grid(stage.surface)})
+        start = start.model_copy(update={"patches": patches})
+        stage = build(start)
+    if stage.meshes is not None:
+        return search.reference(stage)
+    return search.of_contacts(start, stage)
 
 
 @dataclass(frozen=True)
@@ -77,18 +87,11 @@ class _Search:
     def _accuracy(self) -> float:
         return accuracy_of(self.given)
 
-    def of_contacts(self, start: Scene) -> Stage:
+    def of_contacts(self, start: Scene, stage: Stage) -> Stage:
         """Choose for a coupling that solves contacts on cells; it may end with a reference."""
-        free = open_keys(self.given)
-        by_surface = "surface.grid" in free
-        if by_surface:
-            start = on_waves(start, 8 if start.micro.model == "half-space" else 16)
-        stage = self.build(start)
-        if "patches.grid" in free:
-            grid = {"grid": map_grid(stage.surface)}
-            start = start.model_copy(update={"patches": start.patches.model_copy(update=grid)})
         if not isinstance(stage.micro, HalfSpaceModel):
-            return self._decided(self.build(start), {})
+            return self._decided(stage, {})
+        by_surface = "surface.grid" in open_keys(self.given)
         model, errors = self._cells(start, stage, by_surface=by_surface)
         if by_surface:
             section = start.surface.model_copy(update={"grid": model.surface.grid})

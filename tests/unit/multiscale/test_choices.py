@@ -156,6 +156,14 @@ def test_patches_are_nearly_square():
     assert stage.decision is None  # patches gather results, and have no error
 
 
+def test_a_stated_reference_gets_a_grid_and_patches(monkeypatch):
+    monkeypatch.setattr("multiscale.planning.accuracy._Search._of_meshes", lambda *given: 0.001)
+    stage = make_stage(scene({"grid": "auto"}, accuracy=0.05, coupling={"kind": "reference"}))
+    assert stage.surface.grid == (96, 96)  # 16 heights along each of 6 waves
+    assert stage.patches.grid == (8, 8)
+    assert stage.decision.kept
+
+
 def test_models_without_measure_say_so():
     stage = make_stage(scene(accuracy=0.05, micro={"model": "elliptic"}))
     assert not stage.decision.errors
