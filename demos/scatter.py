@@ -22,7 +22,7 @@ from mpi4py import MPI
 
 from geometry import Control
 from multiscale import CondensedCoupling, Scene, consistent_laws, load_steps, make_stage, run
-from multiscale.couplings.blocks import half_space_models, patch_compliance, scene_body
+from multiscale.couplings.blocks import on_body, patch_compliance, scene_body
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -69,7 +69,7 @@ def curve(seed: int) -> list[float]:
     stage = make_stage(scene(seed))
     programme = stage.scene.loading.programme
     table = consistent_laws(
-        half_space_models(stage, None, embedded=True, face=face)(stage.surface, 0),
+        on_body(stage, None, face=face)(stage.micro, 0),
         stage.patches,
         mean_heights=stage.mean_heights,
         largest=Control(approach=programme.largest, tilt=programme.tilt),

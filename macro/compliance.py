@@ -49,6 +49,9 @@ def displacements_under(interface: Interface, pressures: Array) -> Array:
     block, rows = interface.block, []
     work = block.stiffness.createVecRight()
     for row in pressures:
+        if not row.any():
+            rows.append(np.zeros(len(row)))
+            continue
         displacement = block.solve(interface.load(row))
         work.array[:] = displacement.x.array[: block.owned_dofs]
         rows.append(interface.patch_displacements(work))

@@ -17,7 +17,8 @@ from multiscale.couplings.blocks import load_together
 from multiscale.law_tables.law_files import write_laws
 from multiscale.mpi_job import for_large, refuse_strangers
 from multiscale.nodes import Nodes, nodes_of
-from multiscale.planning.forecast import Forecast, forecast
+from multiscale.planning.costs import Cost
+from multiscale.planning.forecast import forecast
 from multiscale.planning.room import shortages
 from multiscale.reporting import terminal
 from multiscale.reporting.field_files import write_fields
@@ -55,7 +56,7 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
                 files = write_results(folder, run, options=options)
                 if scene.output.fields:
                     files += write_fields(folder, run)
-                terminal.show_comparison(comm, run.forecast, run.seconds)
+                terminal.show_times(comm, run.seconds)
                 terminal.show_files(comm, files)
             if failure is not None:
                 raise failure
@@ -74,7 +75,7 @@ def _begun(resume: bool, folder: Path, run: Run, keeper: Keeper) -> bool:
         said = f"nothing to resume in {folder}: begins with the first load step"
     elif on_root(comm, keeper.exists):
         said = f"replaces the interrupted run in {folder} (to go on with it: --resume)"
-    terminal.show_plan(comm, run.stage, run.forecast)
+    terminal.show_plan(comm, run.stage)
     if said:
         terminal.say(comm, said)
     return True
@@ -131,7 +132,7 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
     terminal.show_plan(comm, stage, made, list(shortages(stage, nodes)))
 
 
-def _planned(scene: Scene, nodes: Nodes) -> tuple[Stage, Forecast]:
+def _planned(scene: Scene, nodes: Nodes) -> tuple[Stage, Cost]:
     """Plan a run, on more nodes like those here if it takes them."""
     stage = make_stage(scene, nodes=replace(nodes, more=True))
     return stage, forecast(stage)
@@ -148,7 +149,7 @@ def tabulate_scene(choice: argparse.Namespace, options: list[str], comm: Any) ->
     scene, folder = scene_and_folder(choice, comm)
     with locked(folder, comm):
         run = Run(scene, comm)
-        terminal.show_plan(comm, run.stage, run.forecast)
+        terminal.show_plan(comm, run.stage)
         table = run.make_laws()
 
         def write() -> list[Path]:

@@ -41,6 +41,8 @@ PATCH_COLUMNS = ("step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area
 class History:
     """All load steps of a run; every column of ``history.csv`` is an attribute, as an array.
 
+    What was not measured is NaN there.
+
     Attributes:
         steps: The load steps.
         patches: The partition of the interface.
@@ -66,7 +68,8 @@ class History:
             raise AttributeError(
                 f"a history has no column {name!r} (columns: {', '.join(COLUMNS)})"
             )
-        return np.array([getattr(step, name) for step in self.steps])
+        values = [getattr(step, name) for step in self.steps]
+        return np.array([np.nan if value is None else value for value in values])
 
     @property
     def patch_pressure_MPa(self) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,9 +53,9 @@ class LoadStep:
             validity; empty within it.
         meshes: Approach [mm], force [N] and contact area fraction on every mesh of a reference,
             the finest, which the step is of, last; empty with other couplings.
-        force_error_N: What the force may be off by [N]; 0 where it is prescribed, NaN where it
+        force_error_N: What the force may be off by [N]; 0 where it is prescribed, None where it
             was not measured.
-        approach_error_mm: What the approach may be off by [mm]; 0 where it is prescribed, NaN
+        approach_error_mm: What the approach may be off by [mm]; 0 where it is prescribed, None
             where it was not measured.
         errors: Causes of the error and what each may change the force by at the approach found
             [N]; empty where they were not measured.
@@ -80,8 +79,8 @@ class LoadStep:
     moment_N_mm: tuple[float, float] = (0.0, 0.0)
     warnings: tuple[str, ...] = ()
     meshes: tuple[tuple[float, float, float], ...] = ()
-    force_error_N: float = math.nan
-    approach_error_mm: float = math.nan
+    force_error_N: float | None = None
+    approach_error_mm: float | None = None
     errors: tuple[tuple[str, float], ...] = ()
 
     @property

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from geometry.statistics import roughness
 from micro import MODELS, AsperityModel
 from multiscale.planning.block_plan import block_statement, block_warnings
-from multiscale.planning.forecast import Forecast, forecast_statements
+from multiscale.planning.costs import Cost
+from multiscale.planning.forecast import cost_statement, error_statement
 from multiscale.planning.newton_choice import newton_choice
 from multiscale.planning.reference_plan import (
     NO_MICRO_MODEL,
@@ -21,7 +22,7 @@ from multiscale.stage import Stage
 _INTERACTING = ("elliptic", "circular")
 
 
-def statements(stage: Stage, made: Forecast | None = None) -> Iterator[tuple[str, str]]:
+def statements(stage: Stage, made: Cost | None = None) -> Iterator[tuple[str, str]]:
     """Yield pairs of topic and sentence that say what will be done and why.
 
     Args:
@@ -42,15 +43,15 @@ def statements(stage: Stage, made: Forecast | None = None) -> Iterator[tuple[str
     if stage.decision is not None:
         yield "choice", stage.decision.sentence
     if made is not None:
-        yield from forecast_statements(made)
+        yield "cost", cost_statement(made)
+    yield "error", error_statement(stage)
 
 
-def warnings(stage: Stage, made: Forecast | None = None) -> Iterator[str]:
+def warnings(stage: Stage) -> Iterator[str]:
     """Yield what a user should know about the validity of the scene.
 
     Args:
         stage: The scene's ingredients.
-        made: What is predicted; None leaves it out.
     """
     yield from _surface_warnings(stage)
     if stage.scene.output.fields and not stage.embedded:
@@ -61,9 +62,8 @@ def warnings(stage: Stage, made: Forecast | None = None) -> Iterator[str]:
         yield from reference_warnings(stage.scene, stage.meshes)
     elif stage.embedded:
         yield from block_warnings(stage)
-    missed = None if made is None else made.broken_promise
-    if missed:
-        yield missed
+    if stage.decision is not None and stage.decision.warning:
+        yield stage.decision.warning
 
 
 def _surface_warnings(stage: Stage) -> Iterator[str]:

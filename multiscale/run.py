@@ -20,11 +20,11 @@ from multiscale.assemble import assemble, make_table
 from multiscale.coupling import EmbeddedCoupling
 from multiscale.couplings.blocks import (
     SLOPES,
-    Models,
+    OnBody,
     contact_model,
     final_field,
-    half_space_models,
     load_together,
+    on_body,
 )
 from multiscale.history import History
 from multiscale.law_tables.law_files import LawTable, read_laws, write_laws
@@ -34,7 +34,6 @@ from multiscale.loading import Coupling, Drive, Position, Restorable
 from multiscale.mpi_job import for_large
 from multiscale.nodes import nodes_of
 from multiscale.planning.choices import settled_keys
-from multiscale.planning.forecast import Forecast, forecast
 from multiscale.planning.newton_choice import newton_choice
 from multiscale.records import Arrays
 from multiscale.reference.coupling import ReferenceCoupling, recorded, reference_notes
@@ -79,7 +78,7 @@ class Run:
         self.position = Position()
         self._resumed: Checkpoint | None = None
         self._laws: bytes | None = None
-        self._models: Models | None = None
+        self._on_body: OnBody | None = None
         self._unchecked: list[str] = []
         self.table: LawTable | None = None
         self.interface: Interface | None = None
@@ -90,24 +89,23 @@ class Run:
         self.scene = self.stage.scene
         self.seconds = dict(self.stage.seconds)
 
-    def make_models(self) -> Models | None:
-        """Make what gives the half-space model on the body, once; None for other micro models."""
-        if self._models is None and isinstance(self.stage.micro, HalfSpaceModel):
+    def make_body(self) -> OnBody | None:
+        """Make what puts the half-space model on its body, once; None for other micro models."""
+        if self._on_body is None and isinstance(self.stage.micro, HalfSpaceModel):
             with self.phase("block"):
-                self._models = half_space_models(
-                    self.stage, self.comm, embedded=self.stage.embedded
-                )
-        return self._models
+                alone = not self.stage.embedded
+                self._on_body = on_body(self.stage, self.comm, half_space=alone)
+        return self._on_body
 
     def make_model(self) -> MicroModel:
         """Make the micro model that contacts are solved with, on the body unless isolated."""
-        alone = self.stage.scene.coupling.kind == "isolated"
-        models = None if alone else self.make_models()
-        if models is None:
-            with self.phase("block"):
-                return contact_model(self.stage, self.comm)
-        surface = getattr(self.stage.model, "surface", self.stage.surface)  # "auto" may resample it
-        return models(surface, SLOPES if self.stage.finite_slopes else 0)
+        model = self.stage.micro
+        if isinstance(model, HalfSpaceModel) and self.scene.coupling.kind != "isolated":
+            body = self.make_body()
+            assert body is not None
+            return body(model, SLOPES if self.stage.finite_slopes else 0)
+        with self.phase("block"):
+            return contact_model(self.stage, self.comm)
 
     def make_laws(self) -> LawTable:
         """Tabulate the laws of all patches, once."""
@@ -148,11 +146,11 @@ class Run:
         check = self.scene.output.check
         if check == "none" or (check == "last" and not self.finished):
             return step
-        models = self.make_models()
-        if models is None:
+        body = self.make_body()
+        if body is None:
             return step
         with self.phase("check"):
-            probe = error_probe(self.stage, models)
+            probe = error_probe(self.stage, body)
             try:
                 return checked(step, probe, self.scene.loading.programme, self.comm)
             except NotConverged as error:
@@ -238,7 +236,7 @@ class Run:
         if imbalances:
             notes.append(f"force against the support's reaction: equal to {max(imbalances):.1e}")
         notes += range_notes(self.steps, self.table)
-        notes += [*self._unchecked, *error_notes(self.steps)]
+        notes += [*self._unchecked, *error_notes(self.steps, self.given.accuracy)]
         if self._resumed:
             count = len(self._resumed.steps)
             notes.append(f"resumed after load step {count}; times of phases are those since then")
@@ -254,15 +252,6 @@ class Run:
             notes=tuple(notes),
             reference=record,
         )
-
-    @cached_property
-    def forecast(self) -> Forecast:
-        """What this run was predicted to take and to err by; to be asked for before it starts.
-
-        Not collective: every rank that asks measures its own core.
-        """
-        with self.phase("plan"):
-            return forecast(self.stage)
 
     @property
     def unknowns(self) -> int | None:

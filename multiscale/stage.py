@@ -16,7 +16,7 @@ from geometry.surface import Surface
 from micro import AsperityModel, Choice, HalfSpaceModel, MicroModel, ScaledModel
 from multiscale.coupling import tilted_approaches
 from multiscale.law_tables.refinement import MOST_ROWS
-from multiscale.planning.contact_estimate import Contacts, contacts, nearest
+from multiscale.planning.contact_estimate import nearest
 from multiscale.planning.decision import Decision
 from multiscale.reference.meshes import ReferenceMeshes
 from multiscale.scene import Scene
@@ -118,11 +118,6 @@ class Stage:
     def nearest(self) -> float:
         """How near the plane at the largest load comes anywhere [mm]."""
         return nearest(self.furthest, self.surface)
-
-    @cached_property
-    def contacts(self) -> Contacts:
-        """What is known of the contacts before; solves a half-space of few cells once."""
-        return contacts(self.surface, self.model.contact_modulus, self.furthest)
 
     @cached_property
     def deepest(self) -> float:

@@ -5,23 +5,31 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from geometry.asperities import Asperities, find_asperities
 from geometry.errors import InputError
 from geometry.patches import PatchGrid, patch_means
 from geometry.surface import Surface
-from micro import MicroModel
+from micro import HalfSpaceModel, MicroModel, resampled
 from multiscale.ingredients import make_shape, make_surface
 from multiscale.nodes import Nodes
-from multiscale.planning.choices import SETTLED_LATE, cheapest, open_keys, provisional, with_settled
+from multiscale.planning.accuracy import accurate_stage
+from multiscale.planning.choices import (
+    accuracy_of,
+    is_measured,
+    map_grid,
+    open_keys,
+    provisional,
+    with_settled,
+)
 from multiscale.planning.micro_choice import (
     chosen_model,
     estimated_plane,
     furthest_plane,
     stated_model,
 )
-from multiscale.planning.surface_choice import chosen_surface, micro_tolerance
 from multiscale.reference.meshes import reference_meshes
 from multiscale.scene import Scene
 from multiscale.stage import Stage
@@ -45,61 +53,57 @@ def make_stage(
     known = settled or {}
     free = open_keys(scene) - set(known)
     start = provisional(with_settled(scene, known), free)
-    check_size(start, nodes)
-    if "surface.grid" in free:
-        start, surface = chosen_surface(scene, start)
-    else:
-        surface = make_surface(start)
-    check_patches(start, surface)
-    check_load(start, surface)
-    patches = PatchGrid(grid=patch_grid(start), lengths=surface.lengths)
-    asperities = find_asperities(surface, periodic=False)  # the block's sides are free
-    if start.coupling.kind == "reference":
-        return _reference_stage(start, surface, patches, asperities, nodes, began)
-    label = known.get("micro.model")
-    stage = _micro_stage(scene, start, surface, patches, asperities, label, began)
-    if free & SETTLED_LATE:
-        return cheapest(stage, scene, free, nodes)
-    return stage
+    if free and is_measured(scene) and not known:
+        stage = accurate_stage(scene, start, lambda stated: _stage(stated, nodes))
+        return replace(stage, seconds={"surface": 0.0, "choice": time.perf_counter() - began})
+    if "patches.grid" in free:
+        section = start.patches.model_copy(update={"grid": map_grid(make_surface(start))})
+        start = start.model_copy(update={"patches": section})
+    return _stage(start, nodes, known.get("micro.model"))
 
 
-def _micro_stage(
-    scene: Scene,
-    start: Scene,
-    surface: Surface,
-    patches: PatchGrid,
-    asperities: Asperities,
-    label: str | None,
-    began: float,
-) -> Stage:
-    """Return the ingredients with the micro model that a scene names, or leaves to be chosen.
+def _stage(scene: Scene, nodes: Nodes, known: Any = None) -> Stage:
+    """Return the ingredients of a scene of which the micro model alone may be open.
 
     Args:
-        scene: The scene as it was given.
-        start: What it has become so far.
-        surface: Its surface.
-        patches: Its patches.
-        asperities: The surface's summits.
-        label: What was chosen when the run began; None when it begins now.
-        began: When this began.
+        scene: The scene.
+        nodes: The nodes of the run.
+        known: What became of the micro model when the run began: a label, or cells; None when
+            that is not known.
+
+    Raises:
+        InputError: When something cannot be made or does not fit; names file, key and value.
     """
+    began = time.perf_counter()
+    check_size(scene, nodes)
+    surface = make_surface(scene)
+    check_patches(scene, surface)
+    check_load(scene, surface)
+    patches = PatchGrid(grid=patch_grid(scene), lengths=surface.lengths)
+    asperities = find_asperities(surface, periodic=False)  # the block's sides are free
+    if scene.coupling.kind == "reference":
+        return _reference_stage(scene, surface, patches, asperities, nodes, began)
     seconds, choice = {"surface": time.perf_counter() - began}, None
-    if start.micro.model == "auto":
-        made, tolerance = time.perf_counter(), micro_tolerance(scene, start, surface)
-        choice = chosen_model(start, surface, patches, tolerance, label)
+    if scene.micro.model == "auto":
+        made = time.perf_counter()
+        tolerance = scene.micro.tolerance or accuracy_of(scene)
+        choice = chosen_model(scene, surface, patches, tolerance, known)
         seconds["micro choice"] = time.perf_counter() - made
-    model = choice.model if choice else stated_model(start, surface)
-    _check_summits(start, model)
+    model = choice.model if choice else stated_model(scene, surface)
+    if isinstance(known, list) and isinstance(model, HalfSpaceModel):
+        cells = resampled(surface, (int(known[0]), int(known[1])))
+        model = replace(model, surface=cells, highest=surface.highest)
+    _check_summits(scene, model)
     mean_heights = patch_means(surface, patches)
     return Stage(
-        scene=start,
+        scene=scene,
         surface=surface,
         asperities=asperities,
         micro=model,
         patches=patches,
         mean_heights=mean_heights,
-        shape=make_shape(start, surface),
-        furthest=furthest_plane(start.loading.programme, model, patches, mean_heights),
+        shape=make_shape(scene, surface),
+        furthest=furthest_plane(scene.loading.programme, model, patches, mean_heights),
         choice=choice,
         seconds=seconds,
     )

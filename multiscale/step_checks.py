@@ -8,24 +8,24 @@ from typing import Any
 
 from geometry.collective import on_root
 from micro import HalfSpaceModel
-from multiscale.couplings.blocks import SLOPES, Models
+from multiscale.couplings.blocks import SLOPES, OnBody
 from multiscale.load_step import LoadStep
 from multiscale.loading import Programme
 from multiscale.measured_errors import ErrorProbe, MeasuredErrors
 from multiscale.stage import Stage
 
 
-def error_probe(stage: Stage, models: Models) -> ErrorProbe:
+def error_probe(stage: Stage, body: OnBody) -> ErrorProbe:
     """Return what measures the errors of a scene's load steps.
 
     Args:
         stage: The scene's ingredients, with a half-space model.
-        models: Makes this model on the scene's body, see `half_space_models`.
+        body: Puts this model on the scene's body, see `on_body`.
     """
     assert isinstance(stage.model, HalfSpaceModel)
     return ErrorProbe(
-        models=models,
-        surface=stage.model.surface,
+        model=stage.model,
+        on_body=body,
         order=SLOPES if stage.finite_slopes else 0,
         by_laws=stage.by_laws,
     )
@@ -66,11 +66,12 @@ def checked(step: LoadStep, probe: ErrorProbe, programme: Programme, comm: Any) 
     )
 
 
-def error_notes(steps: list[LoadStep]) -> Iterator[str]:
-    """Yield what the errors of the last load step that has any are.
+def error_notes(steps: list[LoadStep], accuracy: float | None) -> Iterator[str]:
+    """Yield what the errors of the last load step that has any are, and whether they are too large.
 
     Args:
         steps: The load steps.
+        accuracy: Relative error of the force that was asked for; None when it was not.
     """
     measured = [step for step in steps if step.errors]
     if not measured:
@@ -80,6 +81,12 @@ def error_notes(steps: list[LoadStep]) -> Iterator[str]:
     share = f" ({100 * whole / step.force_N:.2g} %)" if step.force_N else ""
     causes = ", ".join(f"{cause} {error:.2g} N" for cause, error in step.errors)
     text = f"measured at load step {step.step}: at its approach the force is within {whole:.2g} N"
-    if step.approach_error_mm > 0.0:
+    if step.approach_error_mm:
         text += f", and under its force the approach within {1e3 * step.approach_error_mm:.2g} µm"
     yield f"{text}{share}: {causes}"
+    if accuracy is not None and whole > accuracy * step.force_N:
+        largest = max(step.errors, key=lambda each: each[1])[0]
+        yield (
+            f"an accuracy of {100 * accuracy:.3g} % was asked for, and the last load step keeps "
+            f"{100 * whole / step.force_N:.2g} %, most of it by {largest}"
+        )

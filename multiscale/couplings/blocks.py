@@ -29,8 +29,8 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
 
 Array = NDArray[np.float64]
 
-Models = Callable[[Surface, int], HalfSpaceModel]
-"""From cells of a surface and the order of finite slopes, 0 for none, to its half-space model."""
+OnBody = Callable[[HalfSpaceModel, int], HalfSpaceModel]
+"""Puts a half-space model on a body; with finite slopes up to an order, 0 for none."""
 
 SLOPES = 2
 """Order of finite slopes where they are seen."""
@@ -56,55 +56,47 @@ def contact_model(stage: Stage, comm: Any) -> MicroModel:
     embedded = stage.embedded and stage.scene.coupling.kind != "isolated"
     if isinstance(model, HalfSpaceModel):
         order = SLOPES if stage.finite_slopes else 0
-        return half_space_models(stage, comm, embedded=embedded)(model.surface, order)
+        return on_body(stage, comm, half_space=not embedded)(model, order)
     if not embedded:
         return model
     body = scene_body(stage)
     return replace(model, body=body.term(body.face(comm)))  # type: ignore[type-var]
 
 
-def half_space_models(
+def on_body(
     stage: Stage,
     comm: Any,
     *,
-    embedded: bool,
+    half_space: bool = False,
     modes: int | None = None,
     coarse: bool = False,
     face: FaceCompliance | None = None,
-) -> Models:
-    """Return what makes a scene's half-space model on any cells, its body solved for once.
+) -> OnBody:
+    """Return what puts half-space models on a scene's body, which is solved for once.
 
     Args:
         stage: The scene's ingredients, with a half-space model.
         comm: MPI communicator; None for this process alone.
-        embedded: Whether the surface lies on the scene's block, or on a half-space.
+        half_space: Whether the body is a half-space instead of the scene's block.
         modes: Modes of the body along a side; by default those of its shape.
         coarse: Whether to take coarser elements for the body.
         face: What pressures do to the body's top, where that is known; then it is not collective.
 
     Returns:
-        A function from the surface and the order of finite slopes, 0 for none, to the model. It is
-        not collective.
+        A function from a model and the order of finite slopes, 0 for none, to the model on the
+        body. It is not collective.
 
     Note:
         Collective.
     """
-    given = stage.model
-    if not isinstance(given, HalfSpaceModel):
-        raise TypeError("the scene's micro model is no half-space")
-    body = scene_body(stage) if embedded else None
+    body = None if half_space else scene_body(stage)
     if body is not None and face is None:
         face = body.face(comm, modes=modes, coarse=coarse)
     section = stage.scene.block
     material = HalfSpace(section.young_modulus, section.poisson_ratio)
 
-    def made(surface: Surface, order: int) -> HalfSpaceModel:
-        model = replace(
-            given,
-            surface=surface,
-            highest=given.datum,
-            tolerance=_SHARP,
-        )
+    def put(model: HalfSpaceModel, order: int) -> HalfSpaceModel:
+        surface, model = model.surface, replace(model, tolerance=_SHARP)
         # heights count from the highest point, which is near the loads: slopes add least there;
         # the flat body then reaches up to it, while the block's height is that of the mean plane
         higher = surface.highest - surface.mean_height if order else 0.0
@@ -118,7 +110,7 @@ def half_space_models(
         slopes = FiniteSlopes(surface, material, order=order, plane=plane, beside=beside)
         return replace(model, slopes=slopes)
 
-    return made
+    return put
 
 
 def _stresses(body: Body, face: FaceCompliance, surface: Surface) -> list[SurfaceStress]:

@@ -19,11 +19,11 @@ from multiscale.planning.block_work import (
 )
 from multiscale.planning.machine import Machine
 from multiscale.planning.newton_choice import CYCLES_PER_PATCH, full_cycles, newton_choice
-from multiscale.planning.press_work import law_work, press_work, step_count
+from multiscale.planning.press_work import check_work, law_work, press_work, step_count
 from multiscale.planning.work import Work
 from multiscale.stage import Stage
 
-PHASES = ("surface", "micro choice", "laws", "block", "load steps", "field", "output")
+PHASES = ("surface", "micro choice", "laws", "block", "load steps", "check", "field", "output")
 """Phases of a run, in their order."""
 
 _FIGURE = Work(call=600_000)
@@ -83,6 +83,9 @@ def run_work(stage: Stage) -> dict[str, Work]:
     else:
         works["block"], works["load steps"] = _block(stage), _load_steps(stage)
     output = stage.scene.output
+    if isinstance(stage.micro, HalfSpaceModel) and output.check != "none":
+        checks = step_count(stage.scene.loading.programme) if output.check == "all" else 1
+        works["check"] = checks * check_work(stage)
     if output.fields and stage.embedded and not (stage.meshes or _on_mesh(stage)):
         works["field"] = mesh_work(stage.shape) + cycle_work(stage.shape, CYCLES_PER_PATCH)
     if output.figures:

@@ -1,100 +1,83 @@
-"""The decision between alternatives: the least cost that promises, or the least expected error."""
+"""What was taken for the keys that a scene leaves open, and why."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-_TOLD = 3  # alternatives that the sentence names
-
-ALL = 0.995
-"""Relative error of the force from which on a bound says nothing."""
-
-
-def bound_text(error: float) -> str:
-    """Return the bound of a relative error in words.
-
-    Args:
-        error: The bound.
-    """
-    return "an unknown error" if error >= ALL else f"{100 * error:.2g} %"
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True, kw_only=True)
 class Alternative:
-    """A combination that could be taken.
+    """A way to compute a scene.
 
     Attributes:
-        kind: The coupling.
-        patches: Patches along x and y.
-        cells: Cells of the block; None without one.
-        error: Bound of the relative error of the force.
+        label: The coupling, and what it works on.
         seconds: Predicted time of the run [s].
     """
 
-    kind: str
-    patches: tuple[int, int]
-    cells: tuple[int, int, int] | None
-    error: float
+    label: str
     seconds: float
 
     @property
-    def label(self) -> str:
-        """The combination in words."""
-        text = f"{self.kind}, {self.patches[0]} × {self.patches[1]} patches"
-        return text + (f", block of {' × '.join(map(str, self.cells))} cells" if self.cells else "")
-
-    @property
-    def price(self) -> str:
-        """Expected error and predicted time in words."""
-        return f"{bound_text(self.error)} in {self.seconds:.2g} s"
+    def text(self) -> str:
+        """The alternative in words."""
+        return f"{self.label}, in about {self.seconds:.2g} s"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Decision:
-    """What was taken for the keys that a scene leaves open, and why.
+    """What was taken, the errors that were measured for it, and what else there was.
 
     Attributes:
         accuracy: Relative error of the force that was asked for.
-        taken: The combination taken.
-        alternatives: All combinations, the cheapest first.
+        taken: What was taken.
+        errors: Measured errors of the force by cause, relative to it, at the load where they are
+            worst; empty where they cannot be measured beforehand.
+        others: What was predicted to take longer, or could not keep the accuracy.
+        missed: Errors by cause of what was tried first and could not keep it, if anything.
     """
 
     accuracy: float
     taken: Alternative
-    alternatives: tuple[Alternative, ...]
+    errors: Mapping[str, float]
+    others: tuple[Alternative, ...] = ()
+    missed: Mapping[str, float] = field(default_factory=dict)
 
     @property
-    def promised(self) -> bool:
-        """Whether the expected error is within the accuracy."""
-        return self.taken.error <= self.accuracy
+    def error(self) -> float:
+        """Measured relative error of the force; 0 where it was not."""
+        return sum(self.errors.values())
+
+    @property
+    def kept(self) -> bool:
+        """Whether what was measured is within the accuracy."""
+        return bool(self.errors) and self.error <= self.accuracy
 
     @property
     def sentence(self) -> str:
-        """What was taken, why, and what others would have cost."""
-        taken, others = self.taken, [a for a in self.alternatives if a is not self.taken]
-        asked = f"an accuracy of {100 * self.accuracy:.3g} %"
-        why = f"the cheapest that promises {asked}"
-        if not self.promised:
-            why = f"the least expected error, for none promises {asked}"
-        told = "; ".join(f"{each.label}: {each.price}" for each in _telling(taken, others))
-        return f"{taken.label}: {why}, {taken.price}" + (f"; instead, {told}" if told else "")
+        """What was taken, what was measured for it, and what else there was."""
+        asked = f"an accuracy of {100 * self.accuracy:.3g} % is asked for"
+        parts = [self.taken.text, f"{asked}, {_told(self.errors)}"]
+        if self.missed:
+            parts.append(f"without meshing the roughness {_told(self.missed)}")
+        if self.others:
+            parts.append(f"instead, {'; '.join(each.text for each in self.others)}")
+        return "; ".join(parts)
+
+    @property
+    def warning(self) -> str | None:
+        """Say that the accuracy is not kept; None where it is, or is not known beforehand."""
+        if self.kept or not self.errors:
+            return None
+        largest = max(self.errors, key=lambda cause: self.errors[cause])
+        return (
+            f"an accuracy of {100 * self.accuracy:.3g} % is not kept: measured at the largest "
+            f"load, the force may be off by {100 * self.error:.2g} %, most of it by {largest}"
+        )
 
 
-def decided(found: list[Alternative], accuracy: float) -> Decision:
-    """Take the cheapest alternative that promises an accuracy, or that with the least error.
-
-    Args:
-        found: The alternatives, one at least.
-        accuracy: Relative error of the force.
-    """
-    ordered = sorted(found, key=lambda a: a.seconds)
-    good = [a for a in ordered if a.error <= accuracy]
-    taken = good[0] if good else min(ordered, key=lambda a: a.error)
-    return Decision(accuracy=accuracy, taken=taken, alternatives=tuple(ordered))
-
-
-def _telling(taken: Alternative, others: list[Alternative]) -> list[Alternative]:
-    """Return the cheapest of every other coupling, then the cheapest others."""
-    rivals = {a.kind: a for a in reversed(others) if a.kind != taken.kind}
-    rest = [a for a in others if a not in rivals.values()]
-    return [*rivals.values(), *rest][:_TOLD]
+def _told(errors: Mapping[str, float]) -> str:
+    if not errors:
+        return "which is not measured beforehand"
+    causes = ", ".join(f"{cause} {100 * error:.2g} %" for cause, error in errors.items())
+    return f"measured at the largest load {100 * sum(errors.values()):.2g} % ({causes})"

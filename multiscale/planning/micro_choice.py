@@ -18,7 +18,7 @@ from micro import (
 )
 from multiscale.coupling import ContactCoupling
 from multiscale.loading import Programme, load_steps
-from multiscale.planning.contact_estimate import Contacts, contacts, nearest, rough_half_space
+from multiscale.planning.contact_estimate import nearest, rough_half_space
 from multiscale.planning.machine import this_machine
 from multiscale.planning.press_work import kind_work, reach
 from multiscale.scene import Scene
@@ -81,11 +81,6 @@ def estimated_plane(scene: Scene, surface: Surface) -> tuple[float, tuple[float,
     rough = rough_half_space(surface, _modulus(scene))
     whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
     return furthest_plane(scene.loading.programme, rough, whole, patch_means(surface, whole))
-
-
-def estimated_contacts(scene: Scene, surface: Surface) -> Contacts:
-    """Return the contacts at the largest load, from a half-space of few cells."""
-    return contacts(surface, _modulus(scene), estimated_plane(scene, surface))
 
 
 def furthest_plane(

@@ -23,6 +23,8 @@ _LOADS = (0.25, 0.5, 0.75, 1.0)
 ROWS = {"cells": 56, "summits": 70}
 """Rows of a table of laws: 45 to 65, and 60 to 150 where the model sees summits."""
 
+_CHECK = 1.5
+"""Load steps that measuring the errors of one takes as long as: 0.5 to 2.5."""
 _SLOPES = 2.5
 """Times more work where finite slopes are seen."""
 _BODY = 1.3
@@ -107,6 +109,16 @@ def press_work(stage: Stage, *, alone: bool = False) -> Work:
         return work
     work = _SLOPES * work if stage.finite_slopes else work
     return _BODY * work if stage.embedded and cells else work
+
+
+def check_work(stage: Stage) -> Work:
+    """Return the work of measuring the errors of a load step.
+
+    Args:
+        stage: The scene's ingredients.
+    """
+    solved = _CHECK + (1.0 if stage.by_laws else 0.0)
+    return solved * press_work(stage)
 
 
 def law_work(stage: Stage) -> Work:

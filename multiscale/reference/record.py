@@ -143,7 +143,7 @@ class ReferenceRecord:
         force = np.abs(self.force_N[-1] - self.force.value) + self.force.error
         approach = np.abs(self.approach_mm[-1] - self.approach.value) + self.approach.error
         return tuple(
-            replace(step, force_error_N=float(force[i]), approach_error_mm=float(approach[i]))
+            replace(step, force_error_N=_known(force[i]), approach_error_mm=_known(approach[i]))
             for i, step in enumerate(steps)
         )
 
@@ -172,6 +172,10 @@ class ReferenceRecord:
                 *self.approach_mm[:, i],
                 *self.contact_area_fraction[:, i],
             )
+
+
+def _known(error: float) -> float | None:
+    return None if np.isnan(error) else float(error)
 
 
 def reference_record(

@@ -55,7 +55,8 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "reference": _reference(run),
         "seconds": history.seconds,
         "memory_bytes": peak_memory(),
-        "predicted": _predicted(run),
+        "errors_N": [dict(step.errors) for step in history],
+        "decision": _decision(run.stage),
         "steps": len(history),
         "finished": run.finished,
         "reasons": sorted(set(history.reason)) if len(history) else [],
@@ -75,19 +76,10 @@ def _known(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _predicted(run: Run) -> dict[str, Any]:
-    """Return the forecast and, where keys were left open, what they became out of what."""
-    made, decision = run.forecast, run.stage.decision
-    return {
-        "seconds": dict(made.seconds),
-        "memory_bytes": made.memory,
-        "force_error": made.error,
-        "force_error_by_cause": dict(made.errors),
-        "finite_slopes": made.slopes,
-        "accuracy": made.accuracy,
-        "promised": made.broken_promise is None,
-        "alternatives": [asdict(each) for each in decision.alternatives] if decision else [],
-    }
+def _decision(stage: Stage) -> dict[str, Any] | None:
+    """Return what open keys became out of what, where an accuracy decided."""
+    decision = stage.decision
+    return None if decision is None else {**asdict(decision), "kept": decision.kept}
 
 
 def _reference(run: Run) -> dict[str, Any] | None:

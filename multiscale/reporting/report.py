@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
 from multiscale.history import History
-from multiscale.planning.decision import bound_text
-from multiscale.planning.forecast import Forecast, comparison
 
 _STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto;
@@ -33,7 +31,6 @@ def report_html(
     warnings: Sequence[str],
     history: History,
     figures: Mapping[str, Path],
-    made: Forecast,
 ) -> str:
     """Compose the page.
 
@@ -43,7 +40,6 @@ def report_html(
         warnings: What a user should know about validity.
         history: The run.
         figures: PNG files by caption; embedded into the page.
-        made: What was predicted.
 
     Returns:
         A complete HTML document.
@@ -58,9 +54,8 @@ def report_html(
         table(*curve_cells(history)),
         *(figure_element(caption, path) for caption, path in figures.items()),
         "<h2>What it took</h2>",
-        table(("what", "predicted", "real"), comparison(made, history.seconds)),
-        "<h2>What the force may be off by</h2>",
-        table(("cause", "at most"), _errors(made)),
+        table(("phase", "wall time [s]"), _times(history)),
+        *_errors(history),
         *(f'<p class="note">{escape(note)}</p>' for note in history.notes),
     ]
     return page(title, parts)
@@ -87,7 +82,7 @@ def curve_cells(history: History) -> tuple[tuple[str, ...], list[tuple[str, ...]
     rows: list[tuple[str, ...]] = [
         (
             str(step.step),
-            with_error(1e3 * step.approach_mm, 1e3 * step.approach_error_mm, digits=4),
+            with_error(1e3 * step.approach_mm, 1e3 * (step.approach_error_mm or 0.0), digits=4),
             with_error(step.force_N, step.force_error_N, digits=6),
             f"{step.mean_pressure_MPa:.5g}",
             f"{100 * step.contact_area_fraction:.4g}",
@@ -106,25 +101,40 @@ def curve_cells(history: History) -> tuple[tuple[str, ...], list[tuple[str, ...]
     return header, rows
 
 
-def with_error(value: float, error: float, *, digits: int) -> str:
+def with_error(value: float, error: float | None, *, digits: int) -> str:
     """Return a value with its error, both to the error's second digit; alone where that is none.
 
     Args:
         value: The value.
-        error: Its error; 0 or NaN for none.
+        error: Its error; 0 or None for none.
         digits: Digits of a value alone.
     """
-    if not error > 0.0:
+    if not error:
         return f"{value:.{digits}g}"
     places = max(1 - math.floor(math.log10(error)), 0)
     return f"{value:.{places}f} ± {error:.{places}f}"
 
 
-def _errors(made: Forecast) -> Iterable[tuple[str, str]]:
-    yield from ((cause, bound_text(error)) for cause, error in made.errors.items())
-    yield "altogether", bound_text(made.error)
-    if made.slopes:
-        yield "finite slopes, outside of it, about", bound_text(made.slopes)
+def _times(history: History) -> Iterator[tuple[str, str]]:
+    for phase, seconds in history.seconds.items():
+        yield phase, f"{seconds:.2f}"
+
+
+def _errors(history: History) -> Iterator[str]:
+    """Yield a heading and a table of the latest errors that were measured by cause."""
+    measured = [step for step in history if step.errors]
+    if not measured:
+        return
+    step, rows = measured[-1], dict(measured[-1].errors)
+    rows["altogether"] = sum(rows.values())
+    yield f"<h2>What the force may be off by, measured at load step {step.step}</h2>"
+    yield table(
+        ("cause", "force [N]", "of the force [%]"),
+        [
+            (cause, f"{error:.2g}", f"{100 * error / step.force_N:.2g}" if step.force_N else "–")
+            for cause, error in rows.items()
+        ],
+    )
 
 
 def _headline(history: History) -> str:
@@ -133,7 +143,7 @@ def _headline(history: History) -> str:
     last, record = history.steps[-1], history.reference
     error = "" if record is None else f" Discretisation error: {escape(record.label)}."
     area = f"{100 * last.contact_area_fraction:.3g} % of the nominal area"
-    approach = with_error(1e3 * last.approach_mm, 1e3 * last.approach_error_mm, digits=4)
+    approach = with_error(1e3 * last.approach_mm, 1e3 * (last.approach_error_mm or 0.0), digits=4)
     force = with_error(last.force_N, last.force_error_N, digits=5)
     return (
         f"<p>At an approach of {approach} µm the plane carries "

@@ -61,7 +61,6 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
 
 def _written(folder: Path, run: Run, drawn: list[Drawing], options: list[str]) -> list[Path]:
     """Write the files of a run with the figures drawn."""
-    made = run.forecast
     history = run.history()
     _remove_older(folder)
     files = write_tables(folder, history)
@@ -75,11 +74,10 @@ def _written(folder: Path, run: Run, drawn: list[Drawing], options: list[str]) -
     if run.scene.output.report:
         page = report_html(
             title=f"patchlaw: {run.scene.name}",
-            statements=plan.statements(run.stage, made),
-            warnings=list(plan.warnings(run.stage, made)),
+            statements=plan.statements(run.stage),
+            warnings=list(plan.warnings(run.stage)),
             history=history,
             figures=figures,
-            made=made,
         )
         files.append(write_text(folder / "report.html", page))
     return files

@@ -17,7 +17,7 @@ from multiscale import plan
 from multiscale.history import History
 from multiscale.load_step import LoadStep
 from multiscale.loading import Programme
-from multiscale.planning.forecast import Forecast, comparison
+from multiscale.planning.costs import Cost, peak_memory
 from multiscale.reporting.report import curve_cells
 from multiscale.stage import Stage
 
@@ -72,31 +72,33 @@ def show_pairs(comm: Any, pairs: Sequence[tuple[str, str]], warnings: Sequence[s
         console.print(f"[yellow]note:[/] {escape(warning)}")
 
 
-def show_plan(comm: Any, stage: Stage, made: Forecast, lacking: Sequence[str] = ()) -> None:
+def show_plan(
+    comm: Any, stage: Stage, made: Cost | None = None, lacking: Sequence[str] = ()
+) -> None:
     """Print what a run will do, and why.
 
     Args:
         comm: MPI communicator, or None.
         stage: The scene's ingredients.
-        made: What is predicted of it.
+        made: What it is predicted to take; None leaves it out.
         lacking: What a run would need more nodes for.
     """
     if speaks(comm):
-        notes = [*plan.warnings(stage, made), *lacking]
+        notes = [*plan.warnings(stage), *lacking]
         show_pairs(comm, list(plan.statements(stage, made)), notes)
 
 
-def show_comparison(comm: Any, made: Forecast, seconds: Mapping[str, float]) -> None:
-    """Print what was predicted beside what came out.
+def show_times(comm: Any, seconds: Mapping[str, float]) -> None:
+    """Print what a run took.
 
     Args:
         comm: MPI communicator, or None.
-        made: What was predicted.
         seconds: Wall time of the phases [s].
     """
     if speaks(comm):
-        rows = [f"{what} {real} ({foreseen})" for what, foreseen, real in comparison(made, seconds)]
-        _wide_console().print(f"real (predicted): {', '.join(rows)}", markup=False)
+        phases = ", ".join(f"{phase} {spent:.2f} s" for phase, spent in seconds.items())
+        memory = f"memory {peak_memory() / 1e6:.0f} MB"
+        _wide_console().print(f"took: {phases}; {memory}", markup=False)
 
 
 @contextmanager

@@ -1,8 +1,8 @@
-"""What a scene leaves open: chosen by cost and error, with respect for what is stated."""
+"""What a scene leaves open: chosen by measured errors, with respect for what is stated."""
 
 from __future__ import annotations
 
-import dataclasses
+import json
 
 import numpy as np
 import pytest
@@ -10,9 +10,7 @@ import pytest
 from geometry.errors import InputError
 from multiscale import Scene, make_stage
 from multiscale.plan import statements, warnings
-from multiscale.planning.choices import MESH_CELLS, cheapest, open_keys
-from multiscale.planning.decision import Alternative, decided
-from multiscale.planning.forecast import Forecast, forecast, forecast_statements
+from multiscale.planning.choices import couplings, open_keys, settled_keys
 
 
 def scene(source=None, **sections):
@@ -38,55 +36,69 @@ OPEN = {
 }
 
 
-def random_alternatives(seed):
-    random = np.random.default_rng(seed)
-    return [
-        Alternative(kind="concurrent", patches=(8, 8), cells=None, error=float(e), seconds=float(s))
-        for e, s in random.uniform(0.001, 0.1, (12, 2)).round(2 if seed % 2 else 9)
+def test_tighter_accuracies_measure_smaller_errors_on_finer_grids():
+    source = {"spectrum": {"hurst": 0.7, "waves": [2, 8], "rms_slope": 0.2}, "grid": "auto"}
+    coupling = {"kind": "analytic"}
+    found = [
+        make_stage(scene(source, accuracy=accuracy, coupling=coupling))
+        for accuracy in (0.2, 0.02, 0.005)
     ]
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_a_tighter_accuracy_never_takes_a_larger_error(seed):
-    found = random_alternatives(seed)  # odd seeds have ties
-    taken = [decided(found, accuracy).taken for accuracy in np.linspace(0.002, 0.12, 60)]
-    promised = [decided(found, accuracy).promised for accuracy in np.linspace(0.002, 0.12, 60)]
-    errors = [each.error for each in taken]
-    assert errors == sorted(errors)
-    assert promised == sorted(promised)  # what was promised stays promised
-    costs = [each.seconds for each, kept in zip(taken, promised, strict=True) if kept]
-    assert costs == sorted(costs, reverse=True)
-
-
-def test_the_cheapest_that_promises_is_taken_or_else_the_least_error():
-    found = random_alternatives(0)
-    good = [each for each in found if each.error <= 0.05]
-    assert decided(found, 0.05).taken is min(good, key=lambda each: each.seconds)
-    hopeless = decided(found, 1e-4)
-    assert not hopeless.promised
-    assert hopeless.taken is min(found, key=lambda each: each.error)
-    assert "for none promises an accuracy of 0.01 %" in hopeless.sentence
-
-
-def test_tighter_scenes_expect_no_larger_error():
-    errors = []
-    for accuracy in (0.2, 0.05, 0.01):
-        stage = make_stage(scene({"grid": "auto"}, accuracy=accuracy, **OPEN))
-        errors.append(forecast(stage).error)
+    errors = [stage.decision.error for stage in found]
+    grids = [stage.surface.grid for stage in found]
     assert errors == sorted(errors, reverse=True)
-    assert errors[-1] < errors[0]
+    assert grids == sorted(grids)
+    assert grids[0] < grids[-1]
+    for stage in found:
+        assert stage.decision.kept
+        assert not [text for text in warnings(stage) if "accuracy" in text]
 
 
-def test_open_keys_become_values_and_isolated_laws_are_not_offered():
-    stage = make_stage(scene({"grid": "auto"}, **OPEN))
+def test_open_keys_become_values_and_the_plan_says_what_was_measured():
+    stage = make_stage(scene({"grid": "auto"}, accuracy=0.05, **OPEN))
     settled = stage.scene
     assert settled.coupling.kind in ("concurrent", "consistent")
-    assert settled.patches.grid in ((8, 8), (16, 16))
-    assert settled.surface.grid == stage.surface.grid
+    assert settled.patches.grid == (8, 8)
+    assert settled.surface.grid == stage.surface.grid == stage.micro.surface.grid
+    assert settled.micro.model == "half-space"
     assert settled.block.cells == "auto"  # of no mesh
-    assert {each.kind for each in stage.decision.alternatives} == {"concurrent", "consistent"}
-    assert stage.decision.accuracy == 0.02
+    assert set(stage.decision.errors) == {"body", "slopes", "grid"}
+    assert stage.decision.error <= stage.decision.accuracy == 0.05
     assert dict(statements(stage))["choice"] == stage.decision.sentence
+
+
+def test_what_a_run_began_with_is_what_it_goes_on_with():
+    given = scene(accuracy=0.05)
+    stage = make_stage(given)
+    kept = json.loads(json.dumps(settled_keys(stage, given)))
+    again = make_stage(given, kept)
+    assert again.scene == stage.scene
+    np.testing.assert_array_equal(again.micro.surface.heights, stage.micro.surface.heights)
+    assert again.micro.datum == stage.micro.datum == stage.surface.highest
+
+
+def test_a_grid_of_heights_is_resampled_for_the_accuracy():
+    fine = make_stage(scene({"grid": [256, 256]}, accuracy=0.1))
+    assert fine.surface.grid == (256, 256)
+    assert fine.micro.surface.grid[0] < 256  # a coarse one will do
+    assert fine.decision.kept
+
+
+def test_finite_slopes_left_out_are_an_error():
+    stated = {"model": "half-space", "finite_slopes": False}
+    stage = make_stage(scene({"grid": "auto"}, accuracy=0.01, micro=stated))
+    assert stage.decision.errors["slopes"] > 0.01
+    (said,) = [text for text in warnings(stage) if "accuracy" in text]
+    assert "an accuracy of 1 % is not kept" in said
+    assert "most of it by slopes" in said
+
+
+def test_few_steps_press_together_and_many_steps_make_laws():
+    for steps, kind in ((1, "concurrent"), (3000, "consistent")):
+        load = {"approach": 0.004, "steps": steps}
+        stage = make_stage(scene(load=load, accuracy=0.2, micro={"model": "half-space"}))
+        assert stage.decision.kept
+        assert stage.scene.coupling.kind == kind
+    assert stage.table_tolerance == pytest.approx(0.02)  # a tenth of the accuracy
 
 
 def test_cells_are_left_to_the_plan_only_under_laws_on_a_mesh():
@@ -94,18 +106,7 @@ def test_cells_are_left_to_the_plan_only_under_laws_on_a_mesh():
     for coupling, free in (({}, False), ({"kind": "concurrent"}, False), (meshed, True)):
         given = scene(coupling=coupling, block=block(cells="auto"))
         assert open_keys(given) == ({"block.cells"} if free else set())
-    decision = make_stage(given).decision
-    assert {each.cells for each in decision.alternatives} == set(MESH_CELLS)
-    assert decision.taken.cells in MESH_CELLS
-
-
-def test_few_steps_press_together_and_many_steps_make_laws():
-    cheap = {"accuracy": 0.2, "micro": {"model": "half-space"}, "block": block(cells=[8, 8, 8])}
-    for steps, kind in ((1, "concurrent"), (3000, "consistent")):
-        load = {"approach": 0.004, "steps": steps}
-        stage = make_stage(scene(load=load, **cheap))
-        assert stage.decision.promised
-        assert stage.scene.coupling.kind == kind
+    assert make_stage(given).scene.block.cells is None  # as by default
 
 
 @pytest.mark.parametrize(
@@ -138,8 +139,9 @@ def test_stated_keys_are_respected(stated):
     ],
 )
 def test_other_keys_narrow_the_couplings(coupling, kinds):
-    stage = make_stage(scene(coupling=coupling | {"kind": "auto"}))
-    assert {each.kind for each in stage.decision.alternatives} == kinds
+    given = scene(coupling=coupling | {"kind": "auto"})
+    assert {section.kind for section in couplings(given)} == kinds
+    assert make_stage(given).scene.coupling.kind in kinds
 
 
 def test_without_accuracy_and_auto_nothing_is_open():
@@ -150,28 +152,48 @@ def test_without_accuracy_and_auto_nothing_is_open():
 
 def test_patches_are_nearly_square():
     stage = make_stage(scene({"grid": [96, 48], "lengths": [2.0, 1.0]}, patches={"grid": "auto"}))
-    assert stage.patches.grid in ((16, 8), (32, 16))
+    assert stage.patches.grid == (16, 8)
+    assert stage.decision is None  # patches gather results, and have no error
 
 
-def test_the_grid_follows_the_shortest_wave_and_the_accuracy():
-    def grid(waves, accuracy):
-        source = {"spectrum": {"hurst": 0.8, "waves": waves, "rms_slope": 0.2}, "grid": "auto"}
-        return make_stage(scene(source, accuracy=accuracy)).surface.grid[0]
+def test_a_stated_reference_gets_a_grid_and_patches(monkeypatch):
+    monkeypatch.setattr("multiscale.planning.accuracy._Search._of_meshes", lambda *given: 0.001)
+    stage = make_stage(scene({"grid": "auto"}, accuracy=0.05, coupling={"kind": "reference"}))
+    assert stage.surface.grid == (96, 96)  # 16 heights along each of 6 waves
+    assert stage.patches.grid == (8, 8)
+    assert stage.decision.kept
 
-    assert grid([2, 12], 0.1) >= 96  # eight heights along a wave at least
-    assert grid([2, 6], 0.02) >= grid([2, 6], 0.1) >= 48
+
+def test_models_without_measure_say_so():
+    stage = make_stage(scene(accuracy=0.05, micro={"model": "elliptic"}))
+    assert not stage.decision.errors
+    assert not stage.decision.kept
+    assert "which is not measured beforehand" in stage.decision.sentence
+    assert dict(statements(stage))["error"].startswith("not known: elliptic")
 
 
-def test_what_cannot_be_promised_is_said():
-    stage = make_stage(scene(accuracy=0.001, micro={"model": "elliptic-independent"}))
-    made = forecast(stage)
-    assert made.error > 0.001
-    said = [text for text in warnings(stage, made) if "cannot be promised" in text]
-    assert len(said) == 1
-    assert "an accuracy of 0.1 % cannot be promised" in said[0]
-    assert "most of it by the micro model" in said[0]
-    assert made.broken_promise == said[0]
-    assert dataclasses.replace(made, accuracy=None).broken_promise is None
+def test_a_reference_is_taken_where_nothing_else_keeps_the_accuracy(monkeypatch):
+    monkeypatch.setattr("multiscale.planning.accuracy._Search._of_meshes", lambda *given: 0.001)
+    stage = make_stage(scene(accuracy=0.0015))
+    assert stage.scene.coupling.kind == "reference"
+    assert stage.micro is None
+    assert stage.decision.kept
+    assert sum(stage.decision.missed.values()) > 0.0015
+    assert "without meshing the roughness measured" in stage.decision.sentence
+
+
+def test_meshes_are_refined_until_their_bar_keeps_the_accuracy(monkeypatch):
+    def error(search, stage):
+        return float((stage.meshes.sizes[-1] / 0.03) ** 3)
+
+    monkeypatch.setattr("multiscale.planning.accuracy._Search._of_meshes", error)
+    coupling = {"kind": "reference"}
+    coarse, fine = (make_stage(scene(accuracy=a, coupling=coupling)) for a in (0.1, 0.01))
+    assert fine.meshes.sizes[-1] < coarse.meshes.sizes[-1]
+    assert fine.decision.error <= 0.01
+    stated = make_stage(scene(accuracy=0.01, coupling=coupling, reference={"fine": 0.03}))
+    assert stated.meshes.sizes[-1] == pytest.approx(0.03)
+    assert "most of it by mesh" in stated.decision.warning
 
 
 @pytest.mark.parametrize(
@@ -238,25 +260,3 @@ def test_open_keys_survive_a_dump_and_are_in_the_schema():
 def test_the_plan_says_how_fine_the_heights_are():
     said = dict(statements(make_stage(scene())))["surface"]
     assert "8 heights along the shortest wavelength" in said  # 48 heights, 6 waves
-
-
-def test_nothing_to_choose(monkeypatch):
-    monkeypatch.setattr("multiscale.planning.choices._scenes", lambda *given: [])
-    with pytest.raises(InputError, match=r"coupling\.kind: leaves nothing to choose"):
-        cheapest(None, None, frozenset(), None)
-
-
-def test_a_bound_beyond_the_force_itself_is_no_number():
-    made = Forecast(
-        seconds={}, memory=1e9, errors={"mesh": 1.0, "block": 0.004}, slopes=0.0, accuracy=0.02
-    )
-    told = dict(forecast_statements(made))["error"]
-    assert told == (
-        "no accuracy can be told: the force may be off by as much as it is "
-        "(mesh an unknown error, block 0.4 %)"
-    )
-    assert "off by as much as it is, most of it by the mesh" in made.broken_promise
-    small = dataclasses.replace(made, errors={"mesh": 0.0123}, slopes=0.026)
-    assert dict(forecast_statements(small))["error"].startswith(
-        "the force, at a given approach, within 1.2 % of the small-slope limit (mesh 1.2 %); finite"
-    )

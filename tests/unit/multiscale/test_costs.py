@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import math
 
-import numpy as np
 import pytest
 
 from geometry import BlockShape
@@ -17,7 +15,6 @@ from multiscale.planning.costs import predicted_cost
 from multiscale.planning.machine import Machine, this_machine
 from multiscale.planning.press_work import step_count
 from multiscale.planning.work import Work
-from multiscale.reporting.results import write_results
 
 
 class Unit(Machine):
@@ -130,20 +127,3 @@ def test_steps_that_may_be_halved_are_counted():
         quantity="approach", points=(0.008,), steps=3, tilt=(0.0, 0.0), force_change=0.05
     )
     assert step_count(fine) == 20
-
-
-def test_report_and_provenance_compare_prediction_with_outcome(tmp_path):
-    run = Run(scene("analytic", grid=32, accuracy=0.1))
-    made = run.forecast
-    list(run.load_steps())
-    write_results(tmp_path, run, options=[])
-    kept = json.loads((tmp_path / "provenance.json").read_text())
-    assert kept["predicted"]["seconds"] == dict(made.seconds)
-    assert kept["predicted"]["force_error"] == pytest.approx(sum(made.errors.values()), rel=1e-12)
-    assert kept["memory_bytes"] > 1e6
-    assert set(made.seconds) <= set(kept["seconds"]) | {"output"}
-    page = (tmp_path / "report.html").read_text()
-    assert "<h2>What it took</h2>" in page
-    assert "predicted</th><th>real" in page
-    assert "What the force may be off by" in page
-    assert np.isclose(kept["predicted"]["accuracy"], 0.1)

@@ -16,6 +16,7 @@ import multiscale.reporting.results
 from geometry import Asperities, PatchGrid
 from micro import HalfSpaceModel, asperity_model
 from multiscale import Run, Scene, make_stage
+from multiscale.cli import main
 from multiscale.planning.forecast import forecast
 from multiscale.reporting.results import write_results
 
@@ -103,14 +104,13 @@ def presses(monkeypatch):
 def test_a_plan_solves_nothing_of_the_scene(monkeypatch, presses, kind):
     monkeypatch.setattr("multiscale.couplings.blocks.embedding", never)
     monkeypatch.setattr("multiscale.couplings.body.Body.face", never)
+    monkeypatch.setattr("multiscale.couplings.blocks.on_body", never)
     monkeypatch.setattr("multiscale.assemble.make_table", never)
     given = data(kind, grid=128)
     stage = make_stage(Scene.from_dict(given))
     made = forecast(stage)
     assert made.total > 0.0
-    assert made.error > 0.0
-    # of the estimates on at most 96² cells there is one
-    assert presses == ([] if kind == "analytic" else [96**2])
+    assert presses == []
 
 
 def test_patches_out_of_reach_build_no_law(monkeypatch):
@@ -167,10 +167,25 @@ def test_summits_out_of_reach_cost_nothing(monkeypatch):
 
 
 def test_a_scene_without_open_keys_weighs_no_alternatives(monkeypatch):
-    monkeypatch.setattr("multiscale.planning.choices.predicted_cost", never)
-    monkeypatch.setattr("multiscale.planning.choices.expected_errors", never)
+    monkeypatch.setattr("multiscale.planning.accuracy.predicted_cost", never)
+    monkeypatch.setattr("multiscale.staging.accurate_stage", never)
     stage = make_stage(Scene.from_dict(data("consistent")))
     assert stage.decision is None
+
+
+def test_a_run_predicts_nothing_and_writes_what_it_took(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr("multiscale.planning.costs.run_work", never)
+    path = tmp_path / "scene.json.toml"
+    path.write_text(
+        "[surface]\nspectrum = {hurst = 0.9, waves = [2, 4], rms_slope = 0.1}\n"
+        "grid = [32, 32]\nlengths = [1.0, 1.0]\n[block]\nyoung_modulus = 4000.0\n"
+        'poisson_ratio = 0.3\n[micro]\nmodel = "half-space"\n[coupling]\nkind = "analytic"\n'
+        "[load]\napproach = 0.004\nsteps = 2\n[output]\nfigures = false\n"
+    )
+    assert main(["run", str(path), "--out", str(tmp_path / "results")]) == 0
+    told = capsys.readouterr().out
+    assert "took: surface" in told
+    assert "memory" in told
 
 
 def test_rates_are_measured_only_where_they_are_needed():

@@ -15,7 +15,7 @@ import pytest
 from geometry.errors import InputError, NotWritten
 from multiscale import Run, Scene
 from multiscale.cli import main
-from multiscale.planning import choices
+from multiscale.planning import accuracy
 from multiscale.reporting.field_files import write_fields
 from multiscale.restart.checkpoint import read_checkpoint, write_checkpoint
 from multiscale.restart.folder_lock import FolderLock
@@ -508,12 +508,12 @@ def test_a_plan_stands_though_another_machine_would_choose_otherwise(tmp_path, m
     def reversed_costs(*_arguments, **_options):
         return replace(predicted(*_arguments, **_options), seconds={"all": -next(ticks)})
 
-    ticks, predicted = iter(range(1, 1000)), choices.predicted_cost
-    monkeypatch.setattr(choices, "predicted_cost", reversed_costs)
+    ticks, predicted = iter(range(1, 1000)), accuracy.predicted_cost
+    monkeypatch.setattr(accuracy, "predicted_cost", reversed_costs)
     assert Run(left_open).scene != whole.scene  # the plan would be another one here
     again = Run(left_open, settled=kept.settled)
     assert again.scene == whole.scene
-    assert again.stage.choice.taken.label == whole.stage.choice.taken.label
+    assert again.stage.micro.surface.grid == whole.stage.micro.surface.grid
     again.resume(kept)
     list(again.load_steps())
     np.testing.assert_allclose(columns(again.steps), columns(whole.steps), rtol=0.0, atol=0.0)

@@ -1,0 +1,184 @@
+"""Are measured errors those that runs have, and is the accuracy kept that was asked for?
+
+Run by hand, ten minutes on an idle core: `.venv/bin/python tests/benchmarks/error_study.py
+[measured] [accuracy] [--first N] [--last N]`.
+
+Scenes are random: hurst, waves, slopes up to 0.25, blocks 0.3, 1 and 3 mm high, tilts, loads; every
+fourth has its roughness meshed as its truth, which all causes are measured against. The truth of
+the others is the contact problem on four times as many cells along a side with four more modes of
+the body: it has the same finite slopes, and what was measured for them is left out.
+"""
+
+import argparse
+import os
+import time
+from dataclasses import replace
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import numpy as np
+
+from geometry.control import Control
+from geometry.spectrum import synthesise
+from multiscale import Run, Scene
+from multiscale.couplings.blocks import SLOPES, on_body, scene_body
+
+SCENES, MESHED = 40, 4
+MORE_MODES, FINER, MOST_CELLS = 4, 4, 512
+BANDS = ((2, 10), (1, 6), (2, 8), (3, 12), (2, 14))
+KINDS = ("concurrent", "concurrent", "analytic", "concurrent", "consistent", "concurrent")
+
+
+def scene(number):
+    """Return one scene of the study as nested dictionaries."""
+    random = np.random.default_rng(77_000 + number)
+    meshed = number % MESHED == 0
+    band = BANDS[random.integers(3 if meshed else len(BANDS))]
+    spectrum = {
+        "hurst": float(random.uniform(0.5, 1.0)),
+        "waves": list(band),
+        "rms_slope": float(random.uniform(0.08, 0.25)),
+        "seed": 500 + number,
+    }
+    load = {"approach": float(random.uniform(3e-3, 9e-3)), "steps": 2}
+    if random.random() < 0.4:
+        load["tilt"] = [float(random.uniform(-3e-3, 3e-3)) for _ in range(2)]
+    kind = "concurrent" if meshed else KINDS[random.integers(len(KINDS))]
+    return {
+        "surface": {
+            "spectrum": spectrum,
+            "grid": [int(random.choice([64, 96, 128]))] * 2,
+            "lengths": [1.0, 1.0],
+        },
+        "block": {
+            "young_modulus": 4000.0,
+            "poisson_ratio": float(random.choice([0.15, 0.3])),
+            "height": float(random.choice([0.3, 1.0, 1.0, 3.0])),
+        },
+        "micro": {"model": "half-space"},
+        "coupling": {"kind": kind},
+        "load": load,
+    }
+
+
+def meshed_force(data):
+    """Return the force of the meshed roughness at the last load step, and its error bar [N]."""
+    heights = {"grid": [192, 192]}
+    whole = data | {
+        "surface": data["surface"] | heights,
+        "coupling": {"kind": "reference"},
+        "load": data["load"] | {"steps": 1},
+    }
+    run = Run(Scene.from_dict(whole))
+    list(run.load_steps())
+    record = run.history().reference
+    run.close()
+    return float(record.force.value[-1]), float(record.force.error[-1])
+
+
+def finer_force(run):
+    """Return the force on more cells and with more modes, under the last load step's plane [N]."""
+    stage, step = run.stage, run.steps[-1]
+    modes = scene_body(stage).modes + MORE_MODES
+    body = on_body(stage, None, half_space=not stage.embedded, modes=modes)
+    grid = [min(FINER * count, MOST_CELLS) for count in stage.model.surface.grid]
+    spectrum = stage.scene.surface.spectrum.spectrum()
+    surface = synthesise(spectrum, grid=tuple(grid), lengths=stage.surface.lengths)
+    model = replace(stage.model, surface=surface, highest=surface.highest)
+    order = SLOPES if stage.finite_slopes else 0
+    return body(model, order).equilibrium(Control(approach=step.approach_mm, tilt=step.tilt)).force
+
+
+def measured(numbers):
+    """Run scenes; print and return rows of the true error, its uncertainty and the stated one."""
+    rows = []
+    for number in numbers:
+        data, began = scene(number), time.perf_counter()
+        run = Run(Scene.from_dict(data))
+        list(run.load_steps())
+        step, meshed = run.steps[-1], number % MESHED == 0
+        if not step.force_N > 0.0:
+            print(f"{number:3d} no contact")
+            continue
+        parts = dict(step.errors)
+        if meshed:
+            true, bar = meshed_force(data)
+            stated = step.force_error_N
+        else:
+            true, bar = finer_force(run), 0.0
+            stated = step.force_error_N - parts["slopes"]
+        rows.append((abs(step.force_N - true), bar, stated, meshed, true))
+        told = ", ".join(f"{cause} {error / true:.2%}" for cause, error in parts.items())
+        print(
+            f"{number:3d} {data['coupling']['kind']:10s} {run.stage.surface.grid[0]:3d}² height "
+            f"{data['block']['height']:g}, {step.force_N:.4g} N: off by "
+            f"{step.force_N / true - 1:+.2%} ± {bar / true:.2%}, stated {stated / true:.2%} "
+            f"({told}) {time.perf_counter() - began:.0f} s{' meshed' if meshed else ''}",
+            flush=True,
+        )
+    return np.array(rows)
+
+
+def tell(rows, what):
+    """Print how stated errors compare with true ones."""
+    off, bar, stated = rows[:, :3].T
+    within = off - bar <= 1.5 * stated
+    print(
+        f"{what}: {len(rows)} scenes; true error within 1.5 × the stated one: {within.mean():.0%}; "
+        f"stated over true in the median: {np.median(stated / np.maximum(off, 1e-12)):.2f}"
+    )
+
+
+def accuracies(numbers):
+    """Ask for an accuracy; print and return what was asked for, found, and whether it was kept."""
+    rows = []
+    for number in numbers:
+        data, began = scene(number), time.perf_counter()
+        random = np.random.default_rng(number)
+        wanted = float(random.choice([0.01, 0.02, 0.05]))
+        asked = {key: value for key, value in data.items() if key not in ("micro", "coupling")}
+        asked |= {"accuracy": wanted, "surface": data["surface"] | {"grid": "auto"}}
+        run = Run(Scene.from_dict(asked))
+        list(run.load_steps())
+        step, kind = run.steps[-1], run.scene.coupling.kind
+        own = time.perf_counter() - began
+        if not step.force_N > 0.0:
+            continue
+        if number % MESHED == 0:
+            true, bar = meshed_force(data)
+        elif kind != "reference":
+            true, bar = finer_force(run), 0.0
+        else:
+            continue
+        off = step.force_N / true - 1.0
+        rows.append((wanted, off, bar / true))
+        print(
+            f"{number:3d} {kind:10s} {run.stage.decision.taken.label}: asked {wanted:.0%}, off by "
+            f"{off:+.2%} ± {bar / true:.2%}, promised {run.stage.decision.error:.2%}, {own:.0f} s "
+            f"and {time.perf_counter() - began - own:.0f} s for the truth",
+            flush=True,
+        )
+    return np.array(rows)
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("what", nargs="*", default=["measured", "accuracy"])
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--last", type=int, default=SCENES)
+    given = parser.parse_args()
+    numbers = range(given.first, given.last)
+    if "measured" in given.what:
+        rows = measured(numbers)
+        tell(rows, "all")
+        for name, kind in (("against meshed roughness", 1), ("against finer cells", 0)):
+            if (rows[:, 3] == kind).any():
+                tell(rows[rows[:, 3] == kind], name)
+    if "accuracy" in given.what:
+        rows = accuracies(numbers)
+        kept = np.abs(rows[:, 1]) - rows[:, 2] <= rows[:, 0]
+        print(f"accuracy kept by {kept.mean():.0%} of {len(rows)} scenes")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,210 @@
+"""Errors of load steps as runs measure and tell them: by cause, and against finer solutions."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.control import Control
+from geometry.errors import NotConverged
+from multiscale import Run, Scene, run
+from multiscale.couplings.blocks import on_body
+from multiscale.measured_errors import ErrorProbe, MeasuredErrors
+from multiscale.reporting.outputs import write_tables
+from multiscale.reporting.report import curve_cells, with_error
+from multiscale.reporting.results import write_results
+
+
+def scene(kind="analytic", grid=40, *, check="last", load=None, seed=4, **micro):
+    spectrum = {"hurst": 0.9, "waves": [2, 5], "rms_slope": 0.2, "seed": seed}
+    laws = {"table_tolerance": 0.01} if kind in ("consistent", "isolated") else {}
+    return Scene.from_dict({
+        "surface": {"spectrum": spectrum, "grid": [grid, grid], "lengths": [1.0, 1.0]},
+        "block": {"young_modulus": 4000.0, "poisson_ratio": 0.15, "cells": [8, 8, 6]},
+        "patches": {"grid": [2, 2]},
+        "micro": {"model": "half-space"} | micro,
+        "coupling": {"kind": kind} | laws,
+        "load": load or {"approach": 0.006, "steps": 2},
+        "output": {"check": check, "figures": False},
+    })  # fmt: skip
+
+
+CAUSES = {
+    "analytic": {"slopes", "grid"},
+    "concurrent": {"body", "slopes", "grid"},
+    "consistent": {"laws", "body", "slopes", "grid"},
+    "isolated": {"laws", "body", "slopes", "grid"},
+}
+
+
+@pytest.mark.parametrize("kind", CAUSES)
+def test_the_last_load_step_has_its_errors_by_cause(kind):
+    history = run(scene(kind))
+    first, last = history.steps
+    assert first.errors == ()
+    assert np.isnan(history.force_error_N[0])
+    assert set(dict(last.errors)) == CAUSES[kind]
+    assert last.force_error_N == pytest.approx(sum(dict(last.errors).values()), rel=1e-12)
+    assert 0.0 < last.force_error_N < 0.5 * last.force_N
+    assert last.approach_error_mm == 0.0  # it is prescribed
+    assert "check" in history.seconds
+    assert f"at its approach the force is within {last.force_error_N:.2g} N" in history.notes[-1]
+
+
+@pytest.mark.parametrize(("check", "measured"), [("none", 0), ("last", 1), ("all", 2)])
+def test_as_many_load_steps_are_measured_as_asked_for(check, measured):
+    history = run(scene(check=check))
+    assert np.isfinite(history.force_error_N).sum() == measured
+
+
+def test_models_without_cells_have_no_measure():
+    history = run(scene(model="islands"))
+    assert np.isnan(history.force_error_N).all()
+    assert np.isnan(history.approach_error_mm).all()
+    assert "check" not in history.seconds
+
+
+@pytest.mark.parametrize("grid", [24, 40, 96])
+def test_the_error_of_the_grid_is_that_against_a_much_finer_one(grid):
+    step = run(scene(grid=grid, finite_slopes=False)).steps[-1]
+    fine = run(scene(grid=384, check="none", finite_slopes=False)).steps[-1]
+    off = abs(step.force_N - fine.force_N)
+    measured = dict(step.errors)["grid"]
+    assert off < 1.5 * measured  # what 98 of 100 surfaces keep
+    assert measured < 0.06 * (96 / grid) ** 2 * fine.force_N  # a twentieth on 96² cells, no more
+
+
+def test_slopes_left_out_are_what_they_would_take():
+    without = run(scene(grid=96, finite_slopes=False)).steps[-1]
+    with_slopes = run(scene(grid=96)).steps[-1]
+    told = dict(without.errors)["slopes"]
+    # measured on half of the cells
+    assert told == pytest.approx(without.force_N - with_slopes.force_N, rel=0.1)
+    assert dict(with_slopes.errors)["slopes"] < 0.3 * told
+
+
+def test_a_prescribed_force_has_an_error_of_the_approach():
+    load = {"force": 0.8, "steps": 2}
+    step = run(scene(load=load)).steps[-1]
+    assert step.force_error_N == 0.0
+    assert step.approach_error_mm > 0.0
+    near = [run(scene(load={"approach": step.approach_mm + d, "steps": 1}, check="none")).force_N
+            for d in (-1e-4, 1e-4)]  # fmt: skip
+    stiffness = float(near[1][-1] - near[0][-1]) / 2e-4
+    error = sum(dict(step.errors).values())
+    assert step.approach_error_mm == pytest.approx(error / stiffness, rel=0.15)  # a coarse grid's
+
+
+def test_laws_under_a_plane_free_to_turn_are_compared_with_one_free_to_turn():
+    stage = Run(scene("concurrent")).stage
+    probe = ErrorProbe(model=stage.micro, on_body=on_body(stage, None), order=0, by_laws=True)
+    free = Control(approach=0.006, tilt=None)
+    turned = probe.on_body(stage.micro, 0).equilibrium(free)
+    level = probe.on_body(stage.micro, 0).solve(0.006)
+    assert max(map(abs, turned.plane.tilt)) > 1e-4
+    for turns, force in ((True, turned.force), (False, level.force)):
+        found = probe.measure(force + 0.1, 0.006, (0.0, 0.0), turns=turns)
+        assert found.parts["laws"] == pytest.approx(0.1, rel=1e-6)
+
+
+def test_a_plane_that_does_not_touch_has_no_error():
+    step = run(scene(load={"approach": 1e-9, "steps": 1})).steps[-1]
+    assert step.force_N == 0.0
+    assert step.force_error_N == 0.0
+
+
+def test_errors_without_contact_leave_the_approach_alone():
+    assert MeasuredErrors(parts={"grid": 0.0}, stiffness=0.0).approach == 0.0
+    assert MeasuredErrors(
+        parts={"grid": 0.1, "laws": 0.2}, stiffness=3.0
+    ).approach == pytest.approx(0.1)
+
+
+def test_what_cannot_be_measured_is_said_and_the_run_goes_on(monkeypatch):
+    def fails(*_given, **_options):
+        raise NotConverged("the contact", reason="TEST", iterations=3, remedy="none")
+
+    monkeypatch.setattr(ErrorProbe, "measure", fails)
+    history = run(scene())
+    assert len(history) == 2
+    assert np.isnan(history.force_error_N).all()
+    assert any(note.startswith("errors of load step 2 not measured") for note in history.notes)
+
+
+def test_an_accuracy_that_is_not_kept_is_said():
+    wanted = scene(grid=96, finite_slopes=False).model_copy(update={"accuracy": 0.005})
+    history = run(wanted)
+    (said,) = [note for note in history.notes if "an accuracy of 0.5 %" in note]
+    assert "was asked for, and the last load step keeps" in said
+    assert "most of it by slopes" in said
+
+
+def test_a_run_that_goes_on_measures_the_same(tmp_path):
+    whole = Run(scene("concurrent"))
+    steps = whole.load_steps()
+    next(steps)
+    kept = whole.checkpoint("name", whole.state())
+    list(steps)
+    again = Run(scene("concurrent"))
+    again.resume(kept)
+    list(again.load_steps())
+    assert again.steps[-1].errors == whole.steps[-1].errors
+
+
+def test_fewer_modes_are_solved_on_the_body_itself():
+    stage = Run(scene("concurrent")).stage
+    body = on_body(stage, None)
+    probe = ErrorProbe(model=stage.micro, on_body=body, order=2)
+    stiff = replace(probe, on_body=lambda model, order: replace(body(model, order), body=None))
+    force = body(stage.micro, 2).solve(0.006).force
+    assert probe.measure(force, 0.006, (0.0, 0.0)).parts["body"] > 0.0
+    assert "body" not in stiff.measure(force, 0.006, (0.0, 0.0)).parts
+
+
+def test_errors_are_columns_and_stand_beside_the_values(tmp_path):
+    history = run(scene())
+    write_tables(tmp_path, history)
+    rows = list(csv.DictReader((tmp_path / "history.csv").open()))
+    assert rows[0]["force_error_N"] == ""
+    assert float(rows[1]["force_error_N"]) == history.force_error_N[1]
+    header, cells = curve_cells(history)
+    at = header.index("force [N]")
+    assert "±" not in cells[0][at]
+    value, error = cells[1][at].split(" ± ")
+    assert float(value) == pytest.approx(history.force_N[1], abs=0.5 * 10.0 ** -len(value[2:]))
+    assert float(error) == pytest.approx(history.force_error_N[1], rel=0.06)  # two digits
+
+
+def test_report_and_provenance_hold_the_errors(tmp_path):
+    run = Run(scene())
+    list(run.load_steps())
+    write_results(tmp_path, run, options=[])
+    kept = json.loads((tmp_path / "provenance.json").read_text())
+    *before, last = kept["errors_N"]
+    assert before == [{} for _ in before]
+    assert set(last) == {"slopes", "grid"}
+    assert sum(last.values()) == pytest.approx(run.steps[-1].force_error_N, rel=1e-12)
+    assert kept["memory_bytes"] > 1e6
+    assert kept["decision"] is None
+    page = (tmp_path / "report.html").read_text()
+    assert "<h2>What it took</h2>" in page
+    assert f"measured at load step {len(run.steps)}</h2>" in page
+    assert " ± " in page
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "told"),
+    [
+        (5.36912, 0.0312, "5.369 ± 0.031"),
+        (5.36912, 1.26, "5.4 ± 1.3"),
+        (123.4, 21.0, "123 ± 21"),
+        (5.36912, 0.0, "5.36912"),
+        (5.36912, None, "5.36912"),
+    ],
+)
+def test_values_are_rounded_to_their_errors(value, error, told):
+    assert with_error(value, error, digits=6) == told
