@@ -98,6 +98,12 @@ class NotWritten(PatchlawError, RuntimeError):
     exit_code = 5
 
 
+class OutOfMemory(PatchlawError, RuntimeError):
+    """The system gave no more memory; what a run had accepted before is in its last checkpoint."""
+
+    exit_code = 5
+
+
 def _shortened(value: Any) -> str:
     """Return what stands for a value in a message: a line, however long the value is."""
     try:

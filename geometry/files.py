@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from geometry.checks import LARGEST, cell_counts, check_scale, positive_lengths
 from geometry.errors import InputError
 from geometry.instruments import read_instrument
+from geometry.memory import process_memory
 from geometry.missing import filled
 from geometry.surface import Surface
 
@@ -145,7 +146,7 @@ def _array_header(stream: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any
 
 
 def _check_memory(needed: float) -> None:
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    memory = process_memory()
     if needed > memory:
         raise InputError(
             f"the heights need about {needed / 1e9:.3g} GB of memory",
