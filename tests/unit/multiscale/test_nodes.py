@@ -231,8 +231,8 @@ def test_address_space(root, megabytes, text):
 
 def test_memory_that_runs_out_ends_with_5(capsys, monkeypatch):
     def hungry(*given):
-        np.empty(1 << 60)
+        np.empty(1 << 50)
 
     monkeypatch.setattr("multiscale.commands.print_schema", hungry)
     assert main(["schema"]) == 5
-    assert "patchlaw: memory ran out: Unable to allocate 8.00 EiB" in capsys.readouterr().err
+    assert "patchlaw: memory ran out: Unable to allocate 8.00 PiB" in capsys.readouterr().err
