@@ -32,6 +32,11 @@ def positive_lengths(value: Any, what: str) -> tuple[float, float]:
     return pair
 
 
+def rounding_of(heights: NDArray[np.float64]) -> float:
+    """Return the range of heights that sums of them may have by rounding alone [mm]."""
+    return 64.0 * float(np.finfo(float).eps) * float(np.abs(heights).max())
+
+
 def check_scale(heights: NDArray[np.float64]) -> None:
     """Refuse roughness so fine that squares of its curvatures leave double precision.
 
@@ -46,12 +51,11 @@ def check_scale(heights: NDArray[np.float64]) -> None:
     finite = heights[np.isfinite(heights)]
     if not finite.size:
         return
-    low, high = float(finite.min()), float(finite.max())
-    rounding = 64.0 * float(np.finfo(float).eps) * max(abs(low), abs(high))
-    if rounding < high - low < SMALLEST:
+    range_ = float(np.ptp(finite))
+    if rounding_of(finite) < range_ < SMALLEST:
         raise InputError(
             "the heights differ by less than any roughness",
-            value=high - low,
+            value=range_,
             allowed=f"equal heights, or differences of at least {SMALLEST:g} mm",
         )
 

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry.checks import LARGEST, frozen_array, positive_lengths
+from geometry.checks import LARGEST, frozen_array, positive_lengths, rounding_of
 from geometry.errors import InputError
 from geometry.interpolant import Interpolant
 
@@ -125,7 +125,7 @@ class Surface:
         """Subtract the least-squares polynomial of total degree ``order``.
 
         A plane or a quadratic does not continue periodically, so the result is periodic only for
-        order 0.
+        order 0. What is left of such a surface itself is rounding, and taken for level.
 
         Args:
             order: 0 mean, 1 mean plane, 2 mean quadratic.
@@ -140,6 +140,8 @@ class Surface:
         basis = np.stack([((2 * u - 1) ** i * (2 * v - 1) ** j).ravel() for i, j in powers], axis=1)
         weights, *_ = np.linalg.lstsq(basis, self.heights.ravel(), rcond=None)
         heights = self.heights - (basis @ weights).reshape(self.grid)
+        if np.ptp(heights) <= rounding_of(self.heights):
+            heights = np.zeros(self.grid)
         return replace(self, heights=heights, periodic=self.periodic and order == 0)
 
     def cropped(
