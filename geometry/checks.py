@@ -32,27 +32,34 @@ def positive_lengths(value: Any, what: str) -> tuple[float, float]:
     return pair
 
 
-def rounding_of(heights: NDArray[np.float64]) -> float:
-    """Return the range of heights that sums of them may have by rounding alone [mm]."""
-    return 64.0 * float(np.finfo(float).eps) * float(np.abs(heights).max())
+def is_level(heights: NDArray[np.float64], among: NDArray[np.float64] | None = None) -> bool:
+    """Tell whether heights differ by no more than what rounding makes of equal ones.
+
+    Args:
+        heights: Heights [mm]; those that are not finite do not count.
+        among: The heights that they were computed from [mm]; by default they themselves.
+    """
+    finite = heights[np.isfinite(heights)]
+    if not finite.size:
+        return False
+    size = float(np.abs(finite if among is None else among).max())
+    return float(np.ptp(finite)) <= 64.0 * float(np.finfo(float).eps) * size
 
 
 def check_scale(heights: NDArray[np.float64]) -> None:
     """Refuse roughness so fine that squares of its curvatures leave double precision.
 
-    Heights that are equal but for rounding are flat, and pass.
-
     Args:
         heights: Heights [mm]; those that are not finite are none of this function's business.
 
     Raises:
-        InputError: When they differ by less than `SMALLEST`.
+        InputError: When they are not level, but differ by less than `SMALLEST`.
     """
     finite = heights[np.isfinite(heights)]
-    if not finite.size:
+    if not finite.size or is_level(finite):
         return
     range_ = float(np.ptp(finite))
-    if rounding_of(finite) < range_ < SMALLEST:
+    if range_ < SMALLEST:
         raise InputError(
             "the heights differ by less than any roughness",
             value=range_,

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry.checks import LARGEST, frozen_array, positive_lengths, rounding_of
+from geometry.checks import LARGEST, frozen_array, is_level, positive_lengths
 from geometry.errors import InputError
 from geometry.interpolant import Interpolant
 
@@ -140,7 +140,7 @@ class Surface:
         basis = np.stack([((2 * u - 1) ** i * (2 * v - 1) ** j).ravel() for i, j in powers], axis=1)
         weights, *_ = np.linalg.lstsq(basis, self.heights.ravel(), rcond=None)
         heights = self.heights - (basis @ weights).reshape(self.grid)
-        if np.ptp(heights) <= rounding_of(self.heights):
+        if is_level(heights, among=self.heights):
             heights = np.zeros(self.grid)
         return replace(self, heights=heights, periodic=self.periodic and order == 0)
 
