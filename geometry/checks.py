@@ -32,26 +32,37 @@ def positive_lengths(value: Any, what: str) -> tuple[float, float]:
     return pair
 
 
+def is_level(heights: NDArray[np.float64], among: NDArray[np.float64] | None = None) -> bool:
+    """Tell whether heights differ by no more than what rounding makes of equal ones.
+
+    Args:
+        heights: Heights [mm]; those that are not finite do not count.
+        among: The heights that they were computed from [mm]; by default they themselves.
+    """
+    finite = heights[np.isfinite(heights)]
+    if not finite.size:
+        return False
+    size = float(np.abs(finite if among is None else among).max())
+    return float(np.ptp(finite)) <= 64.0 * float(np.finfo(float).eps) * size
+
+
 def check_scale(heights: NDArray[np.float64]) -> None:
     """Refuse roughness so fine that squares of its curvatures leave double precision.
-
-    Heights that are equal but for rounding are flat, and pass.
 
     Args:
         heights: Heights [mm]; those that are not finite are none of this function's business.
 
     Raises:
-        InputError: When they differ by less than `SMALLEST`.
+        InputError: When they are not level, but differ by less than `SMALLEST`.
     """
     finite = heights[np.isfinite(heights)]
-    if not finite.size:
+    if not finite.size or is_level(finite):
         return
-    low, high = float(finite.min()), float(finite.max())
-    rounding = 64.0 * float(np.finfo(float).eps) * max(abs(low), abs(high))
-    if rounding < high - low < SMALLEST:
+    range_ = float(np.ptp(finite))
+    if range_ < SMALLEST:
         raise InputError(
             "the heights differ by less than any roughness",
-            value=high - low,
+            value=range_,
             allowed=f"equal heights, or differences of at least {SMALLEST:g} mm",
         )
 

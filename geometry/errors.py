@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from enum import Enum
 from typing import Any
 
@@ -98,13 +99,43 @@ class NotWritten(PatchlawError, RuntimeError):
     exit_code = 5
 
 
+class OutOfMemory(PatchlawError, RuntimeError):
+    """The system gave no more memory; what a run had accepted before is in its last checkpoint."""
+
+    exit_code = 5
+
+
 def _shortened(value: Any) -> str:
     """Return what stands for a value in a message: a line, however long the value is."""
+    text = ""
     try:
-        text = repr(value)
-    except Exception:  # of thousands of digits or levels, or of a class that has no text
+        for piece in _pieces(value):
+            text += piece
+            if len(text) > _LONGEST:
+                return f"{text[: _LONGEST - 1]}…"
+    except Exception:  # of thousands of digits, or of a class that has no text
         return f"<{type(value).__name__}>"
-    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
+    return text
+
+
+def _pieces(value: Any) -> Iterator[str]:
+    """Yield the text of a value bit by bit: all of it may be longer than any memory."""
+    if type(value) in (list, tuple):
+        yield "[" if type(value) is list else "("
+        for place, part in enumerate(value):
+            yield ", " if place else ""
+            yield from _pieces(part)
+        yield "]" if type(value) is list else ",)" if len(value) == 1 else ")"
+    elif type(value) is dict:
+        yield "{"
+        for place, (key, part) in enumerate(value.items()):
+            yield ", " if place else ""
+            yield from _pieces(key)
+            yield ": "
+            yield from _pieces(part)
+        yield "}"
+    else:
+        yield repr(value[: _LONGEST + 1] if type(value) in (str, bytes) else value)
 
 
 def _not_converged(what: str, reason: str, iterations: int, remedy: str) -> NotConverged:

@@ -13,9 +13,10 @@ from typing import Any, BinaryIO, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.checks import LARGEST, cell_counts, check_scale, positive_lengths
+from geometry.checks import LARGEST, cell_counts, check_scale, is_level, positive_lengths
 from geometry.errors import InputError
 from geometry.instruments import read_instrument
+from geometry.memory import process_memory
 from geometry.missing import filled
 from geometry.surface import Surface
 
@@ -84,6 +85,9 @@ def read_surface(
                 allowed="finite heights in mm; missing = 'fill' closes gaps by a membrane",
             )
         check_scale(heights)
+        if is_level(heights) and np.ptp(heights) > 0.0:
+            heights = np.full_like(heights, heights.mean())
+            source += ", level but for rounding"
         surface = Surface(heights=heights, lengths=sides, periodic=periodic, source=source)
         if grid is not None and surface.grid != cell_counts(grid, "the grid of the surface"):
             raise InputError(
@@ -145,7 +149,7 @@ def _array_header(stream: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any
 
 
 def _check_memory(needed: float) -> None:
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    memory = process_memory()
     if needed > memory:
         raise InputError(
             f"the heights need about {needed / 1e9:.3g} GB of memory",

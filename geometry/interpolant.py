@@ -7,9 +7,10 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import BivariateSpline, RectBivariateSpline
+from scipy.interpolate import RectBivariateSpline
 from scipy.optimize import minimize
 
+from geometry.blocked_spline import BlockedSpline
 from geometry.errors import InputError
 
 Array = NDArray[np.float64]
@@ -46,8 +47,9 @@ class Interpolant:
         for length, step, count in zip(lengths, self._spacing, heights.shape, strict=True):
             centres.append((np.arange(-padding, count + padding) + 0.5) * step)
             box += [min(0.0, centres[-1][0]), max(length, centres[-1][-1])]
-        self._spline = RectBivariateSpline(*centres, samples, bbox=box, kx=3, ky=3, s=0)
-        self._derivatives: dict[tuple[int, int], BivariateSpline] = {}
+        spline = RectBivariateSpline(*centres, samples, bbox=box, kx=3, ky=3, s=0)
+        self._spline = BlockedSpline(spline)
+        self._derivatives: dict[tuple[int, int], BlockedSpline] = {}
 
     def window(self, corner: tuple[float, float], lengths: tuple[float, float]) -> Self:
         """Return the same spline on a rectangle within, whose lower corner is its origin.
@@ -104,12 +106,12 @@ class Interpolant:
         x_m, y_m, z_m = max(points, key=lambda point: point[2])
         return x_m - self._corner[0], y_m - self._corner[1], z_m + self._lowest
 
-    def _derivative(self, dx: int, dy: int) -> BivariateSpline:
+    def _derivative(self, dx: int, dy: int) -> BlockedSpline:
         """Return a derivative as a spline of its own, made once: evaluation would remake it."""
         if dx == dy == 0:
             return self._spline
         if (dx, dy) not in self._derivatives:
-            self._derivatives[dx, dy] = self._spline.partial_derivative(dx, dy)
+            self._derivatives[dx, dy] = BlockedSpline(self._spline.partial_derivative(dx, dy))
         return self._derivatives[dx, dy]
 
     def _inside(self, coordinate: ArrayLike, axis: int) -> Array:

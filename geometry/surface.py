@@ -9,7 +9,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry.checks import LARGEST, frozen_array, positive_lengths
+from geometry.checks import LARGEST, frozen_array, is_level, positive_lengths
 from geometry.errors import InputError
 from geometry.interpolant import Interpolant
 
@@ -130,7 +130,7 @@ class Surface:
         """Subtract the least-squares polynomial of total degree ``order``.
 
         A plane or a quadratic does not continue periodically, so the result is periodic only for
-        order 0.
+        order 0. What is left of such a surface itself is rounding, and taken for level.
 
         Args:
             order: 0 mean, 1 mean plane, 2 mean quadratic.
@@ -145,6 +145,8 @@ class Surface:
         basis = np.stack([((2 * u - 1) ** i * (2 * v - 1) ** j).ravel() for i, j in powers], axis=1)
         weights, *_ = np.linalg.lstsq(basis, self.heights.ravel(), rcond=None)
         heights = self.heights - (basis @ weights).reshape(self.grid)
+        if is_level(heights, among=self.heights):
+            heights = np.zeros(self.grid)
         return replace(self, heights=heights, periodic=self.periodic and order == 0)
 
     def cropped(

@@ -13,11 +13,11 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NoReturn
 
-from geometry.errors import InputError, NotWritten, PatchlawError
+from geometry.errors import InputError, NotWritten, OutOfMemory, PatchlawError
 from multiscale import commands
 from multiscale.comparing import command as compare_command
 from multiscale.doctor import command as doctor_command
-from multiscale.mpi_job import petsc_leaves_signals, world
+from multiscale.mpi_job import check_address_space, petsc_leaves_signals, world
 from multiscale.reporting import terminal
 from multiscale.reporting.streams import sturdy_streams
 from multiscale.restart.interruption import Ended, ended_by_signals
@@ -74,6 +74,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     """Run one command and return its exit code."""
     petsc_leaves_signals()
     try:
+        check_address_space()
         comm = world()
     except InputError as error:
         terminal.complain(None, error)
@@ -94,6 +95,9 @@ def _run(arguments: Sequence[str] | None) -> int:
         return _ended(comm, 130)
     except Ended as told:
         return _ended(comm, told.exit_code)
+    except MemoryError as error:
+        terminal.complain(None, OutOfMemory(f"memory ran out: {error or 'none is left'}"))
+        return _ended(comm, OutOfMemory.exit_code)
     except Exception:
         if comm is not None:
             time.sleep(min(comm.rank, _MOST_PATIENT))  # of ranks with the same error, one tells it

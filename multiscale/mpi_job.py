@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from geometry.errors import InputError
+from geometry.memory import PROGRAM, address_space
+
+_LEAST_DATA = 0.5e9
+"""Address space that a small run takes beside the program: 64 × 64 heights do with 0.3 GB [B]."""
 
 # what launchers tell every process of the number of processes: Open MPI's mpirun; Hydra (MPICH,
 # Intel MPI) and others that speak PMI; Hydra, of one node; Slurm's srun, inside which the others
@@ -22,6 +29,28 @@ def petsc_leaves_signals() -> None:
     option, given = "-no_signal_handler", os.environ.get("PETSC_OPTIONS", "")
     if option not in given.split():
         os.environ["PETSC_OPTIONS"] = f"{given} {option}".strip()
+
+
+def check_address_space() -> None:
+    """Refuse to start where MPI or the matrix products would not find room for themselves.
+
+    OpenBLAS asks for its buffers at its first product, and for ever where the system has none: let
+    it have them before data fill the address space.
+
+    Raises:
+        InputError: When the limit of the address space is too low.
+    """
+    left = address_space()
+    if left < _LEAST_DATA:
+        raise InputError(
+            "the address space of a process is limited to less than this program needs",
+            key="ulimit -v",
+            value=round((left + PROGRAM) / 1024.0),
+            allowed=f"at least {round((_LEAST_DATA + PROGRAM) / 1024.0)} kB, or unlimited",
+        )
+    if left < math.inf:
+        some = np.ones((512, 512))
+        np.matmul(some, some)
 
 
 def world() -> Any:

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from geometry.memory import address_space
+
 _OWN, _GROUPS = Path("/proc/self/cgroup"), Path("/sys/fs/cgroup")
 
 
@@ -45,11 +47,13 @@ class Nodes:
     Attributes:
         ranks: Ranks on each node.
         memory: Memory of a node, the least of all [B].
+        process: Address space that a process may fill with data, rank 0's for all [B].
         more: Whether a run could have more nodes like these, which a plan supposes.
     """
 
     ranks: tuple[int, ...] = (1,)
     memory: float = field(default_factory=node_memory)
+    process: float = field(default_factory=address_space)
     more: bool = False
 
     def fit(self, need: Need) -> bool:
@@ -60,7 +64,9 @@ class Nodes:
         """
         most = max(self.ranks)
         taken = most * (need.shared / sum(self.ranks) + need.held) + need.once
-        return taken <= self.memory or (self.more and self.enough(need) is not None)
+        of_one = need.shared / sum(self.ranks) + need.held + need.once
+        fits = taken <= self.memory and of_one <= self.process
+        return fits or (self.more and self.enough(need) is not None)
 
     def enough(self, need: Need) -> int | None:
         """Return the least number of nodes like the fullest that there is room on; None if on none.
@@ -68,7 +74,11 @@ class Nodes:
         Args:
             need: What it takes.
         """
-        left = self.memory - max(self.ranks) * need.held - need.once
+        most = max(self.ranks)
+        left = min(
+            self.memory - most * need.held - need.once,
+            most * (self.process - need.held - need.once),
+        )
         return max(math.ceil(need.shared / left), 1) if left > 0.0 else None
 
     def room(self, need: Need) -> str:
@@ -81,11 +91,15 @@ class Nodes:
         text = f"{len(self.ranks)} nodes" if len(self.ranks) > 1 else "one node"
         text += f" of {self.memory / 1e9:.3g} GB"
         text += f" with {most} ranks" if most > 1 else ""
+        if self.process < self.memory:
+            text += f", {max(self.process, 0.0) / 1e9:.3g} GB for a process (ulimit -v)"
         enough = self.enough(need)
         if enough is not None:
             return (
                 f"{text}; {enough} such nodes would do, filled evenly by mpirun over several hosts"
             )
+        if need.once + need.held > self.process:
+            return text
         left = self.memory - need.once - need.shared / len(self.ranks)
         fewer = int(left / need.held) if need.held else 0
         ranks = "1 rank" if fewer == 1 else f"{fewer} ranks"

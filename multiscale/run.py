@@ -28,6 +28,7 @@ from multiscale.couplings.blocks import (
 )
 from multiscale.history import History
 from multiscale.law_tables.law_files import LawTable, read_laws, write_laws
+from multiscale.law_tables.refinement import missed_notes
 from multiscale.law_tables.repair import repair_notes
 from multiscale.load_step import LoadStep
 from multiscale.loading import Coupling, Drive, Position, Restorable
@@ -228,6 +229,7 @@ class Run:
                 f"interpolation error of the laws between their rows: {self.table.force_error:.1e} "
                 f"of the force, {max(errors):.1e} of a patch's pressure or the mean, if more"
             )
+            notes += missed_notes(self.table, self.stage.table_tolerance)
             notes += repair_notes(self.table.laws)
             planned, taken = newton_choice(self.stage), newton_choice(self.stage, self.table)
             if taken.condensed != planned.condensed:

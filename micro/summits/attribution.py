@@ -9,7 +9,6 @@ nearest.
 
 from __future__ import annotations
 
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +18,8 @@ from geometry import Partition
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
+
+_AT_ONCE = 4096  # pairs of contacts and patches, of 60 points each
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 
@@ -62,11 +63,15 @@ def shares(patches: Partition, position: Array, semi_axes: Array, angle: Array) 
     if cut.size:
         contacts = _Cut(patches, position[cut], across[cut], lean[cut])
         spans = (last - first)[cut].max(axis=0) + 1
-        for i, j in product(*map(range, spans)):
-            place = first[cut] + (i, j)
-            on = np.flatnonzero((place <= last[cut]).all(axis=1))
-            force, area = contacts.within(on, place[on])
-            parts.append(Shares(cut[on], place[on] @ stride, force, area))
+        for i in range(spans[0]):  # a column of patches at once: large contacts reach many
+            rows = np.arange(spans[1])[:, None]
+            inside = (first[cut, 0] + i <= last[cut, 0]) & (first[cut, 1] + rows <= last[cut, 1])
+            row, on = np.nonzero(inside)
+            place = first[cut[on]] + np.stack([np.full_like(row, i), row], axis=1)
+            for part in range(0, len(on), _AT_ONCE):
+                some = slice(part, part + _AT_ONCE)
+                force, area = contacts.within(on[some], place[some])
+                parts.append(Shares(cut[on[some]], place[some] @ stride, force, area))
     return _normed(Shares(*map(np.concatenate, zip(*parts, strict=True))), len(position))
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from multiscale.law_tables.law_files import LawTable
 from multiscale.law_tables.patch_laws import PatchLaws
 from multiscale.law_tables.tangent import Tangent
 from multiscale.laws import LawPoint, PatchLaw
@@ -162,6 +163,22 @@ def refined(
         replace(law, interpolation_error=float(error), stiffness_error=float(stiffness))
         for law, error, stiffness in zip(laws, *largest, strict=True)
     ], float(errors.force.max())
+
+
+def missed_notes(table: LawTable, tolerance: float) -> Iterator[str]:
+    """Yield a note where the most rows that are solved leave a larger error than was asked for.
+
+    Args:
+        table: The laws.
+        tolerance: Error of the force that was asked for.
+    """
+    largest = max(law.interpolation_error for law in table.laws)
+    reached = max(table.force_error, largest / PATCH_FACTOR)
+    if reached > tolerance:
+        yield (
+            f"the laws miss coupling.table_tolerance = {tolerance:g} with all the rows that are "
+            f"solved at most; what they reach is a tolerance of {reached:.1e}"
+        )
 
 
 def law_of(rows: Array, touch: float, reach: float) -> PatchLaw:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from geometry.errors import InputError
 MOST_BYTES = 64 * 1024
 """Size of the largest scene file [B]; a scene with every key takes 2 kB."""
 
+_OF_NUMBER = re.compile(r"[0-9]\.[0-9]+(?!\.)")
 _DEEPEST = 100  # sections within sections
 
 
@@ -88,9 +90,16 @@ def parsed(text: str) -> dict[str, Any]:
     Raises:
         ValueError: When it is no TOML, or nested deeper than anything sensible.
     """
-    if any(line.count(".") > 10 * _DEEPEST for line in text.splitlines()):
-        raise ValueError("a line with more dots than any scene has")
+    if any(_dots(line) > _DEEPEST for line in text.split("\n")):
+        raise ValueError("a line with more dots than any scene has")  # they take hours to parse
     try:
         return tomllib.loads(text)
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
+
+
+def _dots(line: str) -> int:
+    """Count the dots of a line that may part keys, not those of numbers or comments."""
+    if line.lstrip().startswith("#"):
+        return 0
+    return line.count(".") - len(_OF_NUMBER.findall(line))

@@ -22,11 +22,13 @@ sys.path[:0] = [str(ROOT / "tests" / "unit" / name) for name in ("geometry", "mu
 import command_words  # noqa: E402
 import compared_inputs  # noqa: E402
 import height_files  # noqa: E402
+import mutated_scenes  # noqa: E402
 import scene_inputs  # noqa: E402
+import shell_lines  # noqa: E402
 import stored_inputs  # noqa: E402
 
-LONGEST = 10  # seconds of the processor for one input
-LONGEST_WAIT = 90  # seconds on the clock, for one that waits; the machine may be busy
+LONGEST = 30  # seconds of the processor for one input
+LONGEST_WAIT = 120  # seconds on the clock, for one that waits; the machine may be busy
 MOST_MEMORY = 6 << 30  # bytes of address space
 
 
@@ -53,7 +55,7 @@ def doors(folder):
         "scenes, planned",
         scene_inputs.scenes(),
         lambda data: scene_inputs.planned(write(scene, text(data))),
-        0.3,
+        0.2,
     )
     yield (
         "scenes, run",
@@ -65,7 +67,25 @@ def doors(folder):
         "scene files damaged",
         scene_inputs.damaged(),
         lambda content: scene_inputs.planned(write(scene, content)),
+        0.1,
+    )
+    yield (
+        "stored scenes mutated",
+        mutated_scenes.mutated,
+        lambda text: scene_inputs.planned(write(scene, text.encode("utf-8", "surrogatepass"))),
         0.15,
+    )
+    yield (
+        "surfaces of any kind, run",
+        mutated_scenes.surfaces(),
+        lambda drawn: on_heights(folder, *drawn),
+        0.08,
+    )
+    yield (
+        "shells",
+        shell_lines.lines,
+        lambda line: shell_lines.called(write(scene, set_), line),
+        0.02,
     )
     yield (
         "words of --set",
@@ -77,7 +97,7 @@ def doors(folder):
         "files of heights",
         st.tuples(height_files.anything, height_files.sides),
         lambda drawn: height_files.read(write(folder / f"h{drawn[0][0]}", drawn[0][1]), drawn[1]),
-        0.2,
+        0.15,
     )
     yield (
         "comparisons",
@@ -102,6 +122,15 @@ def doors(folder):
             ),
             0.05,
         )
+
+
+def on_heights(folder, heights, data):
+    """Run a scene on heights of its own."""
+    np.save(folder / "heights.npy", heights)
+    data = scene_inputs.put(data, "surface.file", "heights.npy")
+    path = folder / "scene.toml"
+    path.write_bytes(scene_inputs.toml(data).encode())
+    return scene_inputs.ran(path)
 
 
 def campaign(strategy, attempt, count, number):
@@ -139,13 +168,14 @@ def campaign(strategy, attempt, count, number):
 def main():
     """Run the campaign and print a line for every kind of input."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--inputs", type=int, default=6000)
+    parser.add_argument("--inputs", type=int, default=10000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", help="one kind of input, by the begin of its name")
     choice = parser.parse_args()
     os.environ["PATCHLAW_CACHE"] = "off"
     resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
     warnings.simplefilter("error", RuntimeWarning)
+    np.set_printoptions(threshold=20, edgeitems=2)
 
     def late(*_):
         raise Hang

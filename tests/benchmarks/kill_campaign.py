@@ -1,4 +1,4 @@
-"""Kills runs of all couplings at random moments, resumes them and compares; see ``--help``."""
+"""Kills runs of all couplings at random moments, or tells them to stop, resumes and compares."""
 
 import argparse
 import os

@@ -12,7 +12,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "demos" / "refusals.md"
 PACKAGES = ("geometry", "micro", "macro", "multiscale")
-CODES = {"InputError": 2, "NotConverged": 3, "Stopped": 4, "NotWritten": 5}
+CODES = {"InputError": 2, "NotConverged": 3, "Stopped": 4, "NotWritten": 5, "OutOfMemory": 5}
 OF_A_SCENE = {"quantities.py", "sections.py", "scene.py", "scene_files.py"}  # by way of pydantic
 GAP = "…"  # stands for what depends on the case
 
@@ -186,9 +186,10 @@ The load steps up to there are written, and the last of them can be gone on from
 was told to stop in time (`--max-time`, SIGUSR1), with 129 what SIGHUP, with 130 what SIGINT and
 with 143 what SIGTERM stopped.
 """,
-    5: """## 5: a file cannot be written
+    5: """## 5: the system refuses
 
-Nothing half-written stands under its name, and the load steps up to there are in the checkpoint.
+A file or the output cannot be written, or memory ran out. Nothing half-written stands under its
+name, and the load steps up to there are in the checkpoint.
 """,
 }
 INTRO = """# Everything that patchlaw refuses

@@ -36,6 +36,7 @@ SCENES = {
         "load.approach=['8 um', '3 um']", "load.steps=150",
     ],
 }  # fmt: skip
+SIGNALS = (signal.SIGKILL, signal.SIGKILL, signal.SIGTERM, signal.SIGHUP)
 UNCOMPARED = {"newton_iterations", "linear_iterations", "wall_s", "reason"}
 
 
@@ -74,16 +75,21 @@ class Runs:
             ["multiscale.cli", "multiscale.reporting.report", "scipy.fft"]
         )
 
-    def forked(self, words, log, over):
-        """Run in a forked process until `over` tells; return the exit code, None when killed."""
+    def forked(self, words, log, over, number=signal.SIGKILL):
+        """Run in a forked process until `over` tells; return the exit code, None when killed.
+
+        A signal that can be watched for stops a run after its load step, or ends it at once.
+        """
         process = self.forks.Process(target=enter, args=(words, str(log), str(self.root)))
         process.start()
         while process.is_alive() and not over():
             process.join(0.005)
         if process.is_alive():
-            process.kill()
+            os.kill(process.pid, number)
             process.join()
-            return None
+            if process.exitcode != 0:  # else it had just come to its end
+                assert process.exitcode in (-number, 128 + number), log.read_text()
+                return None
         return process.exitcode
 
     def on_two_ranks(self, words, log, over):
@@ -193,8 +199,10 @@ def campaign(runs, scene, kills, folder, *, seed, every=2):
         else:
             over = after(dice.uniform(0.0, 0.2 * lasts), out / "checkpoint.journal")
         sessions += 1
-        start = runs.on_two_ranks if sessions % every == 0 else runs.forked
-        code = start(words_of(out, scene, *words), log, over)
+        if sessions % every == 0:
+            code = runs.on_two_ranks(words_of(out, scene, *words), log, over)
+        else:
+            code = runs.forked(words_of(out, scene, *words), log, over, dice.choice(SIGNALS))
         shown = log.read_text()
         resumed += "goes on after load step" in shown and "after load step 0" not in shown
         if code is None:

@@ -48,3 +48,35 @@ class Odd:
 )
 def test_values_without_a_text_are_named_by_their_type(value):
     assert str(InputError("is wrong", value=value)) == f"<{type(value).__name__}>: is wrong"
+
+
+class Counted:
+    """Says how often it was asked for its text."""
+
+    asked = 0
+
+    def __repr__(self):
+        Counted.asked += 1
+        return "1"
+
+
+def test_no_more_is_made_of_a_text_than_is_shown():
+    value = Counted()
+    for _ in range(60):  # 2^60 parts
+        value = [value, value]
+    text = str(InputError("is wrong", value=value))
+    assert text.startswith("[[[[") and text.endswith("…: is wrong") and Counted.asked < 300
+
+
+@pytest.mark.parametrize(
+    "value",
+    [[], (), {}, [1, "a"], (1,), (1, 2), {"a": [1, {"b": 2.5}], 3: ()}, "it's", b"\xff", None],
+)
+def test_short_values_are_shown_as_python_does(value):
+    assert str(InputError("is wrong", value=value)) == f"{value!r}: is wrong"
+
+
+def test_values_within_themselves_are_shown():
+    value = []
+    value.append(value)
+    assert str(InputError("is wrong", value=value)).startswith("[[[[")

@@ -175,3 +175,11 @@ def test_heights_below_any_scale_are_refused(tmp_path):
         InputError, match=r"h.npy: [0-9.]*e-110: the heights differ by less than any"
     ):
         read_surface(tmp_path / "h.npy", lengths=SIDES)
+
+
+def test_rounding_is_no_roughness(tmp_path):
+    np.save(tmp_path / "h.npy", 1.0 + 1e-15 * HEIGHTS)
+    surface = read_surface(tmp_path / "h.npy", lengths=SIDES)
+    assert np.ptp(surface.heights) == 0.0 and surface.source.endswith(", level but for rounding")
+    np.save(tmp_path / "h.npy", 1.0 + 1e-13 * HEIGHTS)
+    assert np.ptp(read_surface(tmp_path / "h.npy", lengths=SIDES).heights) > 1e-13

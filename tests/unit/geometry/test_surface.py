@@ -206,3 +206,13 @@ def test_a_surface_survives_pickling():
     copy = pickle.loads(pickle.dumps(surface))
     np.testing.assert_array_equal(copy.heights, surface.heights)
     assert copy.highest == highest and copy.lengths == surface.lengths
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e9])
+def test_rounding_is_no_roughness(order, size):
+    x, y = np.meshgrid(np.linspace(0.0, 1.0, 9), np.linspace(0.0, 1.0, 7), indexing="ij")
+    plane = Surface(heights=size * (1.0 + 0.3 * x - 0.7 * y), lengths=(1.0, 1.0))
+    assert not plane.detrended(order).heights.any()
+    rough = Surface(heights=plane.heights + 1e-9 * size * np.cos(9 * x), lengths=(1.0, 1.0))
+    assert rough.detrended(order).heights.any()

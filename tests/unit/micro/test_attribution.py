@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 from geometry import PatchGrid
+from micro.summits import attribution
 from micro.summits.attribution import shares
 
 GRID = PatchGrid(grid=(4, 5), lengths=(1.0, 1.2))
@@ -120,3 +121,20 @@ def test_what_lies_outside_counts_for_the_nearest_patch():
 
 def test_no_contact_has_no_share():
     assert len(shares(GRID, np.empty((0, 2)), np.empty((0, 2)), np.empty(0)).contact) == 0
+
+
+def test_large_contacts_are_shared_a_column_of_patches_at_once(monkeypatch):
+    """Laws of contacts larger than the surface took 26 s of calls for one patch each."""
+    sizes = []
+    within = attribution._Cut.within
+
+    def counted(self, on, place):
+        sizes.append(len(on))
+        return within(self, on, place)
+
+    monkeypatch.setattr(attribution._Cut, "within", counted)
+    patches = PatchGrid(grid=(16, 16), lengths=(1.0, 1.2))
+    position, _, angle = _random_contacts(300)
+    force, area = _table(position, np.full((300, 2), [9.0, 5.0]), angle, patches)
+    np.testing.assert_allclose([force.sum(axis=1), area.sum(axis=1)], 1.0, rtol=1e-12)
+    assert sum(sizes) == 300 * 256 and max(sizes) == attribution._AT_ONCE and len(sizes) == 32

@@ -49,10 +49,7 @@ def called(scene, words):
     words = [str(scene) if word == SCENE else word for word in words]
     told = StringIO()
     with chdir(scene.parent), redirect_stdout(StringIO()), redirect_stderr(told):
-        try:
-            code = main(words)
-        except SystemExit as ended:  # --help
-            code = ended.code
+        code = main(words)
     assert code in (0, 2, 3, 4, 5), (words, code, told.getvalue())
     shown = told.getvalue()
     assert "Traceback" not in shown

@@ -10,7 +10,7 @@ from scene_inputs import BASE, KEYS, damaged, odd_text, planned, put, ran, scene
 
 from geometry.errors import InputError
 from multiscale.scene import Scene
-from multiscale.scenes.scene_files import MOST_BYTES
+from multiscale.scenes.scene_files import MOST_BYTES, parsed
 from multiscale.staging import make_stage
 
 few = settings(
@@ -181,3 +181,23 @@ def test_override_of_endless_sections(tmp_path):
     path.write_text(toml(BASE), encoding="utf-8")
     with pytest.raises(InputError, match="is not an override"):
         Scene.load(path, ["a." * 5000 + "b=1"])
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        ".".join(["a"] * 500) + " = 1",
+        "[" + ".".join(["a"] * 200) + "]",
+        "x = {" + ".".join(["1"] * 200) + " = 1}",
+    ],
+)
+def test_deep_keys_are_refused_before_they_are_parsed(monkeypatch, line):
+    """Thirty such lines took the parser of TOML more than eight minutes."""
+    monkeypatch.setattr("multiscale.scenes.scene_files.tomllib.loads", None)
+    with pytest.raises(ValueError, match="a line with more dots than any scene has"):
+        parsed(line)
+
+
+def test_dots_of_numbers_and_comments_are_no_keys():
+    text = "# " + 500 * "." + "\nx = [" + ", ".join(["0.25"] * 300) + "]\na.b.c = 1.5"
+    assert parsed(text) == {"x": [0.25] * 300, "a": {"b": {"c": 1.5}}}

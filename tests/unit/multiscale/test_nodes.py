@@ -1,14 +1,18 @@
 """What ranks share is divided over nodes, what every rank holds is counted for all on a node."""
 
 import re
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 
 from geometry.errors import InputError
 from multiscale import Scene, make_stage, nodes
+from multiscale.cli import main
 from multiscale.nodes import Need, Nodes, group_memory, node_memory, nodes_of
 from multiscale.planning.room import shortages
 from multiscale.stage_checks import check_size, needs
@@ -186,3 +190,50 @@ def test_control_groups_limit_a_node(monkeypatch, tmp_path, group, folder, names
     monkeypatch.setattr(nodes, "_OWN", tmp_path / "nowhere")
     assert list(group_memory()) == []
     assert node_memory() > 1e8
+
+
+def test_limit_of_a_process_counts():
+    limited = replace(of(2, ranks=4), process=4 * GB)
+    assert limited.fit(Need(shared=31 * GB)) and not limited.fit(Need(shared=33 * GB))
+    assert limited.fit(Need(once=3.9 * GB)) and not limited.fit(Need(once=4.1 * GB))
+    assert limited.enough(Need(shared=33 * GB)) == 3 and limited.enough(Need(held=4.1 * GB)) is None
+    text = "2 nodes of 64 GB with 4 ranks, 4 GB for a process (ulimit -v)"
+    assert limited.room(Need(held=4.1 * GB)) == text
+
+
+LIMITED = """
+import resource, sys
+from multiscale.cli import main
+resource.setrlimit(resource.RLIMIT_AS, (int(sys.argv[1]) << 20, resource.RLIM_INFINITY))
+sys.exit(main(sys.argv[2:]))
+"""
+
+
+@pytest.mark.parametrize(
+    ("megabytes", "text"),
+    [
+        (900, "ulimit -v = 921600: the address space of a process is limited to less than"),
+        (2000, r"of memory (allowed: what fits into one node of .* GB, 1.1 GB for a process"),
+    ],
+)
+def test_address_space(root, megabytes, text):
+    """OpenBLAS asked for its buffers for ever where there was none left."""
+    words = ["plan", str(PAPER), "--set", "surface.grid=[3400, 3400]"]
+    done = subprocess.run(
+        [sys.executable, "-c", LIMITED, str(megabytes), *words],
+        cwd=root,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert re.search(text.replace("(", r"\("), done.stderr), done.stderr
+
+
+def test_memory_that_runs_out_ends_with_5(capsys, monkeypatch):
+    def hungry(*given):
+        np.empty(1 << 50)
+
+    monkeypatch.setattr("multiscale.commands.print_schema", hungry)
+    assert main(["schema"]) == 5
+    assert "patchlaw: memory ran out: Unable to allocate 8.00 PiB" in capsys.readouterr().err

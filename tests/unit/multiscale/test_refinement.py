@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from multiscale import Run, Scene
 from multiscale.law_tables.refinement import Errors, law_of, refined
 
 STIFFNESS = 4e3
@@ -119,3 +120,25 @@ def test_nothing_to_refine_without_contact():
     )
     assert error == 0.0
     assert all(law.is_open and law.interpolation_error == 0.0 for law in some)
+
+
+@pytest.mark.parametrize(("tolerance", "missed"), [(1e-9, True), (1e-2, False)])
+def test_tolerance_that_is_missed_is_said(tolerance, missed):
+    spectrum = {"hurst": 0.8, "waves": [2, 5], "rms_slope": 0.2, "seed": 1}
+    run = Run(
+        Scene.from_dict(
+            {
+                "surface": {"spectrum": spectrum, "grid": [16, 16], "lengths": [1.0, 1.0]},
+                "block": {"young_modulus": 4000.0, "poisson_ratio": 0.3, "cells": [4, 4, 4]},
+                "patches": {"grid": [2, 2]},
+                "micro": {"model": "elliptic"},
+                "coupling": {"table_tolerance": tolerance},
+                "load": {"approach": 0.01, "steps": 1},
+            }
+        )
+    )
+    run.make_laws()
+    said = [
+        note for note in run.history().notes if "the laws miss coupling.table_tolerance" in note
+    ]
+    assert len(said) == missed
