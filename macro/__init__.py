@@ -3,11 +3,13 @@
 BlockShape → block_mesh → Block (with a Material) → Interface (with a PatchGrid)
 → PressedBlock (with one ContactLaw per patch) → PressState for every load step.
 
-`make_correction` gives what a finite block adds to the half-space; rough_block_mesh → Block
+`face_compliance` gives the compliance of the block's top in few smooth modes, `make_correction`
+what a finite block adds to the half-space; rough_block_mesh → Block
 → ObstacleBlock meshes the roughness itself, as a reference.
 """
 
 from macro.block import Block
+from macro.body.face_compliance import FaceCompliance, cached_face_compliance, face_compliance
 from macro.compliance import plain_compliance
 from macro.condense import HalfSpaceField, make_correction
 from macro.correction import Correction, Sag
@@ -28,6 +30,7 @@ __all__ = [
     "BlockMesh",
     "ContactLaw",
     "Correction",
+    "FaceCompliance",
     "HalfSpaceField",
     "Interface",
     "Material",
@@ -39,7 +42,9 @@ __all__ = [
     "Sag",
     "block_mesh",
     "cached_correction",
+    "cached_face_compliance",
     "correction_is_kept",
+    "face_compliance",
     "make_correction",
     "plain_compliance",
     "rough_block_mesh",

@@ -13,6 +13,10 @@ from micro.boussinesq import HalfSpace
 from micro.cells.contacts import Contacts, find_contacts
 from micro.cells.free_sides import FreeSides
 from micro.cells.half_space_state import HalfSpaceState
+from micro.compliance.body_modes import BodyModes
+from micro.compliance.half_space_modes import half_space_modes
+from micro.compliance.side_modes import side_modes
+from micro.compliance.side_patches import side_patches
 from micro.ellipse import (
     area_factor,
     axis_factor,
@@ -45,6 +49,7 @@ __all__ = [
     "SOLVERS",
     "AsperityModel",
     "AsperityState",
+    "BodyModes",
     "Candidate",
     "Choice",
     "Contacts",
@@ -73,6 +78,7 @@ __all__ = [
     "find_contacts",
     "finite_slope_effect",
     "force_factor",
+    "half_space_modes",
     "influence_matrix",
     "love_centre",
     "love_integral",
@@ -81,4 +87,6 @@ __all__ = [
     "micro_model",
     "mutual_influence",
     "resampled",
+    "side_modes",
+    "side_patches",
 ]
