@@ -59,13 +59,14 @@ def test_known_sides_leave_the_same_whole(count):
     np.testing.assert_allclose(one, one.T, atol=1e-12)
 
 
-@pytest.mark.parametrize(("height", "miss"), [(0.1, 5e-4), (1.0, 1e-3), (10.0, 1e-3)])
+@pytest.mark.parametrize(("height", "miss"), [(0.1, 3e-3), (1.0, 6e-4), (10.0, 8e-4)])
 def test_modes_of_a_shape_resolve_points(height, miss):
-    """What a fine contact of 0.02 mm feels of the body changes little with more modes."""
+    """Beside the own compliance of a contact of radius 0.02 mm more modes change little."""
     shape = BlockShape(interface=(1.0, 1.0), height=height, cells=(1, 1, 1))
     block = body(shape)
     places = np.array([0.5, 0.31, 0.02, 0.5, 0.9]), np.array([0.5, 0.44, 0.5, 0.97, 0.85])
     usual = block.term(block.face(COMM)).between(*places)
     more = block.term(block.face(COMM, modes=block.modes + 5)).between(*places)
     own = 1.0 / (2.0 * 0.02 * block.material.contact_modulus)
-    assert np.abs(usual - more).max() < miss * 20 * own * 0.05 / 0.02
+    # 0.16, 0.03 and 0.04 %
+    assert np.abs(usual - more).max() < miss * own

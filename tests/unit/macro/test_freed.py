@@ -15,6 +15,7 @@ from macro import (
     block_mesh,
     compat,
     condense,
+    face_compliance,
     plain_compliance,
     rough_block_mesh,
 )
@@ -100,3 +101,9 @@ def test_a_correction_keeps_no_factors(kept, monkeypatch):
     )
     assert np.all(np.isfinite(made.values))
     assert kept(PETSc.Comm(meshes[0].comm)) == 0
+
+
+def test_a_compliance_in_modes_keeps_no_factors(kept):
+    found = face_compliance((1.0, 1.0), 1.0, MATERIAL, "free", 3, MPI.COMM_SELF)
+    assert np.all(np.isfinite(found.normal))
+    assert kept(PETSc.COMM_SELF) == 0

@@ -1,0 +1,53 @@
+"""Make a block's compliance in modes on all ranks, print it as JSON; for test_body_ranks.py."""
+
+import json
+import sys
+
+import numpy as np
+from mpi4py import MPI
+
+from macro import Material, cached_face_compliance, face_compliance
+from macro.body import face_compliance as module
+
+COMM = MPI.COMM_WORLD
+MATERIAL = Material(young_modulus=1.0, poisson_ratio=0.3)
+BLOCKS = {
+    "square": ((1.0, 1.0), 0.7, 4),
+    "oblong": ((1.0, 1.2), 0.7, 3),
+    "mean": ((1.0, 1.0), 0.7, 1),
+}
+
+
+def made(make, lengths, height, count):
+    """Return both parts, after all ranks were found to have the very same ones."""
+    found = make(lengths, height, MATERIAL, "free", count, COMM)
+    both = np.concatenate([found.normal[None], found.tangential])
+    assert all((both == other).all() for other in COMM.allgather(both)), "ranks disagree"
+    return both.tolist()
+
+
+def failed():
+    """Return the error that every rank meets when the last one has no memory."""
+    solve = module.Quarter.displacements
+
+    def displacements(quarter, count):
+        if COMM.rank == COMM.size - 1:
+            raise MemoryError("no room")
+        return solve(quarter, count)
+
+    module.Quarter.displacements = displacements
+    try:
+        face_compliance((1.0, 1.0), 1.0, MATERIAL, "free", 2, COMM)
+        found = "none"
+    except MemoryError as error:
+        found = str(error)
+    return COMM.allgather(found)
+
+
+if __name__ == "__main__":
+    result = {name: made(face_compliance, *block) for name, block in BLOCKS.items()}
+    result["kept, first"] = made(cached_face_compliance, *BLOCKS["square"])
+    result["kept, again"] = made(cached_face_compliance, *BLOCKS["square"])
+    errors = failed()
+    if COMM.rank == 0:
+        sys.stdout.write(json.dumps({"values": result, "errors": errors}) + "\n")
