@@ -73,8 +73,10 @@ class IslandSums:
 
     def _homes(self, settled: Settled) -> NDArray[np.intp]:
         """Return the patch with the highest peak of each island, shape (m,)."""
-        top = settled.islands.top
-        return self.patches.index_of(self.relief.x[top], self.relief.y[top])
+        peaks = np.flatnonzero(settled.islands.member >= 0)
+        owner = np.zeros(len(self.relief), dtype=np.intp)
+        owner[peaks] = self.patches.index_of(self.relief.x[peaks], self.relief.y[peaks])
+        return owner[settled.islands.top]
 
     def _shares(self, settled: Settled) -> tuple[Array, Array]:
         """Return the shares of each patch in the force and in the area of each island, (m, N).

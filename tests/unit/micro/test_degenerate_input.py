@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from geometry import (
+    Control,
     InputError,
     PatchGrid,
     Spectrum,
@@ -20,7 +21,6 @@ from micro import (
     AsperityModel,
     HalfSpaceModel,
     IslandModel,
-    RigidPlane,
     ScaledModel,
     asperity_model,
 )
@@ -174,9 +174,9 @@ def test_models_of_summits_say_where_they_end(surface):
         assert few.contact_area_fraction[0] < 0.01 and few.warnings == ()
         assert many.contact_area_fraction[0] > 0.1 and len(many.warnings) == 1
         assert "stands for up to" in many.warnings[0]
-        plane = RigidPlane.above(surface, float(many.approach[0]), (0.0, 0.0))
+        control = Control(approach=float(many.approach[0]))
         means = patch_means(surface, PATCHES)
-        pressed = model.press(plane, patches=PATCHES, mean_heights=means).response
+        pressed = model.press(control, patches=PATCHES, mean_heights=means).response
         assert pressed.warnings == many.warnings
 
 

@@ -145,7 +145,8 @@ def test_refuses(surface, model):
 def test_passes_that_never_settle_are_an_error(model, monkeypatch):
     monkeypatch.setattr(island_passes, "_MOST_PASSES", 0)
     message = (
-        "^the passes between islands and their displacements at height .* mm did not converge: "
+        "^the passes between islands and their displacements at an approach of .* mm did not "
+        "converge: "
         r'MAX_ITERATIONS after 0 iterations; .*micro\.model = "half-space"'
     )
     with pytest.raises(NotConverged, match=message):
