@@ -84,7 +84,8 @@ class AsperityModel:
         solver: Solver of the models with interaction, a name in `SOLVERS`.
         pairs: How to sum over pairs, a name in `PAIR_SUMS`, or ``"auto"`` by their number.
         body: What a finite body with its sides adds to the half-space, between all contacts, also
-            those of the models without interaction; a half-space when not given.
+            those of the models without interaction; a half-space when not given. On thin blocks it
+            takes away from the interaction: models without any may then have no solution.
 
     Raises:
         InputError: When the modulus is not positive, the solver or the sum unknown, or the

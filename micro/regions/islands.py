@@ -172,6 +172,10 @@ class IslandModel:
             approach = control.approach
         turned = control.tilt or (_LEVEL if near is None else near.tilt)
         plane = RigidPlane.above(self.surface, approach, turned)
+        if not self._is_kept and (control.force or control.tilt is None):
+            # every peak is known, but not what lies below a floor: first where the plane may come
+            peaks = self._peaks(self._relief(plane), plane)
+            plane = self._deeper(self._plane(peaks.first_plane(control, near)))
         for _ in range(_MOST_CUTS):
             found = self._settled(self._relief(plane), plane, control, near)
             turn = np.hypot(*np.subtract(found.plane.tilt, plane.tilt)) * 0.5
@@ -180,8 +184,26 @@ class IslandModel:
             if turn * np.hypot(*self.surface.lengths) <= _TURN * deepest and reached:
                 break
             near = found.plane
-            plane = replace(near, approach=_MARGIN * near.approach)
+            plane = self._deeper(near)
         return found
+
+    def _plane(self, motion: Array) -> RigidPlane:
+        approach, *tilt = map(float, motion)
+        return RigidPlane.above(self.surface, approach, (tilt[0], tilt[1]))
+
+    def _deeper(self, plane: RigidPlane) -> RigidPlane:
+        return replace(plane, approach=plane.approach + (_MARGIN - 1.0) * abs(plane.approach))
+
+    def _peaks(self, relief: Relief, leant: RigidPlane) -> Peaks:
+        """Return the peaks of catchments under the slopes of a plane."""
+        middle, half = 0.5 * np.asarray(self.surface.lengths), 0.5 * np.hypot(*self.surface.lengths)
+        lever = np.stack([np.ones(len(relief)), relief.x - middle[0], relief.y - middle[1]], axis=1)
+        return Peaks(
+            lever=lever,
+            below=self.datum - relief.z + lever[:, 1:] @ leant.tilt,
+            force=lambda over: self.contact_modulus * total_force(relief, over),
+            half=half,
+        )
 
     def _settled(
         self,
@@ -191,17 +213,9 @@ class IslandModel:
         near: RigidPlane | None = None,
     ) -> _Cut:
         """Solve on catchments under the slopes of one plane, for another."""
-        middle, half = 0.5 * np.asarray(self.surface.lengths), 0.5 * np.hypot(*self.surface.lengths)
-        lever = np.stack([np.ones(len(relief)), relief.x - middle[0], relief.y - middle[1]], axis=1)
-        lean = np.array([0.0, *leant.tilt])
-        peaks = Peaks(
-            lever=lever,
-            below=self.datum - relief.z + lever @ lean,
-            force=lambda over: self.contact_modulus * total_force(relief, over),
-            half=half,
-        )
+        peaks = self._peaks(relief, leant)
         motion = peaks.first_plane(control, near)
-        level = self.datum - motion[0] - lever @ (motion * [0.0, 1.0, 1.0] - lean)
+        level = self.datum - motion[0] - peaks.lever[:, 1:] @ (motion[1:] - leant.tilt)
         body = None
         if self.body is not None:
             body = BodyPoints.at(self.body, relief.x, relief.y, self.contact_modulus)
@@ -215,9 +229,7 @@ class IslandModel:
             body=body,
         )
         settled = settle(relief, level, motion, contact.answer)
-        approach, *tilt = map(float, settled.motion)
-        plane = RigidPlane.above(self.surface, approach, (tilt[0], tilt[1]))
-        return _Cut(relief, plane, settled)
+        return _Cut(relief, self._plane(settled.motion), settled)
 
     def _row(self, found: _Cut, patches: Partition, means: Array) -> dict[str, Any]:
         sums = IslandSums(

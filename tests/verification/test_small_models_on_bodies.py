@@ -73,7 +73,7 @@ def test_keeps_the_error_it_has_on_a_half_space(bodies, name, options):
     for given in ({"approach": 4e-3}, {"approach": APPROACH}):
         force = press(model, **given).response.force[0]
         expected = press(reference, **given).response.force[0]
-        # measured: 0.5 to 4 % on the cube and the column, up to 6.3 % on the pancake
+        # beyond that, measured: 1.2 % on the cube, 4.5 % on the pancake, nothing on the column
         assert force / expected == pytest.approx(1.0, abs=abs(known - 1.0) + 0.05)
 
 

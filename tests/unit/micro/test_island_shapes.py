@@ -48,15 +48,15 @@ def test_merged_caps_add_volume():
     assert abs(np.sin(one.angle[0])) < 1e-2
 
 
-def test_lift_leaves_out_the_own_island():
+def test_displacements_leave_out_the_own_island():
     relief = Relief.of(bumps((0.3, 0.5, 0.0, 0.2, 0.2, 0.0), (0.7, 0.5, 0.0, 0.2, 0.2, 0.0)))
     height = np.where(relief.z > -1e-6, 2e-3, -1.0)
     found = islands(relief, height, np.arange(len(relief)))
     lift = (found.kernel(relief.x, relief.y) @ found.force)[height > 0.0]
     assert lift == pytest.approx(found.force / (np.pi * 0.4), rel=1e-4)
     # At its own centre an island displaces by its depth, no more.
-    middle = np.full(len(relief), found.x[0]), np.full(len(relief), found.y[0])
-    alone = found.kernel(*middle) @ found.force
+    x, y = (np.full(len(relief), place) for place in (found.x[0], found.y[0]))
+    alone = found.kernel(x, y) @ found.force
     other = np.flatnonzero((height > 0.0) & (found.member == 1))
     beyond = alone[other][0]
     assert beyond == pytest.approx(found.depth[0], rel=1e-12)
@@ -65,4 +65,15 @@ def test_lift_leaves_out_the_own_island():
 def test_nothing_above():
     relief = Relief.of(bumps((0.5, 0.5, 0.0, 0.2, 0.2, 0.0)))
     found = islands(relief, np.full(len(relief), -1.0), np.zeros(len(relief), dtype=int))
-    assert len(found) == 0 and found.kernel(relief.x, relief.y).shape == (len(relief), 0)
+    assert len(found) == 0
+    assert found.kernel(relief.x, relief.y).shape == (len(relief), 0)
+
+
+def test_same_shapes_at_other_depths_carry_by_hertz():
+    relief = Relief.of(bumps((0.3, 0.5, 0.0, 0.2, 0.2, 0.0), (0.7, 0.5, 0.0, 0.2, 0.2, 0.0)))
+    height = np.where(relief.z > -1e-6, 2e-3, -1.0)
+    found = islands(relief, height, np.arange(len(relief)))
+    deeper = found.under(4.0 * found.depth)
+    assert deeper.force == pytest.approx(8.0 * found.force, rel=1e-14)
+    assert deeper.semi_axes == pytest.approx(2.0 * found.semi_axes, rel=1e-14)
+    np.testing.assert_array_equal(found.depth[found.member[found.top]], height[found.top])

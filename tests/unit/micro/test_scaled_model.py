@@ -208,14 +208,21 @@ def test_refuses(surface):
 @pytest.mark.parametrize("make", [scaled, lambda s: IslandModel(surface=s, contact_modulus=E_STAR)])
 def test_large_surfaces_keep_less_but_find_the_same(surface, make, monkeypatch):
     """Beyond so many samples only those that a plane can reach are sorted, anew for every plane."""
-    lean = Control(approach=1e-4, tilt=(1e-3, 0.0))
+    steps = [
+        Control(approach=1e-4, tilt=(1e-3, 0.0)),
+        Control(force=0.5),
+        Control(force=0.5, tilt=(1e-3, 0.0)),
+        Control(force=0.5, tilt=None),
+    ]
     means = patch_means(surface, PATCHES)
 
     def found():
         model = make(surface)
         forces = [respond(model, [d]).force[0] for d in (-1e-3, 0.0, 1e-7, 1e-4, 4e-3)]
-        pressed = model.press(lean, patches=PATCHES, mean_heights=means).response
-        return model.first_touch, [*forces, pressed.force[0]]
+        for control in steps:
+            pressed = model.press(control, patches=PATCHES, mean_heights=means)
+            forces += [pressed.response.force[0], pressed.plane.approach]
+        return model.first_touch, forces
 
     touch, all_kept = found()
     for module in (scaled_model, islands):
