@@ -37,7 +37,7 @@ BORDERS = ("ignore", "include")
 """What becomes of maxima on the border of the surface; the paper ignores them."""
 
 _LEVEL = (0.0, 0.0)
-_TOLERANCE = 1e-6
+_TOLERANCE = 1e-9  # so that a load comes back on the way down as it was on the way up
 _MOST_PASSES = 100
 _MOST_KEPT = 2**20
 _MARGIN = 1.2
@@ -129,7 +129,7 @@ class ScaledModel:
 
         Raises:
             InputError: When the approach or the tilt is not finite.
-            NotConverged: When contacts and curvatures do not agree to 1e-6 of the largest required
+            NotConverged: When contacts and curvatures do not agree to 1e-9 of the largest required
                 displacement, or the contact conditions cannot be met.
         """
         plane = RigidPlane.above(self.surface, approach, tilt)
