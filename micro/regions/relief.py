@@ -179,6 +179,24 @@ class Relief:
         return self.owner + self.depth / self._deepest
 
     @cached_property
+    def small(self) -> NDArray[np.bool_]:
+        """Which catchments have no more than 32 samples, shape (n,)."""
+        return np.diff(self._start) <= _FEW
+
+    @cached_property
+    def shaped(self) -> Array:
+        """Heights of the caps with 32 samples, or all of a smaller catchment, shape (n,) [mm].
+
+        Twice as high where all samples are as deep, for such a cap to have a volume; 0 where they
+        are as high as the peak, or below the floor.
+        """
+        depth, start = np.append(self.depth, 0.0), self._start[:-1]
+        last = np.minimum(start + _FEW, self._start[1:] - 1)
+        some = last >= start
+        first, last = (np.where(some, index, -1) for index in (start, last))
+        return np.where(depth[last] > depth[first], 1.0, 2.0) * depth[last]
+
+    @cached_property
     def _least_height(self) -> Array:
         """Height of the cap with 32 samples, 0 where there are not so many."""
         last = self._start[:-1] + _FEW

@@ -84,14 +84,16 @@ class ScaledAsperities:
         relief, taken = self.relief, np.zeros(len(self.relief), dtype=bool)
         taken[self.catchment[self.catchment >= 0]] = True
         added = np.flatnonzero(wanted & ~taken)
+        # of peaks that nothing reaches, and of flat ones until something does
+        some = np.full(len(added), np.sqrt(relief.cell))
         new: dict[str, Any] = {
             name: np.append(getattr(self.summits, name), value)
             for name, value in (
                 ("x", relief.x[added]),
                 ("y", relief.y[added]),
                 ("z", relief.z[added]),
-                ("radius_major", np.ones(len(added))),
-                ("radius_minor", np.ones(len(added))),
+                ("radius_major", some),
+                ("radius_minor", some),
                 ("angle", np.zeros(len(added))),
             )
         }
@@ -127,6 +129,7 @@ class ScaledAsperities:
             return self.summits
         relief, cap = self.relief, self.catchment[which]
         depth = np.maximum(indentation[which], _SMALLEST * relief.depth.max(initial=0.0))
+        depth = np.maximum(depth, np.where(relief.small, relief.shaped, 0.0)[cap])
         height = np.zeros(len(relief))
         height[cap] = depth
         moments = from_origin(relief.caps(height)[:, cap], relief.x[cap], relief.y[cap])

@@ -38,7 +38,7 @@ BORDERS = ("ignore", "include")
 """What becomes of maxima on the border of the surface; the paper ignores them."""
 
 _LEVEL = (0.0, 0.0)
-_TOLERANCE = 1e-6
+_TOLERANCE = 1e-9  # so that a load comes back on the way down as it was on the way up
 _ROUNDING = 64.0 * np.finfo(float).eps
 _MOST_PASSES = 100
 _MOST_KEPT = 2**20
@@ -135,7 +135,7 @@ class ScaledModel:
 
         Raises:
             InputError: When the approach or the tilt is not finite.
-            NotConverged: When contacts and curvatures do not agree to 1e-6 of the largest required
+            NotConverged: When contacts and curvatures do not agree to 1e-9 of the largest required
                 displacement, or the contact conditions cannot be met.
         """
         plane = RigidPlane.above(self.surface, approach, tilt)

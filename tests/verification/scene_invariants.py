@@ -112,10 +112,14 @@ def _solved(case):
     """Return what a coupling and its micro model are solved to, relative to the force."""
     if case.micro["model"] == "islands" and case.kind in ("isolated", "consistent"):
         return 1e-3  # forces jump where islands merge: rounding tells on which side a row lies
-    if case.micro["model"] == "islands" or "curvature" in case.micro:
-        return 1e-6  # changes of displacements, of curvatures
-    if case.micro["model"] == "half-space" or case.kind in ("concurrent", "consistent"):
-        return 1e-8  # residual of pressures; of forces; the body's compliance, whose mesh is turned
+    if case.micro["model"] == "islands":
+        return 1e-6  # changes of displacements
+    if (
+        case.micro["model"] == "half-space"
+        or "curvature" in case.micro
+        or case.kind in ("concurrent", "consistent")
+    ):
+        return 1e-8  # residuals of pressures, curvatures, forces; rounding of the body's compliance
     return 1e-9
 
 

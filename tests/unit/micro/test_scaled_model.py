@@ -232,6 +232,25 @@ def test_large_surfaces_keep_less_but_find_the_same(surface, make, monkeypatch):
     np.testing.assert_allclose(found()[1], all_kept, rtol=1e-6)
 
 
+def test_radii_of_small_catchments_scale_with_the_surface():
+    """Heights in steps have peaks of a few samples, below which a small cap has no volume."""
+    spectrum = Spectrum(hurst=0.5, waves=(1, 5), rms_slope=0.2, seed=3)
+    heights = synthesise(spectrum, grid=(31, 16), lengths=(1.0, 0.5)).heights
+    step = np.ptp(heights) / 47
+    heights = np.round(heights / step) * step
+    forces, radii = [], []
+    for scale in (1.0, 1e3, 1e-3):
+        surface = Surface(heights=heights * scale, lengths=(scale, 0.5 * scale))
+        model = scaled(surface)
+        state = model.solve(3e-3 * scale, tilt=(6e-3, -7e-3))
+        forces.append(state.force.sum() / scale**2)
+        radii.append(np.sort(model.asperities.radius) / scale)
+        assert radii[-1].max() < 1.0  # of the side
+    # contacts and curvatures agree to 1e-6 of the displacement
+    np.testing.assert_allclose(forces, forces[0], rtol=1e-6)
+    np.testing.assert_allclose(radii, [radii[0]] * 3, rtol=1e-6)
+
+
 @pytest.mark.parametrize("border", BORDERS)
 def test_mirrored_surfaces_carry_the_same(border):
     """A ridge on which several samples are peaks must not be divided among them by chance."""
