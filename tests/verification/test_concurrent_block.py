@@ -105,14 +105,15 @@ def test_consistent_laws_find_the_contact_problem_again(
 ):
     """Whatever the partition, and on a mesh however coarse: closures count in its compliance.
 
-    Tables made to 1e-3, the default, leave up to 1.3e-3 between rows on the tilted pancake.
+    Tables are made to 1e-3, the default. Of 64² cells each new one in contact is a kink, and on the
+    tilted pancake 65 rows, the most that are solved, leave 1.3e-3 between them.
     """
     monkeypatch.setenv("PATCHLAW_CACHE", bodies)
     height, sides = BLOCKS[block]
     words = [
         "micro.model=half-space",
         "micro.finite_slopes=false",
-        "surface.grid=[64, 64]",
+        "surface.grid=[128, 128]",
         f"block.height={height} mm",
         f"block.sides={sides}",
         "block.cells=[8, 8, 5]",
@@ -125,17 +126,13 @@ def test_consistent_laws_find_the_contact_problem_again(
     laws, whole = (
         run(Scene.load(root / "demos/scenes/paper.toml", [*words, *kind])).force_N
         for kind in (
-            [
-                "coupling.kind=consistent",
-                f"coupling.compliance={way}",
-                "coupling.table_tolerance=5e-4",
-            ],
+            ["coupling.kind=consistent", f"coupling.compliance={way}"],
             ["coupling.kind=concurrent"],
         )
     )
     loaded = whole > 0.1 * whole[-1]
     assert loaded.sum() >= 3
-    np.testing.assert_allclose(laws[loaded], whole[loaded], rtol=1e-3)
+    np.testing.assert_allclose(laws[loaded], whole[loaded], rtol=1e-3)  # 4e-4
 
 
 def test_laws_on_the_mesh_itself_find_the_contact_problem_again(root):
