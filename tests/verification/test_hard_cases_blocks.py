@@ -65,7 +65,7 @@ def test_blocks_that_do_not_bulge(nu):
     ("element", "nu", "told"), [("Q1", 0.49, 1), ("P1", 0.46, 1), ("Q2", 0.49, 0), ("Q1", 0.4, 0)]
 )
 def test_the_plan_says_that_linear_elements_lock(element, nu, told):
-    cells = {} if element.startswith("Q") else {"block__cells": None}
+    cells = {"reference__cells": [6, 6, 4]} if element.startswith("Q") else {}
     material = {"block__element": element, "block__poisson_ratio": nu}
     plain = scene(coupling__kind="isolated", **material)
     meshed = scene(coupling__kind="reference", **material, **cells)
@@ -97,7 +97,12 @@ WAYS = {
     "at points": {"coupling__kind": "isolated", "coupling__interface": "pointwise"},
     "consistent": {"coupling__kind": "consistent"},
     "concurrent": {"coupling__kind": "concurrent"},
-    "reference": {"coupling__kind": "reference", "reference__meshes": 1},
+    "reference": {
+        "coupling__kind": "reference",
+        "reference__meshes": 1,
+        "reference__cells": [8, 8, 4],
+    },
+    "reference in tetrahedra": {"coupling__kind": "reference", "reference__meshes": 1},
 }
 
 
