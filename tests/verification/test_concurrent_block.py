@@ -83,12 +83,6 @@ def test_without_force_a_tilted_plane_touches_as_on_a_half_space(block):
     assert step.approach_mm == pytest.approx(below.min(), rel=1e-12)
 
 
-@pytest.fixture(scope="module")
-def bodies(tmp_path_factory):
-    """A folder where bodies are found again."""
-    return str(tmp_path_factory.mktemp("bodies"))
-
-
 @pytest.mark.parametrize(
     ("block", "way", "tilt", "patches"),
     [
@@ -100,15 +94,12 @@ def bodies(tmp_path_factory):
         ("cube", "finite-element", "level", 4),
     ],
 )
-def test_consistent_laws_find_the_contact_problem_again(
-    root, bodies, monkeypatch, block, way, tilt, patches
-):
+def test_consistent_laws_find_the_contact_problem_again(root, block, way, tilt, patches):
     """Whatever the partition, and on a mesh however coarse: closures count in its compliance.
 
     Tables are made to 1e-3, the default. Of 64² cells each new one in contact is a kink, and on the
     tilted pancake 65 rows, the most that are solved, leave 1.3e-3 between them.
     """
-    monkeypatch.setenv("PATCHLAW_CACHE", bodies)
     height, sides = BLOCKS[block]
     words = [
         "micro.model=half-space",

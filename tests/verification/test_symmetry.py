@@ -26,14 +26,6 @@ def heights():
     return synthesise(spectrum, grid=GRID, lengths=LENGTHS).heights
 
 
-@pytest.fixture(scope="module", autouse=True)
-def one_correction(tmp_path_factory):
-    """What the block adds to the half-space is made once for all models, and once more turned."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PATCHLAW_CACHE", str(tmp_path_factory.mktemp("cache")))
-        yield
-
-
 def pressed(folder, heights, kind, model, turned=False):
     """Return force, area fraction and patch pressures of heights."""
     order = slice(None, None, -1 if turned else 1)
