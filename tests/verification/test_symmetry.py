@@ -6,7 +6,7 @@ gathered on are finer than what the islands are sampled with.
 
 import numpy as np
 import pytest
-from hard_cases import KINDS, from_file, history
+from hard_cases import KINDS, coarse_tables, from_file, history
 
 from geometry import Spectrum, synthesise
 
@@ -29,11 +29,11 @@ def heights():
 def pressed(folder, heights, kind, model, turned=False):
     """Return force, area fraction and patch pressures of heights."""
     order = slice(None, None, -1 if turned else 1)
-    laws = {"coupling__table_tolerance": 1e-2} if kind in ("isolated", "consistent") else {}
     step = history(
         **from_file(folder, heights), surface__lengths=list(LENGTHS[order]),
         block__cells=[*CELLS[order], 3], patches__grid=list(PATCHES[order]),
-        coupling__kind=kind, micro__model=model, load__approach="12 um", **laws,
+        coupling__kind=kind, micro__model=model, load__approach="12 um",
+        **coarse_tables(kind),
     ).steps[-1]  # fmt: skip
     pressure = step.patches.pressure_MPa.reshape(PATCHES[order])
     return step.force_N, step.contact_area_fraction, pressure
