@@ -1,0 +1,100 @@
+"""Planes that turn as those of the rows did."""
+
+import numpy as np
+import pytest
+
+from geometry import InputError, NotConverged, PatchGrid, Spectrum, patch_means, synthesise
+from geometry.control import Control
+from micro import influence_matrix, micro_model
+from multiscale.couplings.turning import TurningCoupling
+from multiscale.law_tables.consistent import consistent_laws
+from multiscale.law_tables.law_files import LawTable
+from multiscale.law_tables.plane_path import PlanePath
+from multiscale.laws import PatchLaw
+
+MODULUS = 4000.0
+APPROACH = np.linspace(1.0, 3.0, 9)
+
+
+def path(**other):
+    given = {
+        "approach": APPROACH,
+        "tilt": np.column_stack([0.2 * (APPROACH - 1.0), 0.1 * APPROACH]),
+        "force": (APPROACH - 1.0) ** 1.5,
+        "moment": np.zeros((9, 2)),
+    }
+    return PlanePath(**{**given, **other})
+
+
+def test_slopes_are_those_of_the_rows_and_stay_beyond_them():
+    assert path().tilt_at(2.25) == pytest.approx((0.25, 0.225), rel=1e-12)
+    assert path().tilt_at(0.0) == pytest.approx((0.0, 0.1))
+    assert path().tilt_at(9.0) == pytest.approx((0.4, 0.3))
+
+
+def test_force_is_found_and_beyond_the_path_an_approach_beyond():
+    turns = path()
+
+    def force(approach):
+        return max(approach - 1.0, 0.0) ** 1.5
+
+    found, asked = turns.approach_under(1.7, force)
+    assert force(found) == pytest.approx(1.7, rel=1e-12)
+    assert asked < 20
+    assert turns.approach_under(0.0, force) == (1.0, 0)
+    assert turns.approach_under(4.0, force)[0] > 3.0
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"approach": APPROACH[::-1]},
+        {"force": APPROACH[1:]},
+        {"tilt": np.full((9, 2), np.nan)},
+        {"approach": np.empty(0)},
+    ],
+)
+def test_refuses(wrong):
+    with pytest.raises(InputError, match="a path needs"):
+        path(**wrong)
+
+
+@pytest.mark.parametrize("grid", [(1, 1), (2, 1), (2, 2), (8, 8)])
+def test_any_partition_turns_as_the_contacts_do(grid):
+    """Also a single patch, whose pressure does not tell how the plane turns."""
+    spectrum = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=3)
+    surface = synthesise(spectrum, grid=(64, 64), lengths=(1.0, 1.0))
+    model = micro_model("circular", surface, contact_modulus=MODULUS)
+    patches = PatchGrid(grid=grid, lengths=surface.lengths)
+    means = patch_means(surface, patches)
+    table = consistent_laws(
+        model, patches, mean_heights=means, largest=Control(force=2.0, tilt=None)
+    )
+    compliance = influence_matrix(patches) / (np.pi * MODULUS)
+    coupling = TurningCoupling(table, lambda pressures: pressures @ compliance.T)
+    for force in (0.3, 1.1, 2.0):
+        control = Control(force=force, tilt=None)
+        _, plane, _ = model.press(control, patches=patches, mean_heights=means)
+        step = coupling.press(control)
+        assert step.force_N == pytest.approx(force, rel=1e-8)
+        assert step.approach_mm == pytest.approx(plane.approach, rel=1e-3)
+        np.testing.assert_allclose(step.tilt, plane.tilt, atol=3e-3 * np.abs(plane.tilt).max())
+        assert np.abs(step.moment_N_mm).max() < 1e-6 * force
+    with pytest.raises(NotConverged, match="LAW_RANGE"):
+        coupling.press(Control(force=3.0, tilt=None))
+    other = TurningCoupling(table, lambda pressures: 6.0 * pressures @ compliance.T)
+    with pytest.raises(NotConverged, match="make the laws for this block"):
+        other.press(Control(force=2.0, tilt=None))
+
+
+def test_laws_of_a_given_tilt_have_no_path():
+    patches = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
+    law = PatchLaw(
+        **{name: np.empty(0) for name in ("closure", "pressure", "approach", "relief")},
+        contact_area_fraction=np.empty(0),
+        contacts=np.empty(0, dtype=np.int64),
+        touch=1.0,
+        reach=1.0,
+    )
+    with pytest.raises(ValueError, match="given tilt"):
+        TurningCoupling(LawTable(patches=patches, laws=(law,), made_by={}), lambda _: _)
