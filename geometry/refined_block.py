@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 _DELAUNAY = 5  # gmsh's number of the algorithm
 _DIGITS = 12  # of lengths that gmsh is given
-_PLACE = 1e-3  # of the fine edge: places that gmsh is given are multiples of it
+_PLACE = 3  # decimals of places that gmsh is given, beyond those of the fine edge
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -108,8 +108,8 @@ class RefinedShape:
             float(f"{length / self.unit:.{_DIGITS}g}")
             for length in (*self.interface, self.height, self.fine, self.coarse)
         )
-        step = _PLACE * fine
-        places = np.clip(np.round(self.places / self.unit / step) * step, 0.0, (width, depth))
+        decimals = _PLACE + math.ceil(-math.log10(fine))
+        places = np.clip(np.round(self.places / self.unit, decimals), 0.0, (width, depth))
         shape = replace(
             self, interface=(width, depth), height=height, places=places, fine=fine, coarse=coarse
         )
