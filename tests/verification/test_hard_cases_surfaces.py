@@ -181,7 +181,11 @@ def test_infinite_heights_are_never_filled(tmp_path):
 @pytest.mark.parametrize("method", ["active-set", "augmented-lagrangian"])
 def test_a_reference_too_coarse_for_any_contact_node_says_so(method):
     # hard: the plane lies below the highest point, and passes between all nodes above it
-    coarse = {"coupling__kind": "reference", "block__cells": [4, 4, 2], "reference__method": method}
+    coarse = {
+        "coupling__kind": "reference",
+        "reference__cells": [4, 4, 2],
+        "reference__method": method,
+    }
     found = history(load__approach="0.2 um", **coarse)
     assert found.force_N[-1] == 0.0 and found.contacts[-1] == 0
     notes = " ".join(found.notes)
