@@ -7,7 +7,7 @@
 # coupling or another way to the same load. The same is asserted, for more couplings, in
 # `tests/verification/test_hard_cases_*.py` and `test_interaction_merging.py`.
 #
-# Run time: 1 min. `--quick` for fewer patches and load steps, `--out DIR` for the folder of table
+# Run time: two minutes. `--quick` for fewer patches and load steps, `--out DIR` for the folder of table
 # and figure.
 
 # %%

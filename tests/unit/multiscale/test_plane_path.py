@@ -45,21 +45,21 @@ def test_force_is_found_where_the_macro_model_says(centre):
 
 def test_a_plane_that_never_settles_is_an_error():
     steps = iter(range(10**6))
-    with pytest.raises(NotConverged, match="turns under a force of 1 N"):
+    with pytest.raises(NotConverged, match="the plane that turns under a force of 1 N"):
         path().press(Control(force=1.0, tilt=None), lambda _: None, lambda _: float(next(steps)))
 
 
 @pytest.mark.parametrize(
-    "wrong",
+    ("wrong", "message"),
     [
-        {"approach": APPROACH[::-1]},
-        {"force": APPROACH[1:]},
-        {"tilt": np.full((9, 2), np.nan)},
-        {"approach": np.empty(0)},
+        ({"approach": APPROACH[::-1]}, "a path needs a strictly increasing approach"),
+        ({"force": APPROACH[1:]}, "a path needs a finite force"),
+        ({"tilt": np.full((9, 2), np.nan)}, "a path needs a finite tilt"),
+        ({"approach": np.empty(0)}, "a path needs a finite approach"),
     ],
 )
-def test_refuses(wrong):
-    with pytest.raises(InputError, match="a path needs"):
+def test_refuses(wrong, message):
+    with pytest.raises(InputError, match=message):
         path(**wrong)
 
 
