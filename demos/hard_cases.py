@@ -7,8 +7,8 @@
 # coupling or another way to the same load. The same is asserted, for more couplings, in
 # `tests/verification/test_hard_cases_*.py` and `test_interaction_merging.py`.
 #
-# Run time: two minutes. `--quick` for fewer patches and load steps, `--out DIR` for the folder of table
-# and figure.
+# Run time: two minutes. `--quick` for fewer patches and load steps, `--out DIR` for the folder of
+# table and figure.
 
 # %%
 import argparse
