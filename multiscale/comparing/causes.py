@@ -61,7 +61,12 @@ class Value:
     slopes: float = 0.0
 
     def seeing(self, slopes: float) -> float:
-        """Return the value that the level would have, did it account for slopes so."""
+        """Return the value that the level would have, did it account for slopes so.
+
+        Where slopes take all there is, nothing tells what there was without them.
+        """
+        if self.slopes <= -1.0:
+            return self.value
         return self.value * (1.0 + slopes) / (1.0 + self.slopes)
 
 

@@ -11,14 +11,15 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from geometry.errors import InputError
 from multiscale.comparing.level import Level
 from multiscale.comparing.level_results import LevelResult, read_result, write_result
+from multiscale.restart.interruption import ENDING
 
 _NO_CACHE = {"PATCHLAW_CACHE": "off"}
 _IN_MPI = ("OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_SIZE", "PMI_RANK", "SLURM_STEP_TASKS_PER_NODE")
@@ -150,22 +151,35 @@ def _ended(command: list[str], errors: Path, seconds: float | None) -> int | Non
 
     It has a process group of its own, and does not outlive this call, however that ends.
     """
-    with errors.open("wb") as stream:
-        process = subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=stream,
-            # MPI may have put variables into this process that are not for another
-            env=os.environ | _NO_CACHE,
-            start_new_session=True,
-        )
+    with errors.open("wb") as stream, _started(command, stream) as process:
         try:
             return process.wait(seconds)
         except subprocess.TimeoutExpired:
             return None
-        finally:
+
+
+@contextmanager
+def _started(command: list[str], errors: Any) -> Iterator[subprocess.Popen[bytes]]:
+    """Start a process that ends with the block; signals to end wait until it is known."""
+    process = None
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
+    try:
+        process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=errors,
+            # MPI may have put variables into this process that are not for another
+            env=os.environ | _NO_CACHE,
+            start_new_session=True,
+            preexec_fn=lambda: signal.pthread_sigmask(signal.SIG_SETMASK, mask),
+        )
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        yield process
+    finally:
+        if process is not None:
             _end(process)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

@@ -100,4 +100,5 @@ def consistent_laws(
             "tilt": "free" if largest.tilt is None else f"{tilt[0]:g}, {tilt[1]:g}",
         },
         force_error=error,
+        path=whole.path if largest.tilt is None else None,
     )

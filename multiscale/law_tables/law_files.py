@@ -12,6 +12,7 @@ import h5py
 
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
+from multiscale.law_tables.plane_path import PlanePath
 from multiscale.law_tables.repair import evened_law
 from multiscale.laws import PatchLaw
 from multiscale.records import stored_numbers
@@ -33,6 +34,8 @@ _SCALARS = {
     "warned_from": "MPa",
     "repaired": "1",
 }
+_PATH = "path"
+_PLANES = {"approach": "mm", "tilt": "1", "force": "N", "moment": "N mm"}
 FORMAT = "patchlaw laws 3"
 
 
@@ -47,12 +50,15 @@ class LawTable:
             slopes of the plane that pressed the whole surface.
         force_error: Estimated error of the force between the rows, see `refinement.Errors`: of
             all patches together, or of the worst where each was tabulated alone.
+        path: The planes that pressed the whole surface, where they were free to turn; None where
+            the tilt was prescribed, and for patches alone.
     """
 
     patches: PatchGrid
     laws: tuple[PatchLaw, ...]
     made_by: dict[str, str]
     force_error: float = float("nan")
+    path: PlanePath | None = None
 
     def __post_init__(self) -> None:
         if len(self.laws) != self.patches.count:
@@ -65,7 +71,8 @@ class LawTable:
 def write_laws(path: Path | BinaryIO, table: LawTable) -> None:
     """Write all laws to one HDF5 file: a group ``patch_IX_IY`` per patch, a dataset per column.
 
-    A checksum stands before the content; see `multiscale.sealed_files`.
+    A path is a group of its own. A checksum stands before the content; see
+    `multiscale.sealed_files`.
 
     Args:
         path: File to write, by name or open; one that exists is replaced.
@@ -92,6 +99,10 @@ def _fill(file: Any, table: LawTable) -> None:
             group.create_dataset(name, data=getattr(law, name)).attrs["unit"] = unit
         for name in _SCALARS:
             group.attrs[name] = getattr(law, name)
+    if table.path is not None:
+        group = file.create_group(_PATH)
+        for name, unit in _PLANES.items():
+            group.create_dataset(name, data=getattr(table.path, name)).attrs["unit"] = unit
 
 
 def read_laws(path: Path | BinaryIO) -> LawTable:
@@ -142,6 +153,7 @@ def _table(file: Any) -> LawTable:
         laws=tuple(map(law, groups)),
         made_by=made_by,
         force_error=float(file.attrs["force_error"]),
+        path=_path(file[_PATH]) if _PATH in file else None,
     )
 
 
@@ -149,6 +161,10 @@ def _law(group: Any) -> PatchLaw:
     content: dict[str, Any] = {name: stored_numbers(group[name]) for name in _COLUMNS}
     content.update({name: float(group.attrs[name]) for name in _SCALARS})
     return PatchLaw(**content)
+
+
+def _path(group: Any) -> PlanePath:
+    return PlanePath(**{name: stored_numbers(group[name]) for name in _PLANES})
 
 
 def _evened(group: Any) -> PatchLaw:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from geometry.collective import together
 from geometry.control import Control
 from geometry.patches import PatchGrid
 from micro import MicroModel, Response, RigidPlane
+from multiscale.law_tables.plane_path import PlanePath
 from multiscale.law_tables.refinement import law_of, refined
 from multiscale.laws import PatchLaw
 
@@ -49,6 +50,7 @@ class WholeSurface:
     displacements: Displacements
     tilt: tuple[float, float] | None = (0.0, 0.0)
     comm: Any = None
+    _seen: dict[float, tuple[Response, RigidPlane]] = field(default_factory=dict, init=False)
 
     def rows(self, approaches: Array) -> Array:
         """Return rows of all patches at increasing approaches at the middle, shape (m, N, 7).
@@ -60,6 +62,7 @@ class WholeSurface:
             Collective.
         """
         solved = self._solved(approaches)
+        self._seen.update(zip(map(float, approaches), solved, strict=True))
         pressure = np.array([response.patch_pressure[0] for response, _ in solved])
         sunk = self.displacements(pressure)
         local = np.array([plane.means(self.patches) for _, plane in solved])
@@ -79,6 +82,17 @@ class WholeSurface:
             np.broadcast_to(warned[:, None], pressure.shape),
         )
         return np.stack(columns, axis=2).astype(np.float64)
+
+    @property
+    def path(self) -> PlanePath:
+        """The planes of all rows so far."""
+        seen = [self._seen[approach] for approach in sorted(self._seen)]
+        return PlanePath(
+            approach=np.array([plane.approach for _, plane in seen]),
+            tilt=np.array([plane.tilt for _, plane in seen]),
+            force=np.array([response.force[0] for response, _ in seen]),
+            moment=np.array([response.moment[0] for response, _ in seen]),
+        )
 
     def _solved(self, approaches: Array) -> list[tuple[Response, RigidPlane]]:
         """Solve the contact problem at all approaches, shared by the ranks."""

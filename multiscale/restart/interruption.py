@@ -13,7 +13,10 @@ from typing import Any
 
 from geometry.errors import PatchlawError
 
-_WATCHED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""Signals that end a process."""
+
+_WATCHED = (*ENDING, signal.SIGUSR1)
 _AT_ONCE = (signal.SIGTERM, signal.SIGHUP)
 _TIME_OVER = 0.5  # below the numbers of all signals
 _TOLD: dict[float, str] = {

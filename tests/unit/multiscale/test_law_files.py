@@ -1,5 +1,7 @@
 """Laws survive a file bit for bit, and anything else is refused."""
 
+from dataclasses import replace
+
 import h5py
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ import pytest
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from multiscale.law_tables.law_files import LawTable, read_laws, write_laws
+from multiscale.law_tables.plane_path import PlanePath
 from multiscale.laws import PatchLaw
 from multiscale.sealed_files import seal, sealed
 
@@ -37,7 +40,13 @@ def table():
     patches = PatchGrid(grid=(2, 3), lengths=(0.1, 1 / 3))
     laws = tuple(law(rows) for rows in (7, 0, 2, 3, 4, 5))
     made_by = {"model": "elliptic", "love": "mean"}
-    return LawTable(patches=patches, laws=laws, made_by=made_by, force_error=1 / 9)
+    path = PlanePath(
+        approach=np.array([0.1, 1 / 3]),
+        tilt=random.random((2, 2)),
+        force=np.array([0.0, 1 / 7]),
+        moment=random.random((2, 2)),
+    )
+    return LawTable(patches=patches, laws=laws, made_by=made_by, force_error=1 / 9, path=path)
 
 
 def test_round_trip_is_exact(table, tmp_path):
@@ -50,6 +59,10 @@ def test_round_trip_is_exact(table, tmp_path):
             assert getattr(law, name).tobytes() == getattr(copy, name).tobytes()
         for name in ("touch", "reach", "interpolation_error", "stiffness_error", "warned_from"):
             assert getattr(law, name) == getattr(copy, name)
+    for name in ("approach", "tilt", "force", "moment"):
+        assert getattr(table.path, name).tobytes() == getattr(back.path, name).tobytes()
+    write_laws(tmp_path / "laws.h5", replace(table, path=None))
+    assert read_laws(tmp_path / "laws.h5").path is None
 
 
 def test_every_column_says_its_unit(table, tmp_path):
