@@ -10,6 +10,7 @@ from micro import MicroModel
 from multiscale.coupling import ContactCoupling, EmbeddedCoupling
 from multiscale.couplings.blocks import embedding, patch_compliance, patch_displacements
 from multiscale.couplings.condensed import CondensedCoupling
+from multiscale.couplings.turning import TurningCoupling
 from multiscale.law_tables.consistent import consistent_laws
 from multiscale.law_tables.isolated import isolated_laws
 from multiscale.law_tables.law_files import LawTable
@@ -97,7 +98,11 @@ def assemble(
 
 
 def _with_laws(stage: Stage, table: LawTable, comm: Any) -> tuple[Coupling, Interface | None]:
-    if newton_choice(stage, table).condensed:
+    condensed = newton_choice(stage, table).condensed
+    patchwise = stage.scene.coupling.interface == "patchwise"
+    if table.path is not None and patchwise and stage.scene.loading.programme.tilt is None:
+        return TurningCoupling(table, patch_displacements(stage, comm, dense=condensed)), None
+    if condensed:
         return CondensedCoupling(table, patch_compliance(stage, comm)), None
     from macro import PressedBlock
 

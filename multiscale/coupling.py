@@ -92,20 +92,15 @@ class EmbeddedCoupling:
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `Coupling.press`."""
-        path, moment = self._table.path, None
         try:
-            if path is None or control.tilt is not None:
-                state = self._pressed.press(control)
-            else:
-                state = path.press(control, self._pressed.press, lambda found: found.approach)
-                moment = path.moment_at(state.approach)
+            state = self._pressed.press(control)
         except NotConverged as error:
             if not any(law.is_punch for law in self._table.laws):
                 raise
             problem = "a flat patch, whose pressure is a function of closure nowhere"
             made_for = self._table.made_by.get("coupling")
             raise beyond_law(control, problem, made_for) from error
-        step = self._step(control, state, moment)
+        step = self._step(control, state)
         self._last = state
         return step
 
@@ -124,9 +119,7 @@ class EmbeddedCoupling:
             self._pressed.start_from(pressure)
             self._last = self._pressed.press(Control(approach=approach, tilt=tilt))
 
-    def _step(
-        self, control: Control, press: PressState, moment: tuple[float, float] | None
-    ) -> LoadStep:
+    def _step(self, control: Control, press: PressState) -> LoadStep:
         """Read area, contacts and separation off the laws at the converged closures."""
         laws = self._table.laws
         try:
@@ -142,7 +135,7 @@ class EmbeddedCoupling:
             self._table.patches,
             approach=press.approach,
             tilt=press.tilt,
-            moment=press.moment if moment is None else moment,
+            moment=press.moment,
             force=press.force,
             mean_separation_mm=float(np.mean(gaps)),
             contacts=contacts,

@@ -55,7 +55,8 @@ class PatchLaw:
         closure: Closures from the first touch on, shape (n,) [mm]; empty for a patch that stays
             open: such a law is zero as far as it goes.
         pressure: Mean pressures, the first zero, shape (n,) [MPa].
-        approach: Local rigid approaches s, increasing, shape (n,) [mm].
+        approach: Local rigid approaches s, increasing, shape (n,) [mm]; where the plane was free to
+            turn, its approaches at the middle.
         contact_area_fraction: Real over nominal contact area, shape (n,).
         contacts: Number of asperities in contact, shape (n,).
         relief: Mean displacement of the patch by its contacts beyond that by their mean pressure,

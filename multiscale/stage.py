@@ -105,9 +105,9 @@ class Stage:
     def table_tolerance(self) -> float:
         """Interpolation error that laws are tabulated to.
 
-        By default 1e-4, and 1e-3 for models that see cells, whose steps finer tables would trace.
+        By default 1e-4, and 5e-4 for models that see cells, whose steps finer tables would trace.
         """
-        return self.scene.coupling.table_tolerance or (1e-4 if self.by_summits else 1e-3)
+        return self.scene.coupling.table_tolerance or (1e-4 if self.by_summits else 5e-4)
 
     @property
     def table_rows(self) -> int:

@@ -32,26 +32,16 @@ class CondensedCoupling:
 
     def __init__(self, table: LawTable, compliance: Array) -> None:
         self._patches, self._made_for = table.patches, table.made_by.get("coupling")
-        self._path = table.path
         self._laws = PatchLaws(table.laws)
         self._newton = DenseNewton(self._laws, compliance, table.patches)
         self._last: DenseState | None = None
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `Coupling.press`."""
-        moment = None
-        if self._path is None or control.tilt is not None:
-            state = self._newton.solve(control, self._last)
-        else:
-            state = self._path.press(
-                control,
-                lambda turned: self._newton.solve(turned, self._last),
-                lambda found: float(found.plane[0]),
-            )
-            moment = self._path.moment_at(float(state.plane[0]))
+        state = self._newton.solve(control, self._last)
         self._check_range(control, state.local)
         self._last = state
-        return self._step(state, moment)
+        return self._step(state)
 
     def state(self) -> Arrays:
         """Return the latest equilibrium; see `Restorable`."""
@@ -73,12 +63,12 @@ class CondensedCoupling:
                 self._made_for,
             )
 
-    def _step(self, state: DenseState, moment: tuple[float, float] | None) -> LoadStep:
+    def _step(self, state: DenseState) -> LoadStep:
         return embedded_step(
             self._patches,
             approach=state.plane[0],
             tilt=state.plane[1:],
-            moment=state.load[1:] if moment is None else moment,
+            moment=state.load[1:],
             force=state.load[0],
             mean_separation_mm=float(np.mean(self._laws.separation(state.local))),
             contacts=int(self._laws.contacts(state.local).sum()),

@@ -17,6 +17,9 @@ from multiscale.law_tables.whole_surface import Displacements, WholeSurface
 
 Array = NDArray[np.float64]
 
+_GENTLE = 1e-6
+"""Share of the largest force under which a plane that is free to turn is nearly at first touch; by
+Hertz it has then come a ten thousandth of its way."""
 _RESERVE = 0.02
 """Rows beyond the largest load, of the way from first touch: what lies between rows may ask."""
 _POINTWISE = 0.5
@@ -78,14 +81,18 @@ def consistent_laws(
     )
 
     def ends() -> tuple[float, float, tuple[float, float]]:
-        touch = Control(force=0.0, tilt=largest.tilt)
-        end, start = largest, None
+        force, end, start = 0.0, largest, None
         if largest.approach is None or largest.tilt is None:
-            _, plane, start = model.press(largest, patches=patches, mean_heights=means)
+            response, plane, start = model.press(largest, patches=patches, mean_heights=means)
             end = Control(approach=plane.approach, tilt=plane.tilt)
+            force = float(response.force[0])
+        # without force a plane may turn as it likes
+        touch = Control(force=_GENTLE * force if largest.tilt is None else 0.0, tilt=largest.tilt)
         touched = model.press(touch, patches=patches, mean_heights=means, start=start)
-        first = touched.plane.approach
-        return first, float(end.approach or 0.0), end.tilt or (0.0, 0.0)
+        first, last = touched.plane.approach, float(end.approach or 0.0)
+        if touch.force:
+            first -= _GENTLE ** (2 / 3) * (last - first)
+        return first, last, end.tilt or (0.0, 0.0)
 
     first, end, tilt = on_root(comm, ends)
     reserve = _POINTWISE if pointwise else _RESERVE

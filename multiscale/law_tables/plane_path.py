@@ -4,31 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from functools import cached_property
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
+from scipy.optimize import brentq
 
-from geometry.control import Control
-from geometry.errors import InputError, NotConverged
+from geometry.errors import InputError
 
 Array = NDArray[np.float64]
-State = TypeVar("State")
 
-_TOLERANCE = 1e-10
-"""Change of the approach that no longer counts, relative to the way of the whole path."""
-_MOST_PASSES = 40
+_TOLERANCE = 1e-15  # of an approach under a force, of the way of the whole path
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlanePath:
     """How a plane without moment turns while it comes nearer.
-
-    The contacts balance such a plane, not the mean pressures of patches at their centres: laws of
-    few large patches would not tell how it turns, and a single one not at all. It turns as it did
-    where the contacts were solved for.
 
     Attributes:
         approach: Approaches at the middle, increasing, shape (m,) [mm].
@@ -65,59 +56,29 @@ class PlanePath:
         mx, my = self._over_approach(self.moment, approach)
         return float(mx), float(my)
 
-    def press(
-        self,
-        control: Control,
-        press: Callable[[Control], State],
-        approach_of: Callable[[State], float],
-    ) -> State:
-        """Press laws by a plane that turns as the path tells.
+    def approach_under(self, force: float, force_at: Callable[[float], float]) -> tuple[float, int]:
+        """Return the approach under a force [mm], and how often the force was asked for.
 
         Args:
-            control: What is prescribed; the tilt is not.
-            press: Finds the equilibrium under a plane of given tilt.
-            approach_of: Returns the approach of an equilibrium [mm].
-
-        Raises:
-            NotConverged: When no plane of the path bears the force.
+            force: The force; none is that of first touch [N].
+            force_at: Returns the force at an approach, in which it rises [N].
         """
-        if control.approach is not None:
-            at = control.approach
-            return press(Control(approach=at, tilt=self.tilt_at(at)))
-        approach, before = self._approach_under(control.force or 0.0), None
-        for _ in range(_MOST_PASSES):
-            state = press(Control(force=control.force, tilt=self.tilt_at(approach)))
-            missed = approach_of(state) - approach
-            if abs(missed) <= _TOLERANCE * self._way:
-                return state
-            step = missed
-            if before is not None and (missed - before[1]) * (approach - before[0]) < 0.0:
-                step = -missed * (approach - before[0]) / (missed - before[1])
-            before = approach, missed
-            approach += step
-        raise NotConverged(
-            f"the plane that turns under a force of {control.force:g} N",
-            reason="MAX_ITERATIONS",
-            iterations=_MOST_PASSES,
-            remedy="take more load steps (load.steps) or prescribe the tilt (load.tilt)",
-        )
+        first, last = float(self.approach[0]), float(self.approach[-1])
+        if force == 0.0:
+            return first, 0
+        asked = [force_at(last)]
+        if asked[0] < force:  # beyond the path, as if its last secant went on
+            rise = (asked[0] - force_at(0.5 * (first + last))) / (0.5 * (last - first) or 1.0)
+            return last + (force - asked[0]) / (rise or 1.0), 2
 
-    @property
-    def _way(self) -> float:
-        return float(np.abs(self.approach).max())
+        def excess(approach: float) -> float:
+            asked.append(force_at(approach))
+            return asked[-1] ** (2 / 3) - force ** (2 / 3)  # nearly straight (Hertz)
+
+        return float(brentq(excess, first, last, xtol=_TOLERANCE * (last - first))), len(asked)
 
     def _over_approach(self, values: Array, approach: float) -> Array:
         if len(self.approach) == 1:
             return values[0]
         at = np.clip(approach, self.approach[0], self.approach[-1])
         return np.asarray(PchipInterpolator(self.approach, values)(at))
-
-    def _approach_under(self, force: float) -> float:
-        roots, approach = self._bearing
-        return float(np.interp(force ** (2 / 3), roots, approach))
-
-    @cached_property
-    def _bearing(self) -> tuple[Array, Array]:
-        """Increasing F^(2/3), nearly straight over the approach (Hertz), and the approaches."""
-        roots = np.maximum.accumulate(self.force) ** (2 / 3)
-        return roots, self.approach

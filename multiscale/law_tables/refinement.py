@@ -15,15 +15,15 @@ from multiscale.laws import LawPoint, PatchLaw
 
 Array = NDArray[np.float64]
 
-PATCH_FACTOR = 10.0
+PATCH_FACTOR = 20.0
 """Tolerance of a patch's pressure over that of the force."""
 
-MOST_ROWS = 65
+MOST_ROWS = 97
 """Rows that are solved at most, unless told otherwise."""
 
 _FIRST_ROWS = 17
 _BATCH = 8  # rows that are solved together, each starting from those before it
-_LEAST_LOAD = 0.01  # of the mean pressure at the end: loads below count as this much
+_LEAST_LOAD = 0.03  # of the mean pressure at the end: loads below count as this much
 _LEAST_SLOPE = 0.1  # of what the plane's way is shared by, where neighbours take nearly all
 _OF_HALVES = 0.5  # of an interval's error that is left in its halves
 
@@ -41,8 +41,8 @@ class Errors:
     the force erred by up to 1.7 times and a patch's pressure by up to 3 times the largest recorded.
 
     Attributes:
-        force: Error of the force over the force, shape (m,). Forces less than a hundredth of that
-            at the end of the table count as this much, here and below.
+        force: Error of the force over the force, shape (m,). Forces less than three hundredths of
+            that at the end of the table count as this much, here and below.
         pressure: Error of a patch's pressure over that pressure, or over the mean pressure of all
             patches where that is more, shape (m, N).
         stiffness: Change, by the new row, of a patch's dp/dδ under a plane at δ, over the largest
@@ -127,7 +127,7 @@ def refined(
         end: Approach of the last row [mm].
         compliance: Mean displacement of patch i of the half-space by unit pressure on patch j,
             shape (N, N) [mm/MPa].
-        tolerance: Error of the force; that of a patch's pressure may be ten times as large, see
+        tolerance: Error of the force; that of a patch's pressure may be twenty times as large, see
             `Errors`.
         most_rows: Rows that may be solved, 33 at least. The errors then say what was reached.
 

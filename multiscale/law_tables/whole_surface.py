@@ -56,8 +56,9 @@ class WholeSurface:
     def rows(self, approaches: Array) -> Array:
         """Return rows of all patches at increasing approaches at the middle, shape (m, N, 7).
 
-        The columns are local approach, closure, pressure, area fraction, contacts, relief, and
-        whether the model warns.
+        The columns are approach, closure, pressure, area fraction, contacts, relief, and whether
+        the model warns. The approach is the local one; a plane that turns may leave a patch while
+        it comes nearer, and then it is that at the middle for all patches.
 
         Note:
             Collective.
@@ -67,6 +68,9 @@ class WholeSurface:
         pressure = np.array([response.patch_pressure[0] for response, _ in solved])
         sunk = self.displacements(pressure)
         local = np.array([plane.means(self.patches) for _, plane in solved])
+        along = (
+            local if self.tilt is not None else np.broadcast_to(approaches[:, None], local.shape)
+        )
         touched = pressure > 0.0
         area, contacts, displacement = (
             np.array([getattr(response, name)[0] for response, _ in solved])
@@ -74,7 +78,7 @@ class WholeSurface:
         )
         warned = np.array([response.warning[0] != "" for response, _ in solved])
         columns = (
-            local,
+            along,
             local - sunk,
             pressure,
             np.where(touched, area / self.patches.area, 0.0),

@@ -49,7 +49,7 @@ class CouplingSection(Section):
     ``love``: an isolated patch's own displacement by its pressure, its ``mean`` or that at its
     ``centre``. ``interface``: the closure is a mean over each patch, or taken at each point.
     ``table_tolerance``: interpolation error of the laws, relative to the force; by default 1e-4,
-    and 1e-3 with micro models that see cells.
+    and 5e-4 with micro models that see cells.
     """
 
     kind: Literal["isolated", "consistent", "concurrent", "analytic", "reference", "auto"] = (

@@ -7,6 +7,7 @@ from geometry import PatchGrid, Spectrum, patch_means, synthesise
 from geometry.control import Control
 from micro import influence_matrix, micro_model
 from multiscale.couplings.condensed import CondensedCoupling
+from multiscale.couplings.turning import TurningCoupling
 from multiscale.law_tables.consistent import consistent_laws
 from multiscale.law_tables.whole_surface import WholeSurface
 
@@ -103,6 +104,8 @@ def test_any_macro_model_finds_the_rows_again(surface, macro, tilt):
         tolerance=1e-3,
     )
     coupling, start = CondensedCoupling(table, compliance), None
+    if tilt is None:
+        coupling = TurningCoupling(table, lambda pressures: pressures @ compliance.T)
     assert table.made_by["tilt"] == ("free" if tilt is None else f"{tilt[0]:g}, {tilt[1]:g}")
     for force in (0.2, 0.7, 1.3, 2.0):
         control = Control(force=force, tilt=tilt)

@@ -6,9 +6,11 @@ import pytest
 from geometry import InputError, NotConverged, PatchGrid, Spectrum, patch_means, synthesise
 from geometry.control import Control
 from micro import influence_matrix, micro_model
-from multiscale.couplings.condensed import CondensedCoupling
+from multiscale.couplings.turning import TurningCoupling
 from multiscale.law_tables.consistent import consistent_laws
+from multiscale.law_tables.law_files import LawTable
 from multiscale.law_tables.plane_path import PlanePath
+from multiscale.laws import PatchLaw
 
 MODULUS = 4000.0
 APPROACH = np.linspace(1.0, 3.0, 9)
@@ -30,23 +32,17 @@ def test_slopes_are_those_of_the_rows_and_stay_beyond_them():
     assert path().tilt_at(9.0) == pytest.approx((0.4, 0.3))
 
 
-@pytest.mark.parametrize("centre", [-0.6, 0.0, 0.6])
-def test_force_is_found_where_the_macro_model_says(centre):
-    """The plane turns about the middle, the springs stand at a place beside it."""
+def test_force_is_found_and_beyond_the_path_an_approach_beyond():
     turns = path()
 
-    def press(control):
-        tx, _ = control.tilt
-        return control.force ** (2 / 3) + 1.1 - tx * centre  # the approach that bears the force
+    def force(approach):
+        return max(approach - 1.0, 0.0) ** 1.5
 
-    found = turns.press(Control(force=1.0, tilt=None), press, lambda approach: approach)
-    assert found == pytest.approx(2.1 - turns.tilt_at(found)[0] * centre, rel=1e-9)
-
-
-def test_a_plane_that_never_settles_is_an_error():
-    steps = iter(range(10**6))
-    with pytest.raises(NotConverged, match="turns under a force of 1 N"):
-        path().press(Control(force=1.0, tilt=None), lambda _: None, lambda _: float(next(steps)))
+    found, asked = turns.approach_under(1.7, force)
+    assert force(found) == pytest.approx(1.7, rel=1e-12)
+    assert asked < 20
+    assert turns.approach_under(0.0, force) == (1.0, 0)
+    assert turns.approach_under(4.0, force)[0] > 3.0
 
 
 @pytest.mark.parametrize(
@@ -74,7 +70,8 @@ def test_any_partition_turns_as_the_contacts_do(grid):
     table = consistent_laws(
         model, patches, mean_heights=means, largest=Control(force=2.0, tilt=None)
     )
-    coupling = CondensedCoupling(table, influence_matrix(patches) / (np.pi * MODULUS))
+    compliance = influence_matrix(patches) / (np.pi * MODULUS)
+    coupling = TurningCoupling(table, lambda pressures: pressures @ compliance.T)
     for force in (0.3, 1.1, 2.0):
         control = Control(force=force, tilt=None)
         _, plane, _ = model.press(control, patches=patches, mean_heights=means)
@@ -83,3 +80,21 @@ def test_any_partition_turns_as_the_contacts_do(grid):
         assert step.approach_mm == pytest.approx(plane.approach, rel=1e-3)
         np.testing.assert_allclose(step.tilt, plane.tilt, atol=3e-3 * np.abs(plane.tilt).max())
         assert np.abs(step.moment_N_mm).max() < 1e-6 * force
+    with pytest.raises(NotConverged, match="LAW_RANGE"):
+        coupling.press(Control(force=3.0, tilt=None))
+    other = TurningCoupling(table, lambda pressures: 6.0 * pressures @ compliance.T)
+    with pytest.raises(NotConverged, match="make the laws for this block"):
+        other.press(Control(force=2.0, tilt=None))
+
+
+def test_laws_of_a_given_tilt_have_no_path():
+    patches = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
+    law = PatchLaw(
+        **{name: np.empty(0) for name in ("closure", "pressure", "approach", "relief")},
+        contact_area_fraction=np.empty(0),
+        contacts=np.empty(0, dtype=np.int64),
+        touch=1.0,
+        reach=1.0,
+    )
+    with pytest.raises(ValueError, match="given tilt"):
+        TurningCoupling(LawTable(patches=patches, laws=(law,), made_by={}), lambda _: _)
