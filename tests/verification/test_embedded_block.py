@@ -35,7 +35,7 @@ def half_space():
 def test_one_patch_on_a_large_block_is_the_half_space(half_space, interface):
     errors = [
         np.abs(force(*block_of(ratio), f"coupling.interface={interface}") / half_space - 1)
-        for ratio in (2, 4, 8)
+        for ratio in (2, 8)
     ]
     # a clamped bottom at distance H takes ~ 1/H off the displacement
     assert np.all(np.diff(errors, axis=0) < 0)
