@@ -85,7 +85,7 @@ def read_surface(
                 allowed="finite heights in mm; missing = 'fill' closes gaps by a membrane",
             )
         check_scale(heights)
-        if np.isfinite(heights).all() and is_level(heights) and np.ptp(heights) > 0.0:
+        if is_level(heights) and 0.0 < np.ptp(heights) < np.inf:
             heights = np.full_like(heights, heights.mean())
             source += ", level but for rounding"
         surface = Surface(heights=heights, lengths=sides, periodic=periodic, source=source)

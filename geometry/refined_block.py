@@ -20,6 +20,8 @@ from geometry.surface import Surface
 Array = NDArray[np.float64]
 
 _DELAUNAY = 5  # gmsh's number of the algorithm
+_DIGITS = 12  # of lengths that gmsh is given
+_PLACE = 1e-3  # of the fine edge: places that gmsh is given are multiples of it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -77,7 +79,8 @@ class RefinedShape:
         """Length that gmsh meshes the block in, its largest side [mm].
 
         Its CAD kernel takes what is shorter than 1e-7 for nothing. Blocks of one shape have one
-        mesh, whatever their size.
+        mesh, whatever their size: what sizes leave in the last digits is rounded away, as it would
+        decide where triangles are flipped.
         """
         return max(*self.interface, self.height)
 
@@ -101,13 +104,14 @@ class RefinedShape:
 
         The geometry has the order of the element, and its lengths are in `unit`.
         """
+        width, depth, height, fine, coarse = (
+            float(f"{length / self.unit:.{_DIGITS}g}")
+            for length in (*self.interface, self.height, self.fine, self.coarse)
+        )
+        step = _PLACE * fine
+        places = np.clip(np.round(self.places / self.unit / step) * step, 0.0, (width, depth))
         shape = replace(
-            self,
-            interface=(self.interface[0] / self.unit, self.interface[1] / self.unit),
-            height=self.height / self.unit,
-            places=self.places / self.unit,
-            fine=self.fine / self.unit,
-            coarse=self.coarse / self.unit,
+            self, interface=(width, depth), height=height, places=places, fine=fine, coarse=coarse
         )
         with gmsh_session("patchlaw refined block") as gmsh:
             box = gmsh.model.occ.addBox(0.0, 0.0, -shape.height, *shape.interface, shape.height)

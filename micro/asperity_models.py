@@ -278,8 +278,9 @@ class AsperityModel:
         approach, *tilt = map(float, motion)
         return RigidPlane.above(self.asperities, approach, (tilt[0], tilt[1]))
 
-    @cached_property
+    @property
     def _peaks(self) -> Peaks:
+        """The summits as the plane sees them; not kept, for models are sent between processes."""
         a = self.asperities
         middle, sides = 0.5 * np.asarray(a.lengths), np.hypot(*a.lengths)
         lever = np.stack([np.ones(len(a)), a.x - middle[0], a.y - middle[1]], axis=1)

@@ -81,6 +81,7 @@ class Case:
             "micro": self.micro,
             "coupling": {"kind": self.kind},
             "load": load,
+            "output": {"check": "none"},
         }
         return run(Scene.from_dict(data))
 

@@ -83,12 +83,6 @@ def test_without_force_a_tilted_plane_touches_as_on_a_half_space(block):
     assert step.approach_mm == pytest.approx(below.min(), rel=1e-12)
 
 
-@pytest.fixture(scope="module")
-def bodies(tmp_path_factory):
-    """A folder where bodies are found again."""
-    return str(tmp_path_factory.mktemp("bodies"))
-
-
 @pytest.mark.parametrize(
     ("block", "way", "tilt", "patches"),
     [
@@ -100,19 +94,17 @@ def bodies(tmp_path_factory):
         ("cube", "finite-element", "level", 4),
     ],
 )
-def test_consistent_laws_find_the_contact_problem_again(
-    root, bodies, monkeypatch, block, way, tilt, patches
-):
+def test_consistent_laws_find_the_contact_problem_again(root, block, way, tilt, patches):
     """Whatever the partition, and on a mesh however coarse: closures count in its compliance.
 
-    Tables made to 1e-3, the default, leave up to 1.3e-3 between rows on the tilted pancake.
+    Tables are made to 1e-3, the default. Of 64² cells each new one in contact is a kink, and on the
+    tilted pancake 65 rows, the most that are solved, leave 1.3e-3 between them.
     """
-    monkeypatch.setenv("PATCHLAW_CACHE", bodies)
     height, sides = BLOCKS[block]
     words = [
         "micro.model=half-space",
         "micro.finite_slopes=false",
-        "surface.grid=[64, 64]",
+        "surface.grid=[128, 128]",
         f"block.height={height} mm",
         f"block.sides={sides}",
         "block.cells=[8, 8, 5]",
@@ -125,17 +117,13 @@ def test_consistent_laws_find_the_contact_problem_again(
     laws, whole = (
         run(Scene.load(root / "demos/scenes/paper.toml", [*words, *kind])).force_N
         for kind in (
-            [
-                "coupling.kind=consistent",
-                f"coupling.compliance={way}",
-                "coupling.table_tolerance=5e-4",
-            ],
+            ["coupling.kind=consistent", f"coupling.compliance={way}"],
             ["coupling.kind=concurrent"],
         )
     )
     loaded = whole > 0.1 * whole[-1]
     assert loaded.sum() >= 3
-    np.testing.assert_allclose(laws[loaded], whole[loaded], rtol=1e-3)
+    np.testing.assert_allclose(laws[loaded], whole[loaded], rtol=1e-3)  # 4e-4
 
 
 def test_laws_on_the_mesh_itself_find_the_contact_problem_again(root):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from block_cases import block_of
-from hard_cases import history, scene
+from hard_cases import coarse_tables, history, scene
 from mpi4py import MPI
 
 from geometry import BlockShape, Control, Surface
@@ -82,6 +82,7 @@ def test_no_tolerance_knows_a_unit(kind):
         force = history(
             coupling__kind=kind, surface__lengths=[length, length], block__height=length,
             load__approach=[8e-3 * length], block__young_modulus=modulus,
+            surface__grid=[16, 16], patches__grid=[2, 2], **coarse_tables(kind),
         ).force_N[-1]  # fmt: skip
         return force / (modulus * length**2)
 
@@ -98,20 +99,28 @@ WAYS = {
     "consistent": {"coupling__kind": "consistent"},
     "concurrent": {"coupling__kind": "concurrent"},
     "reference": {
-        "coupling__kind": "reference", "reference__meshes": 1, "reference__cells": [6, 6, 4],
+        "coupling__kind": "reference",
+        "reference__meshes": 1,
+        "reference__cells": [8, 8, 4],
     },
-}  # fmt: skip
+    "reference in tetrahedra": {"coupling__kind": "reference", "reference__meshes": 1},
+}
 
 
 @pytest.mark.parametrize("way", WAYS)
 def test_metres_and_micrometres(way):
     # hard: lengths that no power of two scales, so that every rounding is another one
-    here = history(**WAYS[way])
-    for unit, size in (("m", 1e3), ("um", 1e-3)):
-        there = history(
-            surface__lengths=[f"1 {unit}"] * 2, block__height=f"1 {unit}",
-            load__approach=f"{8 * size} um", block__young_modulus="4e9 Pa", **WAYS[way],
+    def measured(unit, size):
+        edges = {"reference__fine": f"{50 * size} um"} if "tetrahedra" in way else {}
+        return history(
+            surface__lengths=[f"1 {unit}"] * 2, block__height=f"1 {unit}", surface__grid=[16, 16],
+            patches__grid=[2, 2], load__approach=f"{8 * size} um", block__young_modulus="4e9 Pa",
+            **WAYS[way], **edges, **coarse_tables(WAYS[way]["coupling__kind"]),
         )  # fmt: skip
+
+    here = measured("mm", 1.0)
+    for unit, size in (("m", 1e3), ("um", 1e-3)):
+        there = measured(unit, size)
         assert there.force_N[-1] / size**2 == pytest.approx(here.force_N[-1], rel=1e-10)
         pressure = here.patch_pressure_MPa[-1]
         limit = 1e-10 * pressure.max()
@@ -126,9 +135,9 @@ def test_a_slender_column_adds_its_own_length():
     last = column.steps[-1]
     arm = np.hypot(*last.moment_N_mm) / force  # the plane stays level: the column bends by F arm
     length = 50.0 * force / 4000.0 * (1.0 + 12.0 * arm**2)
-    # end zones of about half a width: 0.6 % was measured
-    assert column.approach_mm[-1] - alone.approach_mm[-1] == pytest.approx(length, rel=0.01)
-    assert column.newton_iterations.max() <= 60  # of conjugate gradients: 38 were measured
+    # end zones of about half a width, and contacts that know no sides: 2.6 % was measured
+    assert column.approach_mm[-1] - alone.approach_mm[-1] == pytest.approx(length, rel=0.04)
+    assert column.newton_iterations.max() <= 50  # conjugate gradients, 38 were counted
 
 
 @pytest.mark.parametrize(("height", "bound"), [("0.02 mm", 8), ("50 mm", 8)])

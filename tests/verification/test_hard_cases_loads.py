@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hard_cases import KINDS, centred, from_file, history, scene
+from hard_cases import KINDS, centred, coarse_tables, from_file, history, scene
 from scipy.optimize import brentq
 
 from geometry.control import Control
@@ -52,7 +52,8 @@ def test_smallest_forces_first(kind):
 @every_kind
 def test_a_step_a_hundred_times_too_large_and_back(kind):
     # hard: from first touch to full contact at once; isolated laws end where they are functions
-    load = {"coupling__kind": kind, "surface__grid": [16, 16], "block__cells": [6, 6, 4]}
+    load = {"coupling__kind": kind, "surface__grid": [16, 16], "patches__grid": [2, 2]}
+    load |= coarse_tables(kind)
     if kind == "isolated":
         load["coupling__newton"] = "condensed"
     near = history(load__approach="8 um", **load)
@@ -75,6 +76,7 @@ def test_a_patch_alone_at_full_contact_on_the_mesh_is_told():
             coupling__newton="full",
             load__approach="800 um",
             surface__grid=[16, 16],
+            patches__grid=[2, 2],
         )
 
 
@@ -85,8 +87,8 @@ def test_tilt_that_leaves_half_the_patches_open(kind):
     pressed = found.patch_pressure_MPa[-1] > 0.0
     assert 4 <= np.count_nonzero(pressed) <= 8
     assert found.moment_x_N_mm[-1] > 0.1 * found.force_N[-1]  # the force acts on the lower side
-    # of conjugate gradients for contacts without laws: 37 and, on the block, 49 were measured
-    assert found.newton_iterations.max() <= (70 if kind in ("analytic", "concurrent") else 8)
+    # conjugate gradients over all passes of slopes, 37 and 49 were counted; steps of Newton
+    assert found.newton_iterations.max() <= (60 if kind in ("analytic", "concurrent") else 8)
 
 
 @every_kind
@@ -205,7 +207,7 @@ def test_hundreds_of_load_steps_do_not_drift_nor_grow(kind):
     work = Run(
         scene(
             coupling__kind=kind, load__approach=["8 um", "2 um"] * laps, load__steps=5,
-            output__check="none", **small, **changes,  # what checks keep is not the history's
+            **small, **changes, **coarse_tables(kind),
         )
     )  # fmt: skip
     tracemalloc.start()

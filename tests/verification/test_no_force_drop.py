@@ -6,10 +6,10 @@ from interaction_cases import E_STAR, PATCHES, set_1
 
 from micro import MODELS, ScaledModel, asperity_model
 
-APPROACHES = np.linspace(0.5e-3, 52e-3, 104)
+APPROACHES = np.linspace(0.5e-3, 52e-3, 52)
 
 
-@pytest.mark.parametrize("seed", [1, 6, 8])
+@pytest.mark.parametrize("seed", [1, 8])
 @pytest.mark.parametrize("kind", MODELS)
 @pytest.mark.parametrize("scaled", [False, True], ids=["summit", "contact"])
 def test_force_never_falls(seed, kind, scaled):

@@ -9,8 +9,7 @@ SEEDS = (3, 12, 42, 56, 74)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_what_must_hold_of_any_scene(seed, tmp_path, monkeypatch):
-    monkeypatch.setenv("PATCHLAW_CACHE", str(tmp_path))
+def test_what_must_hold_of_any_scene(seed, tmp_path):
     found = list(checks(drawn(seed), tmp_path))
     assert len(found) > 20
     assert [one for one in found if not one.holds] == []

@@ -12,13 +12,14 @@ SMALL = [
     "surface.grid=[64, 64]", "block.cells=[8, 8, 5]", "load.steps=2",
     "output.figures=false", "output.report=false",
 ]  # fmt: skip
-# Figures of Debian 12 (dolfinx 0.5.2, PETSc 3.18.5, numpy 1.24.2, scipy 1.10.1) on one rank;
-# Debian 13 (0.9.0, 3.22.5, 2.2.4, 1.15.3) and sid (0.11.0, 3.25.5, 2.4.6, 1.17.1) agree to 1e-14.
+# Figures of Debian 12 (dolfinx 0.5.2, PETSc 3.18.5, numpy 1.24.2, scipy 1.10.1) on one rank.
+# Debian 13 (0.9.0, 3.22.5, 2.2.4, 1.15.3) and sid (0.11.0, 3.25.5, 2.4.6, 1.17.1) gave the first
+# to 1e-14; the second is to be compared there anew since it knows slopes.
 FORCES = {
     "embedded": (["patches.grid=[4, 2]"], [0.559137615013406, 2.41750883739317]),
     "concurrent": (
         ["coupling.kind=concurrent", "micro.model=half-space"],
-        [0.629037298367604, 3.05775721544548],
+        [0.6125186627894675, 2.9434749713891692],
     ),
 }
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from geometry import BlockShape, Control, PatchGrid, Spectrum, patch_means, synthesise
+from geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
 from macro import Material
 from macro.body.face_compliance import face_compliance
 from micro import FreeSides, HalfSpaceModel, micro_model
@@ -36,8 +36,7 @@ BLOCKS = {"cube": (1.0, 6), "pancake": (0.1, 12), "column": (10.0, 6)}
 def bodies(request):
     """The body of the small models, and the half-space model on the same block."""
     height, modes = BLOCKS[request.param]
-    shape = BlockShape(interface=FACE, height=height, cells=(8, 8, 8))
-    face = face_compliance(shape, MATERIAL, "free", modes, MPI.COMM_SELF)
+    face = face_compliance(FACE, height, MATERIAL, "free", modes, MPI.COMM_SELF)
     whole = face.normal - half_space_modes(FACE, modes) / MODULUS
     sides = FreeSides(lengths=FACE, poisson_ratio=0.15, reach=0.1)
     rest = whole - side_modes(sides, modes) / MODULUS

@@ -6,7 +6,7 @@ gathered on are finer than what the islands are sampled with.
 
 import numpy as np
 import pytest
-from hard_cases import KINDS, from_file, history
+from hard_cases import KINDS, coarse_tables, from_file, history
 
 from geometry import Spectrum, synthesise
 
@@ -26,22 +26,14 @@ def heights():
     return synthesise(spectrum, grid=GRID, lengths=LENGTHS).heights
 
 
-@pytest.fixture(scope="module", autouse=True)
-def one_correction(tmp_path_factory):
-    """What the block adds to the half-space is made once for all models, and once more turned."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PATCHLAW_CACHE", str(tmp_path_factory.mktemp("cache")))
-        yield
-
-
 def pressed(folder, heights, kind, model, turned=False):
     """Return force, area fraction and patch pressures of heights."""
     order = slice(None, None, -1 if turned else 1)
-    laws = {"coupling__table_tolerance": 1e-2} if kind in ("isolated", "consistent") else {}
     step = history(
         **from_file(folder, heights), surface__lengths=list(LENGTHS[order]),
         block__cells=[*CELLS[order], 3], patches__grid=list(PATCHES[order]),
-        coupling__kind=kind, micro__model=model, load__approach="12 um", **laws,
+        coupling__kind=kind, micro__model=model, load__approach="12 um",
+        **coarse_tables(kind),
     ).steps[-1]  # fmt: skip
     pressure = step.patches.pressure_MPa.reshape(PATCHES[order])
     return step.force_N, step.contact_area_fraction, pressure

@@ -145,3 +145,21 @@ def test_blocks_of_any_size_have_the_same_mesh(size):
     with other.meshed() as model:
         np.testing.assert_array_equal(model.mesh.getNodes()[1], expected)
     assert other.unit == size * shape().unit
+
+
+def test_what_is_in_the_last_digits_does_not_change_the_mesh():
+    """Summits are found to 1e-9 of a length; a triangle flipped moves the force by 1e-4."""
+    random = np.random.default_rng(3)
+    places = random.uniform(0.1, 0.7, (60, 2))
+    found = []
+    for size, error in ((1.0, 0.0), (1e3, 0.0), (1.0, 1e-9), (1.0, 1e-9)):
+        near = {
+            "interface": (size, 0.8 * size),
+            "height": 0.5 * size,
+            "places": size * (places + error * random.standard_normal(places.shape)),
+            "fine": 0.02 * size,
+            "coarse": 0.2 * size,
+        }
+        with shape(**near).meshed() as model:
+            found.append(model.mesh.getNodes()[1])
+    assert all(np.array_equal(found[0], other) for other in found[1:])
