@@ -2,7 +2,8 @@
 
 A rigid plane that has approached by δ asks every summit for the displacement
 d_k = <δ(x_k) − (z_M − z_k)>. Without interaction each contact makes it alone, w_k = d_k; with
-interaction the displacements by all contacts add up to w_k (`micro.summits.contact_problem`).
+interaction the displacements by all contacts add up to w_k
+(`micro.complementarity.contact_problem`).
 """
 
 from __future__ import annotations
@@ -18,13 +19,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from geometry import Asperities, Control, Partition, PatchGrid
 from geometry.errors import InputError
+from micro.complementarity.contact_problem import Solution
 from micro.compliance.body_modes import BodyModes
 from micro.curve import PatchSums, checked_approaches, checked_means
 from micro.plane import RigidPlane
 from micro.plane_equilibrium import Held, Peaks, balanced
 from micro.response import Pressed, Response
 from micro.summits.asperity_state import AsperityState
-from micro.summits.contact_problem import Solution
 from micro.summits.many_summits import PAIR_SUMS
 from micro.summits.summit_contacts import SOLVERS, SummitContacts
 

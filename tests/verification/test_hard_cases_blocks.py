@@ -65,14 +65,14 @@ def test_blocks_that_do_not_bulge(nu):
     ("element", "nu", "told"), [("Q1", 0.49, 1), ("P1", 0.46, 1), ("Q2", 0.49, 0), ("Q1", 0.4, 0)]
 )
 def test_the_plan_says_that_linear_elements_lock(element, nu, told):
-    cells = {} if element.startswith("Q") else {"block__cells": None}
+    cells = {"reference__cells": [6, 6, 4]} if element.startswith("Q") else {}
     material = {"block__element": element, "block__poisson_ratio": nu}
     plain = scene(coupling__kind="isolated", **material)
     meshed = scene(coupling__kind="reference", **material, **cells)
     for one in (plain, meshed):
         assert sum("linear elements lock" in text for text in warnings(make_stage(one))) == told
     split = make_stage(scene(block__poisson_ratio=0.4999))
-    assert not any("lock" in one for one in warnings(split))  # the decomposed block is quadratic
+    assert not any("lock" in one for one in warnings(split))  # its elements are of high order
 
 
 @pytest.mark.parametrize("kind", BLOCKED)
@@ -97,8 +97,10 @@ WAYS = {
     "at points": {"coupling__kind": "isolated", "coupling__interface": "pointwise"},
     "consistent": {"coupling__kind": "consistent"},
     "concurrent": {"coupling__kind": "concurrent"},
-    "reference": {"coupling__kind": "reference", "reference__meshes": 1},
-}
+    "reference": {
+        "coupling__kind": "reference", "reference__meshes": 1, "reference__cells": [6, 6, 4],
+    },
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -124,9 +126,9 @@ def test_a_slender_column_adds_its_own_length():
     last = column.steps[-1]
     arm = np.hypot(*last.moment_N_mm) / force  # the plane stays level: the column bends by F arm
     length = 50.0 * force / 4000.0 * (1.0 + 12.0 * arm**2)
-    # end zones of about half a width, and contacts that know no sides: 2.6 % was measured
-    assert column.approach_mm[-1] - alone.approach_mm[-1] == pytest.approx(length, rel=0.04)
-    assert column.newton_iterations.max() <= 15
+    # end zones of about half a width: 0.6 % was measured
+    assert column.approach_mm[-1] - alone.approach_mm[-1] == pytest.approx(length, rel=0.01)
+    assert column.newton_iterations.max() <= 60  # of conjugate gradients: 38 were measured
 
 
 @pytest.mark.parametrize(("height", "bound"), [("0.02 mm", 8), ("50 mm", 8)])
