@@ -39,7 +39,6 @@ COUPLINGS = {
     "consistent, plain mesh": [
         "coupling.kind=consistent",
         "coupling.compliance=finite-element",
-        "block.cells=[16, 16, 8]",
     ],
     "isolated": ["coupling.kind=isolated", "coupling.compliance=decomposed"],
 }
@@ -57,7 +56,7 @@ def forces(seed: int, tilt: float, patches: int, *more: str) -> np.ndarray:
             "micro.model=half-space",
             "micro.finite_slopes=false",
             "output.check=none",
-            "block.cells=[16, 16, 8]",
+            "block.cells=[16, 16, 8]",  # of the plain mesh; other blocks have none
             'load.approach=["2 um", "4 um", "8 um"]',
             "load.steps=1",
             f'load.tilt=["{tilt} um/mm", "0 um/mm"]',
@@ -117,10 +116,7 @@ figure.savefig(choice.out / "couplings.png", dpi=130)
 # their closures count in the compliance of the macro model that they are for.
 
 # %%
+# at 4 and 8 µm: forces at 2 µm are less than a tenth of the largest
 errors = {tuple(key): np.abs(error[:, 1:]).max() for *key, error in rows}
-for name in TILTS:
-    for patches in GRIDS:
-        # forces at 2 µm are less than a tenth of the largest
-        assert errors["consistent", name, patches] < 1e-3
-        assert errors["consistent, plain mesh", name, patches] < 1e-3
-        assert errors["consistent", name, patches] < errors["isolated", name, patches]
+assert max(error for key, error in errors.items() if key[0] != "isolated") < 1e-3
+assert min(error for key, error in errors.items() if key[0] == "isolated") > 1e-3

@@ -43,7 +43,6 @@ KEYS = (
     "coupling.kind=consistent",
     "coupling.table_tolerance=3e-3",
     "surface.grid=[64, 64]",
-    "block.cells=[16, 16, 8]",
 )
 
 

@@ -11,12 +11,12 @@ from micro.auto.candidates import Candidate, resampled
 from micro.auto.choice import Choice, choose
 from micro.boussinesq import HalfSpace
 from micro.cells.contacts import Contacts, find_contacts
-from micro.cells.free_sides import FreeSides
 from micro.cells.half_space_state import HalfSpaceState
 from micro.cells.side_stresses import SideStresses, side_stresses
 from micro.compliance.body_modes import BodyModes
 from micro.compliance.body_stresses import BodyStresses
 from micro.compliance.finite_slopes import FiniteSlopes, coarse_grid
+from micro.compliance.free_sides import FreeSides
 from micro.compliance.half_space_modes import half_space_modes, half_space_stress_modes
 from micro.compliance.side_modes import side_modes, side_stress_modes
 from micro.compliance.side_patches import side_patches

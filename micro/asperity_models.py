@@ -2,7 +2,8 @@
 
 A rigid plane that has approached by δ asks every summit for the displacement
 d_k = <δ(x_k) − (z_M − z_k)>. Without interaction each contact makes it alone, w_k = d_k; with
-interaction the displacements by all contacts add up to w_k (`micro.summits.contact_problem`).
+interaction the displacements by all contacts add up to w_k
+(`micro.complementarity.contact_problem`).
 """
 
 from __future__ import annotations
@@ -18,13 +19,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from geometry import Asperities, Control, Partition, PatchGrid
 from geometry.errors import InputError
+from micro.complementarity.contact_problem import Solution
 from micro.compliance.body_modes import BodyModes
 from micro.curve import PatchSums, checked_approaches, checked_means
 from micro.plane import RigidPlane
 from micro.plane_equilibrium import Held, Peaks, balanced
 from micro.response import Pressed, Response
 from micro.summits.asperity_state import AsperityState
-from micro.summits.contact_problem import Solution
 from micro.summits.many_summits import PAIR_SUMS
 from micro.summits.summit_contacts import SOLVERS, SummitContacts
 
@@ -277,8 +278,9 @@ class AsperityModel:
         approach, *tilt = map(float, motion)
         return RigidPlane.above(self.asperities, approach, (tilt[0], tilt[1]))
 
-    @cached_property
+    @property
     def _peaks(self) -> Peaks:
+        """The summits as the plane sees them; not kept, for models are sent between processes."""
         a = self.asperities
         middle, sides = 0.5 * np.asarray(a.lengths), np.hypot(*a.lengths)
         lever = np.stack([np.ones(len(a)), a.x - middle[0], a.y - middle[1]], axis=1)

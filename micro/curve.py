@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from geometry import Asperities, Partition, PatchGrid, Surface
 from geometry.errors import InputError
+from micro.complementarity.contact_problem import Solution
 from micro.pairs.body_points import BodyPoints
 from micro.patch_displacement import patch_displacements
 from micro.plane import RigidPlane
 from micro.response import Response
 from micro.summits.asperity_state import HertzCoefficients
 from micro.summits.attribution import shares
-from micro.summits.contact_problem import Solution
 
 Array = NDArray[np.float64]
 

@@ -14,11 +14,11 @@ from geometry import Control, Partition, PatchGrid, Surface
 from geometry.errors import InputError
 from micro.cells.contact_pressure import Pressures
 from micro.cells.elastic_grid import BodyTerm, ElasticGrids, SurfaceTerm
-from micro.cells.free_sides import FreeSides
 from micro.cells.half_space_curve import CellSums
 from micro.cells.half_space_state import HalfSpaceState
 from micro.cells.motions import Motions
 from micro.cells.pressing import Pressing
+from micro.compliance.free_sides import FreeSides
 from micro.curve import checked_approaches, checked_means, whole_patch
 from micro.plane import RigidPlane
 from micro.response import Pressed, Response

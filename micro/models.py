@@ -5,11 +5,11 @@ from __future__ import annotations
 from geometry import Surface, find_asperities
 from geometry.errors import InputError
 from micro.asperity_models import MODELS, Balanced, asperity_model
+from micro.complementarity.contact_problem import Solution
 from micro.half_space import HalfSpaceModel
 from micro.model import MicroModel
 from micro.plane import RigidPlane
 from micro.regions.islands import IslandModel
-from micro.summits.contact_problem import Solution
 from micro.summits.scaled_model import ScaledModel
 
 MODEL_NAMES = (*MODELS, "islands", "half-space")

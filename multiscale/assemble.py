@@ -56,6 +56,7 @@ def make_table(stage: Stage, model: MicroModel, comm: Any) -> LawTable:
             mean_heights=stage.mean_heights,
             largest=Control(**{programme.quantity: programme.largest}, tilt=programme.tilt),
             displacements=patch_displacements(stage, comm, dense=newton_choice(stage).condensed),
+            pointwise=stage.scene.coupling.interface == "pointwise",
             tolerance=stage.table_tolerance,
             most_rows=stage.table_rows,
             comm=comm,

@@ -37,8 +37,8 @@ class LoadStep:
         contact_area_fraction: Real over nominal contact area.
         mean_separation_mm: Mean gap between the plane and the deformed surface [mm].
         contacts: Number of asperities in contact.
-        newton_iterations: Newton steps spent, on halved steps too; without laws the iterations of
-            the micro model (analytic) or its presses (concurrent).
+        newton_iterations: Newton steps spent, on halved steps too; without laws (analytic,
+            concurrent) the iterations of the contact problem.
         linear_iterations: Iterations of the linear solver spent.
         wall_s: Wall time of the step [s].
         reason: Name of the reason for which the iteration stopped.

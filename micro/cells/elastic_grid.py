@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from micro.cells.convolution import Convolution
-from micro.cells.free_sides import FreeSides
 from micro.cells.kernels import padded_spectrum, periodic_spectrum
 from micro.cells.reach import Box
 from micro.cells.side_cells import SideCells, SomeCells, side_cells
+from micro.compliance.free_sides import FreeSides
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

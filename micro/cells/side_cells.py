@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from micro.cells.free_sides import FreeSides
 from micro.cells.side_waves import SideWaves, multiplied
+from micro.compliance.free_sides import FreeSides
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import fft
 from scipy.sparse import csr_array, hstack
 
-from micro.cells.distance_nodes import distance_nodes, means_over
+from micro.compliance.distance_nodes import distance_nodes, means_over
 
 Array = NDArray[np.float64]
 Waves = NDArray[np.complex128]

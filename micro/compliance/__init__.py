@@ -1,1 +1,1 @@
-"""Terms of the compliance beside the half-space's: the rest of a finite body, finite slopes."""
+"""Terms of the compliance beside the half-space's: free sides, finite body, finite slopes."""

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from scipy.special import spherical_jn
 
 from geometry.legendre_modes import mode_values
-from micro.cells.distance_nodes import distance_nodes, values_at
-from micro.cells.free_sides import FreeSides
+from micro.compliance.distance_nodes import distance_nodes, values_at
+from micro.compliance.free_sides import FreeSides
 
 Array = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Partition
-from micro.cells.distance_nodes import distance_nodes, means_over
-from micro.cells.free_sides import FreeSides
+from micro.compliance.distance_nodes import distance_nodes, means_over
+from micro.compliance.free_sides import FreeSides
 
 Array = NDArray[np.float64]
 

@@ -3,7 +3,7 @@
 Held at its shape, an island of depth w carries F = c w^(3/2). Where neither a body nor a free
 motion of the plane couples the islands, their forces at the depths at which they were found tell
 the displacements at once; else depths, displacements and plane follow from one contact problem
-(`micro.summits.contact_problem`) of point forces.
+(`micro.complementarity.contact_problem`) of point forces.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control
+from micro.complementarity.active_set import active_set
+from micro.complementarity.contact_problem import ContactProblem, solve
+from micro.complementarity.newton_krylov import newton_krylov
 from micro.pairs.body_points import BodyPoints
 from micro.pairs.interaction import Lift
 from micro.plane_equilibrium import Held, Peaks, balanced, contact_stiffness
 from micro.regions.island_passes import Answer
 from micro.regions.island_shapes import Islands
 from micro.regions.relief import Relief
-from micro.summits.active_set import active_set
-from micro.summits.contact_problem import ContactProblem, solve
-from micro.summits.newton_krylov import newton_krylov
 
 Array = NDArray[np.float64]
 

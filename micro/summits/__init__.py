@@ -1,1 +1,1 @@
-"""Contact problems of interacting asperities, and what they leave."""
+"""Asperities at the summits of a surface: their contacts, fits and states."""

@@ -21,6 +21,8 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from micro.complementarity.contact_problem import ContactProblem, Solution, solve
+from micro.complementarity.newton_krylov import newton_krylov
 from micro.pairs.body_points import BodyPoints
 from micro.pairs.close_pairs import ClosePairs
 from micro.pairs.far_mesh import FarMesh, Neighbourhood
@@ -28,8 +30,6 @@ from micro.pairs.far_pairs import REACH, FarPairs
 from micro.pairs.interaction import Interaction
 from micro.pairs.split_interaction import SplitInteraction
 from micro.summits.body_lift import BodyFarField
-from micro.summits.contact_problem import ContactProblem, Solution, solve
-from micro.summits.newton_krylov import newton_krylov
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

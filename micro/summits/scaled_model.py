@@ -20,13 +20,13 @@ from numpy.typing import ArrayLike, NDArray
 from geometry import Asperities, Control, Partition, PatchGrid, Surface
 from geometry.errors import InputError, NotConverged
 from micro.asperity_models import MODELS, AsperityModel, Balanced, asperity_model
+from micro.complementarity.contact_problem import Solution
 from micro.compliance.body_modes import BodyModes
 from micro.curve import checked_approaches, checked_means
 from micro.plane import RigidPlane
 from micro.relaxation import Relaxation
 from micro.response import Pressed, Response
 from micro.summits.asperity_state import AsperityState
-from micro.summits.contact_problem import Solution
 from micro.summits.contact_scale import ScaledAsperities
 
 Array = NDArray[np.float64]

@@ -11,18 +11,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geometry import Asperities
+from micro.complementarity.active_set import active_set
+from micro.complementarity.contact_problem import ContactProblem, Method, Solution, solve
+from micro.complementarity.truncated_newton import truncated_newton
 from micro.compliance.body_modes import BodyModes
 from micro.hertz import HertzContact
 from micro.pairs.body_points import BodyPoints
 from micro.pairs.interaction import MERGING_SLOPE, Interaction
 from micro.pairs.multipoles import moments
 from micro.plane_equilibrium import contact_stiffness
-from micro.summits.active_set import active_set
 from micro.summits.asperity_state import HertzCoefficients
 from micro.summits.body_lift import BodyInteraction
-from micro.summits.contact_problem import ContactProblem, Method, Solution, solve
 from micro.summits.many_summits import PAIR_SUMS, ManySummits, pair_sum
-from micro.summits.truncated_newton import truncated_newton
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -22,6 +22,10 @@ _GENTLE = 1e-6
 Hertz it has then come a ten thousandth of its way."""
 _RESERVE = 0.02
 """Rows beyond the largest load, of the way from first touch: what lies between rows may ask."""
+_POINTWISE = 0.5
+"""The same of laws that hold at points: where a patch sinks less than in its mean, closures are
+larger than any row's. On eight scenes of the paper's recipe (1 to 64 patches, level and tilted, on
+a cube and a column) 0.02 ended seven, 0.25 two and 0.5 none."""
 
 
 def consistent_laws(
@@ -31,6 +35,7 @@ def consistent_laws(
     mean_heights: Array,
     largest: Control,
     displacements: Displacements | None = None,
+    pointwise: bool = False,
     tolerance: float = 1e-3,
     most_rows: int = MOST_ROWS,
     comm: Any = None,
@@ -49,6 +54,7 @@ def consistent_laws(
             to it are open.
         displacements: Mean displacements of the patches by their pressures in the macro model;
             those of a half-space when not given. Collective.
+        pointwise: Whether the macro model asks for pressures at points, beyond the rows' means.
         tolerance: Interpolation error of the force, see `refinement.refined`.
         most_rows: Rows that are solved at most.
         comm: MPI communicator, whose ranks share the rows. The table does not depend on their
@@ -89,9 +95,10 @@ def consistent_laws(
         return first, last, end.tilt or (0.0, 0.0)
 
     first, end, tilt = on_root(comm, ends)
+    reserve = _POINTWISE if pointwise else _RESERVE
     laws, error = whole.tabulated(
         first,
-        end + _RESERVE * max(end - first, 0.0),
+        end + reserve * max(end - first, 0.0),
         compliance=compliance,
         tolerance=tolerance,
         most_rows=most_rows,

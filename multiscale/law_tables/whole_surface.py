@@ -21,9 +21,10 @@ Array = NDArray[np.float64]
 Displacements = Callable[[Array], Array]
 """From pressures of N patches at m load steps to their mean displacements, [MPa] to [mm]."""
 
-_SHARE = 4
+_SHARE = 2
 """Rows that one rank solves together, each starting from the one before: however many ranks there
-are, rows start from the same ones."""
+are, rows start from the same ones. On 64² to 256² cells it takes up to 7 % more iterations than 4,
+which would leave most of the ranks idle beyond two."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -102,11 +103,13 @@ class WholeSurface:
         """Solve the contact problem at all approaches, shared by the ranks."""
         parts = [approaches[k : k + _SHARE] for k in range(0, len(approaches), _SHARE)]
         rank, size = (0, 1) if self.comm is None else (self.comm.rank, self.comm.size)
-        mine = together(self.comm, lambda: [self._along(part) for part in parts[rank::size]])
+        before = -(-len(self._seen) // _SHARE)  # parts of earlier calls: the next rank goes on
+        own = parts[(rank - before) % size :: size]
+        mine = together(self.comm, lambda: [self._along(part) for part in own])
         if size == 1:
             return [row for part in mine for row in part]
         gathered = self.comm.allgather(mine)
-        return [row for k in range(len(parts)) for row in gathered[k % size][k // size]]
+        return [row for k in range(len(parts)) for row in gathered[(k + before) % size][k // size]]
 
     def _along(self, approaches: Array) -> list[tuple[Response, RigidPlane]]:
         found, start = [], None

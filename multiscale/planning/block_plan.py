@@ -68,7 +68,7 @@ def locking(degree: int, poisson_ratio: float) -> Iterator[str]:
         yield (
             f"linear elements lock as Poisson's ratio comes near 0.5 (here {poisson_ratio:g}): the "
             "block is too stiff by several per cent or more; take block.element = 'Q2' or 'P2', or "
-            "coupling.compliance = 'decomposed', whose elements are quadratic"
+            "coupling.compliance = 'decomposed', whose elements are of high order"
         )
 
 

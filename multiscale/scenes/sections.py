@@ -32,16 +32,16 @@ class CouplingSection(Section):
     """How micro and macro model are put together.
 
     ``kind``: ``isolated`` takes every patch's law from what lies in it alone (Waddad et al. 2016);
-    ``consistent`` takes all laws from one solution of the whole surface under the tilt of the load
-    (where the plane is free, that which it takes on a half-space at the largest load);
+    ``consistent`` takes all laws from the whole surface in contact on the block under the tilt of
+    the load (where the plane is free, under the tilt that it takes at each approach);
     ``concurrent`` solves the whole surface on the block at every load step, without laws;
     ``analytic`` is the micro model alone on a half-space; ``reference`` meshes the rough surface
     itself and has no micro model, see `ReferenceSection`; ``auto`` is concurrent or consistent,
     whichever keeps the scene's accuracy at less cost.
 
     ``compliance`` of the block under its patches: ``finite-element`` from the plain mesh under the
-    laws; ``decomposed`` is the half-space exactly and finite elements for the smooth rest. By
-    default decomposed, but for isolated laws and laws at points.
+    laws; ``decomposed`` is the half-space exactly and few smooth modes for what the block adds.
+    By default decomposed, but for isolated laws and laws at points.
 
     ``newton``: ``condensed`` solves for the patches alone, with the compliance computed once;
     ``full`` for all displacements of the mesh. By default what is predicted to cost less.

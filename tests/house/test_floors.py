@@ -18,7 +18,10 @@ BELOW = {
 FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 # sub-packages from the ground up: each may import those before it
 ORDER = {
-    "micro": ["compliance", "pairs", "regions", "summits", "cells", "auto"],
+    "micro": [
+        "compliance", "pairs", "complementarity", "regions", "summits", "cells", "auto",
+    ],
+    "macro": ["body"],
     "multiscale": [
         "scenes", "law_tables", "couplings", "reference", "planning", "reporting", "restart",
         "doctor", "comparing",

@@ -19,23 +19,23 @@ BLOCKS = {
 
 
 def made(make, lengths, height, count):
-    """Return both parts, after all ranks were found to have the very same ones."""
+    """Return all parts, after all ranks were found to have the very same ones."""
     found = make(lengths, height, MATERIAL, "free", count, COMM)
-    both = np.concatenate([found.normal[None], found.tangential])
-    assert all((both == other).all() for other in COMM.allgather(both)), "ranks disagree"
-    return both.tolist()
+    parts = np.concatenate([[found.normal, found.growth], found.stresses])
+    assert all((parts == other).all() for other in COMM.allgather(parts)), "ranks disagree"
+    return parts.tolist()
 
 
 def failed():
     """Return the error that every rank meets when the last one has no memory."""
-    solve = module.Quarter.displacements
+    solve = module.Quarter.response
 
-    def displacements(quarter, count):
+    def response(quarter, count):
         if COMM.rank == COMM.size - 1:
             raise MemoryError("no room")
         return solve(quarter, count)
 
-    module.Quarter.displacements = displacements
+    module.Quarter.response = response
     try:
         face_compliance((1.0, 1.0), 1.0, MATERIAL, "free", 2, COMM)
         found = "none"

@@ -154,13 +154,16 @@ def stamp(path):
 
 
 def tables(out):
-    """Return the numbers of history.csv and patches.csv that a resumed run has to meet."""
+    """Return the numbers of history.csv and patches.csv that a resumed run has to meet.
+
+    An empty cell, of what was not measured, is NaN.
+    """
     found = []
     for name in ("history.csv", "patches.csv"):
         with (out / name).open(encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
         found.append(
-            np.array([[float(r[key]) for key in r if key not in UNCOMPARED] for r in rows])
+            np.array([[float(r[key] or "nan") for key in r if key not in UNCOMPARED] for r in rows])
         )
     return found
 
@@ -170,6 +173,8 @@ def largest_difference(out, reference):
     worst = 0.0
     for one, other in zip(tables(out), tables(reference), strict=True):
         assert one.shape == other.shape
+        assert (np.isnan(one) == np.isnan(other)).all()
+        one, other = np.nan_to_num(one), np.nan_to_num(other)
         scale = np.maximum(np.abs(other).max(axis=0), np.finfo(float).tiny)
         worst = max(worst, float((np.abs(one - other) / scale).max()))
     return worst

@@ -17,7 +17,10 @@ SCENES = {
         "block.cells=[4, 4, 4]", "block.margin=4 mm", "block.margin_cells=6",
         "load.tilt=['2 um/mm', '-1 um/mm']",
     ],
-    "micro model alone": ["coupling.kind=analytic"],
+    "half-space with slopes, tilted": [
+        "coupling.kind=analytic", "micro.model=half-space", "micro.finite_slopes=true",
+        "load.tilt=['2 um/mm', '-1 um/mm']", "output.check=all",
+    ],
     "condensed, up and down": [
         "block.cells=[8, 8, 5]", "patches.grid=[4, 2]", "coupling.newton=condensed",
         "load.approach=['8 um', '2 um']", "load.tilt=[0.002, 0.001]", "output.fields=true",
@@ -29,12 +32,17 @@ SCENES = {
         "block.cells=[8, 8, 5]", "coupling.kind=consistent", "micro.model=half-space",
         "load.tilt=free",
     ],
-    "concurrent": [
-        "block.cells=[8, 8, 5]", "coupling.kind=concurrent", "micro.model=half-space",
+    "concurrent, errors measured": [
+        "coupling.kind=concurrent", "micro.model=half-space", "micro.finite_slopes=true",
+        "output.check=all",
     ],
-    "concurrent, free to turn": [
-        "surface.grid=[96, 96]", "block.cells=[8, 8, 5]", "coupling.kind=concurrent",
-        "micro.model=half-space", "load.tilt=free",
+    "concurrent, free to turn under a force": [
+        "coupling.kind=concurrent", "micro.model=half-space", "micro.finite_slopes=true",
+        "block.height=0.3 mm", "load={force='1 N', steps=3, tilt='free'}", "output.check=all",
+    ],
+    "concurrent, islands": ["coupling.kind=concurrent", "micro.model=islands"],
+    "concurrent, asperities": [
+        "coupling.kind=concurrent", "micro.model=elliptic", "load.tilt=free",
     ],
     "cells for an accuracy": [
         "accuracy=0.05", "surface.grid=auto", "coupling.kind=auto", "micro.model=auto",
@@ -43,12 +51,16 @@ SCENES = {
     "laws of the half-space": ["block.cells=[8, 8, 5]", "micro.model=half-space"],
 }  # fmt: skip
 NUMBERS = (
+    "approach_mm",
+    "tilt_x",
+    "tilt_y",
     "force_N",
     "mean_pressure_MPa",
     "contact_area_fraction",
     "mean_separation_mm",
     "contacts",
     "force_error_N",
+    "approach_error_mm",
 )
 
 

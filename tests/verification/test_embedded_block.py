@@ -123,3 +123,17 @@ def test_pointwise_laws_reach_to_the_corners_of_tilted_patches():
     assert whole.stage.closure_ends[0] > 15e-3
     (step,) = whole.load_steps()
     assert step.force_N > 1.0
+
+
+@pytest.mark.parametrize("grid", [(4, 4), (4, 2)])
+def test_consistent_laws_go_as_far_as_points_of_patches_ask(grid):
+    """Where a patch sinks less than in its mean, closures are larger than in any of its rows."""
+    small = ["surface.grid=[64, 64]", "micro.model=half-space", "load.steps=1"]
+    small += ["block.cells=[8, 8, 5]", "output.check=none"]
+    points = ["coupling.kind=consistent", "coupling.interface=pointwise"]
+    points.append(f"patches.grid={list(grid)}")
+    found, whole = (
+        run(Scene.load(PAPER, [*small, *more])) for more in (points, ["coupling.kind=concurrent"])
+    )
+    # laws of patches' means, asked for at points: measured 0.9 and 1.2 % off
+    assert found.force_N[0] == pytest.approx(whole.force_N[0], rel=0.02)

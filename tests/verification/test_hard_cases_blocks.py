@@ -72,7 +72,7 @@ def test_the_plan_says_that_linear_elements_lock(element, nu, told):
     for one in (plain, meshed):
         assert sum("linear elements lock" in text for text in warnings(make_stage(one))) == told
     split = make_stage(scene(block__poisson_ratio=0.4999))
-    assert not any("lock" in one for one in warnings(split))  # the decomposed block is quadratic
+    assert not any("lock" in one for one in warnings(split))  # its elements are of high order
 
 
 @pytest.mark.parametrize("kind", BLOCKED)

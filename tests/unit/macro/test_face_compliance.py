@@ -95,9 +95,9 @@ def test_elements_cover_the_block():
 
 
 def test_impossible_blocks_are_refused():
-    with pytest.raises(InputError, match="one mode at least"):
+    with pytest.raises(InputError, match="a top has one mode at least"):
         compliance((1.0, 1.0), 1.0, count=0)
-    with pytest.raises(InputError, match="no such size"):
+    with pytest.raises(InputError, match="the block has no such size"):
         compliance((1.0, 1.0), -1.0)
 
 

@@ -14,12 +14,11 @@ from macro import (
     ObstacleBlock,
     block_mesh,
     compat,
-    condense,
+    displacements_under,
     face_compliance,
     plain_compliance,
     rough_block_mesh,
 )
-from micro.boussinesq import HalfSpace
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 SHAPE = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(8, 8, 3))
@@ -87,20 +86,14 @@ def test_a_compliance_keeps_no_fields_of_its_patches(kept):
     assert found[1] <= found[0]
 
 
-def test_a_correction_keeps_no_factors(kept, monkeypatch):
-    meshes = []
-
-    def remembered(*arguments):
-        meshes.append(block_mesh(*arguments))
-        return meshes[-1]
-
-    monkeypatch.setattr(condense, "block_mesh", remembered)
-    loads = PatchGrid(grid=(2, 1), lengths=(1.0, 1.0))
-    made = condense.make_correction(
-        SHAPE, MATERIAL, "free", loads, HalfSpace(4000.0, 0.15), MPI.COMM_SELF
-    )
-    assert np.all(np.isfinite(made.values))
-    assert kept(PETSc.Comm(meshes[0].comm)) == 0
+def test_displacements_keep_no_fields_of_their_load_steps(kept):
+    block = Block(block_mesh(SHAPE, MPI.COMM_SELF), MATERIAL)
+    interface = Interface(block, PatchGrid(grid=(2, 1), lengths=(1.0, 1.0)))
+    found = []
+    for count in (1, 8):
+        assert (displacements_under(interface, np.ones((count, 2))) > 0.0).all()
+        found.append(kept(block.stiffness.comm))
+    assert found[1] <= found[0]
 
 
 def test_a_compliance_in_modes_keeps_no_factors(kept):

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from geometry import NotConverged
+from micro.complementarity.active_set import active_set
+from micro.complementarity.contact_problem import TOLERANCE, ContactProblem, solve
 from micro.ellipse import shape_factors
 from micro.pairs.interaction import Interaction, Lift
-from micro.summits.active_set import active_set
-from micro.summits.contact_problem import TOLERANCE, ContactProblem, solve
 
 
 @pytest.fixture

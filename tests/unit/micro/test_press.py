@@ -1,5 +1,7 @@
 """Every model at a load step: the same as its curve, and what is prescribed, from any start."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -39,6 +41,12 @@ def test_is_a_row_of_the_curve(model, tilt):
     row = model.respond([APPROACH], patches=PATCHES, mean_heights=MEANS, tilt=tilt)
     assert row.force[0] > 0.0
     same(press(model, approach=APPROACH, tilt=tilt).response, row, rel=1e-12)
+
+
+def test_a_model_can_be_sent_to_other_ranks_after_it_was_pressed(model):
+    found = press(model, force=0.5, tilt=None).response
+    sent = pickle.loads(pickle.dumps(model))
+    same(press(sent, force=0.5, tilt=None).response, found, rel=1e-12)  # the same arithmetic
 
 
 def test_a_vanishing_tilt_changes_nothing(model):

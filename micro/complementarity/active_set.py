@@ -1,7 +1,7 @@
 """Newton's method on the active set: the default solver of the interacting asperity models.
 
-The Jacobian of the normal map (`micro.summits.normal_map`) is made on the active set, and its
-linear system factorised.
+The Jacobian of the normal map (`micro.complementarity.normal_map`) is made on the active set, and
+its linear system factorised.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import NotConverged
+from micro.complementarity.contact_problem import ContactProblem, Solution
+from micro.complementarity.normal_map import newton_on_normal_map
 from micro.pairs.interaction import Lift
-from micro.summits.contact_problem import ContactProblem, Solution
-from micro.summits.normal_map import newton_on_normal_map
 
 Array = NDArray[np.float64]
 

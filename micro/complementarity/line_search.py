@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import NotConverged
-from micro.summits.contact_problem import Lifts
+from micro.complementarity.contact_problem import Lifts
 
 Array = NDArray[np.float64]
 

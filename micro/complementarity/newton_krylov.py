@@ -1,8 +1,8 @@
 """Newton's method for many asperities, its linear systems solved by iteration.
 
-The Jacobian of the normal map (`micro.summits.normal_map`) is not made: its products, distant
-contacts as point forces, are all that GMRES needs, and each system is solved only as far as the
-step pays.
+The Jacobian of the normal map (`micro.complementarity.normal_map`) is not made: its products,
+distant contacts as point forces, are all that GMRES needs, and each system is solved only as far
+as the step pays.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from geometry.errors import NotConverged
+from micro.complementarity.contact_problem import ContactProblem, Solution
+from micro.complementarity.normal_map import newton_on_normal_map
 from micro.pairs.interaction import Lift
 from micro.pairs.split_interaction import SplitLift
-from micro.summits.contact_problem import ContactProblem, Solution
-from micro.summits.normal_map import newton_on_normal_map
 
 Array = NDArray[np.float64]
 

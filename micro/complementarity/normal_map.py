@@ -19,8 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import NotConverged
-from micro.summits.contact_problem import TOLERANCE, ContactProblem, Lifts, Solution, solution
-from micro.summits.line_search import damped_step
+from micro.complementarity.contact_problem import (
+    TOLERANCE,
+    ContactProblem,
+    Lifts,
+    Solution,
+    solution,
+)
+from micro.complementarity.line_search import damped_step
 
 Array = NDArray[np.float64]
 

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import lsqr
 
 from geometry.errors import NotConverged
+from micro.complementarity.contact_problem import TOLERANCE, ContactProblem, Solution, solution
+from micro.complementarity.line_search import damped_step
 from micro.pairs.interaction import Lift
-from micro.summits.contact_problem import TOLERANCE, ContactProblem, Solution, solution
-from micro.summits.line_search import damped_step
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -1,0 +1,52 @@
+"""Make consistent laws on all ranks; print how many contact problems each solved, and the laws."""
+
+import hashlib
+import json
+from io import BytesIO
+
+from mpi4py import MPI
+
+from geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
+from micro import micro_model
+from multiscale.law_tables.consistent import consistent_laws
+from multiscale.law_tables.law_files import write_laws
+
+COMM = MPI.COMM_WORLD
+
+
+class Counted:
+    """A micro model that counts what it solves on this rank."""
+
+    def __init__(self, model):
+        self.model, self.solved = model, 0
+
+    def __getattr__(self, name):
+        return getattr(self.model, name)
+
+    def press(self, *arguments, **more):
+        self.solved += 1
+        return self.model.press(*arguments, **more)
+
+
+def main():
+    """Tabulate the laws of sixteen patches of a small surface."""
+    spectrum = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=3)
+    surface = synthesise(spectrum, grid=(64, 64), lengths=(1.0, 1.0))
+    patches = PatchGrid(grid=(4, 4), lengths=surface.lengths)
+    model = Counted(micro_model("half-space", surface, contact_modulus=4000.0))
+    table = consistent_laws(
+        model,
+        patches,
+        mean_heights=patch_means(surface, patches),
+        largest=Control(approach=8e-3, tilt=(0.0, 0.0)),
+        comm=COMM,
+    )
+    content = BytesIO()
+    write_laws(content, table)
+    laws = hashlib.sha256(content.getvalue()).hexdigest()
+    found = COMM.gather((model.solved, laws))
+    if COMM.rank == 0:
+        print(json.dumps(found))
+
+
+main()
