@@ -26,8 +26,9 @@ def test_ranks_share_the_rows(found, ranks):
     ((whole, _),), solved = found[1], [count for count, _ in found[ranks]]
     assert whole > 33  # rows beyond the first ones: those that errors ask for are shared, too
     assert sum(solved) == whole  # nothing twice
-    # whole pairs of rows, and first touch, which one rank finds for all
-    assert max(solved) - min(solved) <= 3
+    # one pair of rows; the first rows are odd, so that one pair lacks a row; and first touch, which
+    # one rank finds for all
+    assert max(solved) - min(solved) <= 4
 
 
 @pytest.mark.parametrize("ranks", [2, 3])
