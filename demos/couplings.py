@@ -34,12 +34,11 @@ SEEDS = (1,) if choice.quick else (1, 2, 3)
 GRIDS = (2, 4) if choice.quick else (1, 2, 4, 8, 16)
 CELLS = 64 if choice.quick else 128
 TILTS = {"level": 0.0, "tilted by 5 µm/mm": 5.0}
+CONSISTENT = ["coupling.kind=consistent"]
+CONSISTENT += ["coupling.table_tolerance=1e-3"] if choice.quick else []
 COUPLINGS = {
-    "consistent": ["coupling.kind=consistent"],
-    "consistent, plain mesh": [
-        "coupling.kind=consistent",
-        "coupling.compliance=finite-element",
-    ],
+    "consistent": CONSISTENT,
+    "consistent, plain mesh": [*CONSISTENT, "coupling.compliance=finite-element"],
     "isolated": ["coupling.kind=isolated", "coupling.compliance=decomposed"],
 }
 

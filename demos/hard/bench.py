@@ -16,7 +16,7 @@ from multiscale import History, Scene, run
 
 Array = NDArray[np.float64]
 
-CELLS = 32
+CELLS, TABLES = 32, 1e-3
 BASE: dict[str, dict[str, Any]] = {
     "surface": {
         "spectrum": {"hurst": 0.8, "waves": [2, 6], "rms_slope": 0.2, "seed": 2},
@@ -82,7 +82,8 @@ def case(number: int, hard: str, holds: str, bound: float) -> Callable[[Any], An
 
 def solved(kind: str, **changes: Any) -> History:
     """Run the scene with a coupling and other values of ``section__key``; None takes a key out."""
-    data = deepcopy(BASE) | {"coupling": {"kind": kind}}
+    coupling = {"kind": kind} | ({"table_tolerance": TABLES} if kind == "consistent" else {})
+    data = deepcopy(BASE) | {"coupling": coupling}
     for key, value in changes.items():
         section, name = key.split("__")
         data.setdefault(section, {})[name] = value
