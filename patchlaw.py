@@ -1,12 +1,91 @@
-"""The command ``patchlaw``, from the first moment on: loading the rest takes a while."""
+"""Contact of rough surfaces: what most users need, under one name, and the command ``patchlaw``.
+
+The code lives in `geometry`, `micro`, `macro` and `multiscale`, and is loaded when it is asked for.
+"""
+
+from __future__ import annotations
 
 import os
 import signal
 import sys
+from importlib import import_module
 from types import FrameType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:  # what `_HOMES` says, for editors and type checkers
+    from geometry import (
+        Control,
+        InputError,
+        NotConverged,
+        PatchGrid,
+        Spectrum,
+        Surface,
+        read_surface,
+        synthesise,
+    )
+    from micro import HalfSpaceModel
+    from multiscale import (
+        Comparison,
+        History,
+        LawTable,
+        LoadStep,
+        Run,
+        Scene,
+        compare,
+        make_stage,
+        read_laws,
+        run,
+    )
+
+__all__ = [
+    "Comparison",
+    "Control",
+    "HalfSpaceModel",
+    "History",
+    "InputError",
+    "LawTable",
+    "LoadStep",
+    "NotConverged",
+    "PatchGrid",
+    "Run",
+    "Scene",
+    "Spectrum",
+    "Surface",
+    "compare",
+    "main",
+    "make_stage",
+    "read_laws",
+    "read_surface",
+    "run",
+    "synthesise",
+]
+
+_GEOMETRY = (
+    "Control", "InputError", "NotConverged", "PatchGrid", "Spectrum", "Surface", "read_surface",
+    "synthesise",
+)  # fmt: skip
+_MULTISCALE = (
+    "Comparison", "History", "LawTable", "LoadStep", "Run", "Scene", "compare", "make_stage",
+    "read_laws", "run",
+)  # fmt: skip
+_HOMES = {
+    **dict.fromkeys(_GEOMETRY, "geometry"),
+    "HalfSpaceModel": "micro",
+    **dict.fromkeys(_MULTISCALE, "multiscale"),
+}
 
 INTERRUPTED = 130
 """Exit code after SIGINT, as shells have it."""
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        return getattr(import_module(_HOMES[name]), name)
+    raise AttributeError(f"module 'patchlaw' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
 
 
 def main() -> int:

@@ -46,7 +46,7 @@ def make_shape(scene: Scene, surface: Surface) -> BlockShape:
     block = scene.block
     given: dict[str, Any] = {
         "interface": surface.lengths,
-        "height": block.height,
+        "height": block.height_under(surface.lengths),
         "cells": block_cells(scene),
         "element": block.element,
         "grading": block.grading,

@@ -92,12 +92,14 @@ class SurfaceSection(Section):
 class BlockSection(Section):
     """The elastic block below the interface, pressed by a rigid plane.
 
+    Its ``height`` is the shorter side of the surface when not given.
+
     ``cells`` and the keys after it are about the mesh of the flat block, which is made under laws
     (``coupling.compliance = "finite-element"``) and for fields (``output.fields``); nothing else
     depends on it.
     """
 
-    height: PositiveLength = 1.0
+    height: PositiveLength | None = None
     young_modulus: Annotated[Pressure, Field(gt=0)]
     poisson_ratio: Annotated[Number, Field(gt=-1, lt=0.5)]
     sides: Literal["free", "roller"] = "free"
@@ -114,6 +116,10 @@ class BlockSection(Section):
     margin: Annotated[Length, Field(ge=0, description="block beyond the interface")] = 0.0
     margin_cells: Count = 8
     margin_grading: Annotated[Number, Field(ge=1, le=1e6)] = 8.0
+
+    def height_under(self, lengths: tuple[float, float]) -> float:
+        """Return the height of the block under a surface of given sides [mm]."""
+        return min(lengths) if self.height is None else self.height
 
 
 class PatchesSection(Section):

@@ -143,8 +143,9 @@ def check_load(scene: Scene, surface: Surface) -> None:
     if scene.coupling.kind == "analytic":
         return
     block, loading = scene.block, scene.loading
-    most = block.height if loading.force is None else block.young_modulus * surface.area
-    named, unit = ("the block's height", "mm") if loading.force is None else ("E times area", "N")
+    most, named, unit = block.height_under(surface.lengths), "the block's height", "mm"
+    if loading.force is not None:
+        most, named, unit = block.young_modulus * surface.area, "E times area", "N"
     key, points = "load.force", loading.force
     if points is None:
         key, points = "load.approach", loading.approach or ()

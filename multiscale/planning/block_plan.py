@@ -21,9 +21,14 @@ _BODY_TERM = (
 
 def block_statement(stage: Stage) -> str:
     """Say what the block is made of, and at what price."""
-    block, decomposed = stage.scene.block, stage.scene.coupling.decomposed
-    text = _BODY_TERM if decomposed else _elements(stage)
-    return f"{text}, {block.sides} sides, contact modulus {stage.model.contact_modulus:.6g} MPa"
+    text = _BODY_TERM if stage.scene.coupling.decomposed else _elements(stage)
+    return f"{text}, {_size(stage)}, contact modulus {stage.model.contact_modulus:.6g} MPa"
+
+
+def _size(stage: Stage) -> str:
+    """Say how large the block is, and what its sides do."""
+    (lx, ly), height = stage.surface.lengths, stage.shape.height
+    return f"{lx:g} × {ly:g} mm and {height:g} mm high, {stage.scene.block.sides} sides"
 
 
 def block_warnings(stage: Stage) -> Iterator[str]:

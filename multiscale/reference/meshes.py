@@ -117,10 +117,10 @@ def reference_meshes(
         if scene.reference.fine is not None and not hexahedral:
             least = _least_bytes(surface, reach, tilt, scene.reference.fine)
             _check_memory(scene, key, nodes, least)
+        height = scene.block.height_under(surface.lengths)
         shapes = reference_shapes(
-            surface, reach, scene.block.height, count=scene.reference.meshes, tilt=tilt,
-            **_asked(scene),
-        )  # fmt: skip
+            surface, reach, height, count=scene.reference.meshes, tilt=tilt, **_asked(scene)
+        )
         radius = contact_radius(surface, approach, tilt=tilt)
     except InputError as error:
         raise error.located(key=key, file=scene.file) from None

@@ -109,3 +109,21 @@ def test_free_plane_that_is_not_found_at_once_is_found_in_smaller_steps(monkeypa
     Shy.reached = -1.0
     with pytest.raises(NotConverged, match=r"load step 1 \(approach .*: TOO_FAR .* halved 8 times"):
         make_stage(asked)
+
+
+@pytest.mark.parametrize(("given", "height"), [({}, 0.02), ({"height": "5 um"}, 0.005)])
+def test_a_block_is_as_high_as_the_shorter_side_unless_told(given, height):
+    spectrum = {"hurst": 0.95, "waves": [2, 4], "rms_slope": 0.2, "seed": 1}
+    made = make_stage(
+        Scene.from_dict(
+            {
+                "surface": {"spectrum": spectrum, "grid": [32, 16], "lengths": ["40 um", "20 um"]},
+                "block": {"young_modulus": 4000.0, "poisson_ratio": 0.15, **given},
+                "micro": {"model": "half-space"},
+                "load": {"approach": "0.1 um"},
+            }
+        )
+    )
+    assert made.shape.height == pytest.approx(height, rel=1e-12)
+    said = dict(statements(made))["block"]
+    assert f"0.04 × 0.02 mm and {height:g} mm high, free sides" in said

@@ -1,0 +1,35 @@
+"""``import patchlaw`` has what users need, and loads nothing before it is asked for."""
+
+import subprocess
+import sys
+
+import pytest
+
+import geometry
+import micro
+import multiscale
+import patchlaw
+
+PACKAGES = {"geometry": geometry, "micro": micro, "multiscale": multiscale}
+
+
+@pytest.mark.parametrize("name", [name for name in patchlaw.__all__ if name != "main"])
+def test_names_are_those_of_the_packages(name):
+    found = getattr(patchlaw, name)
+    assert [found] == [getattr(one, name) for one in PACKAGES.values() if hasattr(one, name)][:1]
+    assert name in dir(patchlaw)
+
+
+def test_other_names_are_errors():
+    with pytest.raises(AttributeError, match="has no attribute 'surface'"):
+        patchlaw.surface  # noqa: B018
+
+
+def test_importing_it_loads_nothing(root):
+    loaded = (
+        "import patchlaw, sys; print(sorted({'numpy', 'micro', 'geometry'} & set(sys.modules)))"
+    )
+    found = subprocess.run(
+        [sys.executable, "-c", loaded], cwd=root, capture_output=True, text=True, check=True
+    )
+    assert found.stdout.strip() == "[]"
