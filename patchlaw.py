@@ -89,7 +89,7 @@ def __dir__() -> list[str]:
 
 
 def main() -> int:
-    """Run the command line; see `multiscale.cli.main`.
+    """Run the command line; see `multiscale.cli.command_line.main`.
 
     SIGINT before and after it ends the process quietly: nothing is open then.
 
@@ -98,11 +98,11 @@ def main() -> int:
     """
     former = signal.getsignal(signal.SIGINT)
     if former is not signal.default_int_handler:  # a shell ignores it for what it starts aside
-        from multiscale.cli import main as command
+        from multiscale.cli.command_line import main as command
 
         return command()
     signal.signal(signal.SIGINT, _end)
-    from multiscale.cli import main as command
+    from multiscale.cli.command_line import main as command
 
     signal.signal(signal.SIGINT, former)
     try:

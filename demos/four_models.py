@@ -20,7 +20,7 @@ import numpy as np
 
 from geometry import PatchGrid, Spectrum, find_asperities, patch_means, roughness, synthesise
 from micro import MODELS, asperity_model, contact_modulus
-from multiscale.figures import models_figure, surface_figure
+from multiscale.output.figures import models_figure, surface_figure
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

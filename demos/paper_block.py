@@ -26,7 +26,7 @@ from mpi4py import MPI
 
 from micro import MODELS
 from multiscale import Scene, make_stage, run
-from multiscale.figures import draw_pressures, draw_surface
+from multiscale.output.figures import draw_pressures, draw_surface
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -18,8 +18,13 @@ from paper.page import Page
 
 from geometry import PatchGrid, Spectrum, find_asperities, power_spectrum, synthesise
 from micro import HertzContact, contact_modulus
-from micro.ellipse import area_factor, eccentricity, eccentricity_approximate, force_factor
-from multiscale.figures import draw_surface
+from micro.closed_forms.ellipse import (
+    area_factor,
+    eccentricity,
+    eccentricity_approximate,
+    force_factor,
+)
+from multiscale.output.figures import draw_surface
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -17,7 +17,7 @@ from paper.page import Page
 
 from geometry import PatchGrid, Spectrum, patch_means, synthesise
 from micro import contact_modulus, micro_model
-from multiscale.figures import models_figure
+from multiscale.output.figures import models_figure
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

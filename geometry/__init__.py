@@ -8,11 +8,11 @@ from geometry.asperities import Asperities, find_asperities
 from geometry.control import Control
 from geometry.errors import InputError, NotConverged, PatchlawError
 from geometry.files import read_surface
-from geometry.meshes import Alignment, BlockShape, alignment, flat_block
+from geometry.meshes.block import Alignment, BlockShape, alignment, flat_block
+from geometry.meshes.families import characteristic_size, reference_shapes
+from geometry.meshes.refined_block import RefinedShape, places_in_reach
 from geometry.partition import Partition, UnevenPartition
 from geometry.patches import PatchGrid, overlaps, patch_means
-from geometry.reference_meshes import characteristic_size, reference_shapes
-from geometry.refined_block import RefinedShape, places_in_reach
 from geometry.spectrum import Spectrum, synthesise
 from geometry.statistics import PowerSpectrum, Roughness, power_spectrum, roughness
 from geometry.surface import Surface

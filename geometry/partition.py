@@ -56,6 +56,15 @@ class Partition:
         x, y = self.borders_x, self.borders_y
         return np.array([0.5 * (x[0] + x[-1]), 0.5 * (y[0] + y[-1])])
 
+    def mean_approaches(self, approach: float, tilt: tuple[float, float]) -> Array:
+        """Return the mean approach of a rigid plane over every patch, shape (N,) [mm].
+
+        Args:
+            approach: Approach at the middle of the rectangle [mm].
+            tilt: Slopes of the approach along x and y, about the middle.
+        """
+        return approach + (self.centres - self.middle) @ np.asarray(tilt)
+
     @property
     def half_sides(self) -> Array:
         """Half-sides (a, b) in flat order, shape (N, 2) [mm]."""

@@ -8,15 +8,15 @@ BlockShape → block_mesh → Block (with a Material) → Interface (with a Patc
 """
 
 from macro.block import Block
-from macro.body.face_compliance import FaceCompliance, cached_face_compliance, face_compliance
-from macro.compliance import displacements_under, plain_compliance
+from macro.compliance.face_compliance import FaceCompliance, cached_face_compliance, face_compliance
+from macro.compliance.patch_compliance import displacements_under, plain_compliance
+from macro.contact.law_interface import ContactLaw, Interface
+from macro.contact.law_problem import PressedBlock, PressState
+from macro.contact.unilateral_problem import ObstacleBlock, ObstacleState
 from macro.elasticity import Material
-from macro.interface import ContactLaw, Interface
-from macro.mesh import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
-from macro.obstacle import ObstacleBlock, ObstacleState
-from macro.output import write_fields, write_rough_fields
-from macro.pressed import PressedBlock, PressState
-from macro.rough_mesh import MeshQuality, rough_block_mesh
+from macro.fields import write_fields, write_rough_fields
+from macro.mesh.block import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
+from macro.mesh.rough_surface import MeshQuality, rough_block_mesh
 
 __all__ = [
     "BOTTOM",

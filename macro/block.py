@@ -15,11 +15,11 @@ from petsc4py import PETSc
 
 from geometry.errors import InputError
 from macro import compat
-from macro.block_solver import block_solver
 from macro.elasticity import Material, rigid_body_modes, stiffness_form
-from macro.mesh import BOTTOM, SIDES, BlockMesh
-from macro.multigrid import Lattice, lattice_of
-from macro.solvers import solve_linear
+from macro.linear_solvers.multigrid import Lattice, lattice_of
+from macro.linear_solvers.options import solve_linear
+from macro.linear_solvers.selection import block_solver
+from macro.mesh.block import BOTTOM, SIDES, BlockMesh
 
 Sides = Literal["free", "roller"]
 

@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.errors import InputError
-from geometry.lattice import sigint_kept
-from macro.jit import TIMEOUT, explained
+from geometry.meshes.lattice import sigint_kept
+from macro.form_cache import TIMEOUT, explained
 
 _JIT = {"timeout": TIMEOUT}  # another process may be compiling the same form on a slow machine
 HAS_VTX = hasattr(io, "VTXWriter")

@@ -6,22 +6,14 @@ along approaches each gives a `Response` of the surface and its patches; `love` 
 of pressure move the half-space.
 """
 
-from micro.asperity_models import MODELS, SOLVERS, AsperityModel, ModelKind, asperity_model
-from micro.auto.candidates import Candidate, resampled
-from micro.auto.choice import Choice, choose
-from micro.boussinesq import HalfSpace
-from micro.cells.contacts import Contacts, find_contacts
-from micro.cells.half_space_state import HalfSpaceState
-from micro.cells.side_stresses import SideStresses, side_stresses
-from micro.compliance.body_modes import BodyModes
-from micro.compliance.body_stresses import BodyStresses
-from micro.compliance.finite_slopes import FiniteSlopes, coarse_grid
-from micro.compliance.free_sides import FreeSides
-from micro.compliance.half_space_modes import half_space_modes, half_space_stress_modes
-from micro.compliance.side_modes import side_modes, side_stress_modes
-from micro.compliance.side_patches import side_patches
-from micro.compliance.surface_stress import SurfaceStress
-from micro.ellipse import (
+from micro.asperities.many_summits import PAIR_SUMS
+from micro.asperities.model import MODELS, SOLVERS, AsperityModel, ModelKind, asperity_model
+from micro.asperities.scaled_model import BORDERS, CURVATURES, ScaledModel
+from micro.asperities.state import AsperityState
+from micro.choice.candidates import Candidate, resampled
+from micro.choice.selection import Choice, choose
+from micro.closed_forms.boussinesq import HalfSpace
+from micro.closed_forms.ellipse import (
     area_factor,
     axis_factor,
     axis_ratio,
@@ -29,20 +21,28 @@ from micro.ellipse import (
     eccentricity_approximate,
     force_factor,
 )
-from micro.finite_slope import finite_slope_effect
-from micro.half_space import HalfSpaceModel
-from micro.hertz import HertzContact, contact_modulus
-from micro.influence import influence_matrix, mutual_influence
-from micro.love import love_centre, love_integral, love_mean, love_mutual
+from micro.closed_forms.hertz import HertzContact, contact_modulus
+from micro.closed_forms.influence import influence_matrix, mutual_influence
+from micro.closed_forms.love import love_centre, love_integral, love_mean, love_mutual
+from micro.compliance.body_modes import BodyModes
+from micro.compliance.body_stresses import BodyStresses
+from micro.compliance.finite_slopes import FiniteSlopes, coarse_grid
+from micro.compliance.free_sides import FreeSides
+from micro.compliance.half_space_modes import half_space_modes, half_space_stress_modes
+from micro.compliance.side_modes import side_modes, side_stress_modes
+from micro.compliance.side_patches import side_patches
+from micro.compliance.side_stresses import SideStresses, side_stresses
+from micro.compliance.surface_stress import SurfaceStress
+from micro.factory import MODEL_NAMES, START_KINDS, micro_model
+from micro.half_space.contact_spots import Contacts, find_contacts
+from micro.half_space.model import HalfSpaceModel
+from micro.half_space.slope_effect import finite_slope_effect
+from micro.half_space.state import HalfSpaceState
+from micro.islands.model import IslandModel
+from micro.islands.state import IslandState
 from micro.model import MicroModel
-from micro.models import MODEL_NAMES, START_KINDS, micro_model
 from micro.plane import RigidPlane
-from micro.regions.island_state import IslandState
-from micro.regions.islands import IslandModel
 from micro.response import Pressed, Response
-from micro.summits.asperity_state import AsperityState
-from micro.summits.many_summits import PAIR_SUMS
-from micro.summits.scaled_model import BORDERS, CURVATURES, ScaledModel
 
 __all__ = [
     "BORDERS",

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.special import roots_jacobi
 
 from geometry import Partition
-from micro.love import corner_integral
+from micro.closed_forms.love import corner_integral
 
 Array = NDArray[np.float64]
 

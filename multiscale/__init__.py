@@ -5,26 +5,26 @@ patch its law, the laws go onto the flat interface of an elastic block, and load
 `History`. A reference meshes the rough surface itself instead, and tells its own error.
 """
 
-from multiscale.compare import compare
-from multiscale.comparing.comparison import Comparison, Row
-from multiscale.coupling import ContactCoupling, EmbeddedCoupling
+from multiscale.compare.comparison import Comparison, Row
+from multiscale.compare.run_comparison import compare
 from multiscale.couplings.condensed import CondensedCoupling
-from multiscale.history import History
-from multiscale.law_tables.consistent import consistent_laws
-from multiscale.law_tables.isolated import isolated_laws
-from multiscale.law_tables.law_files import LawTable, read_laws, write_laws
-from multiscale.law_tables.patch_laws import PatchLaws
-from multiscale.laws import PatchLaw
-from multiscale.load_step import LoadStep, PatchState
-from multiscale.loading import Programme, load_steps
-from multiscale.reference.coupling import ReferenceCoupling
-from multiscale.reference.extrapolation import Estimate, extrapolated
-from multiscale.reference.record import ReferenceRecord
+from multiscale.couplings.load_steps import ContactCoupling, EmbeddedCoupling
+from multiscale.couplings.reference import ReferenceCoupling
+from multiscale.laws.consistent import consistent_laws
+from multiscale.laws.files import LawTable, read_laws, write_laws
+from multiscale.laws.isolated import isolated_laws
+from multiscale.laws.packed import PatchLaws
+from multiscale.laws.patch_law import PatchLaw
+from multiscale.loading.load_step import LoadStep, PatchState
+from multiscale.loading.stepper import Programme, load_steps
+from multiscale.resolution.problem_setup import make_stage
 from multiscale.restart.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
+from multiscale.results.extrapolation import Estimate, extrapolated
+from multiscale.results.history import History
+from multiscale.results.reference_record import ReferenceRecord
 from multiscale.run import Run, run
-from multiscale.scene import Scene
-from multiscale.stage import Stage
-from multiscale.staging import make_stage
+from multiscale.scene.scene import Scene
+from multiscale.setup.problem import Stage
 
 __all__ = [
     "Checkpoint",

@@ -2,6 +2,6 @@
 
 import sys
 
-from multiscale.cli import main
+from multiscale.cli.command_line import main
 
 sys.exit(main())

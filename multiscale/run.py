@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import gc
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 from io import BytesIO
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from geometry.collective import on_root
 from geometry.errors import NotConverged
 from micro import HalfSpaceModel, MicroModel
-from multiscale.assemble import assemble, make_table
-from multiscale.coupling import EmbeddedCoupling
+from multiscale.couplings.assembly import assemble, make_table
 from multiscale.couplings.blocks import (
     SLOPES,
     OnBody,
@@ -26,27 +25,39 @@ from multiscale.couplings.blocks import (
     load_together,
     on_body,
 )
-from multiscale.history import History
-from multiscale.law_tables.law_files import LawTable, read_laws, write_laws
-from multiscale.law_tables.refinement import missed_notes
-from multiscale.law_tables.repair import repair_notes
-from multiscale.load_step import LoadStep
-from multiscale.loading import Coupling, Drive, Position, Restorable
-from multiscale.mpi_job import for_large
-from multiscale.nodes import nodes_of
-from multiscale.planning.choices import settled_keys
-from multiscale.planning.newton_choice import newton_choice
-from multiscale.records import Arrays
-from multiscale.reference.coupling import ReferenceCoupling, recorded, reference_notes
-from multiscale.reporting.validity import range_notes
-from multiscale.restart.checkpoint import Checkpoint, digest
-from multiscale.scene import Scene
-from multiscale.stage import Stage
-from multiscale.staging import make_stage
-from multiscale.step_checks import checked, error_notes, error_probe
+from multiscale.couplings.load_steps import EmbeddedCoupling
+from multiscale.couplings.newton_choice import newton_choice
+from multiscale.couplings.reference import ReferenceCoupling, recorded, reference_notes
+from multiscale.errors.load_steps import checked, error_notes, error_probe
+from multiscale.laws.files import LawTable, read_laws, write_laws
+from multiscale.laws.refinement import missed_notes
+from multiscale.laws.repair import repair_notes
+from multiscale.loading.load_step import LoadStep
+from multiscale.loading.stepper import Coupling, Drive, Position, Restorable
+from multiscale.machine.mpi_job import for_large
+from multiscale.machine.nodes import nodes_of
+from multiscale.resolution.auto_keys import settled_keys
+from multiscale.resolution.problem_setup import make_stage
+from multiscale.results.history import History
+from multiscale.results.validity import range_notes
+from multiscale.scene.scene import Scene
+from multiscale.setup.problem import Stage
+from multiscale.storage.serialisation import Arrays, digest
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import Interface
+
+
+class Resumed(NamedTuple):
+    """Where a run went on.
+
+    Attributes:
+        after: The last load step accepted before.
+        state: What the coupling's next load step starts from.
+    """
+
+    after: int
+    state: Arrays
 
 
 class Run:
@@ -77,7 +88,7 @@ class Run:
         self.given, self.comm = scene, comm
         self.steps: list[LoadStep] = []
         self.position = Position()
-        self._resumed: Checkpoint | None = None
+        self._resumed: Resumed | None = None
         self._laws: bytes | None = None
         self._on_body: OnBody | None = None
         self._unchecked: list[str] = []
@@ -164,23 +175,10 @@ class Run:
         ends = self.position.targets == self.scene.loading.programme.count
         return ends and not self.position.ahead
 
-    def checkpoint(self, name: str, state: Arrays) -> Checkpoint:
-        """Return all that is needed to go on from here.
-
-        Args:
-            name: Name of the run.
-            state: What `state` returned.
-        """
-        return Checkpoint(
-            run=name,
-            scene=self.given.model_dump(by_alias=True, mode="json"),
-            settled=settled_keys(self.stage, self.given),
-            heights=self.heights,
-            laws=self._law_bytes,
-            steps=tuple(self.steps),
-            position=self.position,
-            state=state,
-        )
+    @cached_property
+    def settled(self) -> dict[str, Any]:
+        """What the scene's open keys became."""
+        return settled_keys(self.stage, self.given)
 
     def state(self) -> Arrays:
         """Return what the coupling's next load step starts from.
@@ -192,16 +190,21 @@ class Run:
             return self.coupling.state()
         return self._resumed.state if self._resumed else {}
 
-    def resume(self, checkpoint: Checkpoint) -> None:
-        """Go on from a checkpoint of the same scene; call it before anything is made.
+    def resume(
+        self, steps: Sequence[LoadStep], position: Position, state: Arrays, laws: bytes
+    ) -> None:
+        """Go on after load steps of the same scene; call it before anything is made.
 
         Args:
-            checkpoint: The checkpoint.
+            steps: The load steps accepted so far.
+            position: Where the load programme came to with them.
+            state: What `state` returned then.
+            laws: What `law_bytes` was then.
         """
-        self._resumed = checkpoint
-        self.steps, self.position = list(checkpoint.steps), checkpoint.position
-        if checkpoint.laws:
-            self.table = read_laws(BytesIO(checkpoint.laws))
+        self._resumed = Resumed(len(steps), state)
+        self.steps, self.position = list(steps), position
+        if laws:
+            self.table = read_laws(BytesIO(laws))
 
     @cached_property
     def heights(self) -> str:
@@ -209,7 +212,8 @@ class Run:
         return digest({"heights": self.stage.surface.heights})
 
     @property
-    def _law_bytes(self) -> bytes:
+    def law_bytes(self) -> bytes:
+        """The law file's bytes; empty as long as there are no laws."""
         if self.table is None:
             return b""
         if self._laws is None:
@@ -240,8 +244,8 @@ class Run:
         notes += range_notes(self.steps, self.table)
         notes += [*self._unchecked, *error_notes(self.steps, self.given.accuracy)]
         if self._resumed:
-            count = len(self._resumed.steps)
-            notes.append(f"resumed after load step {count}; times of phases are those since then")
+            after = self._resumed.after
+            notes.append(f"resumed after load step {after}; times of phases are those since then")
         record, steps = None, tuple(self.steps)
         if isinstance(self.coupling, ReferenceCoupling):
             record = recorded(self.stage, self.coupling, self.steps)

@@ -14,9 +14,9 @@ from geometry.control import Control
 from macro import Block, Material, block_mesh
 from micro import influence_matrix
 from multiscale.couplings.dense_newton import DenseNewton
-from multiscale.law_tables.patch_laws import PatchLaws
-from multiscale.law_tables.repair import evened_law
-from multiscale.laws import PatchLaw
+from multiscale.laws.packed import PatchLaws
+from multiscale.laws.patch_law import PatchLaw
+from multiscale.laws.repair import evened_law
 
 LAPS, MODULI, UNITS = 10, (4e9, 1e3, 1e12), {"m": 1e3, "um": 1e-3}
 SOFT = {"patches__grid": [2, 2], "surface__grid": [16, 16]}

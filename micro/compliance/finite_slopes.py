@@ -39,7 +39,7 @@ from scipy import fft
 
 from geometry import Surface
 from geometry.errors import InputError
-from micro.boussinesq import HalfSpace
+from micro.closed_forms.boussinesq import HalfSpace
 from micro.compliance.surface_stress import SurfaceStress
 from micro.compliance.waves import Around, Spectrum, Waves
 

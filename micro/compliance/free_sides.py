@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from geometry import Partition
 from geometry.errors import InputError
 from micro.compliance.distance_nodes import distance_nodes, means_over, values_at
-from micro.quarter_space import quarter_space
-from micro.quarter_space_stresses import quarter_space_stresses
+from micro.compliance.quarter_space import quarter_space
+from micro.compliance.quarter_space_stresses import quarter_space_stresses
 
 Array = NDArray[np.float64]
 

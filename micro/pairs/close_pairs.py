@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from micro.pairs.hertz_field import circular_field, elliptic_field
+from micro.closed_forms.hertz_field import circular_field, elliptic_field
 from micro.pairs.interaction import SINE_MERGED, Interaction
 
 Array = NDArray[np.float64]

@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from scipy.special import elliprf
 
 from geometry import Asperities
-from micro.ellipse import ShapeFactors
-from micro.pairs.hertz_field import circular_field, elliptic_field
+from micro.closed_forms.ellipse import ShapeFactors
+from micro.closed_forms.hertz_field import circular_field, elliptic_field
 
 Array = NDArray[np.float64]
 

@@ -20,9 +20,9 @@ from micro import (
     coarse_grid,
     side_stresses,
 )
-from multiscale.couplings.body import Body
-from multiscale.scene import Scene
-from multiscale.stage import Stage
+from multiscale.couplings.body_terms import Body
+from multiscale.scene.scene import Scene
+from multiscale.setup.problem import Stage
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FaceCompliance, Interface, Material
@@ -200,8 +200,8 @@ def patch_compliance(stage: Stage, comm: Any) -> Array:
     from mpi4py import MPI
 
     from macro import plain_compliance
-    from macro.compliance_cache import cached
-    from macro.solvers import users_options
+    from macro.compliance.cache import cached
+    from macro.linear_solvers.options import users_options
 
     def compute() -> dict[str, Array]:
         return {"compliance": plain_compliance(embedding(stage, comm))}

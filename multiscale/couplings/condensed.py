@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.control import Control
-from multiscale.coupling import beyond_law, embedded_step
 from multiscale.couplings.dense_newton import DenseNewton, DenseState
-from multiscale.law_tables.law_files import LawTable
-from multiscale.law_tables.patch_laws import PatchLaws
-from multiscale.load_step import LoadStep, PatchState
-from multiscale.records import Arrays, packed, unpacked
+from multiscale.couplings.load_steps import beyond_law, embedded_step
+from multiscale.laws.files import LawTable
+from multiscale.laws.packed import PatchLaws
+from multiscale.loading.load_step import LoadStep, PatchState
+from multiscale.storage.serialisation import Arrays, packed, unpacked
 
 Array = NDArray[np.float64]
 

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
-from multiscale.law_tables.tangent import Tangent
-from multiscale.loading import described
+from multiscale.laws.tangent import Tangent
+from multiscale.loading.stepper import described
 
 if TYPE_CHECKING:
-    from multiscale.laws import LawPoint
+    from multiscale.laws.patch_law import LawPoint
 
 Array = NDArray[np.float64]
 

@@ -26,7 +26,7 @@ def compiler_works(comm: Any) -> list[Finding]:
     Args:
         comm: MPI communicator, or None.
     """
-    from macro import jit
+    from macro import form_cache as jit
 
     if comm is not None and comm.rank > 0:
         return []
@@ -51,7 +51,7 @@ def cache(comm: Any) -> list[Finding]:
     Args:
         comm: MPI communicator, or None.
     """
-    from macro import jit
+    from macro import form_cache as jit
     from macro.compat import form_cache
 
     folder = form_cache()
@@ -123,7 +123,7 @@ def known_solve(comm: Any) -> list[Finding]:
     from mpi4py import MPI
 
     from geometry.control import Control
-    from geometry.meshes import BlockShape
+    from geometry.meshes.block import BlockShape
     from geometry.patches import PatchGrid
     from macro import Block, Interface, Material, PressedBlock, block_mesh
 

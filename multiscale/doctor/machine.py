@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from multiscale.doctor.finding import Finding
-from multiscale.mpi_job import strangers
-from multiscale.nodes import group_memory
+from multiscale.machine.mpi_job import strangers
+from multiscale.machine.nodes import group_memory
 
 _LAUNCHERS = {"Open MPI": "Open MPI", "HYDRA": "MPICH", "MPICH": "MPICH", "Intel": "Intel MPI"}
 

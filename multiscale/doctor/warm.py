@@ -37,7 +37,7 @@ def warm(elements: Sequence[str], comm: Any = None) -> tuple[Path, int]:
 
 
 def _compile_all(elements: Sequence[str]) -> tuple[Path, int]:
-    from macro import jit
+    from macro import form_cache as jit
     from macro.compat import form_cache
 
     folder = form_cache()
@@ -53,7 +53,7 @@ def _use_all_forms(element: str) -> None:
     """Do on a tiny block whatever compiles a form: press it, load it, write its fields."""
     from mpi4py import MPI
 
-    from geometry.meshes import BlockShape
+    from geometry.meshes.block import BlockShape
     from geometry.patches import PatchGrid
     from macro import Block, Interface, Material, ObstacleBlock, block_mesh, write_fields
 
@@ -76,7 +76,7 @@ def checked_elements(names: Sequence[str]) -> tuple[str, ...]:
     Raises:
         InputError: When a name is unknown.
     """
-    from geometry.meshes import ELEMENTS
+    from geometry.meshes.block import ELEMENTS
 
     for name in names:
         if name not in ELEMENTS:

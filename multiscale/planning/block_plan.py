@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from geometry.meshes import alignment
-from multiscale.stage import Stage
+from geometry.meshes.block import alignment
+from multiscale.setup.problem import Stage
 
 STIFF_FROM = 0.45
 """Poisson's ratio above which linear elements lock. Two by two patches on 8 × 8 × 6 trilinear

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from micro import HalfSpaceModel
-from multiscale.planning.costs import Cost, predicted_cost
-from multiscale.planning.machine import this_machine
-from multiscale.stage import Stage
+from multiscale.costs.prediction import Cost, predicted_cost
+from multiscale.machine.rates import this_machine
+from multiscale.setup.problem import Stage
 
 
 def forecast(stage: Stage) -> Cost:

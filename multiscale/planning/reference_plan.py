@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from geometry.meshes import BlockShape
+from geometry.meshes.block import BlockShape
 from multiscale.planning.block_plan import locking
-from multiscale.reference.meshes import ReferenceMeshes
-from multiscale.scene import Scene
-from multiscale.stage_checks import patch_grid
+from multiscale.scene.scene import Scene
+from multiscale.setup.checks import patch_grid
+from multiscale.setup.reference_meshes import ReferenceMeshes
 
 LEAST_ACROSS = {1: 12.0, 2: 3.0}
 """Edges across a typical contact below which the force is wrong by several per cent, by the

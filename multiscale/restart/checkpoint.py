@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -13,9 +12,10 @@ import h5py
 import numpy as np
 
 from geometry.errors import InputError
-from multiscale.load_step import LoadStep, PatchState
-from multiscale.loading import Position
-from multiscale.records import (
+from multiscale.loading.load_step import LoadStep, PatchState
+from multiscale.loading.stepper import Position
+from multiscale.storage.checksummed_hdf5 import sealed, unsealed
+from multiscale.storage.serialisation import (
     Arrays,
     as_text,
     packed,
@@ -25,8 +25,7 @@ from multiscale.records import (
     text_array,
     unpacked,
 )
-from multiscale.reporting.outputs import write_bytes
-from multiscale.sealed_files import sealed, unsealed
+from multiscale.storage.whole_files import write_bytes
 
 FORMAT = "patchlaw checkpoint 2"
 _PATCH = "patches."
@@ -107,20 +106,6 @@ def read_checkpoint(path: Path) -> Checkpoint:
         raise _refused(path, f"cannot be read: {error}") from None
     except Exception as error:  # a sound checksum over what this version cannot understand
         raise _refused(path, f"is not understood: {error!r}") from None
-
-
-def digest(arrays: Mapping[str, Any]) -> str:
-    """Return the SHA-256 of named arrays: of names, types, shapes and every byte.
-
-    Args:
-        arrays: The arrays.
-    """
-    whole = hashlib.sha256()
-    for name in sorted(arrays):
-        array = np.asarray(arrays[name])
-        whole.update(f"{name} {array.dtype.str} {array.shape}\n".encode())
-        whole.update(array.tobytes())
-    return whole.hexdigest()
 
 
 def _refused(path: Path, problem: str, cause: InputError | None = None) -> InputError:

@@ -12,10 +12,18 @@ from typing import BinaryIO
 
 import numpy as np
 
-from multiscale.load_step import LoadStep, PatchState
-from multiscale.loading import Position
-from multiscale.records import Arrays, as_text, packed, part, prefixed, text_array, unpacked
-from multiscale.reporting.outputs import written
+from multiscale.loading.load_step import LoadStep, PatchState
+from multiscale.loading.stepper import Position
+from multiscale.storage.serialisation import (
+    Arrays,
+    as_text,
+    packed,
+    part,
+    prefixed,
+    text_array,
+    unpacked,
+)
+from multiscale.storage.whole_files import written
 
 _CHECK, _LENGTH = 32, 8  # bytes of a record's checksum, and of its length
 

@@ -12,15 +12,15 @@ from typing import Any
 
 from geometry.collective import on_root
 from geometry.errors import InputError, NotWritten
-from multiscale.load_step import LoadStep
-from multiscale.loading import Position
-from multiscale.records import Arrays
-from multiscale.reporting.outputs import remove_partial
+from multiscale.loading.load_step import LoadStep
+from multiscale.loading.stepper import Position
 from multiscale.restart.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
 from multiscale.restart.folder_lock import FolderLock
 from multiscale.restart.journal import Journal, journalled
 from multiscale.run import Run
-from multiscale.scene import Scene
+from multiscale.scene.scene import Scene
+from multiscale.storage.serialisation import Arrays
+from multiscale.storage.whole_files import remove_partial
 
 CHECKPOINT, JOURNAL = "checkpoint.h5", "checkpoint.journal"
 _SOONEST = 1.0  # between two checkpoints [s]; the journal holds the load steps in between
@@ -63,7 +63,7 @@ class Keeper:
         """
         found = on_root(self._run.comm, self._found)
         if found is not None:
-            self._run.resume(found)
+            self._run.resume(found.steps, found.position, found.state, found.laws)
         return found is not None
 
     def keep(self, step: LoadStep) -> None:
@@ -103,7 +103,7 @@ class Keeper:
         if not self.exists():
             return None
         checkpoint = read_checkpoint(self._path)
-        now = self._run.checkpoint(self._name, {})
+        now = checkpoint_of(self._run, self._name, {})
         refuse_changes(checkpoint, now, self._path)
         return with_journal(checkpoint, self._path.with_name(JOURNAL))
 
@@ -120,10 +120,30 @@ class Keeper:
         except InputError as error:  # which was good when the run began
             raise NotWritten(f"{self._path.parent}: {error.problem}") from None
         remove_partial(self._path.parent)
-        write_checkpoint(self._path, self._run.checkpoint(self._name, state))
+        write_checkpoint(self._path, checkpoint_of(self._run, self._name, state))
         self._journal.begin()
         now = time.monotonic()
         self._due = now + max(_SOONEST, _RATHER * (now - began))
+
+
+def checkpoint_of(run: Run, name: str, state: Arrays) -> Checkpoint:
+    """Return all that is needed to go on with a run from here.
+
+    Args:
+        run: The run.
+        name: Name of it.
+        state: What `Run.state` returned.
+    """
+    return Checkpoint(
+        run=name,
+        scene=run.given.model_dump(by_alias=True, mode="json"),
+        settled=run.settled,
+        heights=run.heights,
+        laws=run.law_bytes,
+        steps=tuple(run.steps),
+        position=run.position,
+        state=state,
+    )
 
 
 def with_journal(checkpoint: Checkpoint, path: Path) -> Checkpoint:
@@ -209,7 +229,7 @@ def is_finished(folder: Path, run: Run) -> bool:
         folder: The folder.
         run: A run of the scene.
     """
-    now = run.checkpoint("", {})
+    now = checkpoint_of(run, "", {})
     try:
         facts = json.loads((folder / "provenance.json").read_text(encoding="utf-8"))
         then = replace(now, scene=facts["scene_given"], heights=facts["surface"]["heights_sha256"])

@@ -19,9 +19,9 @@ from scipy.optimize import linprog
 from geometry import Spectrum, Surface, synthesise
 from geometry.errors import NotConverged
 from micro import MODELS, micro_model
-from micro.auto.candidates import FACTORS, half_space
-from micro.auto.errors import CONTACT_TERMS, GRID_TERMS, contact_terms, grid_terms
-from micro.auto.measures import ContactMeasures, contact_measures
+from micro.choice.candidates import FACTORS, half_space
+from micro.choice.expected_errors import CONTACT_TERMS, GRID_TERMS, contact_terms, grid_terms
+from micro.choice.measures import ContactMeasures, contact_measures
 
 SCALED = {"curvature": "contact", "border": "include"}
 KINDS = {**{name: (name, {}) for name in MODELS}, "scaled": ("elliptic", SCALED)}

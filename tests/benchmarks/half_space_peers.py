@@ -119,7 +119,7 @@ def timed_transforms():
 
     from scipy import fft
 
-    import micro.cells.convolution as convolution
+    import micro.compliance.convolution as convolution
 
     spent = [0.0]
 

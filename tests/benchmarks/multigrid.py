@@ -20,7 +20,7 @@ from petsc4py import PETSc
 
 from geometry import BlockShape, RefinedShape, Spectrum, places_in_reach, synthesise
 from macro import Block, Material, block_mesh, rough_block_mesh
-from macro.solvers import PREFIX
+from macro.linear_solvers.options import PREFIX
 
 COMM = MPI.COMM_WORLD
 CUBE = {"interface": (1.0, 1.0), "height": 1.0}

@@ -32,8 +32,8 @@ from geometry import (
 )
 from macro import Block, Material, ObstacleBlock, rough_block_mesh
 from micro import FreeSides, HalfSpaceModel
-from multiscale.couplings.body import Body
-from multiscale.reference.extrapolation import extrapolated
+from multiscale.couplings.body_terms import Body
+from multiscale.results.extrapolation import extrapolated
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 SIDE, APPROACH, ORDER = 1.0, 8e-3, 3.0

@@ -23,7 +23,7 @@ from petsc4py import PETSc
 
 from geometry import BlockShape, PatchGrid
 from macro import Block, Interface, Material, block_mesh
-from macro.solvers import PREFIX
+from macro.linear_solvers.options import PREFIX
 
 COMM = MPI.COMM_WORLD
 SOLVES = 3

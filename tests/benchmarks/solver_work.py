@@ -23,7 +23,7 @@ from petsc4py import PETSc
 from scaling_rank import INSIDE, PARTS, logged, stored
 from stream_triad import bandwidth
 
-from macro.solvers import PREFIX
+from macro.linear_solvers.options import PREFIX
 from multiscale import ReferenceCoupling, Run, Scene
 
 COMM = MPI.COMM_WORLD

@@ -16,17 +16,49 @@ BELOW = {
     "multiscale": {"geometry", "micro", "macro"},
 }
 FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
-# sub-packages from the ground up: each may import those before it
-ORDER = {
+# folders and flat modules from the ground up: each imports only from lines above its own
+FLOORS = {
+    "geometry": [
+        "blocked_spline collective errors legendre_modes maxima memory",
+        "checks control instruments interpolant missing partition",
+        "surface",
+        "ascent files patches spectrum statistics typical_contact",
+        "asperities meshes",
+    ],
     "micro": [
-        "compliance", "pairs", "complementarity", "regions", "summits", "cells", "auto",
+        "checks closed_forms plane relaxation",
+        "compliance patch_displacement plane_equilibrium response",
+        "contact model pairs",
+        "complementarity half_space",
+        "islands",
+        "asperities",
+        "factory",
+        "choice",
     ],
-    "macro": ["body"],
+    "macro": [
+        "elasticity form_cache",
+        "compat",
+        "mesh",
+        "linear_solvers",
+        "block",
+        "contact",
+        "compliance fields",
+    ],
     "multiscale": [
-        "scenes", "law_tables", "couplings", "reference", "planning", "reporting", "restart",
-        "doctor", "comparing",
+        "machine storage",
+        "doctor laws loading",
+        "results scene",
+        "setup",
+        "couplings",
+        "costs errors",
+        "resolution",
+        "planning run",
+        "output restart",
+        "compare",
+        "cli",
+        "__main__",
     ],
-}  # fmt: skip
+}
 HEAVY = {
     "geometry": FINITE_ELEMENTS | {"h5py", "matplotlib", "pydantic"},
     "micro": FINITE_ELEMENTS | {"gmsh", "h5py", "matplotlib", "pydantic"},
@@ -46,6 +78,15 @@ def imports(path):
             yield (node.module or "").split(".")[0]
 
 
+def modules_imported(path):
+    """Return the full names that a module imports from, and those of what it takes there."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
 @pytest.mark.parametrize("package", BELOW)
 def test_imports_go_down_only(package):
     forbidden = (set(BELOW) - BELOW[package] - {package}) | HEAVY[package]
@@ -54,18 +95,22 @@ def test_imports_go_down_only(package):
         assert not crossing, f"{path.name} imports {crossing}"
 
 
-@pytest.mark.parametrize("package", ORDER)
-def test_sub_packages_go_down_only(package):
-    order = ORDER[package]
-    assert sorted(order) == sorted(
-        path.parent.name for path in (ROOT / package).glob("*/__init__.py")
-    )
-    for path in (ROOT / package).glob("*/*.py"):
-        later = {f"{package}.{name}" for name in order[order.index(path.parent.name) + 1 :]}
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ImportFrom):
-                crossing = ".".join((node.module or "").split(".")[:2])
-                assert crossing not in later, f"{path.name} imports {crossing}"
+@pytest.mark.parametrize("package", FLOORS)
+def test_folders_and_flat_modules_go_down_only(package):
+    floor = {name: i for i, names in enumerate(FLOORS[package]) for name in names.split()}
+    found = {path.stem for path in (ROOT / package).iterdir() if path.suffix == ".py"}
+    found |= {path.parent.name for path in (ROOT / package).glob("*/__init__.py")}
+    assert set(floor) == found - {"__init__"}
+    assert len(floor) == len(found - {"__init__"}), "a module stands beside a folder of its name"
+    for path in (ROOT / package).rglob("*.py"):
+        here = path.relative_to(ROOT / package).with_suffix("").parts[0]
+        if here == "__init__":
+            continue
+        for module in modules_imported(path):
+            top, _, rest = module.partition(".")
+            other = rest.split(".")[0]
+            if top == package and other in floor and other != here:
+                assert floor[other] < floor[here], f"{path.name} imports {module}"
 
 
 def test_no_module_needs_itself():
@@ -89,7 +134,7 @@ def test_only_one_module_knows_dolfinx_releases():
 
 def test_micro_scene_loads_no_finite_elements():
     code = (
-        "import sys; from multiscale.run import run; from multiscale.scene import Scene;"
+        "import sys; from multiscale.run import run; from multiscale.scene.scene import Scene;"
         "run(Scene.load('demos/scenes/paper.toml', ['coupling.kind=analytic', 'load.steps=1']));"
         "heavy = {'dolfinx', 'petsc4py', 'gmsh', 'matplotlib'};"
         "print(sorted(heavy & set(sys.modules)))"

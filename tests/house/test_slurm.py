@@ -187,7 +187,7 @@ def test_processes_that_stand_alone_refuse_to_run(slurm):
 
 SLOW = """
 import sys, time
-from multiscale.cli import main
+from multiscale.cli.command_line import main
 from multiscale.run import Run
 at_once = Run.load_steps
 def slowly(self):

@@ -12,10 +12,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "verification"))
 
 from block_cases import PowerLaw, block_of, interface_of, uneven_laws
 
-import geometry.meshes
+import geometry.meshes.block
 from geometry.control import Control
 from geometry.errors import InputError, NotConverged
-from geometry.meshes import BlockShape
+from geometry.meshes.block import BlockShape
 from macro import PressedBlock, block_mesh
 
 COMM = MPI.COMM_WORLD
@@ -67,7 +67,7 @@ def fail_in_gmsh():
         raise InputError("gmsh gave up", value=3, allowed="better luck")
         yield
 
-    geometry.meshes.flat_block = broken
+    geometry.meshes.block.flat_block = broken
     shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(2, 2, 2))
     return error_of(lambda: block_mesh(shape, COMM))
 

@@ -7,7 +7,7 @@ import numpy as np
 from mpi4py import MPI
 
 from macro import Material, cached_face_compliance, face_compliance
-from macro.body import face_compliance as module
+from macro.compliance import face_compliance as module
 
 COMM = MPI.COMM_WORLD
 MATERIAL = Material(young_modulus=1.0, poisson_ratio=0.3)

@@ -9,8 +9,7 @@ import time
 from mpi4py import MPI
 
 from geometry.errors import NotConverged
-from multiscale import commands
-from multiscale.cli import main
+from multiscale.cli import commands, main
 from multiscale.couplings.condensed import CondensedCoupling
 
 run = sys.modules["multiscale.run"]  # the package's attribute of that name is the function

@@ -72,7 +72,7 @@ class Runs:
         self.root, self.environment = root, os.environ | environment
         self.forks = multiprocessing.get_context("forkserver")
         self.forks.set_forkserver_preload(
-            ["multiscale.cli", "multiscale.reporting.report", "scipy.fft"]
+            ["multiscale.cli.command_line", "multiscale.output.report", "scipy.fft"]
         )
 
     def forked(self, words, log, over, number=signal.SIGKILL):
@@ -121,7 +121,7 @@ def enter(words, log, root):
     file = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
     os.dup2(file, 1)
     os.dup2(file, 2)
-    from multiscale.cli import main
+    from multiscale.cli.command_line import main
 
     sys.exit(main(words))
 

@@ -8,8 +8,8 @@ from mpi4py import MPI
 
 from geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
 from micro import micro_model
-from multiscale.law_tables.consistent import consistent_laws
-from multiscale.law_tables.law_files import write_laws
+from multiscale.laws.consistent import consistent_laws
+from multiscale.laws.files import write_laws
 
 COMM = MPI.COMM_WORLD
 

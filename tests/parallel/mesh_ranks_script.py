@@ -14,7 +14,7 @@ from mesh_facts import cells_of, faces_of, measures_of
 
 from geometry import BlockShape, PatchGrid
 from macro import BOTTOM, SIDES, TOP, Block, Material, block_mesh, compat
-from macro.top_nodes import TopNodes
+from macro.contact.face_nodes import TopNodes
 
 COMM = MPI.COMM_WORLD
 WIDE = {"margin": 0.4, "margin_cells": 2, "margin_grading": 3.0, "grading": 5.0}

@@ -7,7 +7,7 @@ from mpi4py import MPI
 
 from geometry import BlockShape, RefinedShape
 from macro import Block, Material, block_mesh
-from macro.multigrid import coarser_grids, lattice_of
+from macro.linear_solvers.multigrid import coarser_grids, lattice_of
 
 COMM = MPI.COMM_WORLD
 CUBE = {"interface": (1.0, 1.0), "height": 1.0}

@@ -14,7 +14,7 @@ def test_doctor_tells_ranks_and_hosts_once(mpirun):
 def test_a_check_that_fails_on_one_rank_fails_for_all(mpirun):
     code = (
         "import sys; from mpi4py import MPI; from multiscale.doctor import machine;"
-        "from multiscale.cli import main\n"
+        "from multiscale.cli.command_line import main\n"
         "def broken(comm):\n"
         "    if comm.rank == 1: raise OSError('only here')\n"
         "    return []\n"

@@ -161,7 +161,7 @@ def test_bug_on_one_rank_ends_all(mpirun, tmp_path):
         "        yield step\n"
         "        if MPI.COMM_WORLD.rank == 1: raise RuntimeError('one rank')\n"
         "Run.load_steps = broken\n"
-        "from multiscale.cli import main\n"
+        "from multiscale.cli.command_line import main\n"
         f"sys.exit(main(['run', '{PAPER}', '--out', '{tmp_path / 'out'}', '--set', "
         "'surface.grid=[64, 64]', 'block.cells=[8, 8, 4]', 'load.steps=3']))"
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from geometry.meshes import BlockShape
+from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid
 from macro import Block, Interface, Material, block_mesh
 

@@ -9,7 +9,7 @@ from dolfinx import mesh as dmesh
 
 from macro import Material, compat
 from macro.elasticity import stiffness_form, stress
-from macro.solvers import linear_solver, solve_linear
+from macro.linear_solvers.options import linear_solver, solve_linear
 
 MATERIAL = Material(young_modulus=2.0, poisson_ratio=0.3)
 ELEMENTS = ["Q1", "Q2", "P1", "P2"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from block_cases import block_of, interface_of
 
-from micro.love import love_mutual
+from micro.closed_forms.love import love_mutual
 
 
 @cache

@@ -10,8 +10,8 @@ from reference_cases import on_block
 from geometry import PatchGrid, Spectrum, Surface, patch_means, synthesise
 from geometry.control import Control
 from multiscale import Scene, run
-from multiscale.coupling import ContactCoupling
-from multiscale.loading import Programme, load_steps
+from multiscale.couplings.load_steps import ContactCoupling
+from multiscale.loading.stepper import Programme, load_steps
 
 SURFACE = synthesise(
     Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1),

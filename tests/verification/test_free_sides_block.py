@@ -19,7 +19,7 @@ from geometry import (
 )
 from macro import Block, Interface, ObstacleBlock, block_mesh, rough_block_mesh
 from micro import FreeSides, HalfSpace
-from multiscale.reference.extrapolation import extrapolated
+from multiscale.results.extrapolation import extrapolated
 
 SQUARE = (1.0, 1.0)
 SIDES = FreeSides(lengths=SQUARE, poisson_ratio=MATERIAL.poisson_ratio, reach=0.25)

@@ -5,8 +5,8 @@ import pytest
 
 from geometry import PatchGrid
 from geometry.errors import InputError
-from micro.boussinesq import HalfSpace
-from micro.love import love_integral
+from micro.closed_forms.boussinesq import HalfSpace
+from micro.closed_forms.love import love_integral
 
 LOADS = PatchGrid(grid=(2, 2), lengths=(1.0, 0.6), origin=(-0.2, 0.1))
 POINTS = np.random.default_rng(7).uniform((-1.0, -1.0, 0.05), (1.5, 1.5, 1.0), (30, 3)).T

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from geometry import BlockShape, Control, Surface
 from macro import Block, Material, ObstacleBlock, block_mesh, rough_block_mesh
 from multiscale import make_stage
-from multiscale.plan import warnings
+from multiscale.planning.plan import warnings
 
 BLOCKED = ("isolated", "consistent", "concurrent")
 

@@ -13,9 +13,9 @@ from geometry.errors import NotConverged
 from geometry.patches import PatchGrid
 from micro import contact_modulus, influence_matrix
 from multiscale.couplings.dense_newton import DenseNewton
-from multiscale.law_tables.patch_laws import PatchLaws
-from multiscale.law_tables.repair import evened_law
-from multiscale.laws import PatchLaw
+from multiscale.laws.packed import PatchLaws
+from multiscale.laws.patch_law import PatchLaw
+from multiscale.laws.repair import evened_law
 from multiscale.run import Run
 
 every_kind = pytest.mark.parametrize("kind", KINDS)

@@ -8,7 +8,7 @@ from geometry.errors import InputError
 from geometry.files import read_surface
 from geometry.missing import filled
 from multiscale import make_stage, run
-from multiscale.plan import statements, warnings
+from multiscale.planning.plan import statements, warnings
 
 X, Y = centred(32)
 DOME = -(X**2 + Y**2) / 0.8

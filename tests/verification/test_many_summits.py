@@ -8,7 +8,7 @@ from interaction_cases import E_STAR, PATCHES
 
 from geometry import Asperities, InputError
 from micro import asperity_model
-from micro.summits.many_summits import PAIR_SUMS, ManySummits, pair_sum
+from micro.asperities.many_summits import PAIR_SUMS, ManySummits, pair_sum
 
 both_shapes = pytest.mark.parametrize("name", ["circular", "elliptic"])
 

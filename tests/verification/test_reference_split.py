@@ -19,7 +19,7 @@ from geometry import (
     synthesise,
 )
 from macro import Block, ObstacleBlock, rough_block_mesh
-from multiscale.reference.extrapolation import extrapolated
+from multiscale.results.extrapolation import extrapolated
 
 APPROACH, FLAT = 8e-3, 0.01
 

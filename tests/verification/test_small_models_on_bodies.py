@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
 from macro import Material
-from macro.body.face_compliance import face_compliance
+from macro.compliance.face_compliance import face_compliance
 from micro import FreeSides, HalfSpaceModel, micro_model
 from micro.compliance.body_modes import BodyModes
 from micro.compliance.half_space_modes import half_space_modes

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from geometry import BlockShape, flat_block
-from geometry.lattice import Segment, gmsh_session, is_initialised
+from geometry.meshes.lattice import Segment, gmsh_session, is_initialised
 
 SHAPE = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(2, 2, 2))
 

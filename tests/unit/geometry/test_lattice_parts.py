@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from geometry.lattice_parts import (
+from geometry.meshes.lattice_parts import (
     cells_beyond,
     lattice_cells,
     lattice_part,

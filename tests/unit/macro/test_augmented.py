@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from geometry import BlockShape, Control, Spectrum, Surface, synthesise
 from macro import Block, Material, ObstacleBlock, rough_block_mesh
-from macro.augmented import PENETRATION
+from macro.contact.augmented_lagrangian import PENETRATION
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.3)
 X = (np.arange(65) + 0.5) / 65 - 0.5

@@ -7,8 +7,8 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
 from geometry.errors import InputError
-from geometry.meshes import BlockShape
-from geometry.refined_block import RefinedShape
+from geometry.meshes.block import BlockShape
+from geometry.meshes.refined_block import RefinedShape
 from macro import BOTTOM, SIDES, TOP, Block, Material, block_mesh, compat
 
 BUILDERS = ["gmsh", "lattice"]
@@ -39,7 +39,7 @@ def test_error_of_gmsh_is_passed_on(monkeypatch):
     def broken(_shape):
         raise InputError("gmsh gave up")
 
-    monkeypatch.setattr("geometry.meshes.flat_block", broken)
+    monkeypatch.setattr("geometry.meshes.block.flat_block", broken)
     shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(1, 1, 1))
     with pytest.raises(InputError, match="gmsh gave up"):
         block_mesh(shape, MPI.COMM_SELF)
@@ -74,8 +74,8 @@ def test_large_flat_blocks_do_without_gmsh(monkeypatch):
     def broken(_shape):
         raise InputError("gmsh was asked")
 
-    monkeypatch.setattr("geometry.meshes.flat_block", broken)
-    monkeypatch.setattr("macro.mesh.GMSH_CELLS", 8)
+    monkeypatch.setattr("geometry.meshes.block.flat_block", broken)
+    monkeypatch.setattr("macro.mesh.block.GMSH_CELLS", 8)
     cubes = {"interface": (1.0, 1.0), "height": 1.0}
     large = BlockShape(cells=(3, 3, 1), **cubes)
     assert block_mesh(large, MPI.COMM_SELF).mesh.topology.index_map(3).size_global == 9

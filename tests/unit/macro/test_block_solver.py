@@ -6,8 +6,9 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from geometry import BlockShape, RefinedShape
-from macro import Block, Material, block_mesh, block_solver
-from macro.block_solver import smoothing
+from macro import Block, Material, block_mesh
+from macro.linear_solvers import selection as block_solver
+from macro.linear_solvers.selection import smoothing
 
 CUBE = {"interface": (1.0, 1.0), "height": 1.0}
 COARSE = {"places": np.array([[0.5, 0.5]]), "fine": 0.3, "coarse": 0.5}

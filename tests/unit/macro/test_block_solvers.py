@@ -3,7 +3,7 @@
 import pytest
 from petsc4py import PETSc
 
-from macro.solvers import default_options, linear_solver, reason_name
+from macro.linear_solvers.options import default_options, linear_solver, reason_name
 
 
 @pytest.fixture

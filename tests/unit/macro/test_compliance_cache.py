@@ -7,8 +7,8 @@ import pytest
 from mpi4py import MPI
 
 from geometry import PatchGrid
-from macro import compliance_cache
-from macro.compliance_cache import cache_directory, cached, is_kept
+from macro.compliance import cache as compliance_cache
+from macro.compliance.cache import cache_directory, cached, is_kept
 
 
 @pytest.fixture
@@ -157,17 +157,17 @@ def test_other_sources_find_nothing(counted, monkeypatch):
 
 
 def test_every_source_counts(monkeypatch, tmp_path):
-    for name in ("macro/body/line.py", "geometry/patches.py", "micro/love.py"):
+    for name in ("macro/compliance/line.py", "geometry/patches.py", "micro/closed_forms/love.py"):
         path = tmp_path / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("one = 1\n")
-    (tmp_path / "macro/compliance_cache.py").write_text("")
-    monkeypatch.setattr(compliance_cache, "__file__", str(tmp_path / "macro/compliance_cache.py"))
+    (tmp_path / "macro/compliance/cache.py").write_text("")
+    monkeypatch.setattr(compliance_cache, "__file__", str(tmp_path / "macro/compliance/cache.py"))
     digests = [compliance_cache.sources_digest.__wrapped__()]
     for name, text in (
-        ("macro/body/line.py", "one = 2\n"),
+        ("macro/compliance/line.py", "one = 2\n"),
         ("geometry/patches.py", "one = 3\n"),
-        ("micro/love.py", "one = 4\n"),
+        ("micro/closed_forms/love.py", "one = 4\n"),
     ):
         (tmp_path / name).write_text(text)
         digests.append(compliance_cache.sources_digest.__wrapped__())

@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from geometry.errors import InputError
-from geometry.meshes import BlockShape
+from geometry.meshes.block import BlockShape
 from macro import Block, Material, block_mesh, compat
 from macro.elasticity import rigid_body_modes
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from geometry.meshes import BlockShape
+from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid
 from macro import block_mesh, compat
-from macro.facets import _areas, _cut, facet_quadrature
+from macro.mesh.contact_face import _areas, _cut, facet_quadrature
 
 
 def points_on(patches, degree=2, **changes):

@@ -6,8 +6,9 @@ from mpi4py import MPI
 
 from geometry import BlockShape
 from geometry.errors import NotConverged
-from macro import Block, Material, block_mesh, factorisation
-from macro.solvers import solve_linear
+from macro import Block, Material, block_mesh
+from macro.linear_solvers import direct as factorisation
+from macro.linear_solvers.options import solve_linear
 
 SHAPE = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(5, 5, 4), element="Q2")
 INCOMPRESSIBLE = Material(young_modulus=4000.0, poisson_ratio=0.4999)

@@ -7,7 +7,7 @@ from petsc4py import PETSc
 
 from geometry import BlockShape, NotConverged
 from macro import Block, Material, block_mesh
-from macro.free_solver import FreeSolver
+from macro.linear_solvers.constrained import FreeSolver
 
 RANDOM = np.random.default_rng(4)
 

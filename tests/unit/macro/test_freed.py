@@ -6,7 +6,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from geometry import Control, PatchGrid, Spectrum, synthesise
-from geometry.meshes import BlockShape
+from geometry.meshes.block import BlockShape
 from macro import (
     Block,
     Interface,

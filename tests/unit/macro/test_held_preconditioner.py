@@ -7,9 +7,9 @@ from petsc4py import PETSc
 
 from geometry import BlockShape
 from macro import Block, Material, block_mesh
-from macro.free_solver import TOLERANCE, FreeSolver, asked_tolerance
-from macro.held_preconditioner import HeldPreconditioner
-from macro.projection import Projection
+from macro.linear_solvers.constrained import TOLERANCE, FreeSolver, asked_tolerance
+from macro.linear_solvers.constrained_preconditioner import HeldPreconditioner
+from macro.linear_solvers.projection import Projection
 
 MATERIAL = Material(young_modulus=4e3, poisson_ratio=0.2)
 

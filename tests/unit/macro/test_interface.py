@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from geometry.errors import InputError
-from geometry.meshes import BlockShape
+from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid
 from macro import Block, Interface, Material, block_mesh
 

@@ -8,7 +8,7 @@ import time
 import pytest
 
 from geometry.errors import InputError
-from macro import jit
+from macro import form_cache as jit
 
 
 def age(path, seconds):
@@ -85,7 +85,7 @@ def test_bugs_stay_bugs(tmp_path):
 
 
 COMPILE = (
-    "from mpi4py import MPI; from geometry.meshes import BlockShape;"
+    "from mpi4py import MPI; from geometry.meshes.block import BlockShape;"
     "from macro import Block, Material, block_mesh;"
     "shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(1, 1, 1));"
     "material = Material(young_modulus=1.0, poisson_ratio=0.3);"

@@ -9,9 +9,9 @@ from petsc4py import PETSc
 
 from geometry import BlockShape
 from macro import Block, Material, block_mesh
-from macro.multigrid import coarser_grids, lattice_of, transfers
-from macro.multigrid_products import galerkin
-from macro.petsc_blocks import block_rows
+from macro.linear_solvers.multigrid import coarser_grids, lattice_of, transfers
+from macro.linear_solvers.multigrid_products import galerkin
+from macro.linear_solvers.petsc_blocks import block_rows
 
 
 def make(sides="free", **changes):
@@ -62,7 +62,7 @@ def test_single_unknowns_may_be_held_anywhere():
 
 def test_rows_are_multiplied_in_any_number_of_pieces(monkeypatch):
     whole = dense(grids_of(make())[0].matrix)
-    monkeypatch.setattr("macro.multigrid_products._AT_ONCE", 7)
+    monkeypatch.setattr("macro.linear_solvers.multigrid_products._AT_ONCE", 7)
     pieces = dense(grids_of(make())[0].matrix)
     np.testing.assert_allclose(pieces, whole, atol=1e-13 * whole.max())  # order of sums
 

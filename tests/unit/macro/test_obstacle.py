@@ -8,10 +8,11 @@ import pytest
 from mpi4py import MPI
 
 from geometry import Control, InputError, NotConverged, PatchGrid, Spectrum, Surface, synthesise
-from geometry.meshes import BlockShape
-from macro import Block, Material, active_nodes, block_mesh
-from macro.obstacle import ObstacleBlock
-from macro.rough_mesh import rough_block_mesh
+from geometry.meshes.block import BlockShape
+from macro import Block, Material, block_mesh
+from macro.contact import active_set as active_nodes
+from macro.contact.unilateral_problem import ObstacleBlock
+from macro.mesh.rough_surface import rough_block_mesh
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.3)
 SURFACE = synthesise(

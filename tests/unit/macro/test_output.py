@@ -5,7 +5,7 @@ import pytest
 from mpi4py import MPI
 
 from geometry import Control, RefinedShape, Surface
-from geometry.meshes import BlockShape
+from geometry.meshes.block import BlockShape
 from macro import Block, Material, ObstacleBlock, rough_block_mesh, write_rough_fields
 
 h5py = pytest.importorskip("h5py")

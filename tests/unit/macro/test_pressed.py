@@ -11,10 +11,10 @@ from petsc4py import PETSc
 
 from geometry.control import Control
 from geometry.errors import InputError, NotConverged
-from geometry.meshes import BlockShape
+from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid
 from macro import Block, Interface, Material, PressedBlock, block_mesh, compat, write_fields
-from macro.prediction import DisplacementBasis
+from macro.contact.energy_start import DisplacementBasis
 
 
 @dataclass

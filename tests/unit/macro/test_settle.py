@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import NotConverged
-from macro.settle import Excess, settle, touch
+from macro.contact.plane_equilibrium import Excess, settle, touch
 
 
 class Supports:

@@ -6,7 +6,7 @@ from mpi4py import MPI
 
 from geometry import BlockShape, PatchGrid
 from macro import Block, Material, block_mesh
-from macro.top_nodes import TopNodes
+from macro.contact.face_nodes import TopNodes
 
 MATERIAL = Material(young_modulus=4e3, poisson_ratio=0.2)
 

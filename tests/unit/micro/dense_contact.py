@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from micro.cells.elastic_grid import ElasticGrid
+from micro.compliance.elastic_grid import ElasticGrid
 
 
 class Dense(NamedTuple):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from micro.cells.anderson import Anderson
+from micro.contact.anderson import Anderson
 
 
 def errors(contraction, target, steps):

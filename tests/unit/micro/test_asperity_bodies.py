@@ -112,7 +112,7 @@ def test_is_the_dense_solution(name, solver, sign):
 def test_body_adds_to_every_sum_over_pairs(name, pairs):
     model = asperity_model(name, apart(), contact_modulus=MODULUS, pairs=pairs, body=body())
     direct = replace(model, pairs="direct").solve(8e-3)
-    # the mesh's own error, see `micro.summits.many_summits`
+    # the mesh's own error, see `micro.asperities.many_summits`
     assert model.solve(8e-3).force == pytest.approx(
         direct.force, rel=1e-4 if pairs == "mesh" else 1e-8
     )

@@ -5,7 +5,7 @@ import pytest
 
 from geometry import InputError, PatchGrid, Surface
 from micro import MODELS, AsperityModel, HertzContact, asperity_model, micro_model
-from micro.summits.attribution import shares
+from micro.asperities.patch_shares import shares
 
 E_STAR = 4000.0
 ONE_PATCH = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))

@@ -7,8 +7,8 @@ import pytest
 from scipy.integrate import quad
 
 from geometry import PatchGrid
-from micro.summits import attribution
-from micro.summits.attribution import shares
+from micro.asperities import patch_shares as attribution
+from micro.asperities.patch_shares import shares
 
 GRID = PatchGrid(grid=(4, 5), lengths=(1.0, 1.2))
 

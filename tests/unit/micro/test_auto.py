@@ -93,7 +93,7 @@ def test_the_check_is_the_difference_from_the_surfaces_own_grid():
 
 def test_the_surfaces_own_grid_is_checked_against_a_finer_one(monkeypatch):
     surface = rough(5)
-    monkeypatch.setattr("micro.auto.candidates.FACTORS", (1.0,))
+    monkeypatch.setattr("micro.choice.candidates.FACTORS", (1.0,))
     choice = choose(surface, contact_modulus=1.0, approach=0.02, tolerance=0.2)
     expected = abs(force(choice.model, [0.01])[0] / force(fine(surface, 96), [0.01])[0] - 1.0)
     assert choice.taken.label == "half-space on 64 × 64 cells"
@@ -102,7 +102,7 @@ def test_the_surfaces_own_grid_is_checked_against_a_finer_one(monkeypatch):
 
 def test_a_failed_check_gives_way_to_the_next_and_says_so(monkeypatch):
     # A bound far too good promises everything; the check refuses what asperities give.
-    monkeypatch.setattr("micro.auto.candidates.contact_error", lambda kind, at: 1e-5)
+    monkeypatch.setattr("micro.choice.candidates.contact_error", lambda kind, at: 1e-5)
     choice = choose(rough(5), contact_modulus=1.0, approach=0.02, tolerance=0.005)
     assert "circular-independent differs by" in choice.sentence
     assert "none that was checked keeps" in choice.sentence
@@ -115,7 +115,7 @@ def test_a_model_without_a_solution_gives_way(monkeypatch):
     def stuck(*_, **__):
         raise NotConverged("nothing", reason="STUCK", iterations=1, remedy="none")
 
-    monkeypatch.setattr("micro.auto.candidates.contact_error", lambda kind, at: 1e-5)
+    monkeypatch.setattr("micro.choice.candidates.contact_error", lambda kind, at: 1e-5)
     monkeypatch.setattr(AsperityModel, "respond", stuck)
     choice = choose(rough(5), contact_modulus=1.0, approach=0.02, tolerance=0.1)
     assert "circular-independent has no solution when checked" in choice.sentence

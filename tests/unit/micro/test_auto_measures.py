@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from geometry import Surface
-from micro.auto.errors import grid_error
-from micro.auto.measures import contact_measures
+from micro.choice.expected_errors import grid_error
+from micro.choice.measures import contact_measures
 
 
 def paraboloid(centre=(0.5, 0.5), ratio=1.0, cells=160):

@@ -5,10 +5,10 @@ import pytest
 
 from geometry import Control, Surface
 from micro import HalfSpaceModel
-from micro.cells.elastic_grid import Cells, ElasticGrids
-from micro.cells.pressing import Pressing
-from micro.cells.reach import Box
 from micro.compliance.body_modes import BodyModes
+from micro.compliance.bounding_box import Box
+from micro.compliance.elastic_grid import Cells, ElasticGrids
+from micro.contact.pressing import Pressing
 
 E_STAR = 4000.0
 GRID, SPACING = (64, 48), (1.0 / 64, 0.75 / 48)

@@ -3,7 +3,7 @@
 import pytest
 
 from geometry.errors import InputError
-from micro.boussinesq import HalfSpace
+from micro.closed_forms.boussinesq import HalfSpace
 
 
 @pytest.mark.parametrize(("modulus", "ratio"), [(0.0, 0.3), (float("inf"), 0.3), (1.0, 0.5)])

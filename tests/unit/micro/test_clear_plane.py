@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from micro.cells.clear_plane import clearance
-from micro.cells.motions import Motions
+from micro.contact.clear_plane import clearance
+from micro.contact.rigid_motions import Motions
 
 
 def brute_force(required, levers):

@@ -5,11 +5,11 @@ import pytest
 from scipy.optimize import nnls
 
 from geometry import NotConverged
-from micro.cells import contact_pressure
-from micro.cells.coarse_start import coarsened, nested_pressure, refined
-from micro.cells.elastic_grid import ElasticGrid, ElasticGrids, HalfSpaceGrid
-from micro.cells.pressing import Pressing
-from micro.cells.reach import Box
+from micro.compliance.bounding_box import Box
+from micro.compliance.elastic_grid import ElasticGrid, ElasticGrids, HalfSpaceGrid
+from micro.contact import problem as contact_pressure
+from micro.contact.nested_grids import coarsened, nested_pressure, refined
+from micro.contact.pressing import Pressing
 
 CASES = {
     "square": ((8, 8), (1.0, 1.0)),

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from geometry import NotConverged
+from micro.closed_forms.ellipse import shape_factors
 from micro.complementarity.active_set import active_set
 from micro.complementarity.contact_problem import TOLERANCE, ContactProblem, solve
-from micro.ellipse import shape_factors
 from micro.pairs.interaction import Interaction, Lift
 
 

@@ -8,9 +8,9 @@ from rough_half_space import displaced
 
 from geometry import InputError, Spectrum, Surface, synthesise
 from micro import FreeSides, HalfSpace, HalfSpaceModel
-from micro.cells.side_stresses import SideStresses
 from micro.compliance import finite_slopes
 from micro.compliance.finite_slopes import FiniteSlopes, coarse_grid
+from micro.compliance.side_stresses import SideStresses
 
 HALF_SPACE = HalfSpace(4000.0, 0.3)
 DICE = np.random.default_rng(7)

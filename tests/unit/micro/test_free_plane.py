@@ -8,11 +8,11 @@ from dense_contact import dense_contact, matrix_of
 
 from geometry import Control, InputError, NotConverged, Spectrum, Surface, synthesise
 from micro import HalfSpaceModel
-from micro.cells.conjugate_gradients import ContactCells
-from micro.cells.contact_pressure import contact_pressure
-from micro.cells.elastic_grid import Cells, ElasticGrid, ElasticGrids, HalfSpaceGrid
-from micro.cells.motions import Motions
-from micro.cells.pressing import Pressing
+from micro.compliance.elastic_grid import Cells, ElasticGrid, ElasticGrids, HalfSpaceGrid
+from micro.contact.conjugate_gradients import ContactCells
+from micro.contact.pressing import Pressing
+from micro.contact.problem import contact_pressure
+from micro.contact.rigid_motions import Motions
 
 CASES = {
     "square": ((12, 12), (1.0, 1.0)),

@@ -8,9 +8,9 @@ import pytest
 from geometry import Surface, UnevenPartition
 from geometry.errors import InputError
 from micro import FreeSides, HalfSpaceModel
-from micro.cells.elastic_grid import Cells, ElasticGrids
-from micro.cells.reach import Box
-from micro.cells.side_cells import SideCells
+from micro.compliance.bounding_box import Box
+from micro.compliance.elastic_grid import Cells, ElasticGrids
+from micro.compliance.side_cells import SideCells
 
 SIDES = FreeSides(lengths=(1.0, 1.5), poisson_ratio=0.2, reach=0.25)
 GRID = (20, 30)

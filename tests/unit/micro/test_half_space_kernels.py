@@ -5,10 +5,10 @@ import pytest
 from scipy import fft
 
 from micro import love_integral
-from micro.cells import elastic_grid
-from micro.cells.convolution import Convolution
-from micro.cells.elastic_grid import Cells, ElasticGrid, ElasticGrids, HalfSpaceGrid
-from micro.cells.kernels import love_kernel, padded_spectrum, periodic_spectrum
+from micro.compliance import elastic_grid
+from micro.compliance.convolution import Convolution
+from micro.compliance.elastic_grid import Cells, ElasticGrid, ElasticGrids, HalfSpaceGrid
+from micro.compliance.kernels import love_kernel, padded_spectrum, periodic_spectrum
 
 GRIDS = [(16, 16), (15, 22), (7, 1), (1, 30), (1, 1)]
 SPACING = (0.1, 0.13)

@@ -6,9 +6,9 @@ import pytest
 from geometry import PatchGrid, UnevenPartition
 from geometry.legendre_modes import mode_means
 from micro import FreeSides, influence_matrix, love_mean
-from micro.cells.side_cells import SideCells
 from micro.compliance import half_space_modes as module
 from micro.compliance.half_space_modes import half_space_modes
+from micro.compliance.side_cells import SideCells
 from micro.compliance.side_modes import side_modes
 from micro.compliance.side_patches import side_patches
 

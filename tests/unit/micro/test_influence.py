@@ -6,7 +6,7 @@ import pytest
 
 from geometry import PatchGrid, UnevenPartition
 from micro import influence_matrix, love_mean, mutual_influence
-from micro.cells.elastic_grid import ElasticGrids
+from micro.compliance.elastic_grid import ElasticGrids
 
 
 def _exact(dx, dy, a, b):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.special import elliprf
 
-from micro.ellipse import shape_factors
-from micro.hertz import HertzContact
+from micro.closed_forms.ellipse import shape_factors
+from micro.closed_forms.hertz import HertzContact
 from micro.pairs.interaction import MERGING_SLOPE, Interaction, merging_parameter
 
 

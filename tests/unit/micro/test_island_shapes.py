@@ -5,8 +5,8 @@ import pytest
 
 from geometry import Surface
 from micro import HertzContact
-from micro.regions.island_shapes import islands
-from micro.regions.relief import Relief
+from micro.islands.shapes import islands
+from micro.islands.volumes import Relief
 
 
 def bumps(*summits, grid=256):

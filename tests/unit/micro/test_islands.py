@@ -7,7 +7,7 @@ import pytest
 
 from geometry import InputError, NotConverged, PatchGrid, Spectrum, Surface, patch_means, synthesise
 from micro import IslandModel
-from micro.regions import island_passes
+from micro.islands import passes as island_passes
 
 PATCHES = PatchGrid(grid=(2, 3), lengths=(1.0, 1.0))
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from micro.cells.motions import Motions
-from micro.cells.reach import Box
+from micro.compliance.bounding_box import Box
+from micro.contact.rigid_motions import Motions
 
 GRID = (9, 8)
 X, Y = np.linspace(-0.7, 0.7, 9), np.linspace(-0.6, 0.6, 8)

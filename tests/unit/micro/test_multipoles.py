@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from micro.ellipse import shape_factors
-from micro.pairs.hertz_field import elliptic_field
+from micro.closed_forms.ellipse import shape_factors
+from micro.closed_forms.hertz_field import elliptic_field
 from micro.pairs.multipoles import angular_polynomials, moments, pair_terms, series_coefficients
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from geometry.partition import UnevenPartition
-from micro.boussinesq import HalfSpace
-from micro.quarter_space_stresses import QuarterSpaceStresses, _by_side
+from micro.closed_forms.boussinesq import HalfSpace
+from micro.compliance.quarter_space_stresses import QuarterSpaceStresses, _by_side
 
 RATIOS = [-0.5, 0.0, 0.15, 0.45]
 

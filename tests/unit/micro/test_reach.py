@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from micro.cells.reach import Box
+from micro.compliance.bounding_box import Box
 
 
 @pytest.mark.parametrize(

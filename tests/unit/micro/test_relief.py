@@ -6,8 +6,8 @@ from scipy.ndimage import label
 from scipy.spatial import cKDTree
 
 from geometry import Spectrum, Surface, synthesise
-from micro.regions.catchments import catchments, passes_between, sampled
-from micro.regions.relief import Relief
+from micro.islands.volumes import Relief
+from micro.islands.watersheds import catchments, passes_between, sampled
 
 EIGHT = np.ones((3, 3))
 

@@ -25,8 +25,8 @@ from micro import (
     asperity_model,
     micro_model,
 )
-from micro.regions import islands
-from micro.summits import scaled_model
+from micro.asperities import scaled_model
+from micro.islands import model as islands
 
 E_STAR = 4000.0
 PATCHES = PatchGrid(grid=(3, 2), lengths=(1.0, 1.0))
@@ -182,7 +182,7 @@ def test_flat_surface():
 
 
 def test_a_fit_that_does_not_settle_is_told(surface, monkeypatch):
-    monkeypatch.setattr("micro.summits.scaled_model._MOST_PASSES", 1)
+    monkeypatch.setattr("micro.asperities.scaled_model._MOST_PASSES", 1)
     message = r"the fit of curvatures to contacts at an approach of 0\.008 mm did not converge"
     with pytest.raises(NotConverged, match=message):
         scaled(surface, curvature="contact").solve(8e-3)

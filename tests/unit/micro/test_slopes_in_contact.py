@@ -7,10 +7,10 @@ import pytest
 
 from geometry import Control, NotConverged, Spectrum, synthesise
 from micro import HalfSpace, HalfSpaceModel
-from micro.cells import lagged_slopes
-from micro.cells.elastic_grid import ElasticGrids
-from micro.cells.reach import Box
+from micro.compliance.bounding_box import Box
+from micro.compliance.elastic_grid import ElasticGrids
 from micro.compliance.finite_slopes import FiniteSlopes
+from micro.contact import slope_iteration as lagged_slopes
 
 NU, MODULUS = 0.3, 4000.0
 E_STAR = MODULUS / (1.0 - NU**2)

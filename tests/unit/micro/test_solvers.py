@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from geometry import NotConverged
+from micro.closed_forms.ellipse import shape_factors
 from micro.complementarity import active_set as active_set_module
 from micro.complementarity import newton_krylov as krylov_module
 from micro.complementarity import truncated_newton as truncated_module
@@ -11,7 +12,6 @@ from micro.complementarity.active_set import active_set
 from micro.complementarity.contact_problem import TOLERANCE, ContactProblem
 from micro.complementarity.line_search import damped_step
 from micro.complementarity.truncated_newton import truncated_newton
-from micro.ellipse import shape_factors
 from micro.pairs.interaction import Interaction
 
 

@@ -6,7 +6,7 @@ from io import StringIO
 from hypothesis import strategies as st
 from scene_inputs import KEYS, odd_text
 
-from multiscale.cli import main
+from multiscale.cli.command_line import main
 
 COMMANDS = ("run", "run", "plan", "compare", "laws", "surface", "schema", "doctor", "warm")
 SCENE = "SCENE"  # stands for the scene file

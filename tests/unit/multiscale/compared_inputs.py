@@ -10,13 +10,13 @@ from scene_inputs import scenes, takes_long
 
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
-from multiscale.compare import compare
-from multiscale.comparing.level_results import LevelResult
-from multiscale.comparing.measures import Curves
-from multiscale.comparing.outcomes import AGAINST
-from multiscale.comparing.report import comparison_html
-from multiscale.reporting.outputs import write_csv
-from multiscale.scene import Scene
+from multiscale.compare.level_results import LevelResult
+from multiscale.compare.measures import Curves
+from multiscale.compare.outcomes import AGAINST
+from multiscale.compare.report import comparison_html
+from multiscale.compare.run_comparison import compare
+from multiscale.scene.scene import Scene
+from multiscale.storage.whole_files import write_csv
 
 STATUSES = ("done", "done", "done", "not converged", "refused", "failed", "over budget")
 SIZES = (0.0, 1.0, 1.0, 1.0, 1e-30, 1e30)

@@ -9,11 +9,11 @@ import numpy as np
 from hypothesis import strategies as st
 
 from geometry.errors import InputError, NotConverged
-from multiscale.plan import statements, warnings
 from multiscale.planning.forecast import forecast
+from multiscale.planning.plan import statements, warnings
+from multiscale.resolution.problem_setup import make_stage
 from multiscale.run import run
-from multiscale.scene import Scene
-from multiscale.staging import make_stage
+from multiscale.scene.scene import Scene
 
 BASE = {
     "surface": {

@@ -7,11 +7,12 @@ import numpy as np
 from hypothesis import strategies as st
 
 from geometry.errors import InputError
-from multiscale.law_tables.law_files import read_laws, write_laws
+from multiscale.laws.files import read_laws, write_laws
 from multiscale.restart.checkpoint import read_checkpoint, write_checkpoint
+from multiscale.restart.resuming import checkpoint_of
 from multiscale.run import Run
-from multiscale.scene import Scene
-from multiscale.sealed_files import seal
+from multiscale.scene.scene import Scene
+from multiscale.storage.checksummed_hdf5 import seal
 
 ODD = (
     np.zeros(0), np.zeros(1), np.zeros((3, 3)), np.full(5, np.nan), np.full(5, 1e308), np.arange(5),
@@ -24,7 +25,7 @@ def originals(base, folder):
     """Return the bytes of a law file and of a checkpoint of a small run."""
     run = Run(Scene.from_dict(base | {"coupling": {"kind": "isolated"}}))
     write_laws(folder / "whole.laws", run.make_laws())
-    write_checkpoint(folder / "whole.h5", run.checkpoint("name", {}))
+    write_checkpoint(folder / "whole.h5", checkpoint_of(run, "name", {}))
     return (folder / "whole.laws").read_bytes(), (folder / "whole.h5").read_bytes()
 
 

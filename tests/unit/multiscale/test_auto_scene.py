@@ -6,11 +6,11 @@ import pytest
 
 from geometry.errors import InputError
 from micro import choose
-from multiscale.plan import statements, warnings
-from multiscale.reporting.provenance import provenance
+from multiscale.output.provenance import provenance
+from multiscale.planning.plan import statements, warnings
+from multiscale.resolution.problem_setup import make_stage
 from multiscale.run import Run
-from multiscale.scene import Scene
-from multiscale.staging import make_stage
+from multiscale.scene.scene import Scene
 
 
 def scene(load=None, coupling="analytic", **micro):
@@ -45,7 +45,7 @@ def chosen_for(monkeypatch, load):
         asked.update(options)
         return choose(*given, **options)
 
-    monkeypatch.setattr("multiscale.planning.micro_choice.choose", watched)
+    monkeypatch.setattr("multiscale.resolution.micro_model.choose", watched)
     make_stage(scene(load, model="auto", tolerance=0.1))
     return asked
 
@@ -68,7 +68,7 @@ def test_under_a_force_a_half_space_tells_how_near_that_is(monkeypatch, tilt):
 
 
 def test_a_chosen_asperity_model_counts_and_warns_as_a_stated_one(monkeypatch):
-    monkeypatch.setattr("micro.auto.candidates.contact_error", lambda kind, at: 1e-5)
+    monkeypatch.setattr("micro.choice.candidates.contact_error", lambda kind, at: 1e-5)
     stage = make_stage(scene({"approach": 0.02}, model="auto", tolerance=0.45))
     assert stage.by_summits
     assert stage.ignores_border

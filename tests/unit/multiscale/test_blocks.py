@@ -7,8 +7,8 @@ import pytest
 
 from micro import BodyModes, FiniteSlopes, FreeSides
 from multiscale import Scene, make_stage
+from multiscale.costs.contact_work import press_work
 from multiscale.couplings.blocks import contact_model, free_sides, patch_displacements
-from multiscale.planning.press_work import press_work
 
 
 def stage(kind="concurrent", model="half-space", patches=4, coupling=None, slopes=None, **block):

@@ -9,8 +9,8 @@ import pytest
 
 from geometry.errors import InputError
 from multiscale import Scene, make_stage
-from multiscale.plan import statements, warnings
-from multiscale.planning.choices import couplings, open_keys, settled_keys
+from multiscale.planning.plan import statements, warnings
+from multiscale.resolution.auto_keys import couplings, open_keys, settled_keys
 
 
 def scene(source=None, **sections):
@@ -157,7 +157,7 @@ def test_patches_are_nearly_square():
 
 
 def test_a_stated_reference_gets_a_grid_and_patches(monkeypatch):
-    monkeypatch.setattr("multiscale.planning.accuracy._Search._of_meshes", lambda *given: 0.001)
+    monkeypatch.setattr("multiscale.resolution.accuracy._Search._of_meshes", lambda *given: 0.001)
     stage = make_stage(scene({"grid": "auto"}, accuracy=0.05, coupling={"kind": "reference"}))
     assert stage.surface.grid == (96, 96)  # 16 heights along each of 6 waves
     assert stage.patches.grid == (8, 8)
@@ -173,7 +173,7 @@ def test_models_without_measure_say_so():
 
 
 def test_a_reference_is_taken_where_nothing_else_keeps_the_accuracy(monkeypatch):
-    monkeypatch.setattr("multiscale.planning.accuracy._Search._of_meshes", lambda *given: 0.001)
+    monkeypatch.setattr("multiscale.resolution.accuracy._Search._of_meshes", lambda *given: 0.001)
     stage = make_stage(scene(accuracy=0.0015))
     assert stage.scene.coupling.kind == "reference"
     assert stage.micro is None
@@ -186,7 +186,7 @@ def test_meshes_are_refined_until_their_bar_keeps_the_accuracy(monkeypatch):
     def error(search, stage):
         return float((stage.meshes.sizes[-1] / 0.03) ** 3)
 
-    monkeypatch.setattr("multiscale.planning.accuracy._Search._of_meshes", error)
+    monkeypatch.setattr("multiscale.resolution.accuracy._Search._of_meshes", error)
     coupling = {"kind": "reference"}
     coarse, fine = (make_stage(scene(accuracy=a, coupling=coupling)) for a in (0.1, 0.01))
     assert fine.meshes.sizes[-1] < coarse.meshes.sizes[-1]
@@ -240,9 +240,9 @@ def test_sizes_that_fit_no_memory_are_refused_before_anything_is_made(
     def never(scene):
         raise AssertionError("a surface was made")
 
-    monkeypatch.setattr("multiscale.staging.make_surface", never)
+    monkeypatch.setattr("multiscale.resolution.problem_setup.make_surface", never)
     pages = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 4_000_000}  # 16 GB
-    monkeypatch.setattr("multiscale.nodes.os.sysconf", pages.__getitem__)
+    monkeypatch.setattr("multiscale.machine.nodes.os.sysconf", pages.__getitem__)
     with pytest.raises(InputError, match=problem):
         make_stage(scene(**sections))
 

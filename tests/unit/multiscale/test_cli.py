@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from multiscale.cli import main
+from multiscale.cli.command_line import main
 
 PAPER = str(Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml")
 SMALL = [
@@ -153,14 +153,14 @@ def test_version(capsys, monkeypatch):
     patchlaw, dolfinx = capsys.readouterr().out.strip().split(", ")
     assert patchlaw == f"patchlaw {metadata.version('patchlaw')}"
     assert re.fullmatch(r"dolfinx \d+\.\d+.*", dolfinx)
-    monkeypatch.setattr("multiscale.cli.version", missing)
+    monkeypatch.setattr("multiscale.cli.command_line.version", missing)
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == "patchlaw not installed, dolfinx not installed\n"
 
 
 def test_version_loads_no_finite_elements():
     code = (
-        "import sys; from multiscale.cli import main\n"
+        "import sys; from multiscale.cli.command_line import main\n"
         "try: main(['--version'])\n"
         "finally: print('dolfinx' in sys.modules)"
     )

@@ -9,9 +9,9 @@ from petsc4py import PETSc
 from geometry.errors import NotConverged
 from multiscale import Run, Scene, run
 from multiscale.couplings.blocks import patch_compliance
-from multiscale.plan import statements
-from multiscale.planning.newton_choice import newton_choice
-from multiscale.staging import make_stage
+from multiscale.couplings.newton_choice import newton_choice
+from multiscale.planning.plan import statements
+from multiscale.resolution.problem_setup import make_stage
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 SMALL = [

@@ -7,9 +7,9 @@ from geometry import PatchGrid, Spectrum, patch_means, synthesise
 from geometry.control import Control
 from micro import influence_matrix, micro_model
 from multiscale.couplings.condensed import CondensedCoupling
-from multiscale.couplings.turning import TurningCoupling
-from multiscale.law_tables.consistent import consistent_laws
-from multiscale.law_tables.whole_surface import WholeSurface
+from multiscale.couplings.free_tilt import TurningCoupling
+from multiscale.laws.consistent import consistent_laws
+from multiscale.laws.whole_surface import WholeSurface
 
 MODULUS = 4000.0
 END = 9e-3

@@ -9,12 +9,12 @@ import pytest
 from geometry import BlockShape
 from micro import HalfSpaceModel
 from multiscale import Run, Scene, make_stage
-from multiscale.loading import Programme
-from multiscale.planning.block_work import mesh_unknowns, reference_work
-from multiscale.planning.costs import predicted_cost
-from multiscale.planning.machine import Machine, this_machine
-from multiscale.planning.press_work import step_count
-from multiscale.planning.work import Work
+from multiscale.costs.block_work import mesh_unknowns, reference_work
+from multiscale.costs.contact_work import step_count
+from multiscale.costs.prediction import predicted_cost
+from multiscale.costs.work import Work
+from multiscale.loading.stepper import Programme
+from multiscale.machine.rates import Machine, this_machine
 
 
 class Unit(Machine):

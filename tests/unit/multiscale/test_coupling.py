@@ -8,10 +8,10 @@ import pytest
 
 from geometry.control import Control
 from geometry.patches import PatchGrid
-from multiscale.coupling import EmbeddedCoupling, tilted_approaches
-from multiscale.law_tables.law_files import LawTable
-from multiscale.laws import PatchLaw
-from multiscale.loading import BeyondLaws
+from multiscale.couplings.load_steps import EmbeddedCoupling
+from multiscale.laws.files import LawTable
+from multiscale.laws.patch_law import PatchLaw
+from multiscale.loading.stepper import BeyondLaws
 
 PATCHES = PatchGrid(grid=(2, 1), lengths=(1.0, 0.5))
 
@@ -95,6 +95,6 @@ def test_remedy_beyond_a_consistent_law_fits_what_is_wrong(falls, remedy):
 
 
 def test_tilt_turns_about_the_middle():
-    approaches = tilted_approaches(PATCHES, 0.01, (0.004, 0.1))
+    approaches = PATCHES.mean_approaches(0.01, (0.004, 0.1))
     # patch centres lie a quarter of a millimetre beside the middle, along x only
     np.testing.assert_allclose(approaches, [0.009, 0.011], rtol=1e-12)

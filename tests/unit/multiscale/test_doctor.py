@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from geometry.errors import InputError
-from multiscale.cli import main
+from multiscale.cli.command_line import main
 from multiscale.doctor import forms as doctor_forms
 from multiscale.doctor import machine as doctor_machine
 from multiscale.doctor import packages as doctor_packages

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import InputError
-from multiscale.reference.extrapolation import extrapolated
+from multiscale.results.extrapolation import extrapolated
 
 LIMIT = 4.0
 RATIOS = (2.0 ** (1 / 3), 1.5, 2.0)

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from scene_inputs import BASE, KEYS, damaged, odd_text, planned, put, ran, scenes, toml
 
 from geometry.errors import InputError
-from multiscale.scene import Scene
-from multiscale.scenes.scene_files import MOST_BYTES, parsed
-from multiscale.staging import make_stage
+from multiscale.resolution.problem_setup import make_stage
+from multiscale.scene.files import MOST_BYTES, parsed
+from multiscale.scene.scene import Scene
 
 few = settings(
     derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)
@@ -83,7 +83,7 @@ def test_sizes_are_refused_before_anything_is_allocated(tmp_path, key, value, te
 
 
 def test_a_law_for_every_patch_takes_memory(tmp_path, monkeypatch):
-    monkeypatch.setattr("multiscale.nodes.os.sysconf", lambda name: 1200)  # of 1.4 MB
+    monkeypatch.setattr("multiscale.machine.nodes.os.sysconf", lambda name: 1200)  # of 1.4 MB
     path = tmp_path / "scene.toml"
     data = put(put(BASE, "coupling.kind", "isolated"), "block.cells", [4, 4, 2])
     path.write_text(toml(put(data, "patches.grid", [12, 12])), encoding="utf-8")
@@ -193,7 +193,7 @@ def test_override_of_endless_sections(tmp_path):
 )
 def test_deep_keys_are_refused_before_they_are_parsed(monkeypatch, line):
     """Thirty such lines took the parser of TOML more than eight minutes."""
-    monkeypatch.setattr("multiscale.scenes.scene_files.tomllib.loads", None)
+    monkeypatch.setattr("multiscale.scene.files.tomllib.loads", None)
     with pytest.raises(ValueError, match="a line with more dots than any scene has"):
         parsed(line)
 

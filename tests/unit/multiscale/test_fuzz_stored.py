@@ -11,9 +11,9 @@ from scene_inputs import BASE
 from stored_inputs import READERS, flipped, originals, read, rewritten
 
 from geometry.errors import InputError
-from multiscale.law_tables.law_files import read_laws
+from multiscale.laws.files import read_laws
 from multiscale.restart.checkpoint import read_checkpoint
-from multiscale.sealed_files import seal
+from multiscale.storage.checksummed_hdf5 import seal
 
 few = settings(
     derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)

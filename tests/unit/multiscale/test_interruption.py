@@ -11,9 +11,9 @@ import pytest
 
 from geometry.errors import InputError
 from multiscale import Run
-from multiscale.cli import main
+from multiscale.cli.command_line import main
 from multiscale.restart.interruption import Ended, Interruption, Stopped, ended_by_signals
-from multiscale.scenes.quantities import parse_duration
+from multiscale.scene.quantities import parse_duration
 
 PAPER = str(Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml")
 SMALL = [
@@ -172,7 +172,8 @@ def test_what_is_told_to_end_clears_away(number):
 
 HUNG_UP = """
 import os, signal, sys
-from multiscale import cli, commands
+from multiscale.cli import command_line as cli
+from multiscale.cli import commands
 
 def hung_up(choice, options, comm):
     import macro

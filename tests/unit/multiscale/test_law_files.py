@@ -8,10 +8,10 @@ import pytest
 
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
-from multiscale.law_tables.law_files import LawTable, read_laws, write_laws
-from multiscale.law_tables.plane_path import PlanePath
-from multiscale.laws import PatchLaw
-from multiscale.sealed_files import seal, sealed
+from multiscale.laws.files import LawTable, read_laws, write_laws
+from multiscale.laws.patch_law import PatchLaw
+from multiscale.laws.plane_path import PlanePath
+from multiscale.storage.checksummed_hdf5 import seal, sealed
 
 COLUMNS = ("closure", "pressure", "approach", "contact_area_fraction", "contacts", "relief")
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import InputError
-from multiscale.laws import ExtendedLaw, PatchLaw
+from multiscale.laws.patch_law import ExtendedLaw, PatchLaw
 
 
 def law_of(form, *, touch=1e-3, end=9e-3, rows=12, **changes):

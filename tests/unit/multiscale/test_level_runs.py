@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from geometry.errors import InputError, NotConverged
-from multiscale.comparing import level_process, level_runs
-from multiscale.comparing.level_results import LevelResult, read_result, write_result
-from multiscale.comparing.level_runs import check_launchable, launch_process, run_levels
-from multiscale.comparing.levels import levels
+from multiscale.compare import level_process, level_runs
+from multiscale.compare.level_results import LevelResult, read_result, write_result
+from multiscale.compare.level_runs import check_launchable, launch_process, run_levels
+from multiscale.compare.levels import levels
 from multiscale.run import Run, run
-from multiscale.scene import Scene
+from multiscale.scene.scene import Scene
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 TINY = ["surface.grid=[32, 32]", "load.steps=2", "patches.grid=[2, 2]"]

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from geometry.patches import PatchGrid
-from multiscale.compare import settled_scene
-from multiscale.comparing.level import pressure_grid
-from multiscale.comparing.level_results import LevelResult
-from multiscale.comparing.levels import SMALL_SLOPES, levels
-from multiscale.comparing.measures import Curves
-from multiscale.comparing.outcomes import Outcome, ranked, refinements
-from multiscale.planning.choices import open_keys
-from multiscale.scene import Scene
-from multiscale.stage_checks import EMBEDDED_CELLS
+from multiscale.compare.level import pressure_grid
+from multiscale.compare.level_results import LevelResult
+from multiscale.compare.levels import SMALL_SLOPES, levels
+from multiscale.compare.measures import Curves
+from multiscale.compare.outcomes import Outcome, ranked, refinements
+from multiscale.compare.run_comparison import settled_scene
+from multiscale.resolution.auto_keys import open_keys
+from multiscale.scene.scene import Scene
+from multiscale.setup.checks import EMBEDDED_CELLS
 
 COLUMNS = (
     "approach", "force", "area", "separation", "approach_error", "force_error", "area_error",
@@ -202,7 +202,7 @@ def test_cells_of_the_block_are_stated_by_laws_on_its_mesh_alone():
 
 def test_references_that_fit_no_memory_are_told(monkeypatch):
     pages = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 30_000}  # 0.12 GB
-    monkeypatch.setattr("multiscale.nodes.os.sysconf", pages.__getitem__)
+    monkeypatch.setattr("multiscale.machine.nodes.os.sysconf", pages.__getitem__)
     refused = {
         level.name: level.refusal for level in made("block.cells=[8, 8, 4]") if level.refusal
     }

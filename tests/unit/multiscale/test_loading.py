@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from geometry.errors import NotConverged
-from multiscale.load_step import LoadStep, PatchState
-from multiscale.loading import BeyondLaws, Programme, load_steps
+from multiscale.loading.load_step import LoadStep, PatchState
+from multiscale.loading.stepper import BeyondLaws, Programme, load_steps
 
 
 class Spring:

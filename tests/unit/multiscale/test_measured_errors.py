@@ -13,10 +13,11 @@ from geometry.control import Control
 from geometry.errors import NotConverged
 from multiscale import Run, Scene, run
 from multiscale.couplings.blocks import on_body
-from multiscale.measured_errors import ErrorProbe, MeasuredErrors
-from multiscale.reporting.outputs import write_tables
-from multiscale.reporting.report import curve_cells, with_error
-from multiscale.reporting.results import write_results
+from multiscale.errors.measured import ErrorProbe, MeasuredErrors
+from multiscale.output.report import curve_cells, with_error
+from multiscale.output.results import write_results
+from multiscale.output.tables import write_tables
+from multiscale.restart.resuming import checkpoint_of
 
 
 def scene(kind="analytic", grid=40, *, check="last", load=None, seed=4, **micro):
@@ -147,10 +148,10 @@ def test_a_run_that_goes_on_measures_the_same(tmp_path):
     whole = Run(scene("concurrent"))
     steps = whole.load_steps()
     next(steps)
-    kept = whole.checkpoint("name", whole.state())
+    kept = checkpoint_of(whole, "name", whole.state())
     list(steps)
     again = Run(scene("concurrent"))
-    again.resume(kept)
+    again.resume(kept.steps, kept.position, kept.state, kept.laws)
     list(again.load_steps())
     assert again.steps[-1].errors == whole.steps[-1].errors
 

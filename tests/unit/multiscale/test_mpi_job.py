@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from geometry.errors import InputError
-from multiscale.cli import main
-from multiscale.mpi_job import refuse_strangers, strangers
+from multiscale.cli.command_line import main
+from multiscale.machine.mpi_job import refuse_strangers, strangers
 
 PAPER = "demos/scenes/paper.toml"
 

@@ -11,11 +11,12 @@ import pytest
 from mpi4py import MPI
 
 from geometry.errors import InputError
-from multiscale import Scene, make_stage, nodes
-from multiscale.cli import main
-from multiscale.nodes import Need, Nodes, group_memory, node_memory, nodes_of
-from multiscale.planning.room import shortages
-from multiscale.stage_checks import check_size, needs
+from multiscale import Scene, make_stage
+from multiscale.cli.command_line import main
+from multiscale.machine import nodes
+from multiscale.machine.nodes import Need, Nodes, group_memory, node_memory, nodes_of
+from multiscale.planning.memory import shortages
+from multiscale.setup.checks import check_size, needs
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 LARGE = ("block.cells=[500, 500, 200]",)  # 5·10⁷ cells, 250 GB
@@ -203,7 +204,7 @@ def test_limit_of_a_process_counts():
 
 LIMITED = """
 import resource, sys
-from multiscale.cli import main
+from multiscale.cli.command_line import main
 resource.setrlimit(resource.RLIMIT_AS, (int(sys.argv[1]) << 20, resource.RLIM_INFINITY))
 sys.exit(main(sys.argv[2:]))
 """
@@ -234,6 +235,6 @@ def test_memory_that_runs_out_ends_with_5(capsys, monkeypatch):
     def hungry(*given):
         np.empty(1 << 50)
 
-    monkeypatch.setattr("multiscale.commands.print_schema", hungry)
+    monkeypatch.setattr("multiscale.cli.commands.print_schema", hungry)
     assert main(["schema"]) == 5
     assert "patchlaw: memory ran out: Unable to allocate 8.00 PiB" in capsys.readouterr().err

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 import micro.pairs.interaction
-import multiscale.reporting.results
+import multiscale.output.results
 from geometry import Asperities, PatchGrid
 from micro import HalfSpaceModel, asperity_model
 from multiscale import Run, Scene, make_stage
-from multiscale.cli import main
+from multiscale.cli.command_line import main
+from multiscale.output.results import write_results
 from multiscale.planning.forecast import forecast
-from multiscale.reporting.results import write_results
 
 FINITE_ELEMENTS = ("dolfinx", "petsc4py", "macro", "gmsh")
 PICTURES = ("matplotlib",)
@@ -43,7 +43,7 @@ def loaded(tmp_path: Path, command: str, given: dict) -> set[str]:
     scene.write_text("\n".join(lines))
     words = [command, str(scene), *(["--out", str(tmp_path / "out")] if command == "run" else [])]
     code = (
-        "import json, sys\nfrom multiscale.cli import main\n"
+        "import json, sys\nfrom multiscale.cli.command_line import main\n"
         f"code = main({words!r})\n"
         "print(json.dumps([code, sorted(sys.modules)]))"
     )
@@ -77,8 +77,8 @@ def never(*given, **options):
 
 
 def test_only_the_force_curve(monkeypatch, tmp_path):
-    monkeypatch.setattr(multiscale.reporting.results, "_figures", never)
-    monkeypatch.setattr(multiscale.reporting.results, "report_html", never)
+    monkeypatch.setattr(multiscale.output.results, "_figures", never)
+    monkeypatch.setattr(multiscale.output.results, "report_html", never)
     monkeypatch.setattr(sys.modules["multiscale.run"], "final_field", never)
     run = Run(Scene.from_dict(data("concurrent", block=data()["block"] | {"cells": [4, 4, 4]})))
     assert len(list(run.load_steps())) == 2
@@ -103,9 +103,9 @@ def presses(monkeypatch):
 @pytest.mark.parametrize("kind", ["analytic", "isolated", "consistent", "concurrent"])
 def test_a_plan_solves_nothing_of_the_scene(monkeypatch, presses, kind):
     monkeypatch.setattr("multiscale.couplings.blocks.embedding", never)
-    monkeypatch.setattr("multiscale.couplings.body.Body.face", never)
+    monkeypatch.setattr("multiscale.couplings.body_terms.Body.face", never)
     monkeypatch.setattr("multiscale.couplings.blocks.on_body", never)
-    monkeypatch.setattr("multiscale.assemble.make_table", never)
+    monkeypatch.setattr("multiscale.couplings.assembly.make_table", never)
     given = data(kind, grid=128)
     stage = make_stage(Scene.from_dict(given))
     made = forecast(stage)
@@ -167,14 +167,14 @@ def test_summits_out_of_reach_cost_nothing(monkeypatch):
 
 
 def test_a_scene_without_open_keys_weighs_no_alternatives(monkeypatch):
-    monkeypatch.setattr("multiscale.planning.accuracy.predicted_cost", never)
-    monkeypatch.setattr("multiscale.staging.accurate_stage", never)
+    monkeypatch.setattr("multiscale.resolution.accuracy.predicted_cost", never)
+    monkeypatch.setattr("multiscale.resolution.problem_setup.accurate_stage", never)
     stage = make_stage(Scene.from_dict(data("consistent")))
     assert stage.decision is None
 
 
 def test_a_run_predicts_nothing_and_writes_what_it_took(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr("multiscale.planning.costs.run_work", never)
+    monkeypatch.setattr("multiscale.costs.prediction.run_work", never)
     path = tmp_path / "scene.json.toml"
     path.write_text(
         "[surface]\nspectrum = {hurst = 0.9, waves = [2, 4], rms_slope = 0.1}\n"
@@ -189,8 +189,8 @@ def test_a_run_predicts_nothing_and_writes_what_it_took(monkeypatch, tmp_path, c
 
 
 def test_rates_are_measured_only_where_they_are_needed():
-    from multiscale.planning.machine import Machine
-    from multiscale.planning.work import Work
+    from multiscale.costs.work import Work
+    from multiscale.machine.rates import Machine
 
     machine = Machine()
     assert Work(call=10.0, passes=5.0).seconds(machine) > 0.0

@@ -8,10 +8,11 @@ import pytest
 
 from geometry.errors import NotWritten
 from geometry.patches import PatchGrid
-from multiscale.history import COLUMNS, PATCH_COLUMNS, History
-from multiscale.load_step import LoadStep, PatchState
-from multiscale.reporting.outputs import write_csv, write_tables, write_text, write_whole
-from multiscale.reporting.terminal import show_history
+from multiscale.loading.load_step import LoadStep, PatchState
+from multiscale.output.tables import write_tables
+from multiscale.output.terminal import show_history
+from multiscale.results.history import COLUMNS, PATCH_COLUMNS, History
+from multiscale.storage.whole_files import write_csv, write_text, write_whole
 
 
 @pytest.fixture

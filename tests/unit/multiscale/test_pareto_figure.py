@@ -7,9 +7,9 @@ import pytest
 from matplotlib.text import Text
 
 from geometry.patches import PatchGrid
-from multiscale.comparing.comparison import Comparison, Row
-from multiscale.comparing.measures import Measures
-from multiscale.comparing.pareto_figure import pareto_figure
+from multiscale.compare.comparison import Comparison, Row
+from multiscale.compare.measures import Measures
+from multiscale.compare.pareto_figure import pareto_figure
 
 KINDS = ("analytic", "isolated", "consistent", "concurrent", "reference")
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from geometry.errors import InputError
-from multiscale.law_tables.patch_laws import PatchLaws
-from multiscale.laws import PatchLaw
+from multiscale.laws.packed import PatchLaws
+from multiscale.laws.patch_law import PatchLaw
 
 
 def law(touch=1e-3, rows=12, own=0.0, stiffness=4e3, reach=0.02):

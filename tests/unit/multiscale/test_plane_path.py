@@ -6,11 +6,11 @@ import pytest
 from geometry import InputError, NotConverged, PatchGrid, Spectrum, patch_means, synthesise
 from geometry.control import Control
 from micro import influence_matrix, micro_model
-from multiscale.couplings.turning import TurningCoupling
-from multiscale.law_tables.consistent import consistent_laws
-from multiscale.law_tables.law_files import LawTable
-from multiscale.law_tables.plane_path import PlanePath
-from multiscale.laws import PatchLaw
+from multiscale.couplings.free_tilt import TurningCoupling
+from multiscale.laws.consistent import consistent_laws
+from multiscale.laws.files import LawTable
+from multiscale.laws.patch_law import PatchLaw
+from multiscale.laws.plane_path import PlanePath
 
 MODULUS = 4000.0
 APPROACH = np.linspace(1.0, 3.0, 9)

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from geometry.errors import InputError
-from multiscale import Scene, make_stage, plan, run
-from multiscale.cli import main
-from multiscale.figures import history_figure, pressure_figure
-from multiscale.reference.record import reference_record
-from multiscale.reporting.report import curve_cells
+from multiscale import Scene, make_stage, run
+from multiscale.cli.command_line import main
+from multiscale.output.figures import history_figure, pressure_figure
+from multiscale.output.report import curve_cells
+from multiscale.planning import plan
+from multiscale.results.reference_record import reference_record
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 COARSE = [

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from multiscale import Run, Scene
-from multiscale.law_tables.refinement import Errors, law_of, refined
+from multiscale.laws.refinement import Errors, law_of, refined
 
 STIFFNESS = 4e3
 COMPLIANCE = np.array([[2e-4, 5e-5], [5e-5, 2e-4]])

@@ -7,9 +7,9 @@ import pytest
 from scipy.optimize import minimize
 
 from geometry.patches import PatchGrid
-from multiscale.law_tables.law_files import LawTable, read_laws, write_laws
-from multiscale.law_tables.repair import evened, evened_law, repair_notes, risen
-from multiscale.laws import PatchLaw
+from multiscale.laws.files import LawTable, read_laws, write_laws
+from multiscale.laws.patch_law import PatchLaw
+from multiscale.laws.repair import evened, evened_law, repair_notes, risen
 
 APPROACH = np.linspace(0.0, 8e-3, 9)
 YIELDS = 2e-5  # own displacement by unit pressure [mm/MPa]

@@ -14,14 +14,14 @@ import pytest
 
 from geometry.errors import InputError, NotWritten
 from multiscale import Run, Scene
-from multiscale.cli import main
-from multiscale.planning import accuracy
-from multiscale.reporting.field_files import write_fields
+from multiscale.cli.command_line import main
+from multiscale.output.field_files import write_fields
+from multiscale.resolution import accuracy
 from multiscale.restart.checkpoint import read_checkpoint, write_checkpoint
 from multiscale.restart.folder_lock import FolderLock
 from multiscale.restart.journal import Journal, journalled
-from multiscale.restart.resuming import Keeper, kept_choices, with_journal
-from multiscale.sealed_files import seal
+from multiscale.restart.resuming import Keeper, checkpoint_of, kept_choices, with_journal
+from multiscale.storage.checksummed_hdf5 import seal
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 ALONE = {"coupling": {"kind": "analytic"}, "micro": {"model": "half-space"}}
@@ -76,7 +76,7 @@ def test_resumed_run_is_as_if_never_stopped(tmp_path, changes):
     whole = Run(scene(changes))
     for step in whole.load_steps():
         path = tmp_path / f"{step.step}.h5"
-        write_checkpoint(path, whole.checkpoint("name", whole.state()))
+        write_checkpoint(path, checkpoint_of(whole, "name", whole.state()))
     count = len(whole.steps)
     assert count >= 3
     wanted = columns(whole.steps)
@@ -86,7 +86,8 @@ def test_resumed_run_is_as_if_never_stopped(tmp_path, changes):
     exact = whole.unknowns is None
     for done in (1, count - 1):
         again = Run(whole.scene)
-        again.resume(read_checkpoint(tmp_path / f"{done}.h5"))
+        kept = read_checkpoint(tmp_path / f"{done}.h5")
+        again.resume(kept.steps, kept.position, kept.state, kept.laws)
         list(again.load_steps())
         off = np.abs(columns(again.steps) - wanted)
         assert np.all(off <= (0.0 if exact else 1e-10) * scale)
@@ -96,7 +97,7 @@ def test_resumed_run_is_as_if_never_stopped(tmp_path, changes):
 def test_checkpoint_keeps_every_bit(tmp_path):
     run = Run(scene(CUBE | {"load": {"approach": "8 um", "steps": 2, "tilt": [1e-3, 0.0]}}))
     list(run.load_steps())
-    kept = run.checkpoint("name", run.state())
+    kept = checkpoint_of(run, "name", run.state())
     found = read_checkpoint(write_checkpoint(tmp_path / "c.h5", kept))
     assert (found.run, found.scene, found.heights) == ("name", kept.scene, kept.heights)
     assert (found.position, found.laws) == (kept.position, kept.laws)
@@ -279,7 +280,7 @@ def test_two_runs_do_not_share_a_folder(tmp_path):
 
 @pytest.mark.parametrize("command", ["laws", "surface", "run", "compare"])
 def test_no_command_writes_where_a_run_does(tmp_path, capsys, monkeypatch, command):
-    monkeypatch.delattr("multiscale.comparing.level_runs.launch_process")  # no level is begun
+    monkeypatch.delattr("multiscale.compare.level_runs.launch_process")  # no level is begun
     out = tmp_path / "out"
     lock = FolderLock(out)
     lock.hold()
@@ -417,7 +418,7 @@ def test_outputs_asked_for_do_not_change_the_solution(tmp_path):
 
 
 LIMITED = (
-    "import resource, sys; from mpi4py import MPI; from multiscale.cli import main;"
+    "import resource, sys; from mpi4py import MPI; from multiscale.cli.command_line import main;"
     "resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), resource.RLIM_INFINITY));"
     "sys.exit(main(sys.argv[2:]))"
 )  # MPI writes files of its own when it starts
@@ -501,7 +502,7 @@ def test_a_plan_stands_though_another_machine_would_choose_otherwise(tmp_path, m
     }).model_copy(update={"accuracy": 0.4})  # fmt: skip
     whole = Run(left_open)
     next(steps := whole.load_steps())
-    path = write_checkpoint(tmp_path / "c.h5", whole.checkpoint("name", whole.state()))
+    path = write_checkpoint(tmp_path / "c.h5", checkpoint_of(whole, "name", whole.state()))
     list(steps)
     kept = read_checkpoint(path)
 
@@ -514,6 +515,6 @@ def test_a_plan_stands_though_another_machine_would_choose_otherwise(tmp_path, m
     again = Run(left_open, settled=kept.settled)
     assert again.scene == whole.scene
     assert again.stage.micro.surface.grid == whole.stage.micro.surface.grid
-    again.resume(kept)
+    again.resume(kept.steps, kept.position, kept.state, kept.laws)
     list(again.load_steps())
     np.testing.assert_allclose(columns(again.steps), columns(whole.steps), rtol=0.0, atol=0.0)

@@ -10,8 +10,8 @@ import pint
 import pytest
 
 from geometry.errors import InputError
-from multiscale.scene import Scene
-from multiscale.staging import make_stage
+from multiscale.resolution.problem_setup import make_stage
+from multiscale.scene.scene import Scene
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import InputError
-from multiscale.sealed_files import seal, sealed, unsealed
+from multiscale.storage.checksummed_hdf5 import seal, sealed, unsealed
 
 
 @pytest.fixture
@@ -52,8 +52,8 @@ def test_damage_costs_no_memory(tmp_path):
     code = (
         "import resource, sys; from pathlib import Path\n"
         "from geometry.errors import InputError\n"
-        "from multiscale.law_tables.law_files import read_laws\n"
-        "from multiscale.sealed_files import sealed\n"
+        "from multiscale.laws.files import read_laws\n"
+        "from multiscale.storage.checksummed_hdf5 import sealed\n"
         "def fill(file): file.attrs['format'] = 'patchlaw laws 2'\n"
         "path = Path(sys.argv[1])\n"
         "path.write_bytes(sealed(fill))\n"

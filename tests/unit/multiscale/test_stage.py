@@ -7,8 +7,8 @@ import pytest
 
 from geometry.errors import NotConverged
 from multiscale import Scene, make_stage, run
-from multiscale.coupling import ContactCoupling
-from multiscale.plan import statements, warnings
+from multiscale.couplings.load_steps import ContactCoupling
+from multiscale.planning.plan import statements, warnings
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 
@@ -102,7 +102,7 @@ class Shy(ContactCoupling):
 def test_free_plane_that_is_not_found_at_once_is_found_in_smaller_steps(monkeypatch):
     asked = scene(coupling="concurrent", approach=3e-3, tilt="free")
     known = make_stage(asked).furthest
-    monkeypatch.setattr("multiscale.planning.micro_choice.ContactCoupling", Shy)
+    monkeypatch.setattr("multiscale.resolution.micro_model.ContactCoupling", Shy)
     approach, tilt = make_stage(asked).furthest
     assert approach == known[0]
     np.testing.assert_allclose(tilt, known[1], rtol=1e-5)  # moments to 1e-8 of force times length

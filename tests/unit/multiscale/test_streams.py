@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from multiscale.reporting.streams import SturdyStream, sturdy_streams
+from multiscale.output.streams import SturdyStream, sturdy_streams
 
 PAPER = str(Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml")
 SMALL = [

@@ -8,8 +8,8 @@ import pytest
 from geometry import PatchGrid, Spectrum, find_asperities, patch_means, synthesise
 from geometry.errors import InputError
 from micro import asperity_model, micro_model
-from micro.love import love_centre, love_mean
-from multiscale.law_tables.isolated import IsolatedPatch, isolated_laws
+from micro.closed_forms.love import love_centre, love_mean
+from multiscale.laws.isolated import IsolatedPatch, isolated_laws
 
 MODULUS = 4000.0
 TOLERANCE = 1e-4

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from multiscale.law_tables.tangent import Tangent
-from multiscale.laws import LawPoint
+from multiscale.laws.patch_law import LawPoint
+from multiscale.laws.tangent import Tangent
 
 RNG = np.random.default_rng(2)
 YIELDS = 1e-5 * (np.eye(12) + 0.05 * RNG.uniform(0.0, 1.0, (12, 12)))

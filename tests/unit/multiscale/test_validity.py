@@ -9,10 +9,10 @@ import pytest
 from geometry import PatchGrid, Spectrum, patch_means, synthesise
 from geometry.control import Control
 from micro import BodyModes, micro_model
-from multiscale.coupling import ContactCoupling
-from multiscale.law_tables.consistent import consistent_laws
-from multiscale.law_tables.isolated import isolated_laws
-from multiscale.reporting.validity import range_notes
+from multiscale.couplings.load_steps import ContactCoupling
+from multiscale.laws.consistent import consistent_laws
+from multiscale.laws.isolated import isolated_laws
+from multiscale.results.validity import range_notes
 
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
 END = 40e-3

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from multiscale.cli import main
+from multiscale.cli.command_line import main
 
 SCENE = "demos/scenes/paper.toml"
 SMALL = [

@@ -1,0 +1,223 @@
+"""The flat block meshed with tetrahedra that are small only where contact can occur."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from geometry.checks import positive_lengths
+from geometry.errors import InputError
+from geometry.meshes.lattice import gmsh_session
+from geometry.surface import Surface
+
+Array = NDArray[np.float64]
+
+_DELAUNAY = 5  # gmsh's number of the algorithm
+_DIGITS = 12  # of lengths that gmsh is given
+_PLACE = 3  # decimals of places that gmsh is given, beyond those of the fine edge
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RefinedShape:
+    """A block whose tetrahedra grow with the distance from places on its top.
+
+    Args:
+        interface: Sides (Lx, Ly) of the top [mm].
+        height: Height of the block [mm].
+        places: Places on the top around which elements are small, shape (n, 2) [mm].
+        fine: Edge length there [mm].
+        coarse: Edge length far from them [mm].
+        growth: Increase of the edge length per distance.
+        element: ``P1``, or ``P2``, whose edges have a node in their middle and can be curved.
+
+    Raises:
+        InputError: When a value is out of its range.
+    """
+
+    interface: tuple[float, float]
+    height: float
+    places: Array
+    fine: float
+    coarse: float
+    growth: float = 0.25
+    element: str = "P1"
+    margin: float = field(default=0.0, init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "interface", positive_lengths(self.interface, "the interface"))
+        if self.element not in ("P1", "P2"):
+            raise InputError("this element is unknown", value=self.element, allowed="P1, P2")
+        if not 0.0 < self.fine <= self.coarse < math.inf:
+            raise InputError(
+                "the edge lengths are out of range",
+                value=(self.fine, self.coarse),
+                allowed="0 < fine ≤ coarse",
+            )
+        if not (0.0 < self.height < math.inf and 0.0 < self.growth < math.inf):
+            raise InputError("height and growth must be positive", value=(self.height, self.growth))
+        self._check_places()
+
+    @property
+    def hexahedral(self) -> bool:
+        """Whether the cells are hexahedra."""
+        return False
+
+    @property
+    def degree(self) -> int:
+        """Polynomial degree of the element."""
+        return int(self.element[1])
+
+    @property
+    def unit(self) -> float:
+        """Length that gmsh meshes the block in, its largest side [mm].
+
+        Its CAD kernel takes what is shorter than 1e-7 for nothing. Blocks of one shape have one
+        mesh, whatever their size: what sizes leave in the last digits is rounded away, as it would
+        decide where triangles are flipped.
+        """
+        return max(*self.interface, self.height)
+
+    def _check_places(self) -> None:
+        places = np.asarray(self.places, float)
+        object.__setattr__(self, "places", places)
+        if places.ndim != 2 or places.shape[1] != 2 or not len(places):
+            raise InputError("places have two coordinates", value=places.shape, allowed="(n, 2)")
+        # gmsh ends the process when it gets what is no number
+        away = ~((places >= 0.0) & (places <= self.interface)).all(axis=1)
+        if away.any():
+            raise InputError(
+                "a place lies outside the interface",
+                value=tuple(places[away][0].tolist()),
+                allowed=f"0 … {self.interface} mm",
+            )
+
+    @contextmanager
+    def meshed(self) -> Iterator[Any]:
+        """Mesh the block in gmsh for as long as the context lasts; faces as in `flat_block`.
+
+        The geometry has the order of the element, and its lengths are in `unit`.
+        """
+        width, depth, height, fine, coarse = (
+            float(f"{length / self.unit:.{_DIGITS}g}")
+            for length in (*self.interface, self.height, self.fine, self.coarse)
+        )
+        decimals = _PLACE + math.ceil(-math.log10(fine))
+        places = np.clip(np.round(self.places / self.unit, decimals), 0.0, (width, depth))
+        shape = replace(
+            self, interface=(width, depth), height=height, places=places, fine=fine, coarse=coarse
+        )
+        with gmsh_session("patchlaw refined block") as gmsh:
+            box = gmsh.model.occ.addBox(0.0, 0.0, -shape.height, *shape.interface, shape.height)
+            gmsh.model.occ.synchronize()
+            _name_faces(gmsh, box, shape.height)
+            _set_sizes(gmsh, shape)
+            _generate(gmsh, shape)
+            gmsh.model.mesh.setOrder(shape.degree)
+            yield gmsh.model
+
+
+def places_in_reach(
+    surface: Surface,
+    approach: float,
+    *,
+    spacing: float,
+    tilt: tuple[float, float] = (0.0, 0.0),
+) -> Array:
+    """Return places that the plane can touch: where the surface stands out behind it.
+
+    The half-space only moves away under pressure, so that nothing else can come into contact.
+
+    Args:
+        surface: The rough surface.
+        approach: Largest approach at the middle of the surface [mm].
+        spacing: Distance between places [mm].
+        tilt: Slopes of the approach along x and y.
+
+    Returns:
+        Points of a square lattice, shape (n, 2) [mm]; at least that of the largest depth.
+    """
+    x, y = (
+        np.linspace(0.0, length, max(2, math.ceil(length / spacing) + 1))
+        for length in surface.lengths
+    )
+    lattice = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    grid = np.vstack([lattice, surface.highest_point])
+    depth = depth_below_plane(surface, grid, approach, tilt)
+    return grid[depth >= min(0.0, float(depth.max()))]
+
+
+def depth_below_plane(
+    surface: Surface, points: Array, approach: float, tilt: tuple[float, float] = (0.0, 0.0)
+) -> Array:
+    """Return how far the undeformed surface stands out behind the rigid plane [mm].
+
+    Args:
+        surface: The rough surface.
+        points: Places on it, shape (…, 2) [mm].
+        approach: Approach at the middle of the surface, from first touch of a level plane [mm].
+        tilt: Slopes of the approach along x and y.
+
+    Returns:
+        Depths, shape (…); negative where there is a gap.
+    """
+    lean = (points - 0.5 * np.array(surface.lengths)) @ np.array(tilt)
+    return surface.height_at(points[..., 0], points[..., 1]) - surface.highest + approach + lean
+
+
+def _name_faces(gmsh: Any, box: int, height: float) -> None:
+    faces = [tag for _, tag in gmsh.model.getBoundary([(3, box)], oriented=False)]
+    level = {tag: gmsh.model.occ.getCenterOfMass(2, tag)[2] / height for tag in faces}
+    groups = {
+        "bottom": [tag for tag in faces if level[tag] < -0.99],
+        "top": [tag for tag in faces if level[tag] > -0.01],
+        "sides": [tag for tag in faces if -0.99 <= level[tag] <= -0.01],
+    }
+    gmsh.model.addPhysicalGroup(3, [box], 1)
+    gmsh.model.setPhysicalName(3, 1, "block")
+    for tag, (name, members) in enumerate(groups.items(), start=1):
+        gmsh.model.addPhysicalGroup(2, members, tag)
+        gmsh.model.setPhysicalName(2, tag, name)
+
+
+def _generate(gmsh: Any, shape: RefinedShape) -> None:
+    """Mesh; again if the frontal algorithm, whose triangles are better, has missed a place.
+
+    It looks at sizes where it puts nodes alone, and can step over small ones between large ones.
+    """
+    gmsh.model.mesh.generate(2)
+    _, nodes, _ = gmsh.model.mesh.getNodes(2, -1, includeBoundary=True)
+    nodes = np.reshape(nodes, (-1, 3))
+    top = nodes[np.abs(nodes[:, 2]) < 1e-9 * shape.height, :2]
+    if np.any(cKDTree(top).query(shape.places)[0] > shape.fine):
+        gmsh.model.mesh.clear()
+        gmsh.option.setNumber("Mesh.Algorithm", _DELAUNAY)
+        gmsh.model.mesh.generate(2)
+    gmsh.model.mesh.generate(3)
+
+
+def _set_sizes(gmsh: Any, shape: RefinedShape) -> None:
+    """Let the edge length grow linearly with the distance from the places."""
+    points = [gmsh.model.occ.addPoint(x, y, 0.0) for x, y in shape.places]
+    gmsh.model.occ.synchronize()
+    fields = gmsh.model.mesh.field
+    near = fields.add("Distance")
+    fields.setNumbers(near, "PointsList", points)
+    size = fields.add("Threshold")
+    reach = 2.0 * shape.fine
+    values = {
+        "DistMin": reach,
+        "DistMax": reach + (shape.coarse - shape.fine) / shape.growth,
+        "SizeMin": shape.fine,
+        "SizeMax": shape.coarse,
+        "InField": near,
+    }
+    for option, value in values.items():
+        fields.setNumber(size, option, value)
+    fields.setAsBackgroundMesh(size)

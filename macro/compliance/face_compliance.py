@@ -1,0 +1,173 @@
+"""Compliance of a block's top, and the stresses in it, in Legendre modes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.collective import together
+from geometry.errors import InputError
+from macro.block import Sides
+from macro.compliance.cache import Arrays, cached
+from macro.compliance.division import division
+from macro.compliance.quarter import Parity, Quarter, Response
+from macro.elasticity import Material
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FaceCompliance:
+    """Displacements and stresses of a block's top by pressures on it, in Legendre modes φ.
+
+    Mode k K + l is P̂_k(x) P̂_l(y) (`geometry.legendre_modes`). A pressure p with the moments
+    b_n = ∫ p φ_n dA displaces the top by Σ φ_m C_mn b_n.
+
+    Args:
+        normal: C, downwards, symmetric, shape (K², K²) [mm/N].
+        growth: Derivative of C to the height of the block, symmetric, shape (K², K²) [1/N].
+        stresses: The same of σ_xx, σ_yy and σ_xy in the face, which is pressed by −σ_zz, shape
+            (3, K², K²) [1/mm²].
+    """
+
+    normal: Array
+    growth: Array
+    stresses: Array
+
+    @property
+    def count(self) -> int:
+        """Modes K along a side."""
+        return int(np.sqrt(len(self.normal)) + 0.5)
+
+
+def face_compliance(
+    lengths: tuple[float, float],
+    height: float,
+    material: Material,
+    sides: Sides,
+    count: int,
+    comm: Any,
+    *,
+    coarse: bool = False,
+) -> FaceCompliance:
+    """Solve for what every mode of pressure does to a block's top.
+
+    The modes are smooth, and so are the displacements but at the edges of the clamped bottom: few
+    elements of high order do. Modes of different parity do not mix: they are solved for apart, on
+    a quarter of the block, by the ranks in turn.
+
+    Args:
+        lengths: Sides (Lx, Ly) of the block's top, all of which the modes cover [mm].
+        height: Height of the block [mm].
+        material: Elastic constants.
+        sides: Support of the block's sides.
+        count: Modes K along a side of the top.
+        comm: MPI communicator.
+        coarse: Whether to take lower degrees: the difference bounds the error of the usual ones.
+
+    Returns:
+        The compliance, the same on every rank and for every number of ranks.
+
+    Raises:
+        InputError: When a length is not positive, or there is no mode.
+
+    Note:
+        Collective. A free cube with 8 × 8 modes takes 0.14 s on one core, and its mean compliance
+        lacks 8e-6, 6e-5 and 4e-4 at ν = 0.15, 0.3 and 0.45.
+    """
+    if not all(math.isfinite(length) and length > 0.0 for length in (*lengths, height)):
+        raise InputError(
+            "the block has no such size", value=(*lengths, height), allowed="lengths > 0 mm"
+        )
+    if count < 1:
+        raise InputError("a top has one mode at least", value=count, allowed="K ≥ 1")
+    elements = division(lengths, height, count, coarse=coarse)
+    parities: tuple[Parity, ...] = ((0, 0), (0, 1), (1, 0), (1, 1))
+    families = [parity for parity in parities if max(parity) < count]
+    alike = lengths[0] == lengths[1]
+    if alike and count > 1:
+        families.remove((1, 0))
+
+    def solved() -> dict[Parity, Response]:
+        return {
+            parity: Quarter(
+                division=elements, lengths=lengths, material=material, sides=sides, parity=parity
+            ).response(count)
+            for parity in families[comm.rank :: comm.size]
+        }
+
+    found: dict[Parity, Response] = {}
+    for part in comm.allgather(together(comm, solved)):
+        found |= part
+    if alike and count > 1:  # exchange x and y
+        turned = Response(*(part.transpose(1, 0, 3, 2) for part in found[0, 1]))
+        found[1, 0] = turned._replace(xx=turned.yy, yy=turned.xx)
+    return _gathered(found, lengths, count, material)
+
+
+def cached_face_compliance(
+    lengths: tuple[float, float],
+    height: float,
+    material: Material,
+    sides: Sides,
+    count: int,
+    comm: Any,
+    *,
+    coarse: bool = False,
+) -> FaceCompliance:
+    """Return `face_compliance` of the same arguments, from the cache where it was made before.
+
+    Args:
+        lengths: Sides of the block's top [mm].
+        height: Height of the block [mm].
+        material: Elastic constants.
+        sides: Support of the block's sides.
+        count: Modes K along a side of the top.
+        comm: MPI communicator.
+        coarse: Whether to take lower degrees.
+
+    Raises:
+        InputError: When a length is not positive, or there is no mode.
+
+    Note:
+        Collective.
+    """
+
+    def compute() -> Arrays:
+        made = face_compliance(lengths, height, material, sides, count, comm, coarse=coarse)
+        return {"normal": made.normal, "growth": made.growth, "stresses": made.stresses}
+
+    key = (lengths, height, material, sides, count, coarse)
+    return FaceCompliance(**cached("face", key, compute, comm))
+
+
+def _gathered(
+    found: dict[Parity, Response], lengths: tuple[float, float], count: int, material: Material
+) -> FaceCompliance:
+    """Put the modes of all parities together, per force."""
+    area = lengths[0] * lengths[1]
+    total = np.zeros((len(Response._fields), *4 * (count,)))
+    for (odd_x, odd_y), response in found.items():
+        for field, part in zip(total, response, strict=True):
+            turn = part is response.xy
+            seen_x, seen_y = (odd_x + turn) % 2, (odd_y + turn) % 2
+            field[seen_x::2, seen_y::2, odd_x::2, odd_y::2] = part
+    normal, xx, yy, xy, growth = total.reshape(-1, count**2, count**2) / area**2
+    return FaceCompliance(
+        normal=0.5 * (normal + normal.T),  # rounding apart it is symmetric
+        growth=0.5 * (growth + growth.T),
+        stresses=_stresses(xx, yy, xy, np.eye(count**2) / area, material),
+    )
+
+
+def _stresses(xx: Array, yy: Array, xy: Array, pressure: Array, material: Material) -> Array:
+    """Return σ_xx, σ_yy, σ_xy where σ_zz = −p, by the strains in the face: Hooke's law."""
+    nu = material.poisson_ratio
+    modulus = material.young_modulus / (1.0 - nu**2)
+    pushed = nu / (1.0 - nu) * pressure
+    found = modulus * (xx + nu * yy) - pushed, modulus * (yy + nu * xx) - pushed
+    return np.stack([*found, material.young_modulus / (1.0 + nu) * xy])

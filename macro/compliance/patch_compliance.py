@@ -1,0 +1,59 @@
+"""The compliance of a block under its patches, from one plain solve per patch."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from macro import compat
+from macro.contact.law_interface import Interface
+
+Array = NDArray[np.float64]
+
+
+def plain_compliance(interface: Interface) -> Array:
+    """Return the mean downward displacement of patch i by unit pressure on patch j.
+
+    By reciprocity the matrix is symmetric for patches of equal area; what the linear solver's
+    tolerance leaves is averaged out.
+
+    Args:
+        interface: Patches on the block's top.
+
+    Returns:
+        The compliance, the same on every rank, shape (N, N) [mm/MPa].
+
+    Raises:
+        NotConverged: When a linear solve fails.
+
+    Note:
+        Collective.
+    """
+    compliance = displacements_under(interface, np.eye(interface.patches.count))
+    return np.asarray(0.5 * (compliance + compliance.T))
+
+
+def displacements_under(interface: Interface, pressures: Array) -> Array:
+    """Return the mean displacements of patches under pressures on them, shape (m, N) [mm].
+
+    Args:
+        interface: Patches on the block's top.
+        pressures: Pressures of all patches, the same on every rank, shape (m, N) [MPa].
+
+    Raises:
+        NotConverged: When a linear solve fails.
+
+    Note:
+        Collective.
+    """
+    block, rows = interface.block, []
+    work = block.stiffness.createVecRight()
+    for row in pressures:
+        if not row.any():
+            rows.append(np.zeros(len(row)))
+            continue
+        displacement = block.solve(interface.load(row))
+        work.array[:] = displacement.x.array[: block.owned_dofs]
+        rows.append(interface.patch_displacements(work))
+        compat.free_dropped(work.comm)
+    return np.array(rows)

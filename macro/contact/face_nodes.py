@@ -1,0 +1,250 @@
+"""The nodes of a block's top, the triangles between them, and the patches that they belong to."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from geometry.patches import PatchGrid
+from macro import compat
+from macro.block import Block
+from macro.contact.facet_area import FacetLattice, covered, facet_lattice
+from macro.mesh.block import TOP
+from macro.mesh.contact_face import top_facets
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+_NO_AREA = 1e-9  # of a patch
+
+
+class TopNodes:
+    """Nodes of a block's top and what is measured with them.
+
+    The force and the area of a node on the border of patches are shared equally among the two or
+    four patches there. Facets are cut into triangles between neighbouring nodes, quadrilaterals
+    along both diagonals with half the weight each.
+
+    Args:
+        block: The block.
+        patches: Patches on its top.
+
+    Attributes:
+        dofs: Vertical degrees of freedom of this rank's nodes of the top, shape (n,).
+        x: Abscissae of this rank's nodes, shape (n,) [mm].
+        y: Their ordinates [mm].
+        height: Their heights [mm].
+        area: Their tributary areas, the integrals of their basis functions over the plane [mm²];
+            none at the vertices of quadratic triangles.
+        patches: The patches.
+
+    Note:
+        Everything here is collective. A rank may have no node.
+    """
+
+    def __init__(self, block: Block, patches: PatchGrid) -> None:
+        self._block, self.patches = block, patches
+        space = block.space
+        nodes = fem.locate_dofs_topological(space, 2, block.mesh.facet_tags.find(TOP))
+        nodes = np.sort(nodes[nodes < space.dofmap.index_map.size_local])
+        self.dofs = 3 * nodes + 2
+        self.x, self.y, self.height = space.tabulate_dof_coordinates()[nodes].T.copy()
+        self.area = self._areas()
+        self._patch_areas = self.patch_sums(self.area)
+
+    @cached_property
+    def facets(self) -> Index:
+        """Rank-local nodes of every facet of this rank's cells, shape (facets, nodes)."""
+        facets = top_facets(self._block.mesh)
+        cells = compat.cell_nodes(self._block.space)[facets.cell]
+        return np.take_along_axis(cells, self._lattice.nodes[facets.side], axis=1)
+
+    @cached_property
+    def triangles(self) -> tuple[Index, Array]:
+        """Rank-local nodes of the triangles, shape (m, 3), and their weighted areas (m,) [mm²]."""
+        triangles = self.facets[:, self._lattice.corners].reshape(-1, 3)
+        place = self._block.space.tabulate_dof_coordinates()[triangles, :2]
+        u, v = place[:, 1] - place[:, 0], place[:, 2] - place[:, 0]
+        weight = np.tile(0.5 * self._lattice.weight, len(self.facets))
+        return triangles, weight * np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+
+    @cached_property
+    def edges(self) -> Array:
+        """Lengths of the edges opposite the triangles' corners, in the plane, (m, 3) [mm]."""
+        place = self._block.space.tabulate_dof_coordinates()[self.triangles[0], :2]
+        return np.linalg.norm(np.roll(place, -1, axis=1) - np.roll(place, 1, axis=1), axis=2)
+
+    @cached_property
+    def _lattice(self) -> FacetLattice:
+        return facet_lattice(self._block.mesh.mesh.topology.cell_name(), self._block.degree)
+
+    def covered_area(self, touching: NDArray[np.bool_], pressing: Array, gap: Array) -> float:
+        """Return the contact area with its border within the facets; see `covered` [mm²].
+
+        Args:
+            touching: Whether this rank's nodes are in contact, shape (n,).
+            pressing: Their contact forces, shape (n,) [N].
+            gap: Their gaps, shape (n,) [mm].
+        """
+        triangles, area = self.triangles
+        pressure = pressing / (self._thirds * self._block.material.contact_modulus)
+        values = self.spread(touching.astype(float), pressure, gap)
+        flags, pressure, gap = (value[triangles] for value in values)
+        share = covered(flags > 0.5, pressure, gap, self.edges)
+        return float(self._block.mesh.comm.allreduce(float(area @ share)))
+
+    def spread(self, *values: Array) -> list[Array]:
+        """Give values of nodes to every rank that sees the nodes, by rank-local node.
+
+        Args:
+            values: Up to three values of this rank's nodes, shape (n,) each.
+        """
+        owned = np.zeros(self._block.owned_dofs)
+        for axis, part in enumerate(values):
+            owned[self.dofs - 2 + axis] = part
+        everywhere = self._block.function(owned).x.array
+        return [everywhere[axis::3].copy() for axis in range(len(values))]
+
+    def patch_sums(self, values: Array) -> Array:
+        """Return the sums of nodal values over every patch, shape (N,), on every rank."""
+        return self._sum(self._shares.T @ values)
+
+    def patch_means(self, values: Array) -> Array:
+        """Return the means of nodal values over every patch, shape (N,), on every rank.
+
+        A patch without a node has the value of the nearest.
+        """
+        empty, nearest = self._empty
+        means = np.empty(self.patches.count)
+        means[~empty] = self.patch_sums(self.area * values)[~empty] / self._patch_areas[~empty]
+        if empty.any():
+            means[empty] = self._sum(nearest.T @ values) / self._sum(nearest.sum(axis=0))
+        return means
+
+    def regions(self, touching: NDArray[np.bool_]) -> int:
+        """Count the regions of nodes in contact that facets connect, over all ranks.
+
+        Args:
+            touching: Whether this rank's nodes are in contact, shape (n,).
+        """
+        (flags,) = self.spread(touching.astype(float))
+        nodes, linked = self.facets, flags[self.facets] > 0.5
+        some = linked.any(axis=1)
+        nodes, linked = nodes[some], linked[some]
+        hub = np.where(linked, nodes, -1).max(axis=1, initial=-1)
+        pairs = np.stack([np.broadcast_to(hub[:, None], nodes.shape)[linked], nodes[linked]])
+        found, ends = np.unique(pairs, return_inverse=True)
+        count, region = _connected(ends.reshape(2, -1), len(found))
+        return self._joined(count, region, found)
+
+    def _joined(self, count: int, region: Index, nodes: Index) -> int:
+        """Count the regions of all ranks, those that share nodes as one.
+
+        Args:
+            count: Number of regions of this rank.
+            region: Region of some rank-local nodes, shape (n,).
+            nodes: These nodes, shape (n,).
+        """
+        comm, numbers = self._block.mesh.comm, self._numbers(nodes)
+        ghost = nodes >= self._block.space.dofmap.index_map.size_local
+        # only nodes at the borders of ranks are told to others
+        border = ghost | np.isin(numbers, np.concatenate(comm.allgather(numbers[ghost])))
+        parts = comm.allgather((count, region[border], numbers[border]))
+        first = np.cumsum([0, *(part[0] for part in parts)])
+        regions = np.concatenate(
+            [start + part[1] for start, part in zip(first, parts, strict=False)]
+        )
+        names, shared = np.unique(np.concatenate([part[2] for part in parts]), return_inverse=True)
+        pairs = np.stack([regions, first[-1] + shared.ravel()])
+        return _connected(pairs, int(first[-1]) + len(names))[0]
+
+    @cached_property
+    def _empty(self) -> tuple[NDArray[np.bool_], csr_array]:
+        """Which patches hold no node, shape (N,), and marks on the nodes nearest to them."""
+        # areas of the vertices of quadratic triangles are rounding, of either sign
+        empty = self._patch_areas <= _NO_AREA * self.patches.area
+        centres = self.patches.centres[empty]
+        tree = cKDTree(np.stack([self.x, self.y], axis=1))
+        apart = tree.query(centres)[0] if tree.n else np.full(len(centres), np.inf)
+        least = np.min(self._block.mesh.comm.allgather(apart), axis=0)
+        # all of several as near
+        near = tree.query_ball_point(centres, (1.0 + 1e-9) * least) if tree.n else []
+        rows = np.concatenate([np.empty(0, dtype=np.intp), *map(np.asarray, near)]).astype(np.intp)
+        counts = np.array([len(found) for found in near], dtype=np.intp)
+        columns = np.repeat(np.arange(len(near)), counts)
+        shape = (len(self.x), len(centres))
+        return empty, coo_array((np.ones(len(rows)), (rows, columns)), shape=shape).tocsr()
+
+    @cached_property
+    def _shares(self) -> csr_array:
+        """Share of every patch in every node of this rank, (n, N)."""
+        slack = 1e-9 * max(self.patches.lengths)
+        sides = [
+            [np.searchsorted(borders, place + offset) - 1 for offset in (-slack, slack)]
+            for borders, place in (
+                (self.patches.borders_x, self.x),
+                (self.patches.borders_y, self.y),
+            )
+        ]
+        counts, at = self.patches.grid, np.arange(len(self.x))
+        parts = []
+        for ix in sides[0]:
+            for iy in sides[1]:
+                inside = (ix >= 0) & (ix < counts[0]) & (iy >= 0) & (iy < counts[1])
+                parts.append((at[inside], (ix * counts[1] + iy)[inside]))
+        rows, columns = (np.concatenate(part) for part in zip(*parts, strict=True))
+        found = np.bincount(rows, minlength=len(at))
+        entries = 1.0 / found[rows]
+        return coo_array((entries, (rows, columns)), shape=(len(at), self.patches.count)).tocsr()
+
+    def _areas(self) -> Array:
+        space, mesh = self._block.space, self._block.mesh
+        test = ufl.TestFunction(space)
+        ds = ufl.Measure("ds", domain=mesh.mesh, subdomain_data=mesh.facet_tags)
+        form = compat.compile_form(test[2] * ufl.FacetNormal(mesh.mesh)[2] * ds(TOP))
+        return compat.assemble_vector(form).array_r[self.dofs].copy()
+
+    @cached_property
+    def _thirds(self) -> Array:
+        """Thirds of the triangles around this rank's nodes [mm²]."""
+        triangles, area = self.triangles
+        return self.collect(triangles, np.repeat(area[:, None] / 3.0, 3, axis=1))
+
+    def collect(self, nodes: Index, values: Array) -> Array:
+        """Add up what all ranks have for this rank's nodes, shape (n,).
+
+        Args:
+            nodes: Rank-local nodes of the top, any shape.
+            values: Values for them, of the same shape.
+        """
+        vector = self._block.stiffness.createVecRight()
+        rows = (3 * self._numbers(nodes).astype(np.int64) + 2).astype(PETSc.IntType)
+        vector.setValues(rows.ravel(), values.ravel(), addv=True)
+        vector.assemble()
+        return vector.array_r[self.dofs].copy()
+
+    def _numbers(self, nodes: Index) -> Index:
+        """Return the numbers of rank-local nodes among those of all ranks."""
+        index_map = self._block.space.dofmap.index_map
+        return index_map.local_to_global(nodes.ravel().astype(np.int32)).reshape(nodes.shape)
+
+    def _sum(self, values: Array) -> Array:
+        return self._block.mesh.comm.allreduce(values, op=MPI.SUM)
+
+
+def _connected(pairs: Index, count: int) -> tuple[int, Index]:
+    """Return how many components pairs (2, n) of things connect, and that of every thing."""
+    if not count:
+        return 0, np.empty(0, dtype=np.intp)
+    graph = coo_array((np.ones(pairs.shape[1]), tuple(pairs)), shape=(count, count))
+    found, component = connected_components(graph, directed=False)
+    return int(found), component

@@ -1,0 +1,228 @@
+"""The contact interface: patches on the block's top, each with a law p = f(closure)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal, Protocol, get_args
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from geometry.errors import InputError
+from geometry.patches import PatchGrid
+from macro.block import Block
+from macro.mesh.contact_face import FacetQuadrature, facet_quadrature
+
+Array = NDArray[np.float64]
+Mode = Literal["patchwise", "pointwise"]
+
+
+class ContactLaw(Protocol):
+    """Pressure over closure; must answer every closure that an iteration may try.
+
+    Closure is the rigid approach minus the downward displacement of the block's surface [mm];
+    pressures are positive in compression [MPa]; stiffness is dp/dc ≥ 0 [MPa/mm].
+    """
+
+    def pressure(self, closure: Array, /) -> Array:
+        """Return the pressures at closures of shape (n,)."""
+        ...
+
+    def stiffness(self, closure: Array, /) -> Array:
+        """Return the exact derivative of the pressures at closures of shape (n,)."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sampling:
+    """Where the laws are evaluated, and how their pressures load the block.
+
+    A sample is a whole patch or a quadrature point. With u the nodal displacements, p the
+    pressures and w the weights of the samples, the nodal load is ``B p`` and the downward
+    displacement of the samples is ``(Bᵀ u) / w``: one operator, so every tangent is symmetric.
+
+    Args:
+        operator: B, rows like the displacements, columns like the samples [mm²].
+        weight: Area of each of this rank's samples, shape (n,) [mm²].
+        x: Abscissae of this rank's samples, shape (n,) [mm].
+        y: Ordinates of this rank's samples, shape (n,) [mm].
+        patch: Flat patch index of this rank's samples, ascending, shape (n,).
+        count: Number of patches N.
+    """
+
+    operator: PETSc.Mat
+    weight: Array
+    x: Array
+    y: Array
+    patch: NDArray[np.intp]
+    count: int
+
+    def pressure(self, laws: Sequence[ContactLaw], closure: Array) -> Array:
+        """Return the laws' pressures at this rank's samples, shape (n,) [MPa].
+
+        Args:
+            laws: One law per patch.
+            closure: Closures of the samples, shape (n,) [mm].
+        """
+        return self.by_patch([law.pressure for law in laws], closure)
+
+    def stiffness(self, laws: Sequence[ContactLaw], closure: Array) -> Array:
+        """Return the laws' stiffnesses dp/dc at this rank's samples, shape (n,) [MPa/mm].
+
+        Args:
+            laws: One law per patch.
+            closure: Closures of the samples, shape (n,) [mm].
+        """
+        return self.by_patch([law.stiffness for law in laws], closure)
+
+    def patch_sums(self, values: Array) -> Array:
+        """Return the integrals of sampled values over every patch, shape (N,); collective."""
+        local = np.bincount(self.patch, weights=self.weight * values, minlength=self.count)
+        return self.operator.comm.tompi4py().allreduce(local, op=MPI.SUM)
+
+    def by_patch(self, functions: Sequence[Callable[[Array], Array]], closure: Array) -> Array:
+        """Return functions of closure, one per patch, at this rank's samples, shape (n,).
+
+        Args:
+            functions: One function per patch.
+            closure: Closures of the samples, shape (n,) [mm].
+        """
+        values = np.empty_like(closure)
+        ends = np.searchsorted(self.patch, np.arange(self.count + 1))
+        for i in np.unique(self.patch):
+            part = slice(ends[i], ends[i + 1])
+            values[part] = functions[i](closure[part])
+        return values
+
+
+@dataclass(frozen=True, eq=False)
+class Interface:
+    """Patches on a block's top; the rest of the top is free of traction.
+
+    Args:
+        block: The elastic block.
+        patches: Patches inside the block's interface.
+        degree: Polynomial degree that the quadrature is exact for; None: products of two basis
+            functions.
+
+    Raises:
+        InputError: When a patch reaches beyond the top.
+
+    Note:
+        Everything here is collective. A rank may own no facet, or nothing of a patch.
+    """
+
+    block: Block
+    patches: PatchGrid
+    degree: int | None = None
+
+    def __post_init__(self) -> None:
+        if not np.allclose(self.areas, self.patches.area, rtol=1e-6, atol=0.0):
+            raise InputError(
+                "the patches reach beyond the top of the block",
+                value=(self.patches.origin, self.patches.lengths),
+                allowed=f"inside the interface {self.block.mesh.shape.interface} mm",
+            )
+
+    @cached_property
+    def quadrature(self) -> FacetQuadrature:
+        """Quadrature points of this rank."""
+        shape = self.block.mesh.shape
+        degree = self.degree or (4 if shape.hexahedral else 2) * shape.degree
+        return facet_quadrature(self.block.mesh, self.block.space, self.patches, degree=degree)
+
+    @cached_property
+    def areas(self) -> Array:
+        """Areas of the patches by quadrature, shape (N,) [mm²]."""
+        points = self.quadrature
+        local = np.bincount(points.patch, weights=points.weight, minlength=self.patches.count)
+        return self.block.mesh.comm.allreduce(local, op=MPI.SUM)
+
+    def sampling(self, mode: Mode) -> Sampling:
+        """Return the samples of a mode: ``"patchwise"`` or ``"pointwise"``.
+
+        Raises:
+            InputError: When there is no such mode.
+        """
+        if mode not in get_args(Mode):
+            raise InputError("unknown interface", value=mode, allowed=", ".join(get_args(Mode)))
+        return self.patchwise if mode == "patchwise" else self.pointwise
+
+    @cached_property
+    def pointwise(self) -> Sampling:
+        """Laws at quadrature points."""
+        points = self.quadrature
+        operator = PETSc.Mat()
+        self.points_by_dofs.transpose(operator)
+        return Sampling(
+            operator=operator,
+            weight=points.weight,
+            x=points.x,
+            y=points.y,
+            patch=points.patch,
+            count=self.patches.count,
+        )
+
+    @cached_property
+    def patchwise(self) -> Sampling:
+        """Laws at the mean closures of the patches, which are shared out over the ranks."""
+        points, comm = self.quadrature, self.block.mesh.comm
+        member = PETSc.Mat().createAIJ(
+            ((len(points.x), None), (None, self.patches.count)),
+            csr=_csr(np.arange(len(points.x) + 1), points.patch, np.ones(len(points.x))),
+            comm=comm,
+        )
+        operator = self.points_by_dofs.transposeMatMult(member)
+        own = np.arange(*operator.getOwnershipRangeColumn())
+        centres = self.patches.centres[own]
+        return Sampling(
+            operator=operator,
+            weight=self.areas[own],
+            x=centres[:, 0],
+            y=centres[:, 1],
+            patch=own,
+            count=self.patches.count,
+        )
+
+    def load(self, pressures: Array) -> PETSc.Vec:
+        """Return the nodal load of pressures that are uniform on every patch.
+
+        Args:
+            pressures: Pressures of all patches, on every rank, shape (N,) [MPa].
+        """
+        sampling = self.patchwise
+        values = sampling.operator.createVecRight()
+        values.array[:] = np.asarray(pressures, dtype=np.float64)[sampling.patch]
+        load = sampling.operator.createVecLeft()
+        sampling.operator.mult(values, load)
+        return load
+
+    def patch_displacements(self, displacement: PETSc.Vec) -> Array:
+        """Return the mean downward displacements of the patches, on every rank, shape (N,) [mm]."""
+        sampling = self.patchwise
+        values = sampling.operator.createVecRight()
+        sampling.operator.multTranspose(displacement, values)
+        return sampling.patch_sums(values.array_r / sampling.weight) / self.areas
+
+    @cached_property
+    def points_by_dofs(self) -> PETSc.Mat:
+        """−w φ of the vertical displacements behind every point, shape (points, dofs) [mm²]."""
+        points, nodes = self.quadrature, self.block.space.dofmap.index_map
+        used = np.abs(points.values) > 1e-12  # the nodes that are not on the facet
+        columns = 3 * nodes.local_to_global(points.nodes[used]).astype(np.int64) + 2
+        starts = np.concatenate([[0], np.cumsum(used.sum(axis=1))])
+        entries = -(points.weight[:, None] * points.values)[used]
+        owned = self.block.owned_dofs
+        return PETSc.Mat().createAIJ(
+            ((len(points.x), None), (owned, None)),
+            csr=_csr(starts, columns, entries),
+            comm=self.block.mesh.comm,
+        )
+
+
+def _csr(starts: Any, columns: Any, entries: Array) -> tuple[Any, Any, Array]:
+    return starts.astype(PETSc.IntType), columns.astype(PETSc.IntType), entries

@@ -1,0 +1,198 @@
+"""A block pressed by a rigid plane through its contact laws: one load step at a time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from geometry.collective import together
+from geometry.control import Control
+from geometry.errors import InputError
+from macro import compat
+from macro.block import Block
+from macro.contact.contact_law import Contact
+from macro.contact.energy_start import DisplacementBasis
+from macro.contact.equilibrium import Equilibrium
+from macro.contact.law_interface import ContactLaw, Interface, Mode
+from macro.contact.newton import NewtonReport, NewtonSolver
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PressState:
+    """Equilibrium of the block at one load step; the same on every rank but for the displacement.
+
+    Args:
+        approach: Approach of the rigid plane at the middle of the patches [mm].
+        tilt: Change of the approach along x and y [mm/mm].
+        displacement: This rank's owned displacements, dof by dof [mm].
+        closure: Mean closure of the patches, shape (N,) [mm].
+        pressure: Mean pressure of the patches, shape (N,) [MPa].
+        force: Force on the interface [N].
+        moment: First moments of the pressures along x and y, about the middle of the patches,
+            shape (2,) [N mm].
+        reaction: Force that the bottom bears [N]; equals ``force`` in equilibrium.
+        newton_iterations: Newton steps.
+        linear_iterations: Iterations of the linear solver, all Newton steps together.
+        residuals: Norm of the residual before each Newton step and at the end, relative to the
+            norm of the interface's load there.
+        reason: Name of PETSc's reason to stop.
+        wall_s: Wall time of the slowest rank [s].
+    """
+
+    approach: float
+    tilt: tuple[float, float]
+    displacement: Array
+    closure: Array
+    pressure: Array
+    force: float
+    moment: Array
+    reaction: float
+    newton_iterations: int
+    linear_iterations: int
+    residuals: Array
+    reason: str
+    wall_s: float
+
+
+class PressedBlock:
+    """A block under a rigid plane, solved for one load step after the other by Newton's method.
+
+    The plane's approach or force, and its tilt or no moment, are prescribed: both ways are one
+    Newton's method in the displacements, with as many linear solves.
+    The tangent is the exact derivative; conjugate gradients are preconditioned by the multigrid of
+    the block alone, which is made once. A load step starts from the best combination of all
+    earlier solutions.
+
+    Args:
+        block: The elastic block.
+        interface: Patches on its top.
+        laws: One law per patch, in flat order, the same on every rank.
+        mode: ``"patchwise"``: the closure averaged over a patch gives one pressure for it;
+            ``"pointwise"``: the law holds at every quadrature point.
+
+    Raises:
+        InputError: When there is not one law per patch, or no such mode.
+
+    Note:
+        Construction and ``press`` are collective.
+    """
+
+    def __init__(
+        self,
+        block: Block,
+        interface: Interface,
+        laws: Sequence[ContactLaw],
+        mode: Mode = "patchwise",
+    ) -> None:
+        if len(laws) != interface.patches.count:
+            raise InputError(
+                "every patch needs a law", value=len(laws), allowed=f"{interface.patches.count}"
+            )
+        self._interface, self._sampling = interface, interface.sampling(mode)
+        contact = Contact(interface, self._sampling, laws)
+        self.equilibrium = Equilibrium(block, self._sampling, contact)
+        self.newton = NewtonSolver(self.equilibrium, block.solver)
+        self._basis = DisplacementBasis(self.equilibrium, self._sampling)
+        self._plane: Array = np.zeros(3)
+        self._closure: Array = np.zeros(len(self._sampling.weight))
+
+    def press(self, control: Control) -> PressState:
+        """Find the equilibrium of one load step.
+
+        A force and a moment of zero are met to `macro.contact.plane_equilibrium.TOLERANCE`. Without
+        any force the plane just touches the highest patch, as it is tilted or was last.
+
+        Args:
+            control: What is prescribed of the plane.
+
+        Raises:
+            NotConverged: When Newton's method fails, or nothing can hold the plane; the earlier
+                solutions stay what they were, so that a smaller step can be tried.
+        """
+        began = time.perf_counter()
+        equilibrium = self.equilibrium
+        equilibrium.contact.prescribe(control, self._plane)
+        solution = equilibrium.block.stiffness.createVecRight()
+        self._basis.start(solution)
+        report = self.newton.solve(
+            solution, what=_described(control), remedy="take more load steps (load.steps)"
+        )
+        self._basis.add(solution)
+        comm = equilibrium.block.mesh.comm
+        seconds = comm.allreduce(time.perf_counter() - began, op=MPI.MAX)
+        state = self._state(solution, report, seconds)
+        compat.free_dropped(solution.comm)
+        return state
+
+    def start_from(self, pressure: Array) -> None:
+        """Let the next load step start from the displacements by mean pressures of the patches.
+
+        Args:
+            pressure: Pressures, shape (N,) [MPa].
+
+        Note:
+            Collective; one linear solve.
+        """
+        if not pressure.any():
+            return
+        block = self.equilibrium.block
+        displacement = block.stiffness.createVecRight()
+        found = block.solve(self._interface.load(pressure))
+        displacement.array[:] = found.x.array[: block.owned_dofs]
+        self._basis.add(displacement)
+
+    def patch_means(self, functions: Sequence[Callable[[Array], Array]]) -> Array:
+        """Average functions of closure over the patches, at the latest equilibrium.
+
+        Args:
+            functions: One function of closures (n,) [mm] per patch.
+
+        Returns:
+            The means over the samples of each patch, shape (N,).
+
+        Raises:
+            Exception: What a function raises on one rank, on every rank.
+
+        Note:
+            Collective.
+        """
+        comm, sampling = self.equilibrium.block.mesh.comm, self._sampling
+        values = together(comm, lambda: sampling.by_patch(functions, self._closure))
+        return sampling.patch_sums(values) / self._interface.areas
+
+    def _state(self, solution: PETSc.Vec, report: NewtonReport, wall_s: float) -> PressState:
+        contact, sampling = self.equilibrium.contact, self._sampling
+        self._closure = closure = self.equilibrium.closure(solution)
+        self._plane = plane = contact.plane.copy()
+        pressure = contact.pressure(closure)
+        forces, load = sampling.patch_sums(pressure), contact.loads(pressure)
+        areas = self._interface.areas
+        return PressState(
+            approach=float(plane[0]),
+            tilt=(float(plane[1]), float(plane[2])),
+            displacement=solution.array_r.copy(),
+            closure=sampling.patch_sums(closure) / areas,
+            pressure=forces / areas,
+            force=float(forces.sum()),
+            moment=load[1:],
+            reaction=self.equilibrium.block.reaction(solution),
+            newton_iterations=report.iterations,
+            linear_iterations=report.linear_iterations,
+            residuals=report.residuals,
+            reason=report.reason,
+            wall_s=wall_s,
+        )
+
+
+def _described(control: Control) -> str:
+    if control.force is not None:
+        return f"the block under a force of {control.force:g} N"
+    return f"the block at an approach of {control.approach:g} mm"

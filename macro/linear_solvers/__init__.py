@@ -1,0 +1,1 @@
+"""Linear solvers for blocks: PETSc's by options, multigrid, factorisation, constraints."""

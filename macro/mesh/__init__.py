@@ -1,0 +1,1 @@
+"""Meshes of blocks in dolfinx, and what their contact face consists of."""

@@ -1,0 +1,183 @@
+"""Quadrature on the block's top, cut along the borders of the patches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.patches import PatchGrid
+from macro import compat
+from macro.mesh.block import TOP, BlockMesh
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FacetQuadrature:
+    """Quadrature points of this rank on the patches, sorted by patch; there may be none.
+
+    Args:
+        x: Abscissae, shape (n,) [mm].
+        y: Ordinates, shape (n,) [mm].
+        weight: Weights, whose sum over a patch and all ranks is its area, shape (n,) [mm²].
+        patch: Flat index of the patch, ascending, shape (n,).
+        cell: Rank-local cell behind, shape (n,).
+        nodes: Rank-local nodes of that cell, shape (n, m).
+        values: Basis functions of these nodes, shape (n, m).
+    """
+
+    x: Array
+    y: Array
+    weight: Array
+    patch: NDArray[np.intp]
+    cell: NDArray[np.int32]
+    nodes: NDArray[np.int32]
+    values: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TopFacets:
+    """Facets of the top whose cells this rank owns; affine images of a triangle or a square.
+
+    Args:
+        cell: Rank-local cell behind, shape (n,).
+        side: Which of its facets it is, shape (n,).
+        reference: Vertices on the reference cell, shape (n, 3 or 4, 3).
+        corners: Vertices in the plane, shape (n, 3 or 4, 2) [mm].
+    """
+
+    cell: NDArray[np.int32]
+    side: NDArray[np.intp]
+    reference: Array
+    corners: Array
+
+    @property
+    def area(self) -> Array:
+        """Areas in the plane, shape (n,) [mm²]."""
+        parallelogram = 2.0 * _areas(self.corners[:, :3])
+        return parallelogram if self.corners.shape[1] == 4 else 0.5 * parallelogram
+
+    def pull_back(self, facet: NDArray[np.intp], points: Array) -> Array:
+        """Map points (n, 2) of given facets (n,) to the reference cell, (n, 3)."""
+        edges = np.swapaxes(self.corners[:, 1:3] - self.corners[:, :1], 1, 2)
+        offset = points - self.corners[facet, 0]
+        s = np.einsum("nij,nj->ni", np.linalg.inv(edges)[facet], offset)
+        start, ends = self.reference[:, 0], self.reference[:, 1:3] - self.reference[:, :1]
+        return start[facet] + np.einsum("nk,nkj->nj", s, ends[facet])
+
+
+def facet_quadrature(
+    block: BlockMesh, space: Any, patches: PatchGrid, *, degree: int
+) -> FacetQuadrature:
+    """Place quadrature points on the part of the block's top that the patches cover.
+
+    Every facet is cut into triangles along the borders of the patches, so that an integral over a
+    patch is exact for polynomials of the degree also where borders run through elements.
+
+    Args:
+        block: Mesh of the block.
+        space: Displacements on it.
+        patches: Patches on its top.
+        degree: Polynomial degree that is integrated exactly.
+    """
+    cell_name = block.mesh.topology.cell_name()
+    facets = top_facets(block)
+    triangles, facet = _cut_into_patches(*_triangles(facets.corners), patches)
+    patch = patches.index_of(*triangles.mean(axis=1).T)
+    order = np.argsort(patch, kind="stable")
+    triangles, facet, patch = triangles[order], facet[order], patch[order]
+
+    points, weights = compat.triangle_rule(degree)
+    edges = triangles[:, 1:] - triangles[:, :1]
+    positions = (triangles[:, :1] + np.einsum("qk,nkj->nqj", points, edges)).reshape(-1, 2)
+    facet, patch = np.repeat(facet, len(weights)), np.repeat(patch, len(weights))
+    return FacetQuadrature(
+        x=positions[:, 0],
+        y=positions[:, 1],
+        weight=np.multiply.outer(2.0 * _areas(triangles), weights).ravel(),
+        patch=patch,
+        cell=facets.cell[facet],
+        nodes=compat.cell_nodes(space)[facets.cell[facet]],
+        values=compat.lagrange_values(
+            cell_name, block.shape.degree, facets.pull_back(facet, positions)
+        ),
+    )
+
+
+def top_facets(block: BlockMesh) -> TopFacets:
+    """Return the facets of the top whose cells this rank owns; there may be none."""
+    topology = block.mesh.topology
+    topology.create_connectivity(2, 3)
+    topology.create_connectivity(3, 2)
+    cells_of, facets_of = topology.connectivity(2, 3), topology.connectivity(3, 2)
+    vertices, shapes = compat.reference_facets(topology.cell_name())
+    facets = block.facet_tags.find(TOP)
+    cell = cells_of.array[cells_of.offsets[facets]]  # an outer facet has one cell
+    owned = cell < topology.index_map(3).size_local
+    cell, facets = cell[owned], facets[owned]
+    mates = facets_of.array.reshape(-1, len(shapes))[cell]
+    side = np.argmax(mates == facets[:, None], axis=1)
+    at = shapes[side]
+    rows = np.take_along_axis(compat.cell_vertices(block.mesh)[cell], at, axis=1)
+    corners = block.mesh.geometry.x[rows][..., :2]
+    return TopFacets(cell=cell, side=side, reference=vertices[at], corners=corners)
+
+
+def _triangles(corners: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Return facets as triangles (n, 3, 2) and the facet that each comes from (n,)."""
+    facet = np.arange(len(corners))
+    if corners.shape[1] == 3:
+        return corners, facet
+    # tensor order: vertices 0 and 3 of a quadrilateral are opposite
+    return np.concatenate([corners[:, [0, 1, 2]], corners[:, [3, 2, 1]]]), np.tile(facet, 2)
+
+
+def _cut_into_patches(
+    triangles: Array, facet: NDArray[np.intp], patches: PatchGrid
+) -> tuple[Array, NDArray[np.intp]]:
+    """Cut triangles along all borders and keep those inside the patches."""
+    slack = 1e-9 * max(patches.lengths)
+    for axis, borders in enumerate((patches.borders_x, patches.borders_y)):
+        for border in borders:
+            triangles, facet = _cut(triangles, facet, axis, border, slack)
+        middle = triangles.mean(axis=1)[:, axis]
+        inside = (middle > borders[0]) & (middle < borders[-1])
+        triangles, facet = triangles[inside], facet[inside]
+    return triangles, facet
+
+
+def _cut(
+    triangles: Array, facet: NDArray[np.intp], axis: int, border: float, slack: float
+) -> tuple[Array, NDArray[np.intp]]:
+    """Cut the triangles that a line x = border or y = border crosses into three each."""
+    height = triangles[:, :, axis] - border
+    side = np.where(np.abs(height) <= slack, 0, np.sign(height)).astype(int)
+    crossed = (side.min(axis=1) < 0) & (side.max(axis=1) > 0)
+    if not crossed.any():
+        return triangles, facet
+    side, corner = side[crossed], triangles[crossed]
+    # the vertex that is alone on its side comes first
+    lonely = np.where((side > 0).sum(axis=1) == 1, 1, -1)
+    first = np.argmax(side == lonely[:, None], axis=1)
+    turn = (first[:, None] + np.arange(3)) % 3
+    corner = np.take_along_axis(corner, turn[:, :, None], axis=1)
+    height = np.take_along_axis(height[crossed], turn, axis=1)
+    height[np.abs(height) <= slack] = 0.0
+    a, b, c = np.swapaxes(corner, 0, 1)
+    share = height[:, :1] / (height[:, :1] - height[:, 1:])
+    p, q = a + share[:, :1] * (b - a), a + share[:, 1:] * (c - a)
+    pieces = np.concatenate([np.stack(t, axis=1) for t in ((a, p, q), (p, b, c), (p, c, q))])
+    owners = np.tile(facet[crossed], 3)
+    solid = _areas(pieces) > slack**2  # a vertex on the line leaves empty pieces
+    return (
+        np.concatenate([triangles[~crossed], pieces[solid]]),
+        np.concatenate([facet[~crossed], owners[solid]]),
+    )
+
+
+def _areas(triangles: Array) -> Array:
+    u, v = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    return 0.5 * np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])

@@ -1,0 +1,211 @@
+"""Meshes of a block whose top is the rough surface itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from geometry.errors import InputError
+from geometry.meshes.block import BlockShape
+from geometry.meshes.refined_block import RefinedShape
+from geometry.surface import Surface
+from macro import compat
+from macro.mesh.block import BlockMesh, block_mesh
+
+Array = NDArray[np.float64]
+
+_DECAY = 3.0
+"""Power of the distance from the bottom with which the roughness fades into the depth."""
+
+_LEAST_VOLUME = 0.05
+"""Volume relative to that of the flat block, below which cells are refused."""
+
+_STEEPEST = 2.0
+"""Slope between neighbouring nodes above which a top is refused: edges at 27° to each other."""
+
+
+_LEAST_BENT = 0.3
+"""The same, below which the edges of a quadratic tetrahedron are made straight."""
+
+_EDGES = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])
+"""Ends of a quadratic tetrahedron's edges, in dolfinx's order of the nodes 4 … 9 between them."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeshQuality:
+    """How far the roughness has deformed the cells.
+
+    Attributes:
+        thinnest: Smallest volume at a node of a cell (the Jacobian of its map), relative to that
+            of the flat block; negative in a cell turned inside out.
+        steepest: Largest slope of an edge of the top.
+    """
+
+    thinnest: float
+    steepest: float
+
+
+def rough_block_mesh(
+    shape: BlockShape | RefinedShape, surface: Surface, comm: Any
+) -> tuple[BlockMesh, MeshQuality]:
+    """Mesh a flat block and move its nodes onto the roughness.
+
+    The top becomes z = h(x, y) − <h>, from the surface's interpolant at the nodes; below, the
+    movement fades as (1 + z/height)³. Every rank moves the nodes that it has.
+
+    The edges of quadratic tetrahedra bend with the roughness, but for the few cells, long against
+    its waves and far from contact, that this would turn inside out: they stay straight.
+
+    Along every vertical line the movement keeps the order of points as long as the deepest valley
+    lies less than height/3 below the mean. Hexahedra, whose sides are vertical, then stay
+    hexahedra; tetrahedra are looked at one by one.
+
+    Args:
+        shape: The flat block, without margin; its interface is the surface's rectangle.
+        surface: The rough surface.
+        comm: MPI communicator.
+
+    Raises:
+        InputError: When the rectangles differ, a valley is too deep for the block, the roughness
+            is too steep for the mesh, or it turns a cell inside out.
+
+    Note:
+        Collective.
+    """
+    _check_cover(shape, surface)
+    _check_depth(shape, surface)
+    flat = block_mesh(shape, comm)
+    points = flat.mesh.geometry.x
+    x, y = (np.clip(points[:, k], 0.0, surface.lengths[k]) for k in (0, 1))
+    rise = surface.height_at(x, y) - surface.mean_height if len(points) else np.empty(0)
+    moved = points.copy()
+    moved[:, 2] += rise * (1.0 + points[:, 2] / shape.height) ** _DECAY
+    if isinstance(shape, RefinedShape) and shape.degree == 2:
+        _straighten(flat, moved)
+    quality = MeshQuality(
+        thinnest=float(comm.allreduce(_volumes(flat, moved).min(initial=np.inf), op=MPI.MIN)),
+        steepest=float(comm.allreduce(_steepest(flat, rise), op=MPI.MAX)),
+    )
+    if quality.steepest > _STEEPEST:
+        raise InputError(
+            "the roughness is too steep for a mesh",
+            value=quality.steepest,
+            allowed=f"slopes up to {_STEEPEST:g} between neighbouring nodes of the top",
+        )
+    if quality.thinnest <= _LEAST_VOLUME:
+        raise InputError(
+            "the roughness turns cells inside out, which are much longer than its waves",
+            value=quality.thinnest,
+            allowed=f"cells that keep {_LEAST_VOLUME:.0%} of their volume at every node",
+        )
+    points[:] = moved
+    return flat, quality
+
+
+def _check_cover(shape: BlockShape | RefinedShape, surface: Surface) -> None:
+    larger = np.array(surface.lengths) > np.array(shape.interface) * (1.0 + 1e-9)
+    if larger.any():
+        raise InputError(
+            "the rough surface is larger than the block's top",
+            value=surface.lengths,
+            allowed=f"{shape.interface} mm",
+        )
+    if shape.margin or not np.allclose(shape.interface, surface.lengths, rtol=1e-9, atol=0.0):
+        raise InputError(
+            "the rough surface must cover the block's top",
+            value=shape.interface,
+            allowed=f"an interface of {surface.lengths} mm without margin",
+        )
+
+
+def _check_depth(shape: BlockShape | RefinedShape, surface: Surface) -> None:
+    valley = surface.mean_height - float(surface.heights.min())
+    deepest = (1.0 - _LEAST_VOLUME) * shape.height / _DECAY
+    if valley > deepest:
+        raise InputError(
+            "a valley of the roughness is too deep for the block",
+            value=valley,
+            allowed=f"{deepest:.6g} mm below the mean, for a block {shape.height:g} mm high",
+        )
+
+
+def _straighten(flat: BlockMesh, moved: Array) -> None:
+    """Put the middles of edges onto the chord in cells that bend too much, on all ranks alike."""
+    cells, names = compat.cell_vertices(flat.mesh), flat.mesh.geometry.input_global_indices
+    done: Array = np.empty(0, dtype=np.int64)
+    while True:
+        middles = cells[:, 4:]
+        found = np.unique(np.asarray(names)[middles[_volumes(flat, moved) < _LEAST_BENT]])
+        wanted = np.union1d(done, np.concatenate(flat.comm.allgather(found)))
+        if len(wanted) == len(done):
+            return
+        done = wanted
+        cell, edge = np.nonzero(np.isin(np.asarray(names)[middles], done))
+        ends = cells[cell[:, None], _EDGES[edge]]
+        moved[middles[cell, edge], 2] = moved[ends, 2].mean(axis=1)
+
+
+def _volumes(flat: BlockMesh, moved: Array) -> Array:
+    """Return each cell's smallest ratio of the volumes at its nodes after and before a movement.
+
+    Nodes move along z alone, which changes one row of the Jacobian matrix.
+    """
+    cells, points = compat.cell_vertices(flat.mesh), flat.mesh.geometry.x
+    x, y, before, after = (row[cells] for row in (*points.T, moved[:, 2]))
+    smallest = np.full(len(cells), np.inf)
+    for slopes in _slopes(cells.shape[1]) if len(cells) else ():
+        normal = np.cross(x @ slopes, y @ slopes)
+        volumes = (np.einsum("ci,ci->c", normal, z @ slopes) for z in (after, before))
+        np.minimum(smallest, np.divide(*volumes), out=smallest)
+    return smallest
+
+
+def _slopes(nodes: int) -> Array:
+    """Return the shape functions' gradients at the nodes of a cell, shape (points, nodes, 3).
+
+    Nodes of hexahedra (8) and tetrahedra (4 or 10) in the order of dolfinx; of a linear
+    tetrahedron's gradients, which are the same everywhere, one.
+    """
+    if nodes == 8:
+        return _trilinear_slopes()
+    linear = np.vstack([np.full(3, -1.0), np.eye(3)])
+    if nodes == 4:
+        return linear[None]
+    i, j = _EDGES.T
+    at = np.vstack([np.eye(4), 0.5 * (np.eye(4)[i] + np.eye(4)[j])])[:, :, None]
+    # of L (2 L - 1) at vertices, of 4 L L' in the middle of edges
+    vertices = (4.0 * at - 1.0) * linear
+    middles = 4.0 * (at[:, i] * linear[j] + at[:, j] * linear[i])
+    return np.concatenate([vertices, middles], axis=1)
+
+
+def _trilinear_slopes() -> Array:
+    corners = np.array(list(np.ndindex(2, 2, 2)))[:, ::-1]  # x runs first
+    slopes = np.zeros((8, 8, 3))
+    for point, node in np.ndindex(8, 8):
+        apart = corners[point] != corners[node]
+        for axis in range(3):
+            if not np.delete(apart, axis).any():
+                slopes[point, node, axis] = 2 * corners[node, axis] - 1
+    return slopes
+
+
+def _steepest(flat: BlockMesh, rise: Array) -> float:
+    """Return the largest slope between horizontal neighbours on the top."""
+    points = flat.mesh.geometry.x
+    cells = compat.cell_vertices(flat.mesh)
+    top = np.abs(points[:, 2]) < 1e-9 * flat.shape.height
+    cells = cells[top[cells].any(axis=1)]
+    steepest = 0.0
+    for i in range(cells.shape[1]):
+        for j in range(i):
+            a, b = cells[:, i], cells[:, j]
+            both = top[a] & top[b]
+            run = np.hypot(*(points[a[both], k] - points[b[both], k] for k in (0, 1)))
+            slope = np.abs(rise[a[both]] - rise[b[both]]) / run
+            steepest = max(steepest, float(slope.max(initial=0.0)))
+    return steepest

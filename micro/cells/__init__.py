@@ -1,1 +1,0 @@
-"""Contact on the half-space cell by cell: kernels, transforms, pressures."""

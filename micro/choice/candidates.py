@@ -1,0 +1,181 @@
+"""The micro models that can be chosen from: what they promise, what they cost, how to make them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from geometry import PatchGrid, Surface
+from micro.asperities.model import MODELS
+from micro.choice.expected_errors import contact_error, grid_error
+from micro.choice.measures import ContactMeasures
+from micro.factory import micro_model
+from micro.half_space.model import HalfSpaceModel
+from micro.model import MicroModel
+
+FACTORS = (0.25, 0.375, 0.5, 0.75, 1.0, 1.5, 2.0)
+"""Cells of half-space grids along a side, relative to the surface's own."""
+
+_LEAST_CELLS = 8
+"""Cells along a patch that a grid needs at least."""
+
+_MOST_CELLS = 2**22
+"""Cells of the largest grid that is offered."""
+
+_SCALED = {"curvature": "contact", "border": "include"}
+_SCALED_LABEL = "elliptic with curvature at the contact's scale and border summits"
+
+_COSTS = {
+    "elliptic": (2e-3, 1.8e-7, 1e-3, 0.0),
+    "circular": (2e-3, 1.8e-7, 1e-3, 0.0),
+    "elliptic-independent": (2e-3, 1.8e-7, 3e-4, 0.0),
+    "circular-independent": (2e-3, 1.8e-7, 3e-4, 0.0),
+    "scaled": (0.15, 1e-7, 4e-3, 6e-7),
+    "islands": (0.15, 1e-7, 3e-3, 1e-8),
+    "half-space": (0.0, 2e-7, 3e-3, 4e-7),
+}
+"""Seconds to set up, and per cell; seconds per approach, and per cell: minima on one core."""
+
+
+Cost = Callable[[str, int], float]
+"""Time of all solutions of a kind of model on so many cells [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """A model that could be taken.
+
+    Attributes:
+        label: Name of the model with its options or its grid.
+        expected_error: Bound of the relative error of the force at the largest approach and at
+            half of it, which 95 of 100 surfaces keep.
+        cost: Predicted time for all solutions [s].
+        checked_error: Difference of the force at half the largest approach from a half-space
+            solution, relative to it; None where it was not computed.
+    """
+
+    label: str
+    expected_error: float
+    cost: float
+    checked_error: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Option:
+    """A candidate and its model.
+
+    Attributes:
+        candidate: What it promises.
+        make: Makes the model.
+        cells: Cells in x and y of a half-space grid.
+    """
+
+    candidate: Candidate
+    make: Callable[[], MicroModel]
+    cells: tuple[int, int] | None = None
+
+
+def options(
+    surface: Surface,
+    measures: Sequence[ContactMeasures],
+    *,
+    contact_modulus: float,
+    solutions: int,
+    patches: PatchGrid | None,
+    periodic: bool,
+    cost: Cost | None = None,
+) -> Iterator[Option]:
+    """Yield the models that a surface and its patches allow.
+
+    Args:
+        surface: The surface.
+        measures: Its contacts at every load that errors are promised for.
+        contact_modulus: E* [MPa].
+        solutions: Approaches to be solved for.
+        patches: Patches that must hold at least 8 cells of a grid along each side.
+        periodic: Whether only periodic models are wanted.
+        cost: Predicted time of all solutions of a kind on so many cells [s]; by default what one
+            core took when it was measured.
+    """
+    seconds = cost or partial(_cost, solutions=solutions)
+    parts = patches.grid if patches else (1, 1)
+    if not periodic:
+        for kind, label, made in _by_contacts(surface, contact_modulus, parts):
+            error = max(contact_error(kind, at) for at in measures)
+            spent = seconds(kind, surface.heights.size)
+            yield Option(
+                candidate=Candidate(label=label, expected_error=error, cost=spent), make=made
+            )
+    for factor, cells in _grids(surface, parts):
+        yield Option(
+            candidate=Candidate(
+                label=f"half-space on {cells[0]} × {cells[1]} cells",
+                expected_error=max(grid_error(at, factor) for at in measures),
+                cost=seconds("half-space", cells[0] * cells[1]),
+            ),
+            make=partial(half_space, surface, cells, contact_modulus, periodic),
+            cells=cells,
+        )
+
+
+def half_space(
+    surface: Surface, cells: tuple[int, int], contact_modulus: float, periodic: bool
+) -> HalfSpaceModel:
+    """Return the half-space model on a grid, its approach counted from the surface's summit."""
+    return HalfSpaceModel(
+        surface=resampled(surface, cells),
+        contact_modulus=contact_modulus,
+        periodic=periodic,
+        highest=surface.highest,
+    )
+
+
+def resampled(surface: Surface, grid: tuple[int, int]) -> Surface:
+    """Return the interpolant of a surface at the centres of other cells.
+
+    Its own highest point differs a little: models that are to be compared get the `highest` of
+    the original.
+
+    Args:
+        surface: The surface.
+        grid: Cells in x and y.
+    """
+    if grid == surface.grid:
+        return surface
+    x, y = (
+        (np.arange(n) + 0.5) * (size / n) for n, size in zip(grid, surface.lengths, strict=True)
+    )
+    points = np.meshgrid(x, y, indexing="ij")
+    return replace(surface, heights=surface.height_at(*points))
+
+
+def _by_contacts(
+    surface: Surface, modulus: float, parts: tuple[int, int]
+) -> Iterator[tuple[str, str, Callable[[], MicroModel]]]:
+    named = partial(micro_model, surface=surface, contact_modulus=modulus)
+    for kind in MODELS:
+        yield kind, kind, partial(named, kind)
+    yield "scaled", _SCALED_LABEL, partial(named, "elliptic", **_SCALED)
+    if _fits(surface.grid, parts):
+        yield "islands", "islands", partial(named, "islands")
+
+
+def _grids(surface: Surface, parts: tuple[int, int]) -> Iterator[tuple[float, tuple[int, int]]]:
+    """Yield the grids that hold the patches and are not too large, the surface's own always."""
+    for factor in FACTORS:
+        cells = round(factor * surface.grid[0]), round(factor * surface.grid[1])
+        fits = factor >= 1.0 or _fits(cells, parts)
+        if factor == 1.0 or (fits and cells[0] * cells[1] <= _MOST_CELLS):
+            yield factor, cells
+
+
+def _cost(kind: str, cells: int, solutions: int) -> float:
+    set_up, per_cell, each, each_per_cell = _COSTS[kind]
+    return set_up + per_cell * cells + solutions * (each + each_per_cell * cells)
+
+
+def _fits(cells: tuple[int, int], parts: tuple[int, int]) -> bool:
+    return all(n >= max(_LEAST_CELLS * m, 16) for n, m in zip(cells, parts, strict=True))

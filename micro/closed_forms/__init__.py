@@ -1,0 +1,1 @@
+"""Closed forms of contact mechanics: Hertz, Love, Boussinesq and what follows from them."""

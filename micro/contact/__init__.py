@@ -1,0 +1,1 @@
+"""The contact problem: pressures between bounds, gaps, rigid motions prescribed or free."""

@@ -1,0 +1,101 @@
+"""Conjugate gradients for the pressures of a given set of cells in contact.
+
+With the set fixed the contact is a linear system: the pressures p on the cells A in contact make
+the gap vanish there, (G p)_A = d_A, or make it a free rigid motion of the body while the loads of
+that motion stay as they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from micro.compliance.elastic_grid import Cells, ElasticGrid
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ContactCells:
+    """Cells in contact, loaded by a rigid body of which k motions are free.
+
+    Args:
+        grid: The elastic body.
+        cells: The n cells in contact.
+        levers: How much nearer each free motion brings the cells, shape (k, n).
+        resistance: Roughly the pressures by each of these motions, shape (k, n).
+        inverse: Inverse of the loads of these pressures, levers · resistance, shape (k, k).
+    """
+
+    grid: ElasticGrid
+    cells: Cells
+    levers: Array
+    resistance: Array
+    inverse: Array
+
+    @classmethod
+    def among(cls, grid: ElasticGrid, cells: Cells, levers: Array) -> ContactCells:
+        """Prepare a set of cells.
+
+        Args:
+            grid: The elastic body.
+            cells: The n cells in contact.
+            levers: How much nearer each of k ≥ 0 free motions brings them, shape (k, n).
+        """
+        found = [grid.resist(cells, lever) for lever in levers]
+        resistance = np.array(found).reshape(levers.shape)
+        stiffness = levers @ resistance.T
+        inverse = np.linalg.pinv(stiffness, rcond=1e-10)
+        return cls(grid=grid, cells=cells, levers=levers, resistance=resistance, inverse=inverse)
+
+    def balanced(self, gap: Array) -> Array:
+        """Subtract from gaps the part that free motions of the body take up."""
+        if not len(self.levers):
+            return gap
+        # transposed: the approximate resistance is symmetric to single precision alone
+        return gap - (self.inverse.T @ (self.resistance @ gap)) @ self.levers
+
+    def preconditioned(self, gap: Array) -> Array:
+        """Return roughly the pressures that make these gaps, without loads on free motions."""
+        found = self.grid.resist(self.cells, gap)
+        if not len(self.levers):
+            return found
+        return found - (self.inverse @ (self.levers @ found)) @ self.resistance
+
+    def close(self, gap: Array, *, stop: float, limit: int) -> Array:
+        """Return the change of the pressures that closes gaps, by preconditioned iterations.
+
+        Args:
+            gap: Gaps of the cells under the present pressures, shape (n,) [mm].
+            stop: Largest gap to leave [mm].
+            limit: Number of iterations after which the change is returned as it is.
+
+        Returns:
+            Change of the pressures / E*, shape (n,); of any sign.
+
+        Source:
+            Polonsky & Keer 1999, doi 10.1016/S0043-1648(99)00113-1, for the given force by removal
+            of the mean; Gould, Hribar & Nocedal 2001, doi 10.1137/S1064827598345667, for its
+            preconditioned form with any linear conditions.
+        """
+        left = self.balanced(gap)
+        change, direction, before = np.zeros_like(left), np.zeros_like(left), np.inf
+        for _ in range(limit):
+            step = self.preconditioned(left)
+            size = float(left @ step)
+            if size <= 0.0:
+                break
+            direction = step + (size / before) * direction
+            answer = self.grid.comply(self.cells, direction)
+            curvature = float(direction @ answer)
+            if curvature <= 0.0:
+                break
+            length = size / curvature
+            change -= length * direction
+            left = self.balanced(left - length * answer)
+            if np.abs(left).max() <= stop:
+                break
+            before = size
+        return change

@@ -1,0 +1,1 @@
+"""The micro model `islands`: connected regions above the plane as Hertz contacts."""

@@ -1,1 +1,0 @@
-"""Connected regions of a surface above a plane, and the contacts that stand for them."""

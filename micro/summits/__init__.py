@@ -1,1 +1,0 @@
-"""Asperities at the summits of a surface: their contacts, fits and states."""

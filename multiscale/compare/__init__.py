@@ -1,0 +1,1 @@
+"""A scene computed in many ways: error against time."""

@@ -1,1 +1,0 @@
-"""A scene computed at many levels: error against time."""

@@ -1,0 +1,86 @@
+"""Chooses between a dense Newton of the patches and the full Newton of the mesh, by cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from multiscale.laws.files import LawTable
+from multiscale.setup.problem import Stage
+
+MOST_CYCLES_PER_STEP = 12
+"""Multigrid cycles that a load step of the full Newton takes at most, starts from earlier steps
+included; with fewer patches in reach about one for each (the paper's cube with 4 × 4 patches, 4
+of them loaded: 39 in 8 steps; with 2 of 64 in reach 36 in 40)."""
+
+CYCLES_PER_PATCH = 11
+"""Multigrid cycles that the compliance of one patch takes (the paper's cube with 4 × 4 and 8 × 8
+patches)."""
+
+
+_UNLESS = "; should a patch turn out to be flat, condensed all the same"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NewtonChoice:
+    """Which Newton solves the load steps, and why.
+
+    Attributes:
+        condensed: Whether the dense one of the patches does.
+        why: The reason, in words.
+    """
+
+    condensed: bool
+    why: str
+
+
+def full_cycles(stage: Stage, steps: int) -> int:
+    """Return the multigrid cycles that load steps on the mesh are predicted to take.
+
+    Args:
+        stage: The scene's ingredients.
+        steps: Load steps.
+    """
+    return steps * min(max(stage.reached_patches, 1), MOST_CYCLES_PER_STEP)
+
+
+def newton_choice(stage: Stage, table: LawTable | None = None) -> NewtonChoice:
+    """Choose as the scene asks, or what is predicted to take fewer multigrid cycles.
+
+    The full Newton spends cycles on load steps until its basis of earlier solutions spans what
+    the patches can do; the condensed one spends them on the compliance, before the first step.
+
+    Args:
+        stage: The scene's ingredients, of a coupling with laws.
+        table: The laws, once made: those of flat patches rule out the mesh's Newton.
+    """
+    coupling = stage.scene.coupling
+    if coupling.decomposed:
+        return NewtonChoice(condensed=True, why="the decomposed block is its compliance")
+    flat = 0 if table is None else sum(law.is_punch for law in table.laws)
+    if flat and _left_open(stage):
+        why = (
+            f"{flat} of {stage.patches.count} patches are flat, and their pressure is a function "
+            "of closure nowhere"
+        )
+        return NewtonChoice(condensed=True, why=why)
+    if coupling.interface == "pointwise":
+        return NewtonChoice(condensed=False, why="laws at points need the whole mesh")
+    if coupling.newton != "auto":
+        return NewtonChoice(condensed=coupling.newton == "condensed", why="as the scene asks")
+    patches, steps = stage.patches.count, stage.scene.loading.programme.count
+    compliance = CYCLES_PER_PATCH * patches
+    full = full_cycles(stage, steps)
+    fewer = "fewer" if compliance < full else "more"
+    unless = "" if compliance < full or table or stage.by_summits else _UNLESS
+    return NewtonChoice(
+        condensed=compliance < full,
+        why=(
+            f"the compliance of {patches} patches takes about {compliance} multigrid cycles, "
+            f"{fewer} than {steps} load steps on the mesh with about {full}{unless}"
+        ),
+    )
+
+
+def _left_open(stage: Stage) -> bool:
+    coupling = stage.scene.coupling
+    return coupling.newton == "auto" and coupling.interface == "patchwise"

@@ -1,0 +1,1 @@
+"""Errors of load steps, measured in the run by further contact problems."""

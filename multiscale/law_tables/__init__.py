@@ -1,1 +1,0 @@
-"""Patch laws: made of a rough surface, refined, packed, kept on disk."""

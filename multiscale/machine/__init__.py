@@ -1,0 +1,1 @@
+"""The machine a run is on: its MPI job, its nodes' memory, its speed."""

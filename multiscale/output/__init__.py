@@ -1,0 +1,1 @@
+"""What a run leaves behind and prints: tables, figures, report, fields, words."""

@@ -1,0 +1,248 @@
+"""Figures of a run; each function returns a matplotlib figure that shares no global state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from geometry.asperities import Asperities
+from geometry.patches import PatchGrid
+from geometry.surface import Surface
+from micro.response import Response
+from multiscale.laws.files import LawTable
+from multiscale.results.history import History
+
+_STYLES = ("-", "--", "-.", ":", (0, (3, 1, 1, 1, 1, 1)))
+_COLOURS = ("#0b3c5d", "#d1495b", "#1b998b", "#edae49", "#6a4c93")
+
+PRESSURE_LABEL = "mean pressure of the patch [MPa]"
+"""What colour bars of pressure maps say."""
+
+
+def surface_figure(surface: Surface, asperities: Asperities, patches: PatchGrid) -> Figure:
+    """Draw heights over the mean plane with summits, border maxima and patch borders.
+
+    Args:
+        surface: The heights.
+        asperities: Its summits.
+        patches: The partition.
+    """
+    figure = Figure(figsize=(6.4, 5.4), layout="constrained")
+    draw_surface(figure, figure.add_subplot(), surface, asperities, patches)
+    return figure
+
+
+def draw_surface(
+    figure: Figure, axes: Any, surface: Surface, asperities: Asperities, patches: PatchGrid
+) -> None:
+    """Draw one surface into given axes.
+
+    Args:
+        figure: Owner of the axes; gets a colour bar.
+        axes: Where to draw.
+        surface: The heights.
+        asperities: Its summits.
+        patches: The partition.
+    """
+    heights = 1e3 * (surface.heights - surface.mean_height).T
+    extent = (0, surface.lengths[0], 0, surface.lengths[1])
+    image = axes.imshow(heights, origin="lower", extent=extent, cmap="cividis")
+    figure.colorbar(image, ax=axes, label="height over the mean plane [µm]")
+    patch_lines(axes, patches, colour="white")
+    summits: dict[str, Any] = {"marker": "o", "ms": 5, "mfc": "#d1495b", "mec": "white"}
+    cut: dict[str, Any] = {"marker": "x", "ms": 6, "color": "black"}
+    for x, y, look, label in (
+        (asperities.x, asperities.y, summits, "summits"),
+        (asperities.border_x, asperities.border_y, cut, "border maxima (unused)"),
+    ):
+        if x.size:
+            axes.plot(x, y, ls="none", label=label, clip_on=False, **look)
+    axes.set(xlabel="x [mm]", ylabel="y [mm]")
+    axes.set_title(f"{len(asperities)} summits, {patches.grid[0]} × {patches.grid[1]} patches")
+    if len(asperities) or asperities.border_x.size:
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncol=2, frameon=False)
+
+
+def history_figure(histories: Mapping[str, History]) -> Figure:
+    """Draw force, contact area and separation of one or more runs over each other.
+
+    Args:
+        histories: The runs by the name that the legend shows.
+    """
+    figure = Figure(figsize=(11.0, 3.6), layout="constrained")
+    force, area, gap = figure.subplots(1, 3)
+    for (name, history), style, colour in zip(histories.items(), _STYLES, _COLOURS, strict=False):
+        look: dict[str, Any] = {
+            "ls": style,
+            "color": colour,
+            "marker": "o",
+            "ms": 3.5,
+            "label": name,
+        }
+        pressure = np.append(0.0, history.mean_pressure_MPa)
+        # a tilted plane touches first at another approach at the middle than zero
+        level = not any(any(step.tilt) for step in history)
+        approach = 1e3 * np.append(0.0 if level else np.nan, history.approach_mm)
+        force.plot(approach, pressure, **look)
+        area.plot(pressure, 100 * np.append(0.0, history.contact_area_fraction), **look)
+        gap.plot(1e3 * history.mean_separation_mm, history.mean_pressure_MPa, **look)
+        if history.reference is not None:
+            draw_error_band(force, area, history, colour=colour)
+    force.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]")
+    area.set(xlabel="mean pressure [MPa]", ylabel="contact area fraction [%]")
+    gap.set(xlabel="mean separation [µm]", ylabel="mean pressure [MPa]")
+    _finish(figure)
+    return figure
+
+
+def draw_error_band(force: Any, area: Any, history: History, *, colour: str) -> None:
+    """Draw the error bands of a reference about its values at mesh size zero.
+
+    Args:
+        force: Axes of pressure [MPa] over approach [µm].
+        area: Axes of the contact area fraction [%] over pressure [MPa]; None leaves it out.
+        history: The reference.
+        colour: Colour of the bands.
+    """
+    record = history.reference
+    if record is None or len(record.sizes) == 1:
+        force.plot([], [], " ", label="(no error bar)")
+        return
+    nominal = history.patches.area * history.patches.count
+    pressure = record.force.value / nominal
+    approach = 1e3 * record.approach.value
+    look: dict[str, Any] = {"color": colour, "alpha": 0.25, "lw": 0.0, "label": record.label}
+    if record.by_force:
+        error = 1e3 * record.approach.error
+        force.fill_betweenx(pressure, approach - error, approach + error, **look)
+    else:
+        error = record.force.error / nominal
+        force.fill_between(approach, pressure - error, pressure + error, **look)
+    if area is not None:
+        middle, error = 100 * record.area.value, 100 * record.area.error
+        look["label"] = None
+        area.fill_between(pressure, middle - error, middle + error, **look)
+
+
+def pressure_figure(history: History) -> Figure:
+    """Draw the patch pressures of the last load step as a map, with their values."""
+    figure = Figure(figsize=(5.6, 4.8), layout="constrained")
+    axes = figure.add_subplot()
+    draw_pressures(figure, axes, history.patches, history.steps[-1].patches.pressure_MPa)
+    last = history.steps[-1]
+    record = history.reference
+    error = "" if record is None else f" ({record.label})"
+    axes.set_title(f"approach {1e3 * last.approach_mm:.3g} µm, force {last.force_N:.4g} N{error}")
+    return figure
+
+
+def draw_pressures(
+    figure: Figure,
+    axes: Any,
+    patches: PatchGrid,
+    pressure: NDArray[np.float64],
+    *,
+    top: float | None = None,
+) -> Any:
+    """Draw one map of patch pressures into given axes.
+
+    Args:
+        figure: Owner of the axes; gets a colour bar, unless the scale is given.
+        axes: Where to draw.
+        patches: The partition.
+        pressure: Mean pressure of each patch, shape (N,) [MPa].
+        top: End of the colour scale, for maps that share one [MPa].
+
+    Returns:
+        The map, as a colour bar takes it.
+    """
+    values = pressure.reshape(patches.grid)
+    image = axes.pcolormesh(
+        patches.borders_x, patches.borders_y, values.T, cmap="magma_r", vmin=0.0, vmax=top
+    )
+    if top is None:
+        figure.colorbar(image, ax=axes, label=PRESSURE_LABEL)
+    patch_lines(axes, patches, colour="0.7")
+    if patches.count <= 100:
+        dark = 0.55 * max(top or values.max(), 1e-300)
+        for (x, y), value in zip(patches.centres, pressure, strict=True):
+            text = f"{value:.2g}" if value > 0 else "open"
+            axes.text(
+                x, y, text, ha="center", va="center", color="white" if value > dark else "black"
+            )
+    axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
+    return image
+
+
+def law_figure(table: LawTable) -> Figure:
+    """Draw pressure and area fraction of every patch law over closure, with the table's rows."""
+    figure = Figure(figsize=(9.0, 3.8), layout="constrained")
+    pressure, area = figure.subplots(1, 2)
+    for law in table.laws:
+        if law.is_open:
+            continue
+        closure = np.linspace(*law.range, 200)
+        (line,) = pressure.plot(1e3 * closure, law.at(closure)[0], lw=1.2)
+        pressure.plot(1e3 * law.closure, law.pressure, ".", ms=3, color=line.get_color())
+        area.plot(1e3 * closure, 100 * law.area_fraction_at(closure), lw=1.2)
+    pressure.set(xlabel="closure [µm]", ylabel="mean pressure of the patch [MPa]")
+    area.set(xlabel="closure [µm]", ylabel="contact area fraction [%]")
+    for axes in (pressure, area):
+        axes.grid(alpha=0.3)
+    closed = sum(not law.is_open for law in table.laws)
+    figure.suptitle(f"{closed} patch laws of {len(table.laws)} patches (dots: table rows)")
+    return figure
+
+
+def models_figure(responses: Mapping[str, Response], *, rms_slope: float) -> Figure:
+    """Draw the four panels of Waddad et al. 2016, Fig. 7, for several micro models.
+
+    Args:
+        responses: Response of each micro model by its name.
+        rms_slope: rms gradient of the surface, which scales κ.
+    """
+    figure = Figure(figsize=(9.6, 7.2), layout="constrained")
+    (motion, separation), (area, kappa) = figure.subplots(2, 2)
+    for (name, response), style, colour in zip(responses.items(), _STYLES, _COLOURS, strict=False):
+        look: dict[str, Any] = {"ls": style, "color": colour, "label": name}
+        pressure, fraction = response.mean_pressure, 100 * response.contact_area_fraction
+        motion.plot(1e3 * response.approach, pressure, **look)
+        separation.plot(1e3 * response.mean_separation, pressure, **look)
+        area.plot(pressure, fraction, **look)
+        kappa.plot(fraction, response.kappa(rms_slope), **look)
+    motion.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]", title="(i)")
+    separation.set(xlabel="mean separation [µm]", ylabel="mean pressure [MPa]", title="(ii)")
+    area.set(xlabel="mean pressure [MPa]", ylabel="contact area fraction [%]", title="(iii)")
+    kappa.set(xlabel="contact area fraction [%]", ylabel="κ", title="(iv)")
+    _finish(figure)
+    return figure
+
+
+def _finish(figure: Figure) -> None:
+    """Add grids, and a legend in the first panel when there is more than one line."""
+    for axes in figure.axes:
+        axes.grid(alpha=0.3)
+    first = figure.axes[0]
+    if len(first.get_legend_handles_labels()[0]) > 1:
+        first.legend(frameon=False)
+
+
+def patch_lines(axes: Any, patches: PatchGrid, colour: str) -> None:
+    """Draw the borders between patches.
+
+    Args:
+        axes: Where to draw.
+        patches: The partition.
+        colour: Colour of the lines.
+    """
+    lines: Sequence[tuple[Any, NDArray[np.float64]]] = (
+        (axes.axvline, patches.borders_x[1:-1]),
+        (axes.axhline, patches.borders_y[1:-1]),
+    )
+    for draw, borders in lines:
+        for border in borders:
+            draw(border, color=colour, lw=0.8, alpha=0.9)

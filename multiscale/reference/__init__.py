@@ -1,1 +1,0 @@
-"""The rough surface itself, meshed: what couplings are measured with, and its own error."""

@@ -1,0 +1,1 @@
+"""What a scene leaves open, resolved to values before the run."""

@@ -1,1 +1,0 @@
-"""What a scene file says, read and checked section by section."""
