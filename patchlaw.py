@@ -32,7 +32,7 @@ if TYPE_CHECKING:  # what `_HOMES` says, for editors and type checkers
         Run,
         Scene,
         compare,
-        make_stage,
+        make_setup,
         read_laws,
         run,
     )
@@ -53,7 +53,7 @@ __all__ = [
     "Surface",
     "compare",
     "main",
-    "make_stage",
+    "make_setup",
     "read_laws",
     "read_surface",
     "run",
@@ -65,7 +65,7 @@ _GEOMETRY = (
     "synthesise",
 )  # fmt: skip
 _MULTISCALE = (
-    "Comparison", "History", "LawTable", "LoadStep", "Run", "Scene", "compare", "make_stage",
+    "Comparison", "History", "LawTable", "LoadStep", "Run", "Scene", "compare", "make_setup",
     "read_laws", "run",
 )  # fmt: skip
 _HOMES = {

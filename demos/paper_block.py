@@ -25,7 +25,7 @@ from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from micro import MODELS
-from multiscale import Scene, make_stage, run
+from multiscale import Scene, make_setup, run
 from multiscale.output.figures import draw_pressures, draw_surface
 
 parser = argparse.ArgumentParser()
@@ -60,10 +60,10 @@ if COMM.rank == 0:
 
 # %%
 if COMM.rank == 0:
-    stage = make_stage(Scene.load(PAPER))
+    setup = make_setup(Scene.load(PAPER))
     figure = Figure(figsize=(14.0, 4.4), layout="constrained")
     surface, curve, pressures = figure.subplots(1, 3)
-    draw_surface(figure, surface, stage.surface, stage.asperities, stage.patches)
+    draw_surface(figure, surface, setup.surface, setup.asperities, setup.patches)
     for (name, history), style in zip(analytic.items(), ("-", "--", "-.", ":"), strict=True):
         approach = 1e3 * history.approach_mm
         curve.plot(approach, history.mean_pressure_MPa, style, label=f"half-space, {name}")

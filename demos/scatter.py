@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from geometry import Control
-from multiscale import CondensedCoupling, Scene, consistent_laws, load_steps, make_stage, run
+from multiscale import CondensedCoupling, Scene, consistent_laws, load_steps, make_setup, run
 from multiscale.couplings.blocks import on_body, patch_compliance, scene_body
 
 parser = argparse.ArgumentParser()
@@ -57,7 +57,7 @@ def scene(seed: int) -> Scene:
 
 # %%
 start = time.perf_counter()
-first = make_stage(scene(0))
+first = make_setup(scene(0))
 face, compliance = scene_body(first).face(comm), patch_compliance(first, comm)
 once = time.perf_counter() - start
 
@@ -65,17 +65,17 @@ once = time.perf_counter() - start
 # %%
 def curve(seed: int) -> list[float]:
     """Return the forces of one surface at all load steps [N]."""
-    stage = make_stage(scene(seed))
-    programme = stage.scene.loading.programme
+    setup = make_setup(scene(seed))
+    load_history = setup.scene.loading.load_history
     table = consistent_laws(
-        on_body(stage, None, face=face)(stage.micro, 0),
-        stage.patches,
-        mean_heights=stage.mean_heights,
-        largest=Control(approach=programme.largest, tilt=programme.tilt),
+        on_body(setup, None, face=face)(setup.micro, 0),
+        setup.patches,
+        mean_heights=setup.mean_heights,
+        largest=Control(approach=load_history.largest, tilt=load_history.tilt),
         displacements=lambda pressures: pressures @ compliance.T,
-        tolerance=stage.table_tolerance,
+        tolerance=setup.table_tolerance,
     )
-    return [step.force_N for step in load_steps(CondensedCoupling(table, compliance), programme)]
+    return [step.force_N for step in load_steps(CondensedCoupling(table, compliance), load_history)]
 
 
 start = time.perf_counter()

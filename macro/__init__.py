@@ -1,18 +1,18 @@
 """The elastic block in dolfinx, pressed by a rigid plane through one contact law per patch.
 
 BlockShape → block_mesh → Block (with a Material) → Interface (with a PatchGrid)
-→ PressedBlock (with one ContactLaw per patch) → PressState for every load step.
+→ LawContactProblem (with one ContactLaw per patch) → PressState for every load step.
 
 `face_compliance` is the displacement of the contact face in smooth modes; rough_block_mesh → Block
-→ ObstacleBlock meshes the roughness itself, as a reference.
+→ UnilateralContactProblem meshes the roughness itself, as a reference.
 """
 
 from macro.block import Block
 from macro.compliance.face_compliance import FaceCompliance, cached_face_compliance, face_compliance
 from macro.compliance.patch_compliance import displacements_under, plain_compliance
 from macro.contact.law_interface import ContactLaw, Interface
-from macro.contact.law_problem import PressedBlock, PressState
-from macro.contact.unilateral_problem import ObstacleBlock, ObstacleState
+from macro.contact.law_problem import LawContactProblem, PressState
+from macro.contact.unilateral_problem import UnilateralContactProblem, UnilateralContactState
 from macro.elasticity import Material
 from macro.fields import write_fields, write_rough_fields
 from macro.mesh.block import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
@@ -27,12 +27,12 @@ __all__ = [
     "ContactLaw",
     "FaceCompliance",
     "Interface",
+    "LawContactProblem",
     "Material",
     "MeshQuality",
-    "ObstacleBlock",
-    "ObstacleState",
     "PressState",
-    "PressedBlock",
+    "UnilateralContactProblem",
+    "UnilateralContactState",
     "block_mesh",
     "cached_face_compliance",
     "displacements_under",

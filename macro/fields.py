@@ -12,8 +12,8 @@ from petsc4py import PETSc
 
 from macro import compat
 from macro.contact.law_interface import Interface
-from macro.contact.unilateral_problem import ObstacleBlock
-from macro.contact.unilateral_state import ObstacleState
+from macro.contact.unilateral_problem import UnilateralContactProblem
+from macro.contact.unilateral_state import UnilateralContactState
 from macro.mesh.contact_face import top_facets
 
 Array = NDArray[np.float64]
@@ -58,7 +58,9 @@ def write_fields(
     compat.write_xdmf(str(path), mesh, [moved, pressed])
 
 
-def write_rough_fields(path: Path | str, obstacle: ObstacleBlock, state: ObstacleState) -> None:
+def write_rough_fields(
+    path: Path | str, obstacle: UnilateralContactProblem, state: UnilateralContactState
+) -> None:
     """Write displacements [mm] and contact pressures [MPa] of a rough block as XDMF.
 
     The pressure of a vertex is the contact force there over the tributary area, to which nodes
@@ -85,7 +87,7 @@ def write_rough_fields(path: Path | str, obstacle: ObstacleBlock, state: Obstacl
     compat.write_xdmf(str(path), mesh, [moved, pressed])
 
 
-def _vertex_pressures(obstacle: ObstacleBlock, state: ObstacleState) -> Any:
+def _vertex_pressures(obstacle: UnilateralContactProblem, state: UnilateralContactState) -> Any:
     """Return contact pressures, linear between vertices, zero away from the top [MPa].
 
     The nodes of an element of degree 2 do not have pressures of their own: its vertices have no

@@ -22,7 +22,7 @@ class MicroModel(Protocol):
         """E* [MPa]."""
 
     @property
-    def datum(self) -> float:
+    def reference_height(self) -> float:
         """Height z_M that the approach counts from [mm]."""
 
     @property

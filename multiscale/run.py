@@ -33,15 +33,15 @@ from multiscale.laws.files import LawTable, read_laws, write_laws
 from multiscale.laws.refinement import missed_notes
 from multiscale.laws.repair import repair_notes
 from multiscale.loading.load_step import LoadStep
-from multiscale.loading.stepper import Coupling, Drive, Position, Restorable
+from multiscale.loading.stepper import Coupling, LoadPosition, LoadStepper, Restorable
 from multiscale.machine.mpi_job import for_large
 from multiscale.machine.nodes import nodes_of
-from multiscale.resolution.auto_keys import settled_keys
-from multiscale.resolution.problem_setup import make_stage
+from multiscale.resolution.auto_keys import resolved_keys
+from multiscale.resolution.problem_setup import make_setup
 from multiscale.results.history import History
 from multiscale.results.validity import range_notes
 from multiscale.scene.scene import Scene
-from multiscale.setup.problem import Stage
+from multiscale.setup.problem import ProblemSetup
 from multiscale.storage.serialisation import Arrays, digest
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
@@ -68,11 +68,11 @@ class Run:
     Args:
         scene: What to run.
         comm: MPI communicator (mpi4py); None runs on this process alone.
-        settled: What the scene's open keys became when the run began; see `settled_keys`.
+        settled: What the scene's open keys became when the run began; see `resolved_keys`.
 
     Attributes:
         given: The scene as it was given.
-        stage: The scene's ingredients, made at once: surface, summits, patches, micro model.
+        setup: The scene's ingredients, made at once: surface, summits, patches, micro model.
         scene: The scene, what it left open settled.
         seconds: Wall time of each phase so far [s].
         table: The patch laws, once made.
@@ -87,7 +87,7 @@ class Run:
     ) -> None:
         self.given, self.comm = scene, comm
         self.steps: list[LoadStep] = []
-        self.position = Position()
+        self.position = LoadPosition()
         self._resumed: Resumed | None = None
         self._laws: bytes | None = None
         self._on_body: OnBody | None = None
@@ -97,44 +97,46 @@ class Run:
         self.coupling: Coupling | None = None
         load_together(scene, comm)
         nodes = nodes_of(comm)
-        self.stage: Stage = on_root(for_large(comm), lambda: make_stage(scene, settled, nodes))
-        self.scene = self.stage.scene
-        self.seconds = dict(self.stage.seconds)
+        self.setup: ProblemSetup = on_root(
+            for_large(comm), lambda: make_setup(scene, settled, nodes)
+        )
+        self.scene = self.setup.scene
+        self.seconds = dict(self.setup.seconds)
 
     def make_body(self) -> OnBody | None:
         """Make what puts the half-space model on its body, once; None for other micro models."""
-        if self._on_body is None and isinstance(self.stage.micro, HalfSpaceModel):
+        if self._on_body is None and isinstance(self.setup.micro, HalfSpaceModel):
             with self.phase("block"):
-                alone = not self.stage.embedded
-                self._on_body = on_body(self.stage, self.comm, half_space=alone)
+                alone = not self.setup.embedded
+                self._on_body = on_body(self.setup, self.comm, half_space=alone)
         return self._on_body
 
     def make_model(self) -> MicroModel:
         """Make the micro model that contacts are solved with, on the body unless isolated."""
-        model = self.stage.micro
+        model = self.setup.micro
         if isinstance(model, HalfSpaceModel) and self.scene.coupling.kind != "isolated":
             body = self.make_body()
             assert body is not None
-            return body(model, SLOPES if self.stage.finite_slopes else 0)
+            return body(model, SLOPES if self.setup.finite_slopes else 0)
         with self.phase("block"):
-            return contact_model(self.stage, self.comm)
+            return contact_model(self.setup, self.comm)
 
     def make_laws(self) -> LawTable:
         """Tabulate the laws of all patches, once."""
         if self.table is None:
             model = self.make_model()
             with self.phase("laws"):
-                self.table = make_table(self.stage, model, self.comm)
+                self.table = make_table(self.setup, model, self.comm)
         return self.table
 
     def make_coupling(self) -> Coupling:
         """Make what finds the load steps, once, and what it needs."""
         if self.coupling is None:
             made: LawTable | MicroModel | None = None
-            if self.stage.micro is not None:
-                made = self.make_laws() if self.stage.by_laws else self.make_model()
+            if self.setup.micro is not None:
+                made = self.make_laws() if self.setup.by_laws else self.make_model()
             with self.phase("block"):
-                coupling, self.interface = assemble(self.stage, made, self.comm)
+                coupling, self.interface = assemble(self.setup, made, self.comm)
                 if self._resumed and self._resumed.state and isinstance(coupling, Restorable):
                     coupling.restore(self._resumed.state)
                 self.coupling = coupling
@@ -146,7 +148,7 @@ class Run:
         Raises:
             NotConverged: When a step fails for good; `history` holds those before it.
         """
-        drive = Drive(self.make_coupling(), self.scene.loading.programme, self.position)
+        drive = LoadStepper(self.make_coupling(), self.scene.loading.load_history, self.position)
         with self.phase("load steps"):
             for step in drive:
                 self.position = drive.position
@@ -162,9 +164,9 @@ class Run:
         if body is None:
             return step
         with self.phase("check"):
-            probe = error_probe(self.stage, body)
+            probe = error_probe(self.setup, body)
             try:
-                return checked(step, probe, self.scene.loading.programme, self.comm)
+                return checked(step, probe, self.scene.loading.load_history, self.comm)
             except NotConverged as error:
                 self._unchecked.append(f"errors of load step {step.step} not measured: {error}")
                 return step
@@ -172,13 +174,13 @@ class Run:
     @property
     def finished(self) -> bool:
         """Whether the load programme has come to its end."""
-        ends = self.position.targets == self.scene.loading.programme.count
+        ends = self.position.targets == self.scene.loading.load_history.count
         return ends and not self.position.ahead
 
     @cached_property
     def settled(self) -> dict[str, Any]:
         """What the scene's open keys became."""
-        return settled_keys(self.stage, self.given)
+        return resolved_keys(self.setup, self.given)
 
     def state(self) -> Arrays:
         """Return what the coupling's next load step starts from.
@@ -191,7 +193,7 @@ class Run:
         return self._resumed.state if self._resumed else {}
 
     def resume(
-        self, steps: Sequence[LoadStep], position: Position, state: Arrays, laws: bytes
+        self, steps: Sequence[LoadStep], position: LoadPosition, state: Arrays, laws: bytes
     ) -> None:
         """Go on after load steps of the same scene; call it before anything is made.
 
@@ -209,7 +211,7 @@ class Run:
     @cached_property
     def heights(self) -> str:
         """SHA-256 of the surface's heights."""
-        return digest({"heights": self.stage.surface.heights})
+        return digest({"heights": self.setup.surface.heights})
 
     @property
     def law_bytes(self) -> bytes:
@@ -225,17 +227,17 @@ class Run:
     def history(self) -> History:
         """Return the load steps accepted so far, with times and notes."""
         notes = []
-        if self.stage.choice is not None:
-            notes.append(f"micro model chosen: {self.stage.choice.sentence}")
+        if self.setup.choice is not None:
+            notes.append(f"micro model chosen: {self.setup.choice.sentence}")
         if self.table is not None:
             errors = [law.interpolation_error for law in self.table.laws]
             notes.append(
                 f"interpolation error of the laws between their rows: {self.table.force_error:.1e} "
                 f"of the force, {max(errors):.1e} of a patch's pressure or the mean, if more"
             )
-            notes += missed_notes(self.table, self.stage.table_tolerance)
+            notes += missed_notes(self.table, self.setup.table_tolerance)
             notes += repair_notes(self.table.laws)
-            planned, taken = newton_choice(self.stage), newton_choice(self.stage, self.table)
+            planned, taken = newton_choice(self.setup), newton_choice(self.setup, self.table)
             if taken.condensed != planned.condensed:
                 notes.append(f"Newton condensed to the patches, not full: {taken.why}")
         imbalances = [abs(step.imbalance) for step in self.steps if step.imbalance is not None]
@@ -248,12 +250,12 @@ class Run:
             notes.append(f"resumed after load step {after}; times of phases are those since then")
         record, steps = None, tuple(self.steps)
         if isinstance(self.coupling, ReferenceCoupling):
-            record = recorded(self.stage, self.coupling, self.steps)
+            record = recorded(self.setup, self.coupling, self.steps)
             steps = record.with_errors(steps)
-            notes += reference_notes(record, self.coupling, self.steps, self.stage)
+            notes += reference_notes(record, self.coupling, self.steps, self.setup)
         return History(
             steps=steps,
-            patches=self.stage.patches,
+            patches=self.setup.patches,
             seconds=dict(self.seconds),
             notes=tuple(notes),
             reference=record,
@@ -274,7 +276,7 @@ class Run:
         if isinstance(self.coupling, EmbeddedCoupling) and self.interface is not None:
             return self.interface, self.coupling.displacement
         with self.phase("field"):
-            return final_field(self.stage, self.steps[-1].patches.pressure_MPa, self.comm)
+            return final_field(self.setup, self.steps[-1].patches.pressure_MPa, self.comm)
 
     def close(self) -> None:
         """Free the blocks; what was accepted stays, fields are gone.

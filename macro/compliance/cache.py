@@ -83,7 +83,7 @@ def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], co
     return kept
 
 
-def is_kept(kind: str, key: tuple[object, ...]) -> bool:
+def is_cached(kind: str, key: tuple[object, ...]) -> bool:
     """Tell whether `cached` would find arrays, without reading them.
 
     Args:
@@ -101,7 +101,7 @@ def is_kept(kind: str, key: tuple[object, ...]) -> bool:
 def sources_digest() -> str:
     """Return a digest of the sources of the packages that make what is kept."""
     found = hashlib.sha256()
-    top = Path(__file__).resolve().parent.parent
+    top = Path(__file__).resolve().parents[2]
     for package in _SOURCES:
         for path in sorted((top / package).rglob("*.py")):
             found.update(path.relative_to(top).as_posix().encode() + b"\0" + path.read_bytes())

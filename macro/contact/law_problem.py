@@ -62,7 +62,7 @@ class PressState:
     wall_s: float
 
 
-class PressedBlock:
+class LawContactProblem:
     """A block under a rigid plane, solved for one load step after the other by Newton's method.
 
     The plane's approach or force, and its tilt or no moment, are prescribed: both ways are one

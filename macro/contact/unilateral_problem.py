@@ -16,13 +16,13 @@ from macro.contact.active_set import ActiveNodes
 from macro.contact.augmented_lagrangian import AugmentedFacets
 from macro.contact.face_nodes import TopNodes
 from macro.contact.rigid_plane import RigidPlane
-from macro.contact.unilateral_state import ObstacleState, measured
+from macro.contact.unilateral_state import UnilateralContactState, measured
 
 Array = NDArray[np.float64]
 Method = Literal["active-set", "augmented-lagrangian", "penalty"]
 
 
-class ObstacleBlock:
+class UnilateralContactProblem:
     """A block with a rough top, pressed by a rigid plane.
 
     Args:
@@ -76,7 +76,7 @@ class ObstacleBlock:
             exact = method == "augmented-lagrangian"
             self._method = AugmentedFacets(block, self.top, self._plane, penalty, exact=exact)
 
-    def press(self, control: Control) -> ObstacleState:
+    def press(self, control: Control) -> UnilateralContactState:
         """Find the contact of one load step, starting from those before.
 
         A force and a moment of zero are met to `macro.linear_solvers.constrained.TOLERANCE` of the

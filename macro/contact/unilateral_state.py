@@ -18,7 +18,7 @@ Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ObstacleState:
+class UnilateralContactState:
     """Contact at one load step; numbers are the same on every rank.
 
     Attributes:
@@ -86,7 +86,9 @@ class Found(NamedTuple):
     reason: str
 
 
-def measured(block: Block, top: TopNodes, plane: RigidPlane, found: Found) -> ObstacleState:
+def measured(
+    block: Block, top: TopNodes, plane: RigidPlane, found: Found
+) -> UnilateralContactState:
     """Measure what is told of a solution.
 
     Args:
@@ -108,7 +110,7 @@ def measured(block: Block, top: TopNodes, plane: RigidPlane, found: Found) -> Ob
     area = np.where(touching, top.area, 0.0)
     weight = np.stack([top.area, top.area * gap, area, touching], axis=1)
     whole, room, contact, nodes = block.mesh.comm.allreduce(weight.sum(axis=0), op=MPI.SUM)
-    return ObstacleState(
+    return UnilateralContactState(
         approach=float(found.plane[0]),
         tilt=(float(found.plane[1]), float(found.plane[2])),
         displacement=found.displacement,

@@ -119,7 +119,7 @@ class AsperityModel:
         return next(name for name, value in MODELS.items() if value == kind)
 
     @property
-    def datum(self) -> float:
+    def reference_height(self) -> float:
         """Height z_M that the approach counts from [mm]."""
         return self.asperities.highest
 
@@ -127,7 +127,7 @@ class AsperityModel:
     def first_touch(self) -> float:
         """Approach of a level plane at first contact [mm]; infinite without asperities."""
         heights = self.asperities.z
-        return float(self.datum - heights.max()) if heights.size else np.inf
+        return float(self.reference_height - heights.max()) if heights.size else np.inf
 
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
         """Return the model of the summits of one patch; see `MicroModel.of_patch`."""

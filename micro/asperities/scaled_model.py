@@ -98,7 +98,7 @@ class ScaledModel:
         return f"{self.kind}, curvature {self.curvature}, border {self.border}"
 
     @property
-    def datum(self) -> float:
+    def reference_height(self) -> float:
         """Height z_M that the approach counts from [mm]."""
         return self.surface.highest
 
@@ -106,7 +106,7 @@ class ScaledModel:
     def first_touch(self) -> float:
         """Approach of a level plane at first contact [mm]; infinite without asperities."""
         heights = self._scaled(0.0).summits.z
-        return float(self.datum - heights.max()) if heights.size else np.inf
+        return float(self.reference_height - heights.max()) if heights.size else np.inf
 
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
         """Return the model of the summits of one patch; see `MicroModel.of_patch`."""

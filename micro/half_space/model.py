@@ -104,7 +104,7 @@ class HalfSpaceModel:
         return "half-space-periodic" if self.periodic else "half-space"
 
     @property
-    def datum(self) -> float:
+    def reference_height(self) -> float:
         """Height z_M that the approach counts from [mm]."""
         return self.surface.highest if self.highest is None else self.highest
 
@@ -123,7 +123,7 @@ class HalfSpaceModel:
         model = replace(
             self,
             surface=piece,
-            highest=self.datum,
+            highest=self.reference_height,
             periodic=False,
             sides=None,
             body=None,
@@ -285,7 +285,7 @@ class HalfSpaceModel:
     def _sums(self, patches: Partition, mean_heights: ArrayLike) -> CellSums:
         means = checked_means(mean_heights, patches)
         return CellSums(
-            surface=self.surface, patches=patches, mean_heights=means, highest=self.datum
+            surface=self.surface, patches=patches, mean_heights=means, highest=self.reference_height
         )
 
     def _along(self, planes: list[RigidPlane]) -> Iterator[tuple[RigidPlane, HalfSpaceState]]:
@@ -334,7 +334,7 @@ class HalfSpaceModel:
 
     def _required(self, plane: RigidPlane) -> Array:
         surface = self.surface
-        below = self.datum - surface.heights
+        below = self.reference_height - surface.heights
         return np.asarray(plane.at(surface.x[:, None], surface.y) - below)
 
     def _state(self, plane: RigidPlane, found: Pressures) -> HalfSpaceState:

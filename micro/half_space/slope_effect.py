@@ -64,4 +64,4 @@ def _lowered(model: HalfSpaceModel, slopes: FiniteSlopes, state: HalfSpaceState)
     surface = model.surface
     heights = surface.heights - slopes.displacement(state.pressure)
     lower = Surface(heights=heights, lengths=surface.lengths, periodic=surface.periodic)
-    return replace(model, surface=lower, highest=model.datum)
+    return replace(model, surface=lower, highest=model.reference_height)

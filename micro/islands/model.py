@@ -86,19 +86,21 @@ class IslandModel:
         return "islands"
 
     @property
-    def datum(self) -> float:
+    def reference_height(self) -> float:
         """Height z_M that the approach counts from [mm]."""
         return self.surface.highest if self.highest is None else self.highest
 
     @property
     def first_touch(self) -> float:
         """Approach of a level plane at first contact [mm]."""
-        return self.datum - self.surface.highest
+        return self.reference_height - self.surface.highest
 
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
         """Return the model of one patch cut out along its borders; see `MicroModel.of_patch`."""
         piece = self.surface.piece(*patches.bounds(index))
-        return replace(self, surface=piece, highest=self.datum, body=None), whole_patch(piece)
+        return replace(self, surface=piece, highest=self.reference_height, body=None), whole_patch(
+            piece
+        )
 
     def solve(self, approach: float, *, tilt: tuple[float, float] = _LEVEL) -> IslandState:
         """Solve the contact at one approach of the plane.
@@ -200,7 +202,7 @@ class IslandModel:
         lever = np.stack([np.ones(len(relief)), relief.x - middle[0], relief.y - middle[1]], axis=1)
         return Peaks(
             lever=lever,
-            below=self.datum - relief.z + lever[:, 1:] @ leant.tilt,
+            below=self.reference_height - relief.z + lever[:, 1:] @ leant.tilt,
             force=lambda over: self.contact_modulus * total_force(relief, over),
             half=half,
         )
@@ -215,7 +217,7 @@ class IslandModel:
         """Solve on catchments under the slopes of one plane, for another."""
         peaks = self._peaks(relief, leant)
         motion = peaks.first_plane(control, near)
-        level = self.datum - motion[0] - peaks.lever[:, 1:] @ (motion[1:] - leant.tilt)
+        level = self.reference_height - motion[0] - peaks.lever[:, 1:] @ (motion[1:] - leant.tilt)
         body = None
         if self.body is not None:
             body = BodyPoints.at(self.body, relief.x, relief.y, self.contact_modulus)
@@ -235,7 +237,7 @@ class IslandModel:
         sums = IslandSums(
             relief=found.relief,
             lengths=self.surface.lengths,
-            highest=self.datum,
+            highest=self.reference_height,
             patches=patches,
             mean_heights=means,
             contact_modulus=self.contact_modulus,
@@ -253,7 +255,7 @@ class IslandModel:
             # apart from the heights, which may continue where a lean does not
             heights = plane.at(surface.x[:, None], surface.y) - plane.approach
             lean = replace(surface, heights=heights, periodic=False)
-        floor = self.datum - _MARGIN * max(plane.approach, 0.0)
+        floor = self.reference_height - _MARGIN * max(plane.approach, 0.0)
         return Relief.of(surface, lean=lean, floor=-np.inf if self._is_kept else floor)
 
     @property

@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import connected_components
 
 from geometry import Surface
 from geometry.ascent import coincident, constrained_summits
-from micro.islands.watersheds import Passes, catchments, passes_between, sampled
+from micro.islands.watersheds import Passes, passes_between, sampled, watersheds
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -77,7 +77,7 @@ class Relief:
         parts = [surface] if lean is None else [surface, lean]
         heights = np.sum([sampled(part) for part in parts], axis=0)
         side = np.array(surface.lengths) / heights.shape
-        owner, peak = catchments(heights)
+        owner, peak = watersheds(heights)
         top = np.stack(np.unravel_index(peak, heights.shape), axis=1)
         summit = constrained_summits(surface, (top + 0.5) * side, lean)
         z = np.sum([part.height_at(*summit.T) for part in parts], axis=0)

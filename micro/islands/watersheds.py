@@ -56,7 +56,7 @@ def sampled(surface: Surface) -> Array:
     return surface.height_at(x[:, None], y)
 
 
-def catchments(heights: Array) -> tuple[Indices, Indices]:
+def watersheds(heights: Array) -> tuple[Indices, Indices]:
     """Return the peak number of every sample, shape (nx ny,), and the peaks' flat indices.
 
     Equal neighbours climb to the one with the larger flat index; a plateau has one peak, or

@@ -15,22 +15,22 @@ from geometry.statistics import roughness
 from multiscale.costs.prediction import Cost
 from multiscale.couplings.blocks import load_together
 from multiscale.laws.files import write_laws
-from multiscale.machine.mpi_job import for_large, refuse_strangers
-from multiscale.machine.nodes import Nodes, nodes_of
+from multiscale.machine.mpi_job import for_large, refuse_detached_processes
+from multiscale.machine.nodes import ClusterNodes, nodes_of
 from multiscale.output import terminal
 from multiscale.output.field_files import write_fields
 from multiscale.output.results import write_figure, write_results
 from multiscale.planning import plan
 from multiscale.planning.forecast import forecast
 from multiscale.planning.memory import shortages
-from multiscale.resolution.problem_setup import make_stage
+from multiscale.resolution.problem_setup import make_setup
 from multiscale.restart.folder_lock import locked
 from multiscale.restart.interruption import Interruption, Stopped
-from multiscale.restart.resuming import Keeper, is_finished, kept_choices
+from multiscale.restart.resuming import CheckpointWriter, is_finished, kept_choices
 from multiscale.run import Run
 from multiscale.scene.quantities import parse_duration
 from multiscale.scene.scene import Scene
-from multiscale.setup.problem import Stage
+from multiscale.setup.problem import ProblemSetup
 from multiscale.storage.whole_files import write_whole
 
 
@@ -47,7 +47,7 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
         kept = on_root(comm, lambda: kept_choices(folder, scene)) if choice.resume else None
         run = Run(scene, comm, kept)
         with locked(folder, comm) as lock:
-            keeper = Keeper(folder, run, lock)
+            keeper = CheckpointWriter(folder, run, lock)
             if not _begun(choice.resume, folder, run, keeper):
                 return
             failure = _stepped(run, keeper, interruption)
@@ -63,7 +63,7 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
             on_root(comm, keeper.remove)
 
 
-def _begun(resume: bool, folder: Path, run: Run, keeper: Keeper) -> bool:
+def _begun(resume: bool, folder: Path, run: Run, keeper: CheckpointWriter) -> bool:
     """Go on from a checkpoint if asked to, and say what will be done; False if nothing is left."""
     comm, said = run.comm, None
     if resume and keeper.resume():
@@ -75,18 +75,20 @@ def _begun(resume: bool, folder: Path, run: Run, keeper: Keeper) -> bool:
         said = f"nothing to resume in {folder}: begins with the first load step"
     elif on_root(comm, keeper.exists):
         said = f"replaces the interrupted run in {folder} (to go on with it: --resume)"
-    terminal.show_plan(comm, run.stage)
+    terminal.show_plan(comm, run.setup)
     if said:
         terminal.say(comm, said)
     return True
 
 
-def _stepped(run: Run, keeper: Keeper, interruption: Interruption) -> PatchlawError | None:
+def _stepped(
+    run: Run, keeper: CheckpointWriter, interruption: Interruption
+) -> PatchlawError | None:
     """Make and keep the load steps; return what ended them early, on all ranks alike."""
-    programme = run.scene.loading.programme
-    with terminal.progress(run.comm, programme, len(run.steps)) as advance:
+    load_history = run.scene.loading.load_history
+    with terminal.progress(run.comm, load_history, len(run.steps)) as advance:
         try:
-            if run.stage.by_laws:
+            if run.setup.by_laws:
                 run.make_laws()
             keeper.write()
             interruption.check("before the block was made")
@@ -128,14 +130,14 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
     scene, _ = scene_and_folder(choice, comm, writes=False)
     load_together(scene, comm)
     nodes = nodes_of(comm)
-    stage, made = on_root(for_large(comm), lambda: _planned(scene, nodes))
-    terminal.show_plan(comm, stage, made, list(shortages(stage, nodes)))
+    setup, made = on_root(for_large(comm), lambda: _planned(scene, nodes))
+    terminal.show_plan(comm, setup, made, list(shortages(setup, nodes)))
 
 
-def _planned(scene: Scene, nodes: Nodes) -> tuple[Stage, Cost]:
+def _planned(scene: Scene, nodes: ClusterNodes) -> tuple[ProblemSetup, Cost]:
     """Plan a run, on more nodes like those here if it takes them."""
-    stage = make_stage(scene, nodes=replace(nodes, more=True))
-    return stage, forecast(stage)
+    setup = make_setup(scene, nodes=replace(nodes, more=True))
+    return setup, forecast(setup)
 
 
 def tabulate_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -149,7 +151,7 @@ def tabulate_scene(choice: argparse.Namespace, options: list[str], comm: Any) ->
     scene, folder = scene_and_folder(choice, comm)
     with locked(folder, comm):
         run = Run(scene, comm)
-        terminal.show_plan(comm, run.stage)
+        terminal.show_plan(comm, run.setup)
         table = run.make_laws()
 
         def write() -> list[Path]:
@@ -173,23 +175,23 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
     """
     scene, folder = scene_and_folder(choice, comm)
     nodes = replace(nodes_of(comm), more=True)  # a surface needs no room for its block
-    stage = on_root(for_large(comm), lambda: make_stage(scene, nodes=nodes))
-    rough = roughness(stage.surface)
+    setup = on_root(for_large(comm), lambda: make_setup(scene, nodes=nodes))
+    rough = roughness(setup.surface)
     pairs = [
-        ("surface", plan.surface_statement(stage)),
+        ("surface", plan.surface_statement(setup)),
         ("Sa, Sq, Sz", f"{1e3 * rough.sa:.4g}, {1e3 * rough.sq:.4g}, {1e3 * rough.sz:.4g} µm"),
         ("Ssk, Sku, Sdq", f"{rough.ssk:.4g}, {rough.sku:.4g}, {rough.sdq:.4g}"),
         ("m0, m2, m4", f"{rough.m0:.4g} mm², {rough.m2:.4g}, {rough.m4:.4g} 1/mm² (profile)"),
         ("Nayak α", f"{rough.nayak:.3g} (profile), {rough.nayak_radial:.3g} (radial moments)"),
-        ("highest point", f"{1e3 * stage.surface.highest:.6g} µm"),
-        ("summits", f"{stage.asperities.count}, border maxima {stage.asperities.border_x.size}"),
+        ("highest point", f"{1e3 * setup.surface.highest:.6g} µm"),
+        ("summits", f"{setup.asperities.count}, border maxima {setup.asperities.border_x.size}"),
     ]
     terminal.show_pairs(comm, pairs)
 
     def write() -> list[Path]:
         from multiscale.output.figures import surface_figure
 
-        figure = surface_figure(stage.surface, stage.asperities, stage.patches)
+        figure = surface_figure(setup.surface, setup.asperities, setup.patches)
         return [write_figure(folder / "surface.png", figure)]
 
     with locked(folder, comm):
@@ -223,7 +225,7 @@ def scene_and_folder(
         InputError: When the scene or the folder cannot be used, or this process is one of several
             that should be one MPI job and are not.
     """
-    refuse_strangers()
+    refuse_detached_processes()
 
     def read() -> tuple[Scene, Path]:
         scene = Scene.load(choice.scene, choice.set)

@@ -8,13 +8,13 @@ from typing import Any
 
 from geometry.errors import InputError, NotConverged
 from multiscale.cli.commands import scene_and_folder
-from multiscale.compare.comparison import Comparison
-from multiscale.compare.level import Level
-from multiscale.compare.level_results import LevelResult
-from multiscale.compare.level_runs import check_launchable
-from multiscale.compare.outcomes import AGAINST
-from multiscale.compare.report import bargains, headline, write_comparison
-from multiscale.compare.run_comparison import compare
+from multiscale.comparison.compare import compare
+from multiscale.comparison.comparison import Comparison
+from multiscale.comparison.level import Level
+from multiscale.comparison.level_results import LevelResult
+from multiscale.comparison.level_runs import check_launchable
+from multiscale.comparison.outcomes import AGAINST
+from multiscale.comparison.report import bargains, headline, write_comparison
 from multiscale.output import terminal
 from multiscale.restart.folder_lock import locked
 from multiscale.scene.quantities import parse_duration

@@ -14,8 +14,8 @@ import numpy as np
 from geometry.surface import Surface
 from micro import HalfSpaceModel, ScaledModel
 from multiscale.costs.work import Work
-from multiscale.loading.stepper import Programme
-from multiscale.setup.problem import Stage
+from multiscale.loading.stepper import LoadHistory
+from multiscale.setup.problem import ProblemSetup
 
 _LOADS = (0.25, 0.5, 0.75, 1.0)
 """Loads, relative to the largest, whose mean stands for those of a run."""
@@ -57,11 +57,11 @@ def reach(surface: Surface, plane: tuple[float, tuple[float, float]], summits: i
     end, tilt = plane
     dx, dy = surface.x - 0.5 * surface.lengths[0], surface.y - 0.5 * surface.lengths[1]
     overlap = end + tilt[0] * dx[:, None] + tilt[1] * dy - (surface.highest - surface.heights)
-    deepest = float(overlap.max())
+    largest_interference = float(overlap.max())
     boxes = []
     for load in _LOADS:
-        i, j = np.nonzero(overlap > (1.0 - load) * deepest)
-        touched = i.size and deepest > 0.0
+        i, j = np.nonzero(overlap > (1.0 - load) * largest_interference)
+        touched = i.size and largest_interference > 0.0
         boxes.append(float((np.ptp(i) + 1) * (np.ptp(j) + 1)) if touched else 1.0)
     size = surface.heights.size
     return Reach(heights=size, box=float(np.mean(boxes)) / size, summits=summits)
@@ -88,58 +88,58 @@ def kind_work(kind: str, cells: int, at: Reach) -> Work:
     return each
 
 
-def press_work(stage: Stage, *, alone: bool = False) -> Work:
+def press_work(setup: ProblemSetup, *, alone: bool = False) -> Work:
     """Return the work of one press of a scene's micro model, started from one nearby.
 
     Args:
-        stage: The scene's ingredients.
+        setup: The scene's ingredients.
         alone: Whether one of the patches is pressed by itself.
     """
-    model, cells = stage.model, 0
+    model, cells = setup.model, 0
     kind = "scaled" if isinstance(model, ScaledModel) else model.name
     if isinstance(model, HalfSpaceModel):
         cells = int(np.prod(model.surface.grid))
-    at = reach(stage.surface, stage.furthest, int(stage.reached.sum()))
+    at = reach(setup.surface, setup.plane_at_largest_load, int(setup.reached.sum()))
     if alone:  # on the piece of the surface that is the patch
-        cells //= stage.patches.count
-        heights = at.heights // stage.patches.count
-        at = replace(at, heights=heights, summits=at.summits // max(stage.reached_patches, 1))
+        cells //= setup.patches.count
+        heights = at.heights // setup.patches.count
+        at = replace(at, heights=heights, summits=at.summits // max(setup.reached_patches, 1))
     work = kind_work(kind, cells, at)
     if alone:
         return work
-    work = _SLOPES * work if stage.finite_slopes else work
-    return _BODY * work if stage.embedded and cells else work
+    work = _SLOPES * work if setup.finite_slopes else work
+    return _BODY * work if setup.embedded and cells else work
 
 
-def check_work(stage: Stage) -> Work:
+def check_work(setup: ProblemSetup) -> Work:
     """Return the work of measuring the errors of a load step.
 
     Args:
-        stage: The scene's ingredients.
+        setup: The scene's ingredients.
     """
-    solved = _CHECK + (1.0 if stage.by_laws else 0.0)
-    return solved * press_work(stage)
+    solved = _CHECK + (1.0 if setup.by_laws else 0.0)
+    return solved * press_work(setup)
 
 
-def law_work(stage: Stage) -> Work:
+def law_work(setup: ProblemSetup) -> Work:
     """Return the work of tabulating the laws of a scene.
 
     Args:
-        stage: The scene's ingredients.
+        setup: The scene's ingredients.
     """
-    rows = ROWS["summits" if stage.by_summits else "cells"]
-    if stage.scene.coupling.kind == "isolated":
-        return rows * stage.reached_patches * press_work(stage, alone=True)
-    return rows * (press_work(stage) + Work(call=15 * stage.patches.count))
+    rows = ROWS["summits" if setup.by_summits else "cells"]
+    if setup.scene.coupling.kind == "isolated":
+        return rows * setup.reached_patches * press_work(setup, alone=True)
+    return rows * (press_work(setup) + Work(call=15 * setup.patches.count))
 
 
-def step_count(programme: Programme) -> int:
+def step_count(load_history: LoadHistory) -> int:
     """Return the number of load steps, as far as it is known before.
 
     Args:
-        programme: What the plane is made to do.
+        load_history: What the plane is made to do.
     """
-    steps = programme.count
-    if programme.force_change is None:
+    steps = load_history.count
+    if load_history.force_change is None:
         return steps
-    return max(steps, int(np.ceil(len(programme.points) / programme.force_change)))
+    return max(steps, int(np.ceil(len(load_history.points) / load_history.force_change)))

@@ -21,7 +21,7 @@ from multiscale.costs.contact_work import check_work, law_work, press_work, step
 from multiscale.costs.work import Work
 from multiscale.couplings.newton_choice import CYCLES_PER_PATCH, full_cycles, newton_choice
 from multiscale.machine.rates import Machine
-from multiscale.setup.problem import Stage
+from multiscale.setup.problem import ProblemSetup
 
 PHASES = ("surface", "micro choice", "laws", "block", "load steps", "check", "field", "output")
 """Phases of a run, in their order."""
@@ -52,44 +52,44 @@ class Cost:
         return sum(self.seconds.values())
 
 
-def predicted_cost(stage: Stage, machine: Machine) -> Cost:
+def predicted_cost(setup: ProblemSetup, machine: Machine) -> Cost:
     """Predict what a run takes.
 
     Args:
-        stage: The scene's ingredients.
+        setup: The scene's ingredients.
         machine: How fast it is; only the rates that are needed are measured.
     """
-    works = run_work(stage)
+    works = run_work(setup)
     seconds = {phase: works[phase].seconds(machine) for phase in PHASES if phase in works}
-    return Cost(seconds=seconds, memory=_memory(stage))
+    return Cost(seconds=seconds, memory=_memory(setup))
 
 
-def run_work(stage: Stage) -> dict[str, Work]:
+def run_work(setup: ProblemSetup) -> dict[str, Work]:
     """Return the work of every phase that a run of a scene has.
 
     Args:
-        stage: The scene's ingredients.
+        setup: The scene's ingredients.
     """
-    works = {"surface": _surface(stage.surface.heights.size)}
-    if stage.choice is not None:
-        works["micro choice"] = _micro_choice(stage)
-    if stage.by_laws:
-        works["laws"] = law_work(stage)
-    if stage.meshes is not None:
-        programme = stage.scene.loading.programme
+    works = {"surface": _surface(setup.surface.heights.size)}
+    if setup.choice is not None:
+        works["micro choice"] = _micro_choice(setup)
+    if setup.by_laws:
+        works["laws"] = law_work(setup)
+    if setup.meshes is not None:
+        load_history = setup.scene.loading.load_history
         works["block"], works["load steps"] = reference_work(
-            stage.meshes, step_count(programme), turning=programme.tilt is None
+            setup.meshes, step_count(load_history), turning=load_history.tilt is None
         )
     else:
-        works["block"], works["load steps"] = _block(stage), _load_steps(stage)
-    output = stage.scene.output
-    if isinstance(stage.micro, HalfSpaceModel) and output.check != "none":
-        checks = step_count(stage.scene.loading.programme) if output.check == "all" else 1
-        works["check"] = checks * check_work(stage)
-    if output.fields and stage.embedded and not (stage.meshes or _on_mesh(stage)):
-        works["field"] = mesh_work(stage.shape) + cycle_work(stage.shape, CYCLES_PER_PATCH)
+        works["block"], works["load steps"] = _block(setup), _load_steps(setup)
+    output = setup.scene.output
+    if isinstance(setup.micro, HalfSpaceModel) and output.check != "none":
+        checks = step_count(setup.scene.loading.load_history) if output.check == "all" else 1
+        works["check"] = checks * check_work(setup)
+    if output.fields and setup.embedded and not (setup.meshes or _on_mesh(setup)):
+        works["field"] = mesh_work(setup.shape) + cycle_work(setup.shape, CYCLES_PER_PATCH)
     if output.figures:
-        works["output"] = (4 if stage.by_laws else 3) * _FIGURE
+        works["output"] = (4 if setup.by_laws else 3) * _FIGURE
         works["output"] += Work() if "matplotlib" in sys.modules else _DRAWING
     return works
 
@@ -98,54 +98,54 @@ def _surface(heights: int) -> Work:
     return Work(call=25_000, passes=400.0 * heights)
 
 
-def _micro_choice(stage: Stage) -> Work:
+def _micro_choice(setup: ProblemSetup) -> Work:
     """Count a cold solution on a grid of twice the sides, and what the candidates ask for."""
-    heights = 4.0 * stage.surface.heights.size
+    heights = 4.0 * setup.surface.heights.size
     return Work(call=200_000, passes=300.0 * heights, transform=350.0 * heights * np.log2(heights))
 
 
-def _on_mesh(stage: Stage) -> bool:
-    return stage.by_laws and not newton_choice(stage).condensed
+def _on_mesh(setup: ProblemSetup) -> bool:
+    return setup.by_laws and not newton_choice(setup).condensed
 
 
-def _block(stage: Stage) -> Work:
-    if not stage.embedded:
+def _block(setup: ProblemSetup) -> Work:
+    if not setup.embedded:
         return Work(call=1_000)
-    coupling = stage.scene.coupling
+    coupling = setup.scene.coupling
     if coupling.decomposed:
         return import_work() + BODY
-    work = import_work() + mesh_work(stage.shape)
-    if newton_choice(stage).condensed:
-        work += cycle_work(stage.shape, CYCLES_PER_PATCH * stage.patches.count)
+    work = import_work() + mesh_work(setup.shape)
+    if newton_choice(setup).condensed:
+        work += cycle_work(setup.shape, CYCLES_PER_PATCH * setup.patches.count)
     return work
 
 
-def _load_steps(stage: Stage) -> Work:
-    steps = step_count(stage.scene.loading.programme)
-    if not stage.by_laws:
-        return steps * press_work(stage)
-    if _on_mesh(stage):
-        return cycle_work(stage.shape, full_cycles(stage, steps))
-    patches = stage.patches.count
+def _load_steps(setup: ProblemSetup) -> Work:
+    steps = step_count(setup.scene.loading.load_history)
+    if not setup.by_laws:
+        return steps * press_work(setup)
+    if _on_mesh(setup):
+        return cycle_work(setup.shape, full_cycles(setup, steps))
+    patches = setup.patches.count
     dense = Work(call=1_200, passes=60.0 * patches**2, flop=patches**3 / 3)
     return (_LAW_NEWTON * steps) * dense
 
 
-def _memory(stage: Stage) -> float:
+def _memory(setup: ProblemSetup) -> float:
     """Return what is in use now, and what the largest phase adds."""
-    model, shape = stage.micro, stage.shape
+    model, shape = setup.micro, setup.shape
     cells = float(np.prod(model.surface.grid)) if isinstance(model, HalfSpaceModel) else 0.0
-    micro = _BYTES_PER_CELL * cells + _BYTES_PER_HEIGHT * stage.surface.heights.size
-    patches, steps = stage.patches.count, step_count(stage.scene.loading.programme)
+    micro = _BYTES_PER_CELL * cells + _BYTES_PER_HEIGHT * setup.surface.heights.size
+    patches, steps = setup.patches.count, step_count(setup.scene.loading.load_history)
     kept = 8.0 * (10.0 * patches**2 + 3.0 * steps * patches)
     block = 0.0
-    if stage.embedded:
+    if setup.embedded:
         block = 0.0 if "dolfinx" in sys.modules else _FINITE_ELEMENTS
-        if stage.meshes is not None:
-            block += stage.meshes.bytes
-        elif not stage.scene.coupling.decomposed:
+        if setup.meshes is not None:
+            block += setup.meshes.bytes
+        elif not setup.scene.coupling.decomposed:
             block += mesh_bytes(shape)
-    drawn = stage.scene.output.figures and "matplotlib" not in sys.modules
+    drawn = setup.scene.output.figures and "matplotlib" not in sys.modules
     return peak_memory() + max(micro, block) + kept + _PICTURES * drawn
 
 

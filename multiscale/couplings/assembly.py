@@ -18,17 +18,17 @@ from multiscale.laws.files import LawTable
 from multiscale.laws.isolated import isolated_laws
 from multiscale.laws.patch_law import ExtendedLaw
 from multiscale.loading.stepper import Coupling
-from multiscale.setup.problem import Stage
+from multiscale.setup.problem import ProblemSetup
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import Interface
 
 
-def make_table(stage: Stage, model: MicroModel, comm: Any) -> LawTable:
+def make_table(setup: ProblemSetup, model: MicroModel, comm: Any) -> LawTable:
     """Tabulate the laws of all patches: each alone, or all from the whole surface on its block.
 
     Args:
-        stage: The scene's ingredients.
+        setup: The scene's ingredients.
         model: Its micro model on the body, see `contact_model`.
         comm: MPI communicator; None for this process alone.
 
@@ -39,47 +39,49 @@ def make_table(stage: Stage, model: MicroModel, comm: Any) -> LawTable:
     Note:
         Collective.
     """
-    kind = stage.scene.coupling.kind
-    if not stage.by_laws:
+    kind = setup.scene.coupling.kind
+    if not setup.by_laws:
         raise InputError(
             "has no laws",
             key="coupling.kind",
             value=kind,
             allowed="isolated, consistent",
-            file=stage.scene.file,
+            file=setup.scene.file,
         )
     if kind == "consistent":
-        programme = stage.scene.loading.programme
+        load_history = setup.scene.loading.load_history
         return consistent_laws(
             model,
-            stage.patches,
-            mean_heights=stage.mean_heights,
-            largest=Control(**{programme.quantity: programme.largest}, tilt=programme.tilt),
-            displacements=patch_displacements(stage, comm, dense=newton_choice(stage).condensed),
-            pointwise=stage.scene.coupling.interface == "pointwise",
-            tolerance=stage.table_tolerance,
-            most_rows=stage.table_rows,
+            setup.patches,
+            mean_heights=setup.mean_heights,
+            largest=Control(
+                **{load_history.quantity: load_history.largest}, tilt=load_history.tilt
+            ),
+            displacements=patch_displacements(setup, comm, dense=newton_choice(setup).condensed),
+            pointwise=setup.scene.coupling.interface == "pointwise",
+            tolerance=setup.table_tolerance,
+            most_rows=setup.table_rows,
             comm=comm,
         )
     return isolated_laws(
         model,
-        stage.patches,
-        mean_heights=stage.mean_heights,
-        closure_ends=stage.closure_ends,
-        love=stage.scene.coupling.love,
-        tolerance=stage.table_tolerance,
-        most_rows=stage.table_rows,
+        setup.patches,
+        mean_heights=setup.mean_heights,
+        closure_ends=setup.closure_ends,
+        love=setup.scene.coupling.love,
+        tolerance=setup.table_tolerance,
+        most_rows=setup.table_rows,
         comm=comm,
     )
 
 
 def assemble(
-    stage: Stage, made: LawTable | MicroModel | None, comm: Any
+    setup: ProblemSetup, made: LawTable | MicroModel | None, comm: Any
 ) -> tuple[Coupling, Interface | None]:
     """Put micro and macro model together as the scene asks.
 
     Args:
-        stage: The scene's ingredients.
+        setup: The scene's ingredients.
         made: The patch laws, of couplings that use them, or else the micro model on the body; None
             in a reference.
         comm: MPI communicator; None for this process alone.
@@ -91,23 +93,25 @@ def assemble(
         Collective.
     """
     if isinstance(made, LawTable):
-        return _with_laws(stage, made, comm)
+        return _with_laws(setup, made, comm)
     if made is None:
-        return make_reference(stage, comm), None
-    return ContactCoupling(made, stage.patches, stage.mean_heights, comm), None
+        return make_reference(setup, comm), None
+    return ContactCoupling(made, setup.patches, setup.mean_heights, comm), None
 
 
-def _with_laws(stage: Stage, table: LawTable, comm: Any) -> tuple[Coupling, Interface | None]:
-    condensed = newton_choice(stage, table).condensed
-    patchwise = stage.scene.coupling.interface == "patchwise"
-    if table.path is not None and patchwise and stage.scene.loading.programme.tilt is None:
-        return TurningCoupling(table, patch_displacements(stage, comm, dense=condensed)), None
+def _with_laws(
+    setup: ProblemSetup, table: LawTable, comm: Any
+) -> tuple[Coupling, Interface | None]:
+    condensed = newton_choice(setup, table).condensed
+    patchwise = setup.scene.coupling.interface == "patchwise"
+    if table.path is not None and patchwise and setup.scene.loading.load_history.tilt is None:
+        return TurningCoupling(table, patch_displacements(setup, comm, dense=condensed)), None
     if condensed:
-        return CondensedCoupling(table, patch_compliance(stage, comm)), None
-    from macro import PressedBlock
+        return CondensedCoupling(table, patch_compliance(setup, comm)), None
+    from macro import LawContactProblem
 
-    interface = embedding(stage, comm)
+    interface = embedding(setup, comm)
     laws = [ExtendedLaw(law) for law in table.laws]
-    mode = stage.scene.coupling.interface
-    pressed = PressedBlock(interface.block, interface, laws, mode=mode)
+    mode = setup.scene.coupling.interface
+    pressed = LawContactProblem(interface.block, interface, laws, mode=mode)
     return EmbeddedCoupling(pressed, table), interface

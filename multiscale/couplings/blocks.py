@@ -22,7 +22,7 @@ from micro import (
 )
 from multiscale.couplings.body_terms import Body
 from multiscale.scene.scene import Scene
-from multiscale.setup.problem import Stage
+from multiscale.setup.problem import ProblemSetup
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FaceCompliance, Interface, Material
@@ -42,29 +42,29 @@ _SHARP = 1e-10
 of length nor the number of ranks is seen in a result. It costs a tenth more than 1e-8."""
 
 
-def contact_model(stage: Stage, comm: Any) -> MicroModel:
+def contact_model(setup: ProblemSetup, comm: Any) -> MicroModel:
     """Return a scene's micro model on the body that it is pressed on, finite slopes included.
 
     Args:
-        stage: The scene's ingredients.
+        setup: The scene's ingredients.
         comm: MPI communicator; None for this process alone.
 
     Note:
         Collective.
     """
-    model = stage.model
-    embedded = stage.embedded and stage.scene.coupling.kind != "isolated"
+    model = setup.model
+    embedded = setup.embedded and setup.scene.coupling.kind != "isolated"
     if isinstance(model, HalfSpaceModel):
-        order = SLOPES if stage.finite_slopes else 0
-        return on_body(stage, comm, half_space=not embedded)(model, order)
+        order = SLOPES if setup.finite_slopes else 0
+        return on_body(setup, comm, half_space=not embedded)(model, order)
     if not embedded:
         return model
-    body = scene_body(stage)
+    body = scene_body(setup)
     return replace(model, body=body.term(body.face(comm)))  # type: ignore[type-var]
 
 
 def on_body(
-    stage: Stage,
+    setup: ProblemSetup,
     comm: Any,
     *,
     half_space: bool = False,
@@ -75,7 +75,7 @@ def on_body(
     """Return what puts half-space models on a scene's body, which is solved for once.
 
     Args:
-        stage: The scene's ingredients, with a half-space model.
+        setup: The scene's ingredients, with a half-space model.
         comm: MPI communicator; None for this process alone.
         half_space: Whether the body is a half-space instead of the scene's block.
         modes: Modes of the body along a side; by default those of its shape.
@@ -89,10 +89,10 @@ def on_body(
     Note:
         Collective.
     """
-    body = None if half_space else scene_body(stage)
+    body = None if half_space else scene_body(setup)
     if body is not None and face is None:
         face = body.face(comm, modes=modes, coarse=coarse)
-    section = stage.scene.block
+    section = setup.scene.block
     material = HalfSpace(section.young_modulus, section.poisson_ratio)
 
     def put(model: HalfSpaceModel, order: int) -> HalfSpaceModel:
@@ -123,47 +123,47 @@ def _stresses(body: Body, face: FaceCompliance, surface: Surface) -> list[Surfac
     return [*found, body.stresses(face, grid)]
 
 
-def scene_body(stage: Stage) -> Body:
+def scene_body(setup: ProblemSetup) -> Body:
     """Return the block of a scene, some of whose free sides its micro model knows of itself.
 
     Args:
-        stage: The scene's ingredients.
+        setup: The scene's ingredients.
     """
     return Body(
-        shape=stage.shape,
-        material=block_material(stage),
-        sides=stage.scene.block.sides,
-        known=free_sides(stage),
+        shape=setup.shape,
+        material=block_material(setup),
+        sides=setup.scene.block.sides,
+        known=free_sides(setup),
     )
 
 
-def free_sides(stage: Stage) -> FreeSides | None:
+def free_sides(setup: ProblemSetup) -> FreeSides | None:
     """Return the free sides that a scene's half-space model takes into account itself.
 
     None where there are none, or the micro model is another one.
 
     Args:
-        stage: The scene's ingredients.
+        setup: The scene's ingredients.
     """
-    return _block_sides(stage) if isinstance(stage.model, HalfSpaceModel) else None
+    return _block_sides(setup) if isinstance(setup.model, HalfSpaceModel) else None
 
 
-def _block_sides(stage: Stage) -> FreeSides | None:
+def _block_sides(setup: ProblemSetup) -> FreeSides | None:
     """Return the free sides of a scene's block that end its interface; None without them."""
-    if not stage.embedded or stage.scene.block.sides != "free" or stage.shape.margin:
+    if not setup.embedded or setup.scene.block.sides != "free" or setup.shape.margin:
         return None
     return FreeSides(
-        lengths=stage.surface.lengths,
-        poisson_ratio=stage.scene.block.poisson_ratio,
-        reach=_REACH * min(*stage.surface.lengths, stage.shape.height),
+        lengths=setup.surface.lengths,
+        poisson_ratio=setup.scene.block.poisson_ratio,
+        reach=_REACH * min(*setup.surface.lengths, setup.shape.height),
     )
 
 
-def patch_displacements(stage: Stage, comm: Any, *, dense: bool) -> Callable[[Array], Array]:
+def patch_displacements(setup: ProblemSetup, comm: Any, *, dense: bool) -> Callable[[Array], Array]:
     """Return what gives the mean displacements of patches in the macro model of a scene.
 
     Args:
-        stage: The scene's ingredients.
+        setup: The scene's ingredients.
         comm: MPI communicator; None for this process alone.
         dense: Whether the macro model is the compliance of the patches, or the mesh itself.
 
@@ -175,28 +175,28 @@ def patch_displacements(stage: Stage, comm: Any, *, dense: bool) -> Callable[[Ar
         Collective.
     """
     # laws have about as many rows as they may have: fewer patches than that take fewer solves
-    if dense or stage.patches.count <= stage.table_rows:
-        compliance = patch_compliance(stage, comm)
+    if dense or setup.patches.count <= setup.table_rows:
+        compliance = patch_compliance(setup, comm)
         return lambda pressures: np.asarray(pressures @ compliance.T)
     from macro import displacements_under
 
-    interface = embedding(stage, comm)
+    interface = embedding(setup, comm)
     return lambda pressures: displacements_under(interface, pressures)
 
 
-def patch_compliance(stage: Stage, comm: Any) -> Array:
+def patch_compliance(setup: ProblemSetup, comm: Any) -> Array:
     """Return the compliance of a scene's block under its patches, shape (N, N) [mm/MPa].
 
     Args:
-        stage: The scene's ingredients.
+        setup: The scene's ingredients.
         comm: MPI communicator; None for this process alone.
 
     Note:
         Collective.
     """
-    if stage.scene.coupling.decomposed:
-        body = replace(scene_body(stage), known=_block_sides(stage))
-        return body.patch_compliance(stage.patches, comm)
+    if setup.scene.coupling.decomposed:
+        body = replace(scene_body(setup), known=_block_sides(setup))
+        return body.patch_compliance(setup.patches, comm)
     from mpi4py import MPI
 
     from macro import plain_compliance
@@ -204,18 +204,18 @@ def patch_compliance(stage: Stage, comm: Any) -> Array:
     from macro.linear_solvers.options import users_options
 
     def compute() -> dict[str, Array]:
-        return {"compliance": plain_compliance(embedding(stage, comm))}
+        return {"compliance": plain_compliance(embedding(setup, comm))}
 
-    sides = stage.scene.block.sides
-    key = (stage.shape, block_material(stage), sides, stage.patches, users_options())
+    sides = setup.scene.block.sides
+    key = (setup.shape, block_material(setup), sides, setup.patches, users_options())
     return cached("plain", key, compute, comm or MPI.COMM_SELF)["compliance"]
 
 
-def embedding(stage: Stage, comm: Any) -> Interface:
+def embedding(setup: ProblemSetup, comm: Any) -> Interface:
     """Mesh and assemble the block of a scene, with its patches on top.
 
     Args:
-        stage: The scene's ingredients.
+        setup: The scene's ingredients.
         comm: MPI communicator; None for this process alone.
 
     Note:
@@ -225,9 +225,9 @@ def embedding(stage: Stage, comm: Any) -> Interface:
 
     from macro import Block, Interface, block_mesh
 
-    section = stage.scene.block
-    mesh = block_mesh(stage.shape, comm or MPI.COMM_SELF)
-    return Interface(Block(mesh, block_material(stage), sides=section.sides), stage.patches)
+    section = setup.scene.block
+    mesh = block_mesh(setup.shape, comm or MPI.COMM_SELF)
+    return Interface(Block(mesh, block_material(setup), sides=section.sides), setup.patches)
 
 
 def load_together(scene: Scene, comm: Any) -> None:
@@ -246,25 +246,25 @@ def load_together(scene: Scene, comm: Any) -> None:
         import macro  # noqa: F401
 
 
-def block_material(stage: Stage) -> Material:
+def block_material(setup: ProblemSetup) -> Material:
     """Return the elastic constants of a scene's block."""
     from macro import Material
 
-    section = stage.scene.block
+    section = setup.scene.block
     return Material(young_modulus=section.young_modulus, poisson_ratio=section.poisson_ratio)
 
 
-def final_field(stage: Stage, pressure: Array, comm: Any) -> tuple[Interface, Array]:
+def final_field(setup: ProblemSetup, pressure: Array, comm: Any) -> tuple[Interface, Array]:
     """Return the meshed block and its displacements under pressures that are uniform on patches.
 
     Args:
-        stage: The scene's ingredients.
+        setup: The scene's ingredients.
         pressure: Pressures of the patches, shape (N,) [MPa].
         comm: MPI communicator; None for this process alone.
 
     Note:
         Collective.
     """
-    interface = embedding(stage, comm)
+    interface = embedding(setup, comm)
     function = interface.block.solve(interface.load(pressure))
     return interface, function.x.array[: interface.block.owned_dofs].copy()

@@ -19,7 +19,7 @@ from multiscale.loading.stepper import BeyondLaws, described
 from multiscale.storage.serialisation import Arrays, packed, unpacked
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import PressedBlock, PressState
+    from macro import LawContactProblem, PressState
 
 Array = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ class EmbeddedCoupling:
         table: The laws, which also give contact area, contacts and separation.
     """
 
-    def __init__(self, pressed: PressedBlock, table: LawTable) -> None:
+    def __init__(self, pressed: LawContactProblem, table: LawTable) -> None:
         self._pressed, self._table = pressed, table
         self._last: PressState | None = None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from multiscale.laws.files import LawTable
-from multiscale.setup.problem import Stage
+from multiscale.setup.problem import ProblemSetup
 
 MOST_CYCLES_PER_STEP = 12
 """Multigrid cycles that a load step of the full Newton takes at most, starts from earlier steps
@@ -33,33 +33,33 @@ class NewtonChoice:
     why: str
 
 
-def full_cycles(stage: Stage, steps: int) -> int:
+def full_cycles(setup: ProblemSetup, steps: int) -> int:
     """Return the multigrid cycles that load steps on the mesh are predicted to take.
 
     Args:
-        stage: The scene's ingredients.
+        setup: The scene's ingredients.
         steps: Load steps.
     """
-    return steps * min(max(stage.reached_patches, 1), MOST_CYCLES_PER_STEP)
+    return steps * min(max(setup.reached_patches, 1), MOST_CYCLES_PER_STEP)
 
 
-def newton_choice(stage: Stage, table: LawTable | None = None) -> NewtonChoice:
+def newton_choice(setup: ProblemSetup, table: LawTable | None = None) -> NewtonChoice:
     """Choose as the scene asks, or what is predicted to take fewer multigrid cycles.
 
     The full Newton spends cycles on load steps until its basis of earlier solutions spans what
     the patches can do; the condensed one spends them on the compliance, before the first step.
 
     Args:
-        stage: The scene's ingredients, of a coupling with laws.
+        setup: The scene's ingredients, of a coupling with laws.
         table: The laws, once made: those of flat patches rule out the mesh's Newton.
     """
-    coupling = stage.scene.coupling
+    coupling = setup.scene.coupling
     if coupling.decomposed:
         return NewtonChoice(condensed=True, why="the decomposed block is its compliance")
     flat = 0 if table is None else sum(law.is_punch for law in table.laws)
-    if flat and _left_open(stage):
+    if flat and _left_open(setup):
         why = (
-            f"{flat} of {stage.patches.count} patches are flat, and their pressure is a function "
+            f"{flat} of {setup.patches.count} patches are flat, and their pressure is a function "
             "of closure nowhere"
         )
         return NewtonChoice(condensed=True, why=why)
@@ -67,11 +67,11 @@ def newton_choice(stage: Stage, table: LawTable | None = None) -> NewtonChoice:
         return NewtonChoice(condensed=False, why="laws at points need the whole mesh")
     if coupling.newton != "auto":
         return NewtonChoice(condensed=coupling.newton == "condensed", why="as the scene asks")
-    patches, steps = stage.patches.count, stage.scene.loading.programme.count
+    patches, steps = setup.patches.count, setup.scene.loading.load_history.count
     compliance = CYCLES_PER_PATCH * patches
-    full = full_cycles(stage, steps)
+    full = full_cycles(setup, steps)
     fewer = "fewer" if compliance < full else "more"
-    unless = "" if compliance < full or table or stage.by_summits else _UNLESS
+    unless = "" if compliance < full or table or setup.by_summits else _UNLESS
     return NewtonChoice(
         condensed=compliance < full,
         why=(
@@ -81,6 +81,6 @@ def newton_choice(stage: Stage, table: LawTable | None = None) -> NewtonChoice:
     )
 
 
-def _left_open(stage: Stage) -> bool:
-    coupling = stage.scene.coupling
+def _left_open(setup: ProblemSetup) -> bool:
+    coupling = setup.scene.coupling
     return coupling.newton == "auto" and coupling.interface == "patchwise"

@@ -15,11 +15,11 @@ from multiscale.couplings.blocks import block_material
 from multiscale.couplings.load_steps import embedded_step
 from multiscale.loading.load_step import LoadStep, PatchState
 from multiscale.results.reference_record import ReferenceRecord, reference_record
-from multiscale.setup.problem import Stage
+from multiscale.setup.problem import ProblemSetup
 from multiscale.storage.serialisation import Arrays, packed, unpacked
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import Block, MeshQuality, ObstacleBlock, ObstacleState
+    from macro import Block, MeshQuality, UnilateralContactProblem, UnilateralContactState
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ class ReferenceCoupling:
 
     def __init__(
         self,
-        blocks: Sequence[ObstacleBlock],
+        blocks: Sequence[UnilateralContactProblem],
         patches: PatchGrid,
         qualities: Sequence[MeshQuality] = (),
     ) -> None:
@@ -52,10 +52,10 @@ class ReferenceCoupling:
             raise ValueError("a reference needs a mesh")
         self._blocks, self._patches = tuple(blocks), patches
         self.qualities = tuple(qualities)
-        self._last: tuple[ObstacleState, ...] = ()
+        self._last: tuple[UnilateralContactState, ...] = ()
 
     @property
-    def finest(self) -> ObstacleBlock:
+    def finest(self) -> UnilateralContactProblem:
         """The block that the load steps tell of."""
         return self._blocks[-1]
 
@@ -70,7 +70,7 @@ class ReferenceCoupling:
         return tuple(block.dofs for block in self.blocks)
 
     @property
-    def latest(self) -> ObstacleState:
+    def latest(self) -> UnilateralContactState:
         """The finest block at the latest load step.
 
         Raises:
@@ -97,7 +97,7 @@ class ReferenceCoupling:
             for block, (approach, tx, ty) in zip(self._blocks, planes, strict=False)
         )
 
-    def _step(self, states: Sequence[ObstacleState]) -> LoadStep:
+    def _step(self, states: Sequence[UnilateralContactState]) -> LoadStep:
         finest, nominal = states[-1], self._patches.area * self._patches.count
         # patches count whole nodes; all together they have the area with its border in the facets
         share = finest.contact_area_fine / finest.contact_area if finest.contact_area else 0.0
@@ -124,11 +124,11 @@ class ReferenceCoupling:
         )
 
 
-def make_reference(stage: Stage, comm: Any) -> ReferenceCoupling:
+def make_reference(setup: ProblemSetup, comm: Any) -> ReferenceCoupling:
     """Mesh the rough block of a scene, as often as it asks.
 
     Args:
-        stage: The scene's ingredients, of a reference.
+        setup: The scene's ingredients, of a reference.
         comm: MPI communicator; None for this process alone.
 
     Raises:
@@ -139,53 +139,56 @@ def make_reference(stage: Stage, comm: Any) -> ReferenceCoupling:
     """
     from mpi4py import MPI
 
-    from macro import Block, ObstacleBlock, rough_block_mesh
+    from macro import Block, UnilateralContactProblem, rough_block_mesh
 
-    assert stage.meshes is not None
-    scene, surface, blocks, qualities = stage.scene, stage.surface, [], []
-    for shape in stage.meshes.shapes:
-        finest = shape is stage.meshes.shapes[-1]
+    assert setup.meshes is not None
+    scene, surface, blocks, qualities = setup.scene, setup.surface, [], []
+    for shape in setup.meshes.shapes:
+        finest = shape is setup.meshes.shapes[-1]
         try:
             mesh, quality = rough_block_mesh(shape, surface, comm or MPI.COMM_SELF)
         except InputError as error:
             raise error.located(key="surface", file=scene.file) from None
-        block = Block(mesh, block_material(stage), sides=scene.block.sides)
-        pressed = ObstacleBlock(
+        block = Block(mesh, block_material(setup), sides=scene.block.sides)
+        pressed = UnilateralContactProblem(
             block,
             surface.highest - surface.mean_height,
             method=scene.reference.method,
-            patches=stage.patches if finest else None,
+            patches=setup.patches if finest else None,
         )
         blocks.append(pressed)
         qualities.append(quality)
-    return ReferenceCoupling(blocks, stage.patches, qualities)
+    return ReferenceCoupling(blocks, setup.patches, qualities)
 
 
 def recorded(
-    stage: Stage, coupling: ReferenceCoupling, steps: Sequence[LoadStep]
+    setup: ProblemSetup, coupling: ReferenceCoupling, steps: Sequence[LoadStep]
 ) -> ReferenceRecord:
     """Return what the meshes of a reference say together.
 
     Where they all miss contacts that must be there, that they agree is no error bar.
 
     Args:
-        stage: The scene's ingredients.
+        setup: The scene's ingredients.
         coupling: What made the load steps.
         steps: The load steps accepted so far.
     """
-    assert stage.meshes is not None
+    assert setup.meshes is not None
     record = reference_record(
         steps,
-        stage.meshes.sizes,
+        setup.meshes.sizes,
         coupling.unknowns,
-        force_order=stage.meshes.force_order,
-        area_order=stage.meshes.area_order,
+        force_order=setup.meshes.force_order,
+        area_order=setup.meshes.area_order,
     )
-    return record.without_bars(np.array([_misses(step, stage) for step in steps], dtype=bool))
+    return record.without_bars(np.array([_misses(step, setup) for step in steps], dtype=bool))
 
 
 def reference_notes(
-    record: ReferenceRecord, coupling: ReferenceCoupling, steps: Sequence[LoadStep], stage: Stage
+    record: ReferenceRecord,
+    coupling: ReferenceCoupling,
+    steps: Sequence[LoadStep],
+    setup: ProblemSetup,
 ) -> Iterator[str]:
     """Yield what a report says of a reference's own errors.
 
@@ -193,16 +196,16 @@ def reference_notes(
         record: What its meshes say together.
         coupling: What made the load steps.
         steps: The load steps.
-        stage: The scene's ingredients.
+        setup: The scene's ingredients.
     """
     yield record.sentence
-    missed = [step.step for step in steps if _misses(step, stage)]
+    missed = [step.step for step in steps if _misses(step, setup)]
     if missed:
         yield (
             f"no node of the finest mesh touches in {len(missed)} of {len(steps)} load steps, "
             f"first in step {missed[0]}, though the plane lies below the surface's highest point: "
             f"the mesh is too coarse for contact there, and the force zero; refine "
-            f"{stage.meshes.key if stage.meshes else 'it'}"
+            f"{setup.meshes.key if setup.meshes else 'it'}"
         )
     if coupling.qualities:
         thinnest = min(quality.thinnest for quality in coupling.qualities)
@@ -213,9 +216,9 @@ def reference_notes(
         )
 
 
-def _misses(step: LoadStep, stage: Stage) -> bool:
+def _misses(step: LoadStep, setup: ProblemSetup) -> bool:
     """Whether no node touches though the plane lies below the surface's highest point."""
     if step.contacts:
         return False
-    arm = np.asarray(stage.surface.highest_point) - 0.5 * np.asarray(stage.surface.lengths)
+    arm = np.asarray(setup.surface.highest_point) - 0.5 * np.asarray(setup.surface.lengths)
     return step.approach_mm + float(arm @ np.asarray(step.tilt)) > 0.0

@@ -125,14 +125,14 @@ def known_solve(comm: Any) -> list[Finding]:
     from geometry.control import Control
     from geometry.meshes.block import BlockShape
     from geometry.patches import PatchGrid
-    from macro import Block, Interface, Material, PressedBlock, block_mesh
+    from macro import Block, Interface, LawContactProblem, Material, block_mesh
 
     began = time.perf_counter()
     material = Material(young_modulus=_MODULUS, poisson_ratio=_RATIO)
     shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(10, 10, 8))
     block = Block(block_mesh(shape, comm or MPI.COMM_SELF), material, sides="roller")
     patches = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
-    pressed = PressedBlock(block, Interface(block, patches), [_Spring()] * patches.count)
+    pressed = LawContactProblem(block, Interface(block, patches), [_Spring()] * patches.count)
     state = pressed.press(Control(approach=_APPROACH))
     seconds = time.perf_counter() - began
     expected = _APPROACH / (1.0 / _SPRING + 1.0 / material.confined_modulus)

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from multiscale.doctor.finding import Finding
-from multiscale.machine.mpi_job import strangers
+from multiscale.machine.mpi_job import detached_processes
 from multiscale.machine.nodes import group_memory
 
 _LAUNCHERS = {"Open MPI": "Open MPI", "HYDRA": "MPICH", "MPICH": "MPICH", "Intel": "Intel MPI"}
@@ -55,7 +55,7 @@ def launcher(comm: Any) -> list[Finding]:
     from mpi4py import MPI
 
     library = MPI.Get_library_version().strip().partition(",")[0].splitlines()[0]
-    found = strangers()
+    found = detached_processes()
     if found is not None:
         text = f"started as one of {found[1]} processes, but each stands alone ({library})"
         remedy = f"start with the mpirun of {library}, or srun --mpi=pmix; see demos/hpc/README.md"

@@ -55,11 +55,11 @@ def _use_all_forms(element: str) -> None:
 
     from geometry.meshes.block import BlockShape
     from geometry.patches import PatchGrid
-    from macro import Block, Interface, Material, ObstacleBlock, block_mesh, write_fields
+    from macro import Block, Interface, Material, UnilateralContactProblem, block_mesh, write_fields
 
     shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(2, 2, 2), element=element)
     block = Block(block_mesh(shape, MPI.COMM_SELF), Material(young_modulus=1.0, poisson_ratio=0.3))
-    ObstacleBlock(block, 0.0)
+    UnilateralContactProblem(block, 0.0)
     rest = block.stiffness.createVecRight()
     block.reaction(rest)
     interface = Interface(block, PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)))

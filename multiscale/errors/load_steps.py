@@ -11,33 +11,33 @@ from micro import HalfSpaceModel
 from multiscale.couplings.blocks import SLOPES, OnBody
 from multiscale.errors.measured import ErrorProbe, MeasuredErrors
 from multiscale.loading.load_step import LoadStep
-from multiscale.loading.stepper import Programme
-from multiscale.setup.problem import Stage
+from multiscale.loading.stepper import LoadHistory
+from multiscale.setup.problem import ProblemSetup
 
 
-def error_probe(stage: Stage, body: OnBody) -> ErrorProbe:
+def error_probe(setup: ProblemSetup, body: OnBody) -> ErrorProbe:
     """Return what measures the errors of a scene's load steps.
 
     Args:
-        stage: The scene's ingredients, with a half-space model.
+        setup: The scene's ingredients, with a half-space model.
         body: Puts this model on the scene's body, see `on_body`.
     """
-    assert isinstance(stage.model, HalfSpaceModel)
+    assert isinstance(setup.model, HalfSpaceModel)
     return ErrorProbe(
-        model=stage.model,
+        model=setup.model,
         on_body=body,
-        order=SLOPES if stage.finite_slopes else 0,
-        by_laws=stage.by_laws,
+        order=SLOPES if setup.finite_slopes else 0,
+        by_laws=setup.by_laws,
     )
 
 
-def checked(step: LoadStep, probe: ErrorProbe, programme: Programme, comm: Any) -> LoadStep:
+def checked(step: LoadStep, probe: ErrorProbe, load_history: LoadHistory, comm: Any) -> LoadStep:
     """Return a load step with its errors measured; rank 0 solves for all.
 
     Args:
         step: The load step.
         probe: What measures.
-        programme: What is prescribed of the plane.
+        load_history: What is prescribed of the plane.
         comm: MPI communicator; None for this process alone.
 
     Raises:
@@ -46,14 +46,14 @@ def checked(step: LoadStep, probe: ErrorProbe, programme: Programme, comm: Any) 
     Note:
         Collective.
     """
-    by_force = programme.quantity == "force"
+    by_force = load_history.quantity == "force"
 
     def measure() -> MeasuredErrors:
         return probe.measure(
             step.force_N,
             step.approach_mm,
             step.tilt,
-            turns=programme.tilt is None,
+            turns=load_history.tilt is None,
             stiffness=by_force,
         )
 

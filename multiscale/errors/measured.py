@@ -205,7 +205,9 @@ class _Problems:
 
     def _model(self, grid: tuple[int, int], order: int) -> HalfSpaceModel:
         model = self._probe.model
-        cells = replace(model, surface=resampled(model.surface, grid), highest=model.datum)
+        cells = replace(
+            model, surface=resampled(model.surface, grid), highest=model.reference_height
+        )
         return replace(self._probe.on_body(cells, order), tolerance=_RESIDUAL)
 
 

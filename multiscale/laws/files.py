@@ -15,7 +15,7 @@ from geometry.patches import PatchGrid
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.plane_path import PlanePath
 from multiscale.laws.repair import evened_law
-from multiscale.storage.checksummed_hdf5 import sealed, unsealed
+from multiscale.storage.checksummed_hdf5 import checksummed, verified
 from multiscale.storage.serialisation import stored_numbers
 
 _COLUMNS = {
@@ -78,7 +78,7 @@ def write_laws(path: Path | BinaryIO, table: LawTable) -> None:
         path: File to write, by name or open; one that exists is replaced.
         table: The laws.
     """
-    content = sealed(lambda file: _fill(file, table))
+    content = checksummed(lambda file: _fill(file, table))
     if isinstance(path, Path):
         path.write_bytes(content)
     else:
@@ -123,7 +123,7 @@ def read_laws(path: Path | BinaryIO) -> LawTable:
     if isinstance(path, Path) and not path.is_file():  # a pipe would be waited for
         raise InputError("is not a readable law file: there is no such file", file=name)
     try:
-        with h5py.File(unsealed(path), "r") as file:
+        with h5py.File(verified(path), "r") as file:
             if file.attrs.get("format") != FORMAT:
                 raise InputError("is not a law file of patchlaw", file=name)
             return _table(file)

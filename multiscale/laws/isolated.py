@@ -55,7 +55,7 @@ class IsolatedPatch:
     @property
     def reach(self) -> float:
         """Height of the plane over the patch's mean plane at zero approach [mm]."""
-        return float(self.model.datum - self.mean_height)
+        return float(self.model.reference_height - self.mean_height)
 
     def rows(self, approaches: Array) -> Array:
         """Return rows, shape (n, 7), with the columns of `refinement.refined`."""
@@ -193,7 +193,7 @@ def _work(model: MicroModel, patches: PatchGrid, closure_ends: Array) -> Array:
     else:
         return np.ones(patches.count)
     owner = patches.index_of(x, y)
-    reached = model.datum - z < closure_ends[owner]
+    reached = model.reference_height - z < closure_ends[owner]
     return np.bincount(owner[reached], minlength=patches.count).astype(float)
 
 

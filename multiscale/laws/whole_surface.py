@@ -125,7 +125,7 @@ class WholeSurface:
 
     def laws(self, rows: Array) -> list[PatchLaw]:
         """Return the laws of all patches through rows (m, N, 7), the plane coming nearer."""
-        reaches = self.model.datum - self.mean_heights
+        reaches = self.model.reference_height - self.mean_heights
         return [_law(rows[:, index], float(reach)) for index, reach in enumerate(reaches)]
 
     def tabulated(
@@ -168,8 +168,8 @@ def _law(rows: Array, reach: float) -> PatchLaw:
     Where contacts join, a block may begin to sag so much that a patch falls behind a plane that
     comes nearer: rows that do not get beyond those before them are left out.
     """
-    furthest = np.maximum.accumulate(rows[:, 0])
-    rows = rows[np.append(True, rows[1:, 0] > furthest[:-1])]
+    plane_at_largest_load = np.maximum.accumulate(rows[:, 0])
+    rows = rows[np.append(True, rows[1:, 0] > plane_at_largest_load[:-1])]
     loaded = np.flatnonzero(rows[:, 2] > 0.0)
     if not loaded.size:
         return law_of(rows[:0], float(rows[:, 1].max()), reach)

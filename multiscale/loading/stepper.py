@@ -62,7 +62,7 @@ class BeyondLaws(NotConverged):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Programme:
+class LoadHistory:
     """Turning points of the load, and how densely the legs between them are stepped.
 
     Attributes:
@@ -106,7 +106,7 @@ class Programme:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Position:
+class LoadPosition:
     """Where a programme has come to between two load steps; all that is needed to go on from there.
 
     Attributes:
@@ -129,7 +129,7 @@ class Position:
     largest: float = 0.0
 
 
-def load_steps(coupling: Coupling, programme: Programme) -> Iterator[LoadStep]:
+def load_steps(coupling: Coupling, load_history: LoadHistory) -> Iterator[LoadStep]:
     """Yield the load steps of a programme as they are accepted.
 
     A step that does not converge is reached through smaller ones, which are not told; one that
@@ -137,21 +137,21 @@ def load_steps(coupling: Coupling, programme: Programme) -> Iterator[LoadStep]:
 
     Args:
         coupling: What finds the equilibria.
-        programme: The loads.
+        load_history: The loads.
 
     Raises:
         NotConverged: When a step fails at the smallest increment too, or a patch leaves the range
             of its law; the steps yielded before stay valid.
     """
-    return iter(Drive(coupling, programme))
+    return iter(LoadStepper(coupling, load_history))
 
 
-class Drive:
+class LoadStepper:
     """Makes the load steps of a programme, see `load_steps`; may go on where another one stopped.
 
     Args:
         coupling: What finds the equilibria.
-        programme: The loads.
+        load_history: The loads.
         position: Where to go on from.
 
     Attributes:
@@ -159,10 +159,10 @@ class Drive:
     """
 
     def __init__(
-        self, coupling: Coupling, programme: Programme, position: Position | None = None
+        self, coupling: Coupling, load_history: LoadHistory, position: LoadPosition | None = None
     ) -> None:
-        self._coupling, self._programme = coupling, programme
-        self.position = position or Position()
+        self._coupling, self._programme = coupling, load_history
+        self.position = position or LoadPosition()
         self._newton = self._linear = 0
         self._spent = 0.0
 

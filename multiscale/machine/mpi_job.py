@@ -88,7 +88,7 @@ def for_large(comm: Any) -> Any:
     return pkl5.Intracomm(comm)
 
 
-def strangers() -> tuple[str, int] | None:
+def detached_processes() -> tuple[str, int] | None:
     """Tell whether a launcher started several processes that do not know of each other.
 
     Returns:
@@ -101,13 +101,13 @@ def strangers() -> tuple[str, int] | None:
     return (name, count) if count > 1 else None
 
 
-def refuse_strangers() -> None:
+def refuse_detached_processes() -> None:
     """Refuse to compute what every other process of this start computes as well.
 
     Raises:
         InputError: When the launcher is not the one of the MPI that mpi4py was built with.
     """
-    found = strangers()
+    found = detached_processes()
     if found is None:
         return
     name, count = found

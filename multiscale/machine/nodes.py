@@ -15,7 +15,7 @@ _OWN, _GROUPS = Path("/proc/self/cgroup"), Path("/sys/fs/cgroup")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Need:
+class MemoryRequest:
     """Memory that something takes.
 
     Attributes:
@@ -41,7 +41,7 @@ def node_memory() -> float:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Nodes:
+class ClusterNodes:
     """The nodes of a run; by default this one, for a process on its own.
 
     Attributes:
@@ -56,7 +56,7 @@ class Nodes:
     process: float = field(default_factory=address_space)
     more: bool = False
 
-    def fit(self, need: Need) -> bool:
+    def fit(self, need: MemoryRequest) -> bool:
         """Tell whether there is room for something, on the fullest node and on that of rank 0.
 
         Args:
@@ -68,7 +68,7 @@ class Nodes:
         fits = taken <= self.memory and of_one <= self.process
         return fits or (self.more and self.enough(need) is not None)
 
-    def enough(self, need: Need) -> int | None:
+    def enough(self, need: MemoryRequest) -> int | None:
         """Return the least number of nodes like the fullest that there is room on; None if on none.
 
         Args:
@@ -81,7 +81,7 @@ class Nodes:
         )
         return max(math.ceil(need.shared / left), 1) if left > 0.0 else None
 
-    def room(self, need: Need) -> str:
+    def room(self, need: MemoryRequest) -> str:
         """Say what room there is, and what would make enough of it.
 
         Args:
@@ -106,7 +106,7 @@ class Nodes:
         return f"{text}; {ranks} on a node would do, for each holds it all" if fewer > 0 else text
 
 
-def nodes_of(comm: Any) -> Nodes:
+def nodes_of(comm: Any) -> ClusterNodes:
     """Return the nodes of a run.
 
     Args:
@@ -116,14 +116,14 @@ def nodes_of(comm: Any) -> Nodes:
         Collective.
     """
     if comm is None or comm.size == 1:
-        return Nodes()
+        return ClusterNodes()
     from mpi4py import MPI
 
     node = comm.Split_type(MPI.COMM_TYPE_SHARED)
     ranks = node.size if node.rank == 0 else 0
     node.Free()
     told = comm.allgather((ranks, node_memory()))
-    return Nodes(
+    return ClusterNodes(
         ranks=tuple(ranks for ranks, _ in told if ranks), memory=min(memory for _, memory in told)
     )
 

@@ -18,7 +18,7 @@ import scipy
 from multiscale.costs.prediction import peak_memory
 from multiscale.couplings.reference import ReferenceCoupling
 from multiscale.run import Run
-from multiscale.setup.problem import Stage
+from multiscale.setup.problem import ProblemSetup
 
 
 def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
@@ -40,14 +40,14 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "scene_given": run.given.model_dump(by_alias=True, mode="json"),
         "units": "mm, N, MPa",
         "surface": {
-            "source": run.stage.surface.source,
+            "source": run.setup.surface.source,
             "heights_sha256": run.heights,
-            "highest_mm": run.stage.surface.highest,
-            "summits": run.stage.asperities.count,
-            "summits_in_reach": int(run.stage.reached.sum()),
-            "border_maxima_in_reach": run.stage.reached_at_border,
+            "highest_mm": run.setup.surface.highest,
+            "summits": run.setup.asperities.count,
+            "summits_in_reach": int(run.setup.reached.sum()),
+            "border_maxima_in_reach": run.setup.reached_at_border,
         },
-        "micro_model": _micro_model(run.stage),
+        "micro_model": _micro_model(run.setup),
         "ranks": 1 if run.comm is None else run.comm.size,
         "threads": os.environ.get("OMP_NUM_THREADS"),
         "petsc_options": options,
@@ -56,7 +56,7 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "seconds": history.seconds,
         "memory_bytes": peak_memory(),
         "errors_N": [dict(step.errors) for step in history],
-        "decision": _decision(run.stage),
+        "decision": _decision(run.setup),
         "steps": len(history),
         "finished": run.finished,
         "reasons": sorted(set(history.reason)) if len(history) else [],
@@ -76,9 +76,9 @@ def _known(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _decision(stage: Stage) -> dict[str, Any] | None:
+def _decision(setup: ProblemSetup) -> dict[str, Any] | None:
     """Return what open keys became out of what, where an accuracy decided."""
-    decision = stage.decision
+    decision = setup.decision
     return None if decision is None else {**asdict(decision), "kept": decision.kept}
 
 
@@ -99,16 +99,16 @@ def _reference(run: Run) -> dict[str, Any] | None:
     }
 
 
-def _micro_model(stage: Stage) -> dict[str, Any] | None:
+def _micro_model(setup: ProblemSetup) -> dict[str, Any] | None:
     """Return the micro model used and, when it was chosen, from what."""
-    if stage.micro is None:
+    if setup.micro is None:
         return None
-    if stage.choice is None:
-        return {"name": stage.model.name}
+    if setup.choice is None:
+        return {"name": setup.model.name}
     return {
-        "name": stage.model.name,
-        "chosen": asdict(stage.choice.taken),
-        "candidates": [asdict(candidate) for candidate in stage.choice.candidates],
+        "name": setup.model.name,
+        "chosen": asdict(setup.choice.taken),
+        "candidates": [asdict(candidate) for candidate in setup.choice.candidates],
     }
 
 

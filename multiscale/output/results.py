@@ -74,8 +74,8 @@ def _written(folder: Path, run: Run, drawn: list[Drawing], options: list[str]) -
     if run.scene.output.report:
         page = report_html(
             title=f"patchlaw: {run.scene.name}",
-            statements=plan.statements(run.stage),
-            warnings=list(plan.warnings(run.stage)),
+            statements=plan.statements(run.setup),
+            warnings=list(plan.warnings(run.setup)),
             history=history,
             figures=figures,
         )
@@ -127,11 +127,11 @@ def _figures(run: Run) -> Iterator[tuple[str, str, Callable[[], Figure]]]:
     """Yield file name, caption and maker; matplotlib is loaded only when a figure is wanted."""
     from multiscale.output import figures
 
-    stage, history, table = run.stage, run.history(), run.table
+    setup, history, table = run.setup, run.history(), run.table
     yield (
         "surface",
         "The rough surface with its summits and the patches.",
-        lambda: figures.surface_figure(stage.surface, stage.asperities, stage.patches),
+        lambda: figures.surface_figure(setup.surface, setup.asperities, setup.patches),
     )
     bands = "" if history.reference is None else " Bands: error bars about mesh size zero."
     yield (

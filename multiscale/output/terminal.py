@@ -15,11 +15,11 @@ from rich.table import Table
 from geometry.errors import PatchlawError
 from multiscale.costs.prediction import Cost, peak_memory
 from multiscale.loading.load_step import LoadStep
-from multiscale.loading.stepper import Programme
+from multiscale.loading.stepper import LoadHistory
 from multiscale.output.report import curve_cells
 from multiscale.planning import plan
 from multiscale.results.history import History
-from multiscale.setup.problem import Stage
+from multiscale.setup.problem import ProblemSetup
 
 _MOST_ROWS = 60  # load steps that are printed; files hold them all
 
@@ -73,19 +73,19 @@ def show_pairs(comm: Any, pairs: Sequence[tuple[str, str]], warnings: Sequence[s
 
 
 def show_plan(
-    comm: Any, stage: Stage, made: Cost | None = None, lacking: Sequence[str] = ()
+    comm: Any, setup: ProblemSetup, made: Cost | None = None, lacking: Sequence[str] = ()
 ) -> None:
     """Print what a run will do, and why.
 
     Args:
         comm: MPI communicator, or None.
-        stage: The scene's ingredients.
+        setup: The scene's ingredients.
         made: What it is predicted to take; None leaves it out.
         lacking: What a run would need more nodes for.
     """
     if speaks(comm):
-        notes = [*plan.warnings(stage), *lacking]
-        show_pairs(comm, list(plan.statements(stage, made)), notes)
+        notes = [*plan.warnings(setup), *lacking]
+        show_pairs(comm, list(plan.statements(setup, made)), notes)
 
 
 def show_times(comm: Any, seconds: Mapping[str, float]) -> None:
@@ -103,19 +103,19 @@ def show_times(comm: Any, seconds: Mapping[str, float]) -> None:
 
 @contextmanager
 def progress(
-    comm: Any, programme: Programme, done: int = 0
+    comm: Any, load_history: LoadHistory, done: int = 0
 ) -> Iterator[Callable[[LoadStep], None]]:
     """Follow load steps: by a bar, or under ``mpirun`` by a line each, fit for a log file.
 
     Args:
         comm: MPI communicator, or None.
-        programme: The load steps to come.
+        load_history: The load steps to come.
         done: How many of them were accepted before.
 
     Yields:
         The function to call with every load step.
     """
-    steps = None if programme.force_change else programme.count  # some may be halved
+    steps = None if load_history.force_change else load_history.count  # some may be halved
     if comm is not None:
         of = "" if steps is None else f"/{steps}"
         yield lambda step: say(comm, f"load step {step.step}{of}: {_in_short(step)}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from geometry.meshes.block import alignment
-from multiscale.setup.problem import Stage
+from multiscale.setup.problem import ProblemSetup
 
 STIFF_FROM = 0.45
 """Poisson's ratio above which linear elements lock. Two by two patches on 8 × 8 × 6 trilinear
@@ -19,26 +19,26 @@ _BODY_TERM = (
 )
 
 
-def block_statement(stage: Stage) -> str:
+def block_statement(setup: ProblemSetup) -> str:
     """Say what the block is made of, and at what price."""
-    text = _BODY_TERM if stage.scene.coupling.decomposed else _elements(stage)
-    return f"{text}, {_size(stage)}, contact modulus {stage.model.contact_modulus:.6g} MPa"
+    text = _BODY_TERM if setup.scene.coupling.decomposed else _elements(setup)
+    return f"{text}, {_size(setup)}, contact modulus {setup.model.contact_modulus:.6g} MPa"
 
 
-def _size(stage: Stage) -> str:
+def _size(setup: ProblemSetup) -> str:
     """Say how large the block is, and what its sides do."""
-    (lx, ly), height = stage.surface.lengths, stage.shape.height
-    return f"{lx:g} × {ly:g} mm and {height:g} mm high, {stage.scene.block.sides} sides"
+    (lx, ly), height = setup.surface.lengths, setup.shape.height
+    return f"{lx:g} × {ly:g} mm and {height:g} mm high, {setup.scene.block.sides} sides"
 
 
-def block_warnings(stage: Stage) -> Iterator[str]:
+def block_warnings(setup: ProblemSetup) -> Iterator[str]:
     """Yield what a user should know about the block's cells."""
-    if not stage.scene.coupling.decomposed:
-        yield from _element_warnings(stage)
+    if not setup.scene.coupling.decomposed:
+        yield from _element_warnings(setup)
 
 
-def _elements(stage: Stage) -> str:
-    shape = stage.shape
+def _elements(setup: ProblemSetup) -> str:
+    shape = setup.shape
     margin = (
         f", {shape.margin:g} mm beyond it in {shape.margin_cells} cells" if shape.margin else ""
     )
@@ -49,15 +49,15 @@ def _elements(stage: Stage) -> str:
     )
 
 
-def _element_warnings(stage: Stage) -> Iterator[str]:
-    cells = min(c / n for c, n in zip(stage.shape.cells[:2], stage.patches.grid, strict=True))
-    if cells * stage.shape.degree < 4:
+def _element_warnings(setup: ProblemSetup) -> Iterator[str]:
+    cells = min(c / n for c, n in zip(setup.shape.cells[:2], setup.patches.grid, strict=True))
+    if cells * setup.shape.degree < 4:
         yield (
             f"{cells:.3g} cells along a patch: fewer than four linear (two quadratic) ones make "
             "the block stiffer by several per cent under a patch's pressure; refine block.cells"
         )
-    yield from locking(stage.shape.degree, stage.scene.block.poisson_ratio)
-    fit = alignment(stage.shape, stage.patches)
+    yield from locking(setup.shape.degree, setup.scene.block.poisson_ratio)
+    fit = alignment(setup.shape, setup.patches)
     if not fit:
         yield fit.sentence
 

@@ -5,16 +5,16 @@ from __future__ import annotations
 from micro import HalfSpaceModel
 from multiscale.costs.prediction import Cost, predicted_cost
 from multiscale.machine.rates import this_machine
-from multiscale.setup.problem import Stage
+from multiscale.setup.problem import ProblemSetup
 
 
-def forecast(stage: Stage) -> Cost:
+def forecast(setup: ProblemSetup) -> Cost:
     """Predict what a run takes.
 
     Args:
-        stage: The scene's ingredients.
+        setup: The scene's ingredients.
     """
-    return predicted_cost(stage, this_machine())
+    return predicted_cost(setup, this_machine())
 
 
 def cost_statement(made: Cost) -> str:
@@ -27,23 +27,23 @@ def cost_statement(made: Cost) -> str:
     return f"about {made.total:.2g} s on one core ({phases}) and {made.memory / 1e6:.0f} MB"
 
 
-def error_statement(stage: Stage) -> str:
+def error_statement(setup: ProblemSetup) -> str:
     """Say how the run will know its error.
 
     Args:
-        stage: The scene's ingredients.
+        setup: The scene's ingredients.
     """
-    check = stage.scene.output.check
-    if stage.meshes is not None:
-        if len(stage.meshes.shapes) > 1:
+    check = setup.scene.output.check
+    if setup.meshes is not None:
+        if len(setup.meshes.shapes) > 1:
             return "the meshes of the reference tell it, at every load step"
         return "not known: one mesh has no error bar (reference.meshes = 2)"
-    if not isinstance(stage.micro, HalfSpaceModel):
-        return f"not known: {stage.model.name} contacts have no measure of it, half-space has"
+    if not isinstance(setup.micro, HalfSpaceModel):
+        return f"not known: {setup.model.name} contacts have no measure of it, half-space has"
     if check == "none":
         return "not measured (output.check = 'none')"
     which = "every load step" if check == "all" else "the last load step"
     causes = "grid, slopes"
-    causes += ", body" if stage.embedded else "; a block is not thought of"
-    causes += " and laws" if stage.by_laws else ""
+    causes += ", body" if setup.embedded else "; a block is not thought of"
+    causes += " and laws" if setup.by_laws else ""
     return f"measured at {which}, by cause: {causes}"

@@ -4,26 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from multiscale.machine.nodes import Nodes
+from multiscale.machine.nodes import ClusterNodes
 from multiscale.setup.checks import needs
-from multiscale.setup.problem import Stage
+from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import reference_needs
 
 
-def shortages(stage: Stage, nodes: Nodes) -> Iterator[str]:
+def shortages(setup: ProblemSetup, nodes: ClusterNodes) -> Iterator[str]:
     """Yield what a run would need more nodes for than there are.
 
     Args:
-        stage: The scene's ingredients.
+        setup: The scene's ingredients.
         nodes: The nodes there are.
     """
     wanted = [
         (f"{key} = {value}: {what}needs", need)
-        for key, value, what, need in needs(stage.scene)
+        for key, value, what, need in needs(setup.scene)
         if not nodes.fit(need)
     ]
-    if stage.meshes is not None:
-        of_meshes = reference_needs(stage.meshes.bytes, stage.meshes.gathered)
+    if setup.meshes is not None:
+        of_meshes = reference_needs(setup.meshes.bytes, setup.meshes.gathered)
         wanted += [(f"{what} needs", need) for what, need in of_meshes if not nodes.fit(need)]
     for text, need in wanted:
         yield f"{text} about {need.alone / 1e9:.3g} GB of memory; there is {nodes.room(need)}"

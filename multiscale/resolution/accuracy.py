@@ -21,14 +21,14 @@ from multiscale.couplings.blocks import SLOPES, OnBody, on_body
 from multiscale.couplings.reference import make_reference, recorded
 from multiscale.errors.load_steps import error_probe
 from multiscale.machine.rates import this_machine
-from multiscale.resolution.auto_keys import accuracy_of, couplings, map_grid, open_keys
+from multiscale.resolution.auto_keys import accuracy_of, auto_keys, couplings, map_grid
 from multiscale.resolution.surface_grid import MOST_HEIGHTS, on_waves
 from multiscale.scene.scene import Scene
 from multiscale.setup.decision import Alternative, Decision
-from multiscale.setup.problem import Stage
+from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.surface import make_surface
 
-Build = Callable[[Scene], Stage]
+Build = Callable[[Scene], ProblemSetup]
 Cells = tuple[int, int]
 Errors = Mapping[str, float]
 
@@ -52,7 +52,7 @@ _CHEAPER = 0.7
 _NOTHING_TO_SAVE = 4.0  # seconds
 
 
-def accurate_stage(given: Scene, start: Scene, build: Build) -> Stage:
+def accurate_stage(given: Scene, start: Scene, build: Build) -> ProblemSetup:
     """Return the ingredients of a scene, what it leaves open chosen so that its accuracy is kept.
 
     Args:
@@ -64,18 +64,18 @@ def accurate_stage(given: Scene, start: Scene, build: Build) -> Stage:
         InputError: When nothing that the scene allows can be made.
         NotConverged: When a contact problem cannot be solved.
     """
-    search, free = _Search(given, build), open_keys(given)
+    search, free = _Search(given, build), auto_keys(given)
     if "surface.grid" in free:
         by_cells = start.micro.model == "half-space" and start.coupling.kind != "reference"
         start = on_waves(start, _COARSE if by_cells else _FINE)
-    stage = build(start)
+    setup = build(start)
     if "patches.grid" in free:
-        patches = start.patches.model_copy(update={"grid": map_grid(stage.surface)})
+        patches = start.patches.model_copy(update={"grid": map_grid(setup.surface)})
         start = start.model_copy(update={"patches": patches})
-        stage = build(start)
-    if stage.meshes is not None:
-        return search.reference(stage)
-    return search.of_contacts(start, stage)
+        setup = build(start)
+    if setup.meshes is not None:
+        return search.reference(setup)
+    return search.of_contacts(start, setup)
 
 
 @dataclass(frozen=True)
@@ -87,54 +87,54 @@ class _Search:
     def _accuracy(self) -> float:
         return accuracy_of(self.given)
 
-    def of_contacts(self, start: Scene, stage: Stage) -> Stage:
+    def of_contacts(self, start: Scene, setup: ProblemSetup) -> ProblemSetup:
         """Choose for a coupling that solves contacts on cells; it may end with a reference."""
-        if not isinstance(stage.micro, HalfSpaceModel):
-            return self._decided(stage, {})
-        by_surface = "surface.grid" in open_keys(self.given)
-        model, errors = self._cells(start, stage, by_surface=by_surface)
+        if not isinstance(setup.micro, HalfSpaceModel):
+            return self._decided(setup, {})
+        by_surface = "surface.grid" in auto_keys(self.given)
+        model, errors = self._cells(start, setup, by_surface=by_surface)
         if by_surface:
             section = start.surface.model_copy(update={"grid": model.surface.grid})
             start = start.model_copy(update={"surface": section})
-        stage = replace(self.build(start), micro=model)
-        stage, others = self._cheapest(stage)
+        setup = replace(self.build(start), micro=model)
+        setup, others = self._cheapest(setup)
         if not self._may_be_meshed:
-            return self._decided(stage, errors, others)
-        seconds = _seconds(stage)
+            return self._decided(setup, errors, others)
+        seconds = _seconds(setup)
         needed = sum(errors.values()) > self._accuracy
         if not needed and seconds < _NOTHING_TO_SAVE:
-            return self._decided(stage, errors, others)
+            return self._decided(setup, errors, others)
         try:
             meshed = self.build(_meshed(start, {}))
             if self.given.reference.fine is None:
                 meshed = self._with_meshes(start, self._first_size(meshed))
             if not needed and _seconds(meshed) > _CHEAPER * seconds:
                 others = (*others, _alternative(meshed))
-                return self._decided(stage, errors, others)
+                return self._decided(setup, errors, others)
             found = self.reference(meshed)
         except (InputError, NotConverged):  # the block or the memory does not allow it
-            return self._decided(stage, errors, others)
+            return self._decided(setup, errors, others)
         decision = found.decision
         if decision is None or (needed and decision.error > sum(errors.values())):
-            return self._decided(stage, errors, others)
+            return self._decided(setup, errors, others)
         missed = errors if needed else {}
-        others = (_alternative(stage), *others)
+        others = (_alternative(setup), *others)
         return replace(found, decision=replace(decision, missed=missed, others=others))
 
     def _cells(
-        self, start: Scene, stage: Stage, *, by_surface: bool
+        self, start: Scene, setup: ProblemSetup, *, by_surface: bool
     ) -> tuple[HalfSpaceModel, Errors]:
         """Refine the cells of the half-space model until its errors keep the accuracy."""
-        model = stage.micro
+        model = setup.micro
         assert isinstance(model, HalfSpaceModel)
-        resample = not by_surface and "micro.model" in open_keys(self.given)
-        body = on_body(stage, None, half_space=not stage.embedded)
-        cells = stage.surface.grid
+        resample = not by_surface and "micro.model" in auto_keys(self.given)
+        body = on_body(setup, None, half_space=not setup.embedded)
+        cells = setup.surface.grid
         if resample:
             cells = _scaled(cells, 1.0 / _FIRST_CELLS)
         for trial in range(_TRIALS):
-            model = replace(model, **_on_cells(start, stage.surface, cells, by_surface))
-            errors = self._measured(stage, model, body)
+            model = replace(model, **_on_cells(start, setup.surface, cells, by_surface))
+            errors = self._measured(setup, model, body)
             off, others = sum(errors.values()), sum(errors.values()) - errors.get("grid", 0.0)
             if off <= _SPARE * self._accuracy or not (by_surface or resample):
                 break
@@ -145,14 +145,14 @@ class _Search:
             cells = _scaled(cells, min(max(finer, _LEAST_STEP), _LARGEST_STEP))
         return model, errors
 
-    def _measured(self, stage: Stage, model: HalfSpaceModel, body: OnBody) -> Errors:
+    def _measured(self, setup: ProblemSetup, model: HalfSpaceModel, body: OnBody) -> Errors:
         """Return the errors relative to the force, at the load where their sum is largest."""
-        programme = self.given.loading.programme
-        order = SLOPES if stage.finite_slopes else 0
-        probe = replace(error_probe(stage, body), model=model, by_laws=False)
+        load_history = self.given.loading.load_history
+        order = SLOPES if setup.finite_slopes else 0
+        probe = replace(error_probe(setup, body), model=model, by_laws=False)
         worst: Errors = {"grid": 0.0}
-        for value in sorted({programme.largest, programme.points[-1]}):
-            state = body(model, order).equilibrium(programme.control(value))
+        for value in sorted({load_history.largest, load_history.points[-1]}):
+            state = body(model, order).equilibrium(load_history.control(value))
             if not state.force > 0.0:
                 continue
             found = probe.measure(state.force, state.plane.approach, state.plane.tilt)
@@ -160,18 +160,18 @@ class _Search:
             worst = max(worst, errors, key=lambda each: sum(each.values()))
         return worst
 
-    def _cheapest(self, stage: Stage) -> tuple[Stage, tuple[Alternative, ...]]:
+    def _cheapest(self, setup: ProblemSetup) -> tuple[ProblemSetup, tuple[Alternative, ...]]:
         """Return the stage with the coupling that is predicted to take least, and the others."""
-        sections = [stage.scene.coupling]
-        if "coupling.kind" in open_keys(self.given):
+        sections = [setup.scene.coupling]
+        if "coupling.kind" in auto_keys(self.given):
             sections = list(couplings(self.given))
         tolerance = {"table_tolerance": 0.1 * self._accuracy}
         found = []
         for section in sections:
             if section.kind == "consistent" and section.table_tolerance is None:
                 section = section.model_copy(update=tolerance)
-            scene = stage.scene.model_copy(update={"coupling": section})
-            found.append(replace(stage, scene=scene))
+            scene = setup.scene.model_copy(update={"coupling": section})
+            found.append(replace(setup, scene=scene))
         if len(found) == 1:
             return found[0], ()
         found.sort(key=_seconds)
@@ -181,58 +181,60 @@ class _Search:
     def _may_be_meshed(self) -> bool:
         """Whether the scene leaves it open that its roughness be meshed."""
         stated = self.given.coupling.model_fields_set - {"kind"}
-        free = open_keys(self.given)
+        free = auto_keys(self.given)
         return {"coupling.kind", "micro.model"} <= free and not stated
 
-    def reference(self, stage: Stage) -> Stage:
+    def reference(self, setup: ProblemSetup) -> ProblemSetup:
         """Refine the meshes of a reference until its errors keep the accuracy."""
-        assert stage.meshes is not None
-        may_refine = self.given.reference.fine is None and not stage.meshes.hexahedral
-        if may_refine and stage.scene.reference.fine is None:
-            stage = self._with_meshes(stage.scene, self._first_size(stage))
-        if stage.meshes is None or len(stage.meshes.shapes) == 1:  # which cannot tell of its error
-            return self._decided(stage, {})
+        assert setup.meshes is not None
+        may_refine = self.given.reference.fine is None and not setup.meshes.hexahedral
+        if may_refine and setup.scene.reference.fine is None:
+            setup = self._with_meshes(setup.scene, self._first_size(setup))
+        if setup.meshes is None or len(setup.meshes.shapes) == 1:  # which cannot tell of its error
+            return self._decided(setup, {})
         for _ in range(_TRIALS):
-            error = self._of_meshes(stage)
-            fine = stage.scene.reference.fine
+            error = self._of_meshes(setup)
+            fine = setup.scene.reference.fine
             if error <= self._accuracy or not may_refine or fine is None:
                 break
-            finer = (error / self._accuracy) ** (1.0 / stage.meshes.force_order)
+            finer = (error / self._accuracy) ** (1.0 / setup.meshes.force_order)
             step = min(max(finer, _LEAST_STEP), _LARGEST_STEP)
             try:
-                stage = self._with_meshes(stage.scene, fine / step)
+                setup = self._with_meshes(setup.scene, fine / step)
             except InputError:  # more memory than there is
                 break
-        return self._decided(stage, {"mesh": error})
+        return self._decided(setup, {"mesh": error})
 
-    def _of_meshes(self, stage: Stage) -> float:
+    def _of_meshes(self, setup: ProblemSetup) -> float:
         """Return the relative error of the meshes at the largest load."""
-        coupling = make_reference(stage, None)
-        programme = stage.scene.loading.programme
-        step = coupling.press(programme.control(programme.largest))
-        (found,) = recorded(stage, coupling, [step]).with_errors([step])
+        coupling = make_reference(setup, None)
+        load_history = setup.scene.loading.load_history
+        step = coupling.press(load_history.control(load_history.largest))
+        (found,) = recorded(setup, coupling, [step]).with_errors([step])
         if not step.force_N > 0.0:
             return 0.0
         if found.force_error_N is None or found.approach_error_mm is None:
             return 1.0
-        if programme.quantity == "force":
+        if load_history.quantity == "force":
             return 1.5 * found.approach_error_mm / abs(found.approach_mm)  # F grows as δ^1.5
         return found.force_error_N / found.force_N
 
-    def _first_size(self, stage: Stage) -> float:
+    def _first_size(self, setup: ProblemSetup) -> float:
         """Return the edge length to begin with [mm], from the one that is taken by default."""
-        assert stage.meshes is not None
+        assert setup.meshes is not None
         coarser = (self._accuracy / _DEFAULT_MESHES) ** 0.5
-        return float(stage.meshes.sizes[-1]) * min(max(coarser, 1.0), _COARSEST_MESH)
+        return float(setup.meshes.sizes[-1]) * min(max(coarser, 1.0), _COARSEST_MESH)
 
-    def _with_meshes(self, scene: Scene, fine: float) -> Stage:
+    def _with_meshes(self, scene: Scene, fine: float) -> ProblemSetup:
         return self.build(_meshed(scene, {"fine": fine}))
 
-    def _decided(self, stage: Stage, errors: Errors, others: tuple[Alternative, ...] = ()) -> Stage:
+    def _decided(
+        self, setup: ProblemSetup, errors: Errors, others: tuple[Alternative, ...] = ()
+    ) -> ProblemSetup:
         decision = Decision(
-            accuracy=self._accuracy, taken=_alternative(stage), errors=errors, others=others
+            accuracy=self._accuracy, taken=_alternative(setup), errors=errors, others=others
         )
-        return replace(stage, decision=decision)
+        return replace(setup, decision=decision)
 
 
 def _on_cells(scene: Scene, surface: Surface, cells: Cells, by_surface: bool) -> dict[str, Any]:
@@ -259,17 +261,17 @@ def _meshed(scene: Scene, changes: dict[str, Any]) -> Scene:
     return scene.model_copy(update={"coupling": coupling, "reference": reference})
 
 
-def _seconds(stage: Stage) -> float:
-    return predicted_cost(stage, this_machine()).total
+def _seconds(setup: ProblemSetup) -> float:
+    return predicted_cost(setup, this_machine()).total
 
 
-def _alternative(stage: Stage) -> Alternative:
-    if stage.meshes is not None:
-        size = 1e3 * float(stage.meshes.sizes[-1])
+def _alternative(setup: ProblemSetup) -> Alternative:
+    if setup.meshes is not None:
+        size = 1e3 * float(setup.meshes.sizes[-1])
         label = f"reference, meshed with edges of {size:.3g} µm"
-    elif isinstance(stage.micro, HalfSpaceModel):
-        x, y = stage.micro.surface.grid
-        label = f"{stage.scene.coupling.kind} on {x} × {y} cells"
+    elif isinstance(setup.micro, HalfSpaceModel):
+        x, y = setup.micro.surface.grid
+        label = f"{setup.scene.coupling.kind} on {x} × {y} cells"
     else:
-        label = f"{stage.scene.coupling.kind}, {stage.model.name}"
-    return Alternative(label=label, seconds=_seconds(stage))
+        label = f"{setup.scene.coupling.kind}, {setup.model.name}"
+    return Alternative(label=label, seconds=_seconds(setup))

@@ -12,7 +12,7 @@ from micro import HalfSpaceModel
 from multiscale.scene.scene import Scene
 from multiscale.scene.sections import CouplingSection, ReferenceSection
 from multiscale.setup.checks import PROVISIONAL_PATCHES
-from multiscale.setup.problem import Stage
+from multiscale.setup.problem import ProblemSetup
 
 DEFAULT_ACCURACY = 0.02
 """Relative error of the force that is kept unless the scene says."""
@@ -24,7 +24,7 @@ REFERENCE = "reference"
 """Section that is settled as a whole beside an accuracy."""
 
 
-def open_keys(scene: Scene) -> frozenset[str]:
+def auto_keys(scene: Scene) -> frozenset[str]:
     """Return the keys that are left to the plan: ``"auto"``, or not stated beside an accuracy.
 
     The block's cells are one of them only under laws on its mesh.
@@ -69,7 +69,7 @@ def is_measured(scene: Scene) -> bool:
     Args:
         scene: The scene as it was given.
     """
-    free = open_keys(scene)
+    free = auto_keys(scene)
     if scene.accuracy is None and free <= {"micro.model", "patches.grid", "block.cells"}:
         return False
     fine = scene.coupling.kind == "reference" and scene.accuracy is not None
@@ -97,13 +97,13 @@ def provisional(scene: Scene, free: frozenset[str]) -> Scene:
     return scene.model_copy(update=changes)
 
 
-def settled_keys(stage: Stage, given: Scene) -> dict[str, Any]:
+def resolved_keys(setup: ProblemSetup, given: Scene) -> dict[str, Any]:
     """Return what the open keys of a scene became, so that a run goes on as it began.
 
     Rates of the machine decide near ties, and another session may run on another machine.
 
     Args:
-        stage: The ingredients.
+        setup: The ingredients.
         given: The scene as it was given.
 
     Returns:
@@ -111,13 +111,13 @@ def settled_keys(stage: Stage, given: Scene) -> dict[str, Any]:
         a half-space; of coupling and reference the whole section.
     """
     found: dict[str, Any] = {}
-    scene = stage.scene
-    for key in sorted(open_keys(given)):
+    scene = setup.scene
+    for key in sorted(auto_keys(given)):
         section, _, name = key.partition(".")
         if key == "coupling.kind":
             found[key] = scene.coupling.model_dump(mode="json", exclude_unset=True)
         elif key == "micro.model":
-            found[key] = _settled_model(stage)
+            found[key] = _settled_model(setup)
         else:
             found[key] = getattr(getattr(scene, section), name)
     if is_measured(given):
@@ -125,21 +125,21 @@ def settled_keys(stage: Stage, given: Scene) -> dict[str, Any]:
     return found
 
 
-def _settled_model(stage: Stage) -> Any:
-    if stage.choice is not None:
-        return stage.choice.taken.label
-    return list(stage.micro.surface.grid) if isinstance(stage.micro, HalfSpaceModel) else None
+def _settled_model(setup: ProblemSetup) -> Any:
+    if setup.choice is not None:
+        return setup.choice.taken.label
+    return list(setup.micro.surface.grid) if isinstance(setup.micro, HalfSpaceModel) else None
 
 
-def with_settled(scene: Scene, settled: Mapping[str, Any]) -> Scene:
+def with_resolved(scene: Scene, settled: Mapping[str, Any]) -> Scene:
     """Return a scene whose open keys, but for the micro model's cells, are what they became.
 
     Args:
         scene: The scene as it was given.
-        settled: What `settled_keys` returned.
+        settled: What `resolved_keys` returned.
     """
     changes: dict[str, Any] = {}
-    for key in open_keys(scene) & set(settled):
+    for key in auto_keys(scene) & set(settled):
         section, _, name = key.partition(".")
         value = settled[key]
         if key == "coupling.kind":

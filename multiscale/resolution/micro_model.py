@@ -18,10 +18,10 @@ from micro import (
 )
 from multiscale.costs.contact_work import kind_work, reach
 from multiscale.couplings.load_steps import ContactCoupling
-from multiscale.loading.stepper import Programme, load_steps
+from multiscale.loading.stepper import LoadHistory, load_steps
 from multiscale.machine.rates import this_machine
 from multiscale.scene.scene import Scene
-from multiscale.setup.contact_estimate import nearest, rough_half_space
+from multiscale.setup.contact_estimate import largest_local_approach, rough_half_space
 
 _FEW_SUMMITS = 30  # that interact, for the cost of models that may be taken
 
@@ -58,7 +58,7 @@ def chosen_model(
     kind, plane = scene.coupling.kind, estimated_plane(scene, surface)
     at = reach(surface, plane, summits=_FEW_SUMMITS)
     by_laws = kind in ("isolated", "consistent")
-    solutions = SOLUTIONS_OF_LAWS if by_laws else scene.loading.programme.count
+    solutions = SOLUTIONS_OF_LAWS if by_laws else scene.loading.load_history.count
 
     def cost(model: str, cells: int) -> float:
         work = kind_work(model, cells, at)
@@ -67,7 +67,7 @@ def chosen_model(
     return choose(
         surface,
         contact_modulus=_modulus(scene),
-        approach=nearest(plane, surface),
+        approach=largest_local_approach(plane, surface),
         tolerance=tolerance,
         patches=patches if scene.coupling.kind != "analytic" else None,
         solutions=solutions,
@@ -77,24 +77,29 @@ def chosen_model(
 
 
 def estimated_plane(scene: Scene, surface: Surface) -> tuple[float, tuple[float, float]]:
-    """Return `furthest_plane`, from a half-space of few cells where loads are prescribed."""
+    """Return the plane at the largest load, where loads are prescribed from a coarse half-space."""
     rough = rough_half_space(surface, _modulus(scene))
     whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
-    return furthest_plane(scene.loading.programme, rough, whole, patch_means(surface, whole))
+    return find_plane_at_largest_load(
+        scene.loading.load_history, rough, whole, patch_means(surface, whole)
+    )
 
 
-def furthest_plane(
-    programme: Programme, model: MicroModel, patches: PatchGrid, mean_heights: NDArray[np.float64]
+def find_plane_at_largest_load(
+    load_history: LoadHistory,
+    model: MicroModel,
+    patches: PatchGrid,
+    mean_heights: NDArray[np.float64],
 ) -> tuple[float, tuple[float, float]]:
     """Return the largest approach and the slopes there, from the half-space where not given.
 
     Raises:
         NotConverged: When the plane is not found in smaller steps either.
     """
-    if programme.quantity == "approach" and programme.tilt is not None:
-        return programme.largest, programme.tilt
+    if load_history.quantity == "approach" and load_history.tilt is not None:
+        return load_history.largest, load_history.tilt
     alone = ContactCoupling(model, patches, mean_heights)
-    there = replace(programme, points=(programme.largest,), steps=1, force_change=None)
+    there = replace(load_history, points=(load_history.largest,), steps=1, force_change=None)
     (step,) = load_steps(alone, there)
     return step.approach_mm, step.tilt
 

@@ -13,56 +13,56 @@ from geometry.errors import InputError
 from geometry.patches import PatchGrid, patch_means
 from geometry.surface import Surface
 from micro import HalfSpaceModel, MicroModel, resampled
-from multiscale.machine.nodes import Nodes
+from multiscale.machine.nodes import ClusterNodes
 from multiscale.resolution.accuracy import accurate_stage
 from multiscale.resolution.auto_keys import (
     accuracy_of,
+    auto_keys,
     is_measured,
     map_grid,
-    open_keys,
     provisional,
-    with_settled,
+    with_resolved,
 )
 from multiscale.resolution.micro_model import (
     chosen_model,
     estimated_plane,
-    furthest_plane,
+    find_plane_at_largest_load,
     stated_model,
 )
 from multiscale.scene.scene import Scene
 from multiscale.setup.checks import check_load, check_patches, check_size, patch_grid
-from multiscale.setup.problem import Stage
+from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import reference_meshes
 from multiscale.setup.surface import make_shape, make_surface
 
 
-def make_stage(
-    scene: Scene, settled: Mapping[str, Any] | None = None, nodes: Nodes | None = None
-) -> Stage:
+def make_setup(
+    scene: Scene, settled: Mapping[str, Any] | None = None, nodes: ClusterNodes | None = None
+) -> ProblemSetup:
     """Make or read the surface, find its summits, settle what is open, check that all fits.
 
     Args:
         scene: The scene.
-        settled: What open keys became when the run began; see `settled_keys`.
+        settled: What open keys became when the run began; see `resolved_keys`.
         nodes: The nodes of the run; None for this process alone.
 
     Raises:
         InputError: When something cannot be made or does not fit; names file, key and value.
     """
-    began, nodes = time.perf_counter(), nodes or Nodes()
+    began, nodes = time.perf_counter(), nodes or ClusterNodes()
     known = settled or {}
-    free = open_keys(scene) - set(known)
-    start = provisional(with_settled(scene, known), free)
+    free = auto_keys(scene) - set(known)
+    start = provisional(with_resolved(scene, known), free)
     if free and is_measured(scene) and not known:
-        stage = accurate_stage(scene, start, lambda stated: _stage(stated, nodes))
-        return replace(stage, seconds={"surface": 0.0, "choice": time.perf_counter() - began})
+        setup = accurate_stage(scene, start, lambda stated: _stage(stated, nodes))
+        return replace(setup, seconds={"surface": 0.0, "choice": time.perf_counter() - began})
     if "patches.grid" in free:
         section = start.patches.model_copy(update={"grid": map_grid(make_surface(start))})
         start = start.model_copy(update={"patches": section})
     return _stage(start, nodes, known.get("micro.model"))
 
 
-def _stage(scene: Scene, nodes: Nodes, known: Any = None) -> Stage:
+def _stage(scene: Scene, nodes: ClusterNodes, known: Any = None) -> ProblemSetup:
     """Return the ingredients of a scene of which the micro model alone may be open.
 
     Args:
@@ -95,7 +95,7 @@ def _stage(scene: Scene, nodes: Nodes, known: Any = None) -> Stage:
         model = replace(model, surface=cells, highest=surface.highest)
     _check_summits(scene, model)
     mean_heights = patch_means(surface, patches)
-    return Stage(
+    return ProblemSetup(
         scene=scene,
         surface=surface,
         asperities=asperities,
@@ -103,7 +103,9 @@ def _stage(scene: Scene, nodes: Nodes, known: Any = None) -> Stage:
         patches=patches,
         mean_heights=mean_heights,
         shape=make_shape(scene, surface),
-        furthest=furthest_plane(scene.loading.programme, model, patches, mean_heights),
+        plane_at_largest_load=find_plane_at_largest_load(
+            scene.loading.load_history, model, patches, mean_heights
+        ),
         choice=choice,
         seconds=seconds,
     )
@@ -125,12 +127,12 @@ def _reference_stage(
     surface: Surface,
     patches: PatchGrid,
     asperities: Asperities,
-    nodes: Nodes,
+    nodes: ClusterNodes,
     began: float,
-) -> Stage:
+) -> ProblemSetup:
     """Return the ingredients of a reference, which needs no micro model."""
-    furthest = estimated_plane(scene, surface)
-    return Stage(
+    plane_at_largest_load = estimated_plane(scene, surface)
+    return ProblemSetup(
         scene=scene,
         surface=surface,
         asperities=asperities,
@@ -138,7 +140,7 @@ def _reference_stage(
         patches=patches,
         mean_heights=patch_means(surface, patches),
         shape=make_shape(scene, surface),
-        furthest=furthest,
-        meshes=reference_meshes(scene, surface, furthest, nodes),
+        plane_at_largest_load=plane_at_largest_load,
+        meshes=reference_meshes(scene, surface, plane_at_largest_load, nodes),
         seconds={"surface": time.perf_counter() - began},
     )

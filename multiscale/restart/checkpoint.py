@@ -13,8 +13,8 @@ import numpy as np
 
 from geometry.errors import InputError
 from multiscale.loading.load_step import LoadStep, PatchState
-from multiscale.loading.stepper import Position
-from multiscale.storage.checksummed_hdf5 import sealed, unsealed
+from multiscale.loading.stepper import LoadPosition
+from multiscale.storage.checksummed_hdf5 import checksummed, verified
 from multiscale.storage.serialisation import (
     Arrays,
     as_text,
@@ -52,7 +52,7 @@ class Checkpoint:
     heights: str
     laws: bytes
     steps: tuple[LoadStep, ...] = ()
-    position: Position
+    position: LoadPosition
     state: Arrays
 
 
@@ -73,7 +73,7 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> Path:
         for name, array in arrays.items():
             file.create_dataset(name, data=array)
 
-    return write_bytes(path, sealed(fill))
+    return write_bytes(path, checksummed(fill))
 
 
 def read_checkpoint(path: Path) -> Checkpoint:
@@ -88,7 +88,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
     if not path.is_file():  # a pipe would be waited for
         raise _refused(path, "is no file")
     try:
-        with h5py.File(unsealed(path), "r") as file:
+        with h5py.File(verified(path), "r") as file:
             form = str(file.attrs.get("format", ""))
             if form != FORMAT:
                 raise InputError("is not a checkpoint of this patchlaw", value=form, allowed=FORMAT)
@@ -131,7 +131,7 @@ def _checkpoint(arrays: Arrays) -> Checkpoint:
         **json.loads(as_text(arrays["facts"])),
         laws=arrays["laws"].tobytes(),
         steps=_steps(part(arrays, "steps/")),
-        position=unpacked(part(arrays, "position/"), (Position,)),
+        position=unpacked(part(arrays, "position/"), (LoadPosition,)),
         state=part(arrays, "state/"),
     )
 

@@ -13,7 +13,7 @@ from typing import BinaryIO
 import numpy as np
 
 from multiscale.loading.load_step import LoadStep, PatchState
-from multiscale.loading.stepper import Position
+from multiscale.loading.stepper import LoadPosition
 from multiscale.storage.serialisation import (
     Arrays,
     as_text,
@@ -64,7 +64,7 @@ class Journal:
             self.close()
             self._file = self._path.open("wb", buffering=0)
 
-    def append(self, step: LoadStep, position: Position, state: Arrays) -> None:
+    def append(self, step: LoadStep, position: LoadPosition, state: Arrays) -> None:
         """Append a load step, and what is needed to go on after it.
 
         Args:
@@ -89,7 +89,7 @@ class Journal:
             self._file = None
 
 
-def journalled(path: Path, run: str) -> Iterator[tuple[LoadStep, Position, Arrays]]:
+def journalled(path: Path, run: str) -> Iterator[tuple[LoadStep, LoadPosition, Arrays]]:
     """Yield the load steps in a journal, up to a torn record or one of another run.
 
     Args:
@@ -105,7 +105,7 @@ def journalled(path: Path, run: str) -> Iterator[tuple[LoadStep, Position, Array
         arrays = _arrays(bytes(content))
         if as_text(arrays["run"]) != run:
             return
-        step, position = unpacked(part(arrays, "step/"), (LoadStep, PatchState, Position))
+        step, position = unpacked(part(arrays, "step/"), (LoadStep, PatchState, LoadPosition))
         yield step, position, part(arrays, "state/")
         data = data[_CHECK + _LENGTH + length :]
 

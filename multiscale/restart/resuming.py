@@ -13,7 +13,7 @@ from typing import Any
 from geometry.collective import on_root
 from geometry.errors import InputError, NotWritten
 from multiscale.loading.load_step import LoadStep
-from multiscale.loading.stepper import Position
+from multiscale.loading.stepper import LoadPosition
 from multiscale.restart.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
 from multiscale.restart.folder_lock import FolderLock
 from multiscale.restart.journal import Journal, journalled
@@ -27,7 +27,7 @@ _SOONEST = 1.0  # between two checkpoints [s]; the journal holds the load steps 
 _RATHER = 20.0  # likewise, times what writing one takes
 
 
-class Keeper:
+class CheckpointWriter:
     """Writes what is needed to resume a run after every load step, at a cost that does not grow.
 
     The checkpoint is written whole at most every second, and less often where that takes long; the
@@ -107,7 +107,7 @@ class Keeper:
         refuse_changes(checkpoint, now, self._path)
         return with_journal(checkpoint, self._path.with_name(JOURNAL))
 
-    def _keep(self, step: LoadStep, position: Position, state: Arrays) -> None:
+    def _keep(self, step: LoadStep, position: LoadPosition, state: Arrays) -> None:
         if time.monotonic() < self._due and self._journal.stands:
             self._journal.append(step, position, state)
         else:

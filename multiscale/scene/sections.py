@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from multiscale.loading.stepper import Programme
+from multiscale.loading.stepper import LoadHistory
 from multiscale.scene.quantities import Approaches, Forces, Length, Tilt
 
 
@@ -133,12 +133,12 @@ class CouplingSection(Section):
 class ReferenceSection(Section):
     """The rough surface meshed, for ``coupling.kind = "reference"``; other couplings ignore it.
 
-    ``method``: how contact is found, see `macro.ObstacleBlock`. ``mesh``: ``tetrahedra`` are small
-    only where contact can occur, ``hexahedra`` are as many as ``cells`` says; by default
+    ``method``: how contact is found, see `macro.UnilateralContactProblem`. ``mesh``: ``tetrahedra``
+    are small only where contact can occur, ``hexahedra`` are as many as ``cells`` says; by default
     tetrahedra, unless ``cells`` is stated. ``meshes`` of falling size are pressed alike, and their
-    results extrapolated; one alone has no error bar. ``fine``: edge length of the finest
-    tetrahedra where contact can occur, by default from the surface and the load. ``cells``:
-    hexahedra of the finest mesh; their element and grading are those of ``[block]``.
+    results extrapolated; one alone has no error bar. ``fine``: edge length of the finest tetrahedra
+    where contact can occur, by default from the surface and the load. ``cells``: hexahedra of the
+    finest mesh; their element and grading are those of ``[block]``.
     """
 
     method: Literal["active-set", "augmented-lagrangian"] = "active-set"
@@ -203,9 +203,9 @@ class LoadSection(Section):
         return self
 
     @property
-    def programme(self) -> Programme:
+    def load_history(self) -> LoadHistory:
         """What the rigid plane is made to do."""
-        return Programme(
+        return LoadHistory(
             quantity="approach" if self.force is None else "force",
             points=self.approach or self.force or (),
             steps=self.steps,

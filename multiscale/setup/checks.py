@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from geometry.errors import InputError
 from geometry.files import BYTES_PER_HEIGHT
 from geometry.surface import Surface
-from multiscale.machine.nodes import Need, Nodes
+from multiscale.machine.nodes import ClusterNodes, MemoryRequest
 from multiscale.scene.scene import Scene
 
 BYTES_PER_CELL = 5000
@@ -63,7 +63,7 @@ def patch_grid(scene: Scene) -> tuple[int, int]:
     return PROVISIONAL_PATCHES if grid == "auto" else grid
 
 
-def check_size(scene: Scene, nodes: Nodes) -> None:
+def check_size(scene: Scene, nodes: ClusterNodes) -> None:
     """Refuse what could never fit into the memory of the nodes, before anything is allocated.
 
     Keys that are left to the plan are passed over: it takes nothing that would be refused.
@@ -86,7 +86,7 @@ def check_size(scene: Scene, nodes: Nodes) -> None:
             )
 
 
-def needs(scene: Scene) -> Iterator[tuple[str, object, str, Need]]:
+def needs(scene: Scene) -> Iterator[tuple[str, object, str, MemoryRequest]]:
     """Yield keys, their values, what of them takes memory, and how much.
 
     Args:
@@ -96,28 +96,28 @@ def needs(scene: Scene) -> Iterator[tuple[str, object, str, Need]]:
     if isinstance(grid, tuple):
         kept = math.prod(grid) * BYTES_PER_SENT_HEIGHT
         made = math.prod(grid) * BYTES_PER_HEIGHT - kept
-        yield "surface.grid", grid, "", Need(held=kept, once=made)
+        yield "surface.grid", grid, "", MemoryRequest(held=kept, once=made)
     if meshes_block(scene):  # a reference checks its meshes itself
         nx, ny, nz = block_cells(scene)
-        yield "block.cells", (nx, ny, nz), "", Need(shared=nx * ny * nz * BYTES_PER_CELL)
+        yield "block.cells", (nx, ny, nz), "", MemoryRequest(shared=nx * ny * nz * BYTES_PER_CELL)
         if scene.block.margin:
             more = 2 * scene.block.margin_cells
-            need = Need(shared=(nx + more) * (ny + more) * nz * BYTES_PER_CELL)
+            need = MemoryRequest(shared=(nx + more) * (ny + more) * nz * BYTES_PER_CELL)
             yield "block.margin_cells", scene.block.margin_cells, "", need
     if not isinstance(patches, tuple):
         return
-    count, steps = math.prod(patches), scene.loading.steps * len(scene.loading.programme.points)
-    yield "patches.grid", patches, "", Need(held=count * BYTES_PER_HEIGHT)
+    count, steps = math.prod(patches), scene.loading.steps * len(scene.loading.load_history.points)
+    yield "patches.grid", patches, "", MemoryRequest(held=count * BYTES_PER_HEIGHT)
     if scene.coupling.kind not in ("analytic", "reference"):
         what = "the interaction of all patches with each other "
-        yield "patches.grid", patches, what, Need(held=count**2 * BYTES_PER_PAIR)
+        yield "patches.grid", patches, what, MemoryRequest(held=count**2 * BYTES_PER_PAIR)
     if scene.coupling.kind in ("isolated", "consistent"):
         law, new = count * BYTES_PER_LAW, count * BYTES_PER_NEW_LAW
         dealt = scene.coupling.kind == "isolated"  # to the ranks; else all are made by rank 0
-        need = Need(held=law, shared=new) if dealt else Need(held=law, once=new)
+        need = MemoryRequest(held=law, shared=new) if dealt else MemoryRequest(held=law, once=new)
         yield "patches.grid", patches, "a law for every patch ", need
     what = f"the history of {count} patches "
-    need = Need(held=steps * (count * BYTES_PER_STATE + 1000))
+    need = MemoryRequest(held=steps * (count * BYTES_PER_STATE + 1000))
     yield "load.steps", scene.loading.steps, what, need
 
 

@@ -23,7 +23,7 @@ def rough_half_space(surface: Surface, modulus: float) -> HalfSpaceModel:
     )
 
 
-def nearest(plane: tuple[float, tuple[float, float]], surface: Surface) -> float:
+def largest_local_approach(plane: tuple[float, tuple[float, float]], surface: Surface) -> float:
     """Return how near a tilted plane comes anywhere: its approach at the nearest corner [mm]."""
     approach, tilt = plane
     return approach + 0.5 * float(np.abs(np.multiply(surface.lengths, tilt)).sum())

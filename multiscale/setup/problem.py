@@ -16,7 +16,7 @@ from geometry.surface import Surface
 from micro import AsperityModel, Choice, HalfSpaceModel, MicroModel, ScaledModel
 from multiscale.laws.refinement import MOST_ROWS
 from multiscale.scene.scene import Scene
-from multiscale.setup.contact_estimate import nearest
+from multiscale.setup.contact_estimate import largest_local_approach
 from multiscale.setup.decision import Decision
 from multiscale.setup.reference_meshes import ReferenceMeshes
 
@@ -27,7 +27,7 @@ CLOSURE_RESERVE = 0.15
 
 
 @dataclass(frozen=True, kw_only=True)
-class Stage:
+class ProblemSetup:
     """Everything that is known before laws and finite elements are made.
 
     Attributes:
@@ -38,7 +38,8 @@ class Stage:
         patches: Partition of the interface.
         mean_heights: Mean height of each patch, shape (N,) [mm].
         shape: The block's shape and mesh.
-        furthest: Largest approach at the middle of the interface [mm] and the plane's slopes
+        plane_at_largest_load: Largest approach at the middle of the interface [mm] and the plane's
+        slopes
             there; where force or moment are prescribed, those of the surface on a half-space.
         choice: Why this micro model, where the scene leaves it open.
         meshes: The meshes of a reference; None with other couplings.
@@ -53,7 +54,7 @@ class Stage:
     patches: PatchGrid
     mean_heights: Array
     shape: BlockShape
-    furthest: tuple[float, tuple[float, float]]
+    plane_at_largest_load: tuple[float, tuple[float, float]]
     choice: Choice | None = None
     meshes: ReferenceMeshes | None = None
     decision: Decision | None = None
@@ -114,19 +115,19 @@ class Stage:
         return 400 if self.by_summits else MOST_ROWS
 
     @property
-    def nearest(self) -> float:
+    def largest_local_approach(self) -> float:
         """How near the plane at the largest load comes anywhere [mm]."""
-        return nearest(self.furthest, self.surface)
+        return largest_local_approach(self.plane_at_largest_load, self.surface)
 
     @cached_property
-    def deepest(self) -> float:
+    def largest_interference(self) -> float:
         """Deepest overlap of plane and undeformed surface at the largest load [mm].
 
         A level plane overlaps by its approach; the approach at the middle of a tilted one may be
         negative though its lower side touches.
         """
         overlap = self._overlap(*self._cells)
-        return max(self.furthest[0], float(overlap.max()))
+        return max(self.plane_at_largest_load[0], float(overlap.max()))
 
     @property
     def closure_ends(self) -> Array:
@@ -137,7 +138,7 @@ class Stage:
         at points see the approach at the patch's corners; so does a level patch alone that has to
         carry a force, for under the tilted plane its contacts may lie at a corner.
         """
-        approach, tilt = self.furthest
+        approach, tilt = self.plane_at_largest_load
         ends = self.patches.mean_approaches(approach, tilt)
         coupling, loading = self.scene.coupling, self.scene.loading
         alone_by_force = coupling.kind == "isolated" and loading.force is not None
@@ -145,7 +146,7 @@ class Stage:
             ends = ends + 0.5 * float(np.abs(np.multiply(self.patches.size, tilt)).sum())
         if loading.tilt == "free":
             ends = ends + (ends.max() - approach)
-        return ends + CLOSURE_RESERVE * self.deepest
+        return ends + CLOSURE_RESERVE * self.largest_interference
 
     @property
     def reached(self) -> NDArray[np.bool_]:
@@ -178,6 +179,6 @@ class Stage:
 
     def _overlap(self, x: Array, y: Array, z: Array) -> Array:
         """Return how far the plane at the largest load lies below points of the surface [mm]."""
-        approach, tilt = self.furthest
+        approach, tilt = self.plane_at_largest_load
         from_centre = np.column_stack((x, y)) - 0.5 * np.asarray(self.surface.lengths)
         return np.asarray(approach + from_centre @ np.asarray(tilt) - (self.surface.highest - z))

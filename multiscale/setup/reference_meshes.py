@@ -17,7 +17,7 @@ from geometry.meshes.families import characteristic_size, reference_shapes
 from geometry.meshes.refined_block import RefinedShape
 from geometry.surface import Surface
 from geometry.typical_contact import contact_radius
-from multiscale.machine.nodes import Need, Nodes
+from multiscale.machine.nodes import ClusterNodes, MemoryRequest
 from multiscale.scene.scene import Scene
 
 Array = NDArray[np.float64]
@@ -94,14 +94,14 @@ class ReferenceMeshes:
 
 
 def reference_meshes(
-    scene: Scene, surface: Surface, furthest: Plane, nodes: Nodes
+    scene: Scene, surface: Surface, plane_at_largest_load: Plane, nodes: ClusterNodes
 ) -> ReferenceMeshes:
     """Return the meshes of a scene's reference.
 
     Args:
         scene: The scene.
         surface: Its surface.
-        furthest: Largest approach at the middle [mm] and the plane's slopes there.
+        plane_at_largest_load: Largest approach at the middle [mm] and the plane's slopes there.
         nodes: The nodes of the run.
 
     Raises:
@@ -110,7 +110,7 @@ def reference_meshes(
     _check_block(scene)
     hexahedral = scene.reference.hexahedral
     key = "reference.cells" if hexahedral else "reference.fine"
-    approach, tilt = furthest
+    approach, tilt = plane_at_largest_load
     given = scene.loading.force is None and scene.loading.tilt != "free"
     reach = approach if given else (1.0 + _RESERVE) * approach
     try:
@@ -172,19 +172,19 @@ def _check_block(scene: Scene) -> None:
             raise InputError(problem, key=key, value=value, allowed=allowed, file=scene.file)
 
 
-def reference_needs(shared: float, gathered: float = 0.0) -> Iterator[tuple[str, Need]]:
+def reference_needs(shared: float, gathered: float = 0.0) -> Iterator[tuple[str, MemoryRequest]]:
     """Yield what of a reference takes memory, and how much.
 
     Args:
         shared: See `ReferenceMeshes.bytes`.
         gathered: See `ReferenceMeshes.gathered`.
     """
-    yield "the reference", Need(shared=shared)
-    yield "gmsh on rank 0, which meshes the reference,", Need(once=gathered)
+    yield "the reference", MemoryRequest(shared=shared)
+    yield "gmsh on rank 0, which meshes the reference,", MemoryRequest(once=gathered)
 
 
 def _check_memory(
-    scene: Scene, key: str, nodes: Nodes, shared: float, gathered: float = 0.0
+    scene: Scene, key: str, nodes: ClusterNodes, shared: float, gathered: float = 0.0
 ) -> None:
     for what, need in reference_needs(shared, gathered):
         if not nodes.fit(need):

@@ -21,7 +21,7 @@ _ROOM = 512  # bytes, the least that HDF5 leaves to users
 _MARK = b"patchlaw, SHA-256 of all bytes from 512 on: "
 
 
-def sealed(fill: Callable[[Any], None]) -> bytes:
+def checksummed(fill: Callable[[Any], None]) -> bytes:
     """Return the bytes of a sealed HDF5 file.
 
     Args:
@@ -35,7 +35,7 @@ def sealed(fill: Callable[[Any], None]) -> bytes:
     return image.getvalue()
 
 
-def seal(content: bytes) -> bytes:
+def checksum(content: bytes) -> bytes:
     """Return the bytes of an HDF5 file with the checksum that fits them.
 
     Args:
@@ -44,7 +44,7 @@ def seal(content: bytes) -> bytes:
     return _head(content) + content[_ROOM:]
 
 
-def unsealed(source: Path | BinaryIO) -> BytesIO:
+def verified(source: Path | BinaryIO) -> BytesIO:
     """Return the bytes of a sealed HDF5 file, found whole, for `h5py.File`.
 
     Args:

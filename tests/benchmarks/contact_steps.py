@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from multiscale import Scene, make_stage
+from multiscale import Scene, make_setup
 from multiscale.couplings.blocks import contact_model
 
 
@@ -52,7 +52,7 @@ def main():
     for grid in choice.grids:
         ratios = []
         for seed in choice.seeds:
-            whole = contact_model(make_stage(scene(grid, seed)), None)
+            whole = contact_model(make_setup(scene(grid, seed)), None)
             small = replace(whole, slopes=None)
             models = [replace(small, body=None), small, whole]
             starts = [model.solve(6e-3) for model in models]

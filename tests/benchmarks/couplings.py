@@ -17,7 +17,7 @@ from mpi4py import MPI
 from geometry import BlockShape, Control, PatchGrid, Spectrum, patch_means, synthesise
 from macro import Material
 from micro import FreeSides, HalfSpaceModel
-from multiscale import CondensedCoupling, Programme, consistent_laws, load_steps
+from multiscale import CondensedCoupling, LoadHistory, consistent_laws, load_steps
 from multiscale.couplings.body_terms import Body
 from multiscale.couplings.load_steps import ContactCoupling
 
@@ -59,8 +59,8 @@ def surface_of(cells):
 
 def condensed(table, compliance):
     """Press a hundred steps."""
-    programme = Programme(quantity="approach", points=(APPROACH,), steps=100)
-    return list(load_steps(CondensedCoupling(table, compliance), programme))
+    load_history = LoadHistory(quantity="approach", points=(APPROACH,), steps=100)
+    return list(load_steps(CondensedCoupling(table, compliance), load_history))
 
 
 def by_laws(body, face, count):

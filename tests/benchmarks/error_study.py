@@ -78,14 +78,14 @@ def meshed_force(data):
 
 def finer_force(run):
     """Return the force on more cells and with more modes, under the last load step's plane [N]."""
-    stage, step = run.stage, run.steps[-1]
-    modes = scene_body(stage).modes + MORE_MODES
-    body = on_body(stage, None, half_space=not stage.embedded, modes=modes)
-    grid = [min(FINER * count, MOST_CELLS) for count in stage.model.surface.grid]
-    spectrum = stage.scene.surface.spectrum.spectrum()
-    surface = synthesise(spectrum, grid=tuple(grid), lengths=stage.surface.lengths)
-    model = replace(stage.model, surface=surface, highest=surface.highest)
-    order = SLOPES if stage.finite_slopes else 0
+    setup, step = run.setup, run.steps[-1]
+    modes = scene_body(setup).modes + MORE_MODES
+    body = on_body(setup, None, half_space=not setup.embedded, modes=modes)
+    grid = [min(FINER * count, MOST_CELLS) for count in setup.model.surface.grid]
+    spectrum = setup.scene.surface.spectrum.spectrum()
+    surface = synthesise(spectrum, grid=tuple(grid), lengths=setup.surface.lengths)
+    model = replace(setup.model, surface=surface, highest=surface.highest)
+    order = SLOPES if setup.finite_slopes else 0
     return body(model, order).equilibrium(Control(approach=step.approach_mm, tilt=step.tilt)).force
 
 
@@ -110,7 +110,7 @@ def measured(numbers):
         rows.append((abs(step.force_N - true), bar, stated, meshed, true))
         told = ", ".join(f"{cause} {error / true:.2%}" for cause, error in parts.items())
         print(
-            f"{number:3d} {data['coupling']['kind']:10s} {run.stage.surface.grid[0]:3d}² height "
+            f"{number:3d} {data['coupling']['kind']:10s} {run.setup.surface.grid[0]:3d}² height "
             f"{data['block']['height']:g}, {step.force_N:.4g} N: off by "
             f"{step.force_N / true - 1:+.2%} ± {bar / true:.2%}, stated {stated / true:.2%} "
             f"({told}) {time.perf_counter() - began:.0f} s{' meshed' if meshed else ''}",
@@ -153,8 +153,8 @@ def accuracies(numbers):
         off = step.force_N / true - 1.0
         rows.append((wanted, off, bar / true))
         print(
-            f"{number:3d} {kind:10s} {run.stage.decision.taken.label}: asked {wanted:.0%}, off by "
-            f"{off:+.2%} ± {bar / true:.2%}, promised {run.stage.decision.error:.2%}, {own:.0f} s "
+            f"{number:3d} {kind:10s} {run.setup.decision.taken.label}: asked {wanted:.0%}, off by "
+            f"{off:+.2%} ± {bar / true:.2%}, promised {run.setup.decision.error:.2%}, {own:.0f} s "
             f"and {time.perf_counter() - began - own:.0f} s for the truth",
             flush=True,
         )

@@ -27,7 +27,7 @@ from geometry import (
     suggested_fine,
     synthesise,
 )
-from macro import Block, Material, ObstacleBlock, rough_block_mesh
+from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 SPECTRUM = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1)
@@ -66,7 +66,7 @@ def curve(surface, shape, approaches):
     clock = Clock()
     mesh, _ = rough_block_mesh(shape, surface, COMM)
     meshing = clock.lap()
-    block = ObstacleBlock(Block(mesh, MATERIAL), surface.highest - surface.mean_height)
+    block = UnilateralContactProblem(Block(mesh, MATERIAL), surface.highest - surface.mean_height)
     setup, counts = clock.lap(), per_solve(block)
     say(
         f"{block.block.dofs} unknowns, {1e3 * characteristic_size(shape):.2f} µm: "

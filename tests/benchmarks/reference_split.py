@@ -30,7 +30,7 @@ from geometry import (
     suggested_fine,
     synthesise,
 )
-from macro import Block, Material, ObstacleBlock, rough_block_mesh
+from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from micro import FreeSides, HalfSpaceModel
 from multiscale.couplings.body_terms import Body
 from multiscale.results.extrapolation import extrapolated
@@ -71,7 +71,7 @@ def meshed(surface, approach, scale, edges, meshes):
     top, forces, unknowns = surface.scaled(scale), [], []
     for shape in shapes:
         mesh, _ = rough_block_mesh(shape, top, COMM)
-        block = ObstacleBlock(Block(mesh, MATERIAL), top.highest - top.mean_height)
+        block = UnilateralContactProblem(Block(mesh, MATERIAL), top.highest - top.mean_height)
         forces.append(block.press(Control(approach=approach * scale)).force / scale)
         unknowns.append(block.block.dofs)
     return np.array(forces), [characteristic_size(shape) for shape in shapes], unknowns

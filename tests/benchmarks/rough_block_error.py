@@ -28,8 +28,8 @@ from geometry import (
     suggested_fine,
     synthesise,
 )
-from macro import Block, Material, ObstacleBlock, rough_block_mesh
-from multiscale import Scene, extrapolated, make_stage
+from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
+from multiscale import Scene, extrapolated, make_setup
 from multiscale.couplings.blocks import contact_model
 
 GRID, SIDE, RADIUS, FLOOR = 256, 1.0, 0.16, -0.05
@@ -53,13 +53,13 @@ def cap(x0):
 
 def meshed(surface, scale, approaches, edges):
     """Return the forces over the scale, extrapolated, and their bars."""
-    deepest = max(approaches)
-    fine = suggested_fine(surface, deepest, edges=edges)
-    shapes = reference_shapes(surface, deepest, SIDE, count=3, fine=fine)
+    largest_interference = max(approaches)
+    fine = suggested_fine(surface, largest_interference, edges=edges)
+    shapes = reference_shapes(surface, largest_interference, SIDE, count=3, fine=fine)
     top, forces = surface.scaled(scale), []
     for shape in shapes:
         mesh, _ = rough_block_mesh(shape, top, MPI.COMM_SELF)
-        block = ObstacleBlock(Block(mesh, MATERIAL), top.highest - top.mean_height)
+        block = UnilateralContactProblem(Block(mesh, MATERIAL), top.highest - top.mean_height)
         forces.append([block.press(Control(approach=scale * a)).force / scale for a in approaches])
     sizes = np.array([characteristic_size(shape) for shape in shapes])
     found = extrapolated(np.array(forces), sizes, 3.0)
@@ -81,15 +81,15 @@ def models(surface):
             "load": {"approach": 8e-3},
         }
     )
-    stage = make_stage(scene)
-    stage = replace(stage, surface=surface, micro=replace(stage.micro, surface=surface))
-    steep = contact_model(stage, None)
-    return steep, replace(contact_model(_small(stage), None), surface=surface)
+    setup = make_setup(scene)
+    setup = replace(setup, surface=surface, micro=replace(setup.micro, surface=surface))
+    steep = contact_model(setup, None)
+    return steep, replace(contact_model(_small(setup), None), surface=surface)
 
 
-def _small(stage):
-    micro = stage.scene.micro.model_copy(update={"finite_slopes": False})
-    return replace(stage, scene=stage.scene.model_copy(update={"micro": micro}))
+def _small(setup):
+    micro = setup.scene.micro.model_copy(update={"finite_slopes": False})
+    return replace(setup, scene=setup.scene.model_copy(update={"micro": micro}))
 
 
 def curve(model, scale, approaches):

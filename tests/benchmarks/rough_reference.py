@@ -23,7 +23,7 @@ from geometry import (
     suggested_fine,
     synthesise,
 )
-from macro import Block, Material, ObstacleBlock, rough_block_mesh
+from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from micro import FreeSides, HalfSpaceModel, finite_slope_effect
 from multiscale.couplings.body_terms import Body
 
@@ -38,7 +38,7 @@ def report(surface, name, shape, scale):
     start = time.process_time()
     rough = surface.scaled(scale)
     mesh, _ = rough_block_mesh(shape, rough, COMM)
-    block = ObstacleBlock(Block(mesh, MATERIAL), rough.highest - rough.mean_height)
+    block = UnilateralContactProblem(Block(mesh, MATERIAL), rough.highest - rough.mean_height)
     states = [block.press(Control(approach=approach * scale)) for approach in APPROACHES]
     forces = [state.force / scale for state in states]
     if COMM.rank == 0:

@@ -54,7 +54,7 @@ FLOORS = {
         "resolution",
         "planning run",
         "output restart",
-        "compare",
+        "comparison",
         "cli",
         "__main__",
     ],

@@ -19,7 +19,7 @@ PLACES = {
     "laws": (run, "make_table"),
     "block": (run, "assemble"),
     "load step": (CondensedCoupling, "press"),
-    "checkpoint": (commands.Keeper, "keep"),
+    "checkpoint": (commands.CheckpointWriter, "keep"),
     "output": (commands, "write_fields"),
     "writing on rank 0": (commands, "write_results"),
 }
@@ -52,7 +52,7 @@ def full(folder, run):
     return write_fields(folder, run)
 
 
-keep, press = commands.Keeper.keep, CondensedCoupling.press
+keep, press = commands.CheckpointWriter.keep, CondensedCoupling.press
 write_fields = commands.write_fields
 rank, what, place, *words = int(sys.argv[1]), *sys.argv[2:]
 if MPI.COMM_WORLD.rank == rank:

@@ -16,7 +16,7 @@ from geometry import (
     places_in_reach,
     synthesise,
 )
-from macro import Block, Material, ObstacleBlock, rough_block_mesh
+from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 
 COMM = MPI.COMM_WORLD
 TILT = (4e-3, -2e-3)
@@ -62,7 +62,9 @@ def run(shape, surface, sides, method, controls):
     highest = surface.highest - surface.mean_height
     cells = getattr(shape, "cells", (12, 12, 4))
     patches = PatchGrid(grid=(min(3, cells[0]), 1), lengths=surface.lengths)
-    block = ObstacleBlock(Block(mesh, MATERIAL, sides), highest, method=method, patches=patches)
+    block = UnilateralContactProblem(
+        Block(mesh, MATERIAL, sides), highest, method=method, patches=patches
+    )
     states = [block.press(control) for control in controls]
     numbers = {
         "force": [state.force for state in states],

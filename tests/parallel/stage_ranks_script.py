@@ -22,16 +22,16 @@ def parts(value):
 
 if __name__ == "__main__":
     scene = Scene.load(PAPER, ["surface.grid=[200, 256]", "coupling.kind=analytic"])
-    stage = Run(scene, COMM if COMM.size > 1 else None).stage
-    surface = stage.surface
+    setup = Run(scene, COMM if COMM.size > 1 else None).setup
+    surface = setup.surface
     told = (
         hashlib.sha256(surface.heights.tobytes()).hexdigest(),
         surface.heights.flags.writeable,
         float(surface.interpolant(0.31, 0.62, dx=1)).hex(),
-        stage.asperities.count,
-        stage.model.contact_modulus.hex(),
+        setup.asperities.count,
+        setup.model.contact_modulus.hex(),
     )
     nodes = nodes_of(COMM)
     everywhere = COMM.gather(told)
     if COMM.rank == 0:
-        print(*sorted(set(everywhere)), parts(stage), nodes.ranks, sep="\n")
+        print(*sorted(set(everywhere)), parts(setup), nodes.ranks, sep="\n")

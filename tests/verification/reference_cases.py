@@ -7,7 +7,7 @@ from mpi4py import MPI
 from scipy.special import gamma
 
 from geometry import BlockShape, Control, Surface, reference_shapes
-from macro import Block, Material, ObstacleBlock, rough_block_mesh
+from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from micro import FreeSides, HalfSpaceModel, HertzContact
 from multiscale.couplings.body_terms import Body
 
@@ -114,7 +114,7 @@ def meshed(surface, approach, *, method="active-set", patches=None, **options):
         mesh, _ = rough_block_mesh(shape, surface, COMM)
         highest = surface.highest - surface.mean_height
         block = Block(mesh, MATERIAL)
-        blocks.append(ObstacleBlock(block, highest, method=method, patches=patches))
+        blocks.append(UnilateralContactProblem(block, highest, method=method, patches=patches))
     return blocks
 
 

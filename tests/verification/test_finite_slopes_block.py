@@ -7,18 +7,18 @@ from mpi4py import MPI
 
 from geometry import RefinedShape, places_in_reach
 from geometry.control import Control
-from macro import Block, Material, ObstacleBlock, rough_block_mesh
+from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from micro import FiniteSlopes
-from multiscale import Scene, make_stage
+from multiscale import Scene, make_setup
 from multiscale.couplings.blocks import contact_model
 
 MATERIAL = {"young_modulus": 4000.0, "poisson_ratio": 0.15}
 HEIGHT, APPROACH, FINE, LOW = 0.3, 8e-3, 1.4e-2, 0.01
 
 
-def stage(*, slopes):
+def setup(*, slopes):
     spectrum = {"hurst": 0.95, "waves": [2, 6], "rms_slope": 0.215, "seed": 2}
-    return make_stage(
+    return make_setup(
         Scene.from_dict(
             {
                 "surface": {"spectrum": spectrum, "grid": [128, 128], "lengths": [1.0, 1.0]},
@@ -47,7 +47,7 @@ def meshed(surface):
     for scale in (1.0, LOW):
         scaled = surface.scaled(scale)
         mesh, _ = rough_block_mesh(shape, scaled, MPI.COMM_SELF)
-        block = ObstacleBlock(
+        block = UnilateralContactProblem(
             Block(mesh, Material(**MATERIAL)), scaled.highest - scaled.mean_height
         )
         forces.append(block.press(Control(approach=APPROACH * scale)).force / scale)
@@ -55,8 +55,8 @@ def meshed(surface):
 
 
 def test_slopes_soften_a_low_block_as_its_mesh():
-    expected = meshed(stage(slopes=True).surface)  # −3.73, −3.94, −4.06 % with edges 20, 14, 10 µm
-    steep, flat = (contact_model(stage(slopes=slopes), None) for slopes in (True, False))
+    expected = meshed(setup(slopes=True).surface)  # −3.73, −3.94, −4.06 % with edges 20, 14, 10 µm
+    steep, flat = (contact_model(setup(slopes=slopes), None) for slopes in (True, False))
     small = flat.solve(APPROACH).force
     found = replace(steep, tolerance=1e-8).solve(APPROACH).force / small - 1.0
     assert found == pytest.approx(expected, abs=2.5e-3)  # −4.13 %
@@ -68,7 +68,7 @@ def test_slopes_soften_a_low_block_as_its_mesh():
 
 
 def test_heights_count_from_the_highest_point_of_a_higher_block():
-    steep, flat = (contact_model(stage(slopes=slopes), None) for slopes in (True, False))
+    steep, flat = (contact_model(setup(slopes=slopes), None) for slopes in (True, False))
     assert flat.slopes is None
     assert len(steep.slopes.beside) == 2  # the sides' stresses, and the body's
     surface = steep.surface

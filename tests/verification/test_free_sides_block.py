@@ -17,7 +17,7 @@ from geometry import (
     characteristic_size,
     reference_shapes,
 )
-from macro import Block, Interface, ObstacleBlock, block_mesh, rough_block_mesh
+from macro import Block, Interface, UnilateralContactProblem, block_mesh, rough_block_mesh
 from micro import FreeSides, HalfSpace
 from multiscale.results.extrapolation import extrapolated
 
@@ -74,7 +74,7 @@ def meshed_force():
     top = ball.scaled(FLAT)
     for shape in shapes:
         block = Block(rough_block_mesh(shape, top, COMM)[0], MATERIAL)
-        obstacle = ObstacleBlock(block, top.highest - top.mean_height)
+        obstacle = UnilateralContactProblem(block, top.highest - top.mean_height)
         forces.append(obstacle.press(Control(approach=APPROACH * FLAT)).force / FLAT)
     found = extrapolated(np.array(forces)[:, None], [characteristic_size(s) for s in shapes], 3.0)
     return float(found.value[0]), float(found.error[0])

@@ -7,8 +7,8 @@ from hard_cases import coarse_tables, history, scene
 from mpi4py import MPI
 
 from geometry import BlockShape, Control, Surface
-from macro import Block, Material, ObstacleBlock, block_mesh, rough_block_mesh
-from multiscale import make_stage
+from macro import Block, Material, UnilateralContactProblem, block_mesh, rough_block_mesh
+from multiscale import make_setup
 from multiscale.planning.plan import warnings
 
 BLOCKED = ("isolated", "consistent", "concurrent")
@@ -45,7 +45,7 @@ def test_rubber_under_a_plane():
     shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(6, 6, 4), element="Q2")
     mesh, _ = rough_block_mesh(shape, surface, MPI.COMM_SELF)
     block = Block(mesh, Material(young_modulus=4000.0, poisson_ratio=0.4999))
-    pressed = ObstacleBlock(block, surface.highest - surface.mean_height)
+    pressed = UnilateralContactProblem(block, surface.highest - surface.mean_height)
     state = pressed.press(Control(approach=4e-3))
     assert state.nodes > 4
     assert state.reaction == pytest.approx(state.force, rel=1e-9)
@@ -70,8 +70,8 @@ def test_the_plan_says_that_linear_elements_lock(element, nu, told):
     plain = scene(coupling__kind="isolated", **material)
     meshed = scene(coupling__kind="reference", **material, **cells)
     for one in (plain, meshed):
-        assert sum("linear elements lock" in text for text in warnings(make_stage(one))) == told
-    split = make_stage(scene(block__poisson_ratio=0.4999))
+        assert sum("linear elements lock" in text for text in warnings(make_setup(one))) == told
+    split = make_setup(scene(block__poisson_ratio=0.4999))
     assert not any("lock" in one for one in warnings(split))  # its elements are of high order
 
 
@@ -151,7 +151,7 @@ def test_flat_and_slender_blocks_on_the_mesh(height, bound):
 def test_love_on_a_patch_as_large_as_the_block():
     # hard: the half-space inside the law is none; warned, and the error is this
     large = {"patches__grid": [1, 1], "block__height": "0.2 mm"}
-    told = list(warnings(make_stage(scene(coupling__kind="isolated", **large))))
+    told = list(warnings(make_setup(scene(coupling__kind="isolated", **large))))
     assert any("not small against the block" in one for one in told)
     right = history(coupling__kind="concurrent", **large).force_N[-1]
     wrong = history(coupling__kind="isolated", **large).force_N[-1]

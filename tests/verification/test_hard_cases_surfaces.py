@@ -7,7 +7,7 @@ from hard_cases import centred, from_file, history, scene
 from geometry.errors import InputError
 from geometry.files import read_surface
 from geometry.missing import filled
-from multiscale import make_stage, run
+from multiscale import make_setup, run
 from multiscale.planning.plan import statements, warnings
 
 X, Y = centred(32)
@@ -50,7 +50,7 @@ def test_a_flat_patch_alone_needs_the_condensed_newton(tmp_path):
         history(coupling__kind="isolated", coupling__newton="full", **surface)
     # left open, it is taken after all; the plan says that it may be, the run that it was
     left_open = scene(coupling__kind="isolated", **surface)
-    assert "should a patch turn out to be flat" in dict(statements(make_stage(left_open)))["newton"]
+    assert "should a patch turn out to be flat" in dict(statements(make_setup(left_open)))["newton"]
     found = run(left_open)
     assert found.force_N[-1] > 0.0
     assert any(
@@ -117,7 +117,7 @@ def test_too_few_heights_are_refused(shape, tmp_path):
 def test_noise_between_the_heights_is_told(tmp_path):
     # hard: a spline through white noise rises far above all heights, and approach counts from it
     noise = 1e-3 * np.random.default_rng(0).standard_normal((32, 32))
-    told = list(warnings(make_stage(scene(**from_file(tmp_path, noise)))))
+    told = list(warnings(make_setup(scene(**from_file(tmp_path, noise)))))
     assert any("too coarse or too noisy" in one for one in told)
 
 
@@ -132,7 +132,7 @@ def test_missing_heights_are_refused_or_filled_on_request(tmp_path):
     gaps = from_file(tmp_path, with_gaps(DOME))
     with pytest.raises(InputError, match=r"49 of 1024 heights are not finite.*missing = 'fill'"):
         history(**gaps)
-    made = make_stage(scene(surface__missing="fill", **gaps))
+    made = make_setup(scene(surface__missing="fill", **gaps))
     said = dict(statements(made))["surface"]
     assert "0.0479 of the heights missing and filled by a membrane" in said
     # the summit is not in a gap, and what is filled nowhere rises above what is around it; slopes

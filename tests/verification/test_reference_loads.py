@@ -5,7 +5,7 @@ import pytest
 from reference_cases import COMM, MATERIAL, MODULUS, body, give, on_block, pressed
 
 from geometry import BlockShape, Control, PatchGrid, RefinedShape, Surface
-from macro import Block, ObstacleBlock, rough_block_mesh
+from macro import Block, UnilateralContactProblem, rough_block_mesh
 from micro import HertzContact
 
 RADIUS, SIZE, APART = 100.0, 0.06, 0.16
@@ -68,7 +68,7 @@ def test_a_flat_top_between_rollers_is_compressed_evenly(shape, method):
     """All of it in contact from the first touch: confined compression, exact on every mesh."""
     mesh, _ = rough_block_mesh(shape, FLAT, COMM)
     patches = PatchGrid(grid=(4, 2), lengths=(1.0, 1.0))
-    block = ObstacleBlock(
+    block = UnilateralContactProblem(
         Block(mesh, MATERIAL, sides="roller"), 0.0, method=method, patches=patches
     )
     state = block.press(Control(approach=1e-3))
@@ -89,7 +89,9 @@ def test_a_flat_top_between_rollers_is_compressed_evenly(shape, method):
 def test_a_flat_top_holds_a_free_plane_level():
     """By symmetry; its sides bulge, and the corners press hardest."""
     mesh, _ = rough_block_mesh(CUBES, FLAT, COMM)
-    state = ObstacleBlock(Block(mesh, MATERIAL), 0.0).press(Control(force=2.0, tilt=None))
+    state = UnilateralContactProblem(Block(mesh, MATERIAL), 0.0).press(
+        Control(force=2.0, tilt=None)
+    )
     assert state.force == pytest.approx(2.0, rel=1e-9)
     assert np.abs(state.moment).max() < 2e-9  # of force times half a side
     assert np.abs(state.tilt).max() < 1e-9 * state.approach

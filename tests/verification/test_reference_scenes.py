@@ -7,7 +7,7 @@ import pytest
 from reference_cases import COMM, ellipsoid
 
 from geometry import Control, Spectrum, reference_shapes, synthesise
-from macro import Block, Material, ObstacleBlock, rough_block_mesh
+from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 
 SET_1 = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1)
 SET_2 = Spectrum(hurst=0.95, waves_x=(2, 7), waves_y=(2, 12), rms_slope=0.215, seed=2)
@@ -49,7 +49,7 @@ def curve(case, options, method="active-set", shares=(0.5, 1.0)):
     (shape,) = reference_shapes(surface, case.approach, 1.0, count=1, tilt=case.tilt, **options)
     mesh, _ = rough_block_mesh(shape, surface, COMM)
     material = Material(young_modulus=4000.0, poisson_ratio=case.poisson_ratio)
-    block = ObstacleBlock(
+    block = UnilateralContactProblem(
         Block(mesh, material), surface.highest - surface.mean_height, method=method
     )
     controls = (Control(approach=share * case.approach, tilt=case.tilt) for share in shares)
@@ -109,7 +109,7 @@ def force_on_a_sphere(poisson_ratio, element, size):
     options = {"fine": size * contact, "element": element}
     (shape,) = reference_shapes(surface, approach, 1.0, count=1, **options)
     mesh, _ = rough_block_mesh(shape, surface, COMM)
-    block = ObstacleBlock(Block(mesh, material), surface.highest - surface.mean_height)
+    block = UnilateralContactProblem(Block(mesh, material), surface.highest - surface.mean_height)
     hertz = 4.0 / 3.0 * material.contact_modulus * np.sqrt(radius) * approach**1.5
     state = block.press(Control(approach=approach))
     return state.force / hertz

@@ -18,7 +18,7 @@ from geometry import (
     suggested_fine,
     synthesise,
 )
-from macro import Block, ObstacleBlock, rough_block_mesh
+from macro import Block, UnilateralContactProblem, rough_block_mesh
 from multiscale.results.extrapolation import extrapolated
 
 APPROACH, FLAT = 8e-3, 0.01
@@ -38,7 +38,7 @@ def forces(seed, scale, edges):
     top, found = rough(seed).scaled(scale), []
     for shape in shapes:
         mesh, _ = rough_block_mesh(shape, top, COMM)
-        block = ObstacleBlock(Block(mesh, MATERIAL), top.highest - top.mean_height)
+        block = UnilateralContactProblem(Block(mesh, MATERIAL), top.highest - top.mean_height)
         found.append(block.press(Control(approach=APPROACH * scale)).force / scale)
     return np.array(found), [characteristic_size(shape) for shape in shapes]
 

@@ -16,7 +16,7 @@ from geometry import (
     places_in_reach,
     synthesise,
 )
-from macro import Block, Material, ObstacleBlock, compat, rough_block_mesh
+from macro import Block, Material, UnilateralContactProblem, compat, rough_block_mesh
 
 getfem = pytest.importorskip("getfem", reason="python3-getfem is not installed")
 
@@ -80,7 +80,7 @@ def independent(mesh, kind, plane):
 def test_getfem_finds_the_same_contact(kind):
     mesh, _ = rough_block_mesh(SHAPES[kind], SURFACE, MPI.COMM_SELF)
     top = SURFACE.highest - SURFACE.mean_height
-    ours = ObstacleBlock(Block(mesh, MATERIAL), top).press(Control(approach=APPROACH))
+    ours = UnilateralContactProblem(Block(mesh, MATERIAL), top).press(Control(approach=APPROACH))
     forces = independent(mesh.mesh, kind, f"{top - APPROACH:.17g}")
     # the same discrete problem; 1e-9 is the tolerance of our linear solver. Measured 3e-11
     assert ours.force == pytest.approx(forces.sum(), rel=1e-9)

@@ -15,7 +15,7 @@ from geometry import (
     synthesise,
 )
 from geometry.control import Control
-from macro import Block, Material, ObstacleBlock, rough_block_mesh
+from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from micro import FreeSides, HalfSpaceModel, finite_slope_effect
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
@@ -54,7 +54,7 @@ def pressed(sphere, element, refinement):
         element=element,
     )
     mesh, _ = rough_block_mesh(shape, sphere, MPI.COMM_SELF)
-    block = ObstacleBlock(Block(mesh, MATERIAL), sphere.highest - sphere.mean_height)
+    block = UnilateralContactProblem(Block(mesh, MATERIAL), sphere.highest - sphere.mean_height)
     return block.press(Control(approach=APPROACH))
 
 
@@ -85,7 +85,7 @@ def test_family_extrapolates_to_the_half_space_with_order_three(sphere, expected
     forces = []
     for shape in shapes:
         mesh, _ = rough_block_mesh(shape, sphere, MPI.COMM_SELF)
-        block = ObstacleBlock(Block(mesh, MATERIAL), sphere.highest - sphere.mean_height)
+        block = UnilateralContactProblem(Block(mesh, MATERIAL), sphere.highest - sphere.mean_height)
         forces.append(block.press(Control(approach=APPROACH)).force)
     coarse, fine = (force / expected - 1.0 for force in forces)
     # measured 0.5 to 1.1 % by where nodes happen to lie, and −0.05 to 0.06 % of 18 families
@@ -110,7 +110,9 @@ def test_finite_slopes_soften_the_rough_block_as_estimated():
         )
         surface = rough.scaled(scale)
         mesh, _ = rough_block_mesh(shape, surface, MPI.COMM_SELF)
-        block = ObstacleBlock(Block(mesh, MATERIAL), surface.highest - surface.mean_height)
+        block = UnilateralContactProblem(
+            Block(mesh, MATERIAL), surface.highest - surface.mean_height
+        )
         forces.append(block.press(Control(approach=approach * scale)).force / scale)
     measured = forces[1] / forces[0] - 1.0
     nu = MATERIAL.poisson_ratio
@@ -133,7 +135,7 @@ def test_area_within_facets_is_hertz():
     block = Block(mesh, MATERIAL)
     highest = moved.highest - moved.mean_height
     nodes, points = (
-        ObstacleBlock(block, highest, method=method).press(Control(approach=APPROACH))
+        UnilateralContactProblem(block, highest, method=method).press(Control(approach=APPROACH))
         for method in ("active-set", "augmented-lagrangian")
     )
     # of the force that was found, so that the mesh's stiffness does not count

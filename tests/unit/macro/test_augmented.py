@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from geometry import BlockShape, Control, Spectrum, Surface, synthesise
-from macro import Block, Material, ObstacleBlock, rough_block_mesh
+from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from macro.contact.augmented_lagrangian import PENETRATION
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.3)
@@ -23,7 +23,9 @@ SHAPE = BlockShape(interface=(1.0, 1.0), height=0.5, cells=(8, 8, 3), grading=2.
 def obstacle(shape, method, surface=SPHERE, sides="free", **options):
     mesh, _ = rough_block_mesh(shape, surface, MPI.COMM_SELF)
     block = Block(mesh, MATERIAL, sides)
-    return ObstacleBlock(block, surface.highest - surface.mean_height, method=method, **options)
+    return UnilateralContactProblem(
+        block, surface.highest - surface.mean_height, method=method, **options
+    )
 
 
 def at_points(found, state):

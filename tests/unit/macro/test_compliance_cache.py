@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from geometry import PatchGrid
 from macro.compliance import cache as compliance_cache
-from macro.compliance.cache import cache_directory, cached, is_kept
+from macro.compliance.cache import cache_directory, cached, is_cached
 
 
 @pytest.fixture
@@ -121,7 +121,7 @@ def test_home_that_may_not_be_entered_keeps_nothing(counted, monkeypatch):
 
     with monkeypatch.context() as patch:
         patch.setattr(compliance_cache.Path, "is_file", refused)
-        assert not is_kept("kind", ())
+        assert not is_cached("kind", ())
 
 
 def test_nobody_at_home_keeps_nothing(monkeypatch):

@@ -11,7 +11,7 @@ from macro import (
     Block,
     Interface,
     Material,
-    ObstacleBlock,
+    UnilateralContactProblem,
     block_mesh,
     compat,
     displacements_under,
@@ -48,7 +48,7 @@ def rough_block(method):
     spectrum = Spectrum(hurst=0.9, waves=(2, 4), rms_slope=0.1, seed=2)
     surface = synthesise(spectrum, grid=(32, 32), lengths=(1.0, 1.0))
     mesh, _ = rough_block_mesh(SHAPE, surface, MPI.COMM_SELF)
-    return ObstacleBlock(
+    return UnilateralContactProblem(
         Block(mesh, MATERIAL), surface.highest - surface.mean_height, method=method
     )
 

@@ -11,7 +11,7 @@ from geometry import Control, InputError, NotConverged, PatchGrid, Spectrum, Sur
 from geometry.meshes.block import BlockShape
 from macro import Block, Material, block_mesh
 from macro.contact import active_set as active_nodes
-from macro.contact.unilateral_problem import ObstacleBlock
+from macro.contact.unilateral_problem import UnilateralContactProblem
 from macro.mesh.rough_surface import rough_block_mesh
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.3)
@@ -29,7 +29,7 @@ def block_below(surface, sides, shape, material):
 
 def obstacle(surface=SURFACE, sides="free", shape=SHAPE, material=MATERIAL, **options):
     block = block_below(surface, sides, shape, material)
-    return ObstacleBlock(block, surface.highest - surface.mean_height, **options)
+    return UnilateralContactProblem(block, surface.highest - surface.mean_height, **options)
 
 
 def test_top_is_the_surface():
@@ -192,7 +192,7 @@ def test_wrong_input_is_refused():
         obstacle(patches=PatchGrid(grid=(2, 2), lengths=(1.0, 1.1)))
     wide = block_mesh(replace(SHAPE, cells=(2, 2, 1), margin=0.5, margin_cells=1), MPI.COMM_SELF)
     with pytest.raises(InputError, match=r"^0\.5: the plane presses on the whole top"):
-        ObstacleBlock(Block(wide, MATERIAL), 0.0)
+        UnilateralContactProblem(Block(wide, MATERIAL), 0.0)
 
 
 def test_a_patch_without_a_node_is_closed_like_the_nearest():

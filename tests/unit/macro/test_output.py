@@ -6,7 +6,7 @@ from mpi4py import MPI
 
 from geometry import Control, RefinedShape, Surface
 from geometry.meshes.block import BlockShape
-from macro import Block, Material, ObstacleBlock, rough_block_mesh, write_rough_fields
+from macro import Block, Material, UnilateralContactProblem, rough_block_mesh, write_rough_fields
 
 h5py = pytest.importorskip("h5py")
 
@@ -25,7 +25,7 @@ def test_a_confined_block_has_one_pressure(element, tmp_path):
         else BlockShape(**CUBE, cells=(3, 2, 2), element=element)
     )
     mesh, _ = rough_block_mesh(shape, flat, MPI.COMM_SELF)
-    rough = ObstacleBlock(Block(mesh, MATERIAL, sides="roller"), 0.0)
+    rough = UnilateralContactProblem(Block(mesh, MATERIAL, sides="roller"), 0.0)
     state = rough.press(Control(approach=5e-3))
     write_rough_fields(tmp_path / "fields.xdmf", rough, state)
     with h5py.File(tmp_path / "fields.h5") as file:

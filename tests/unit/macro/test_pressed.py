@@ -13,7 +13,7 @@ from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid
-from macro import Block, Interface, Material, PressedBlock, block_mesh, compat, write_fields
+from macro import Block, Interface, LawContactProblem, Material, block_mesh, compat, write_fields
 from macro.contact.energy_start import DisplacementBasis
 
 
@@ -50,11 +50,11 @@ def interface():
 
 def test_every_patch_needs_a_law(interface):
     with pytest.raises(InputError, match=r"3: every patch needs a law \(allowed: 4\)"):
-        PressedBlock(interface.block, interface, [Spring()] * 3)
+        LawContactProblem(interface.block, interface, [Spring()] * 3)
 
 
 def test_open_interface_is_solved_at_once(interface):
-    state = PressedBlock(interface.block, interface, [Spring(touch=1.0)] * 4).press(
+    state = LawContactProblem(interface.block, interface, [Spring(touch=1.0)] * 4).press(
         Control(approach=5e-3)
     )
     assert (state.newton_iterations, state.force, state.reaction) == (0, 0.0, 0.0)
@@ -65,14 +65,14 @@ def test_open_interface_is_solved_at_once(interface):
 
 @pytest.mark.parametrize("mode", ["patchwise", "pointwise"])
 def test_linear_laws_take_one_newton_step(interface, mode):
-    pressed = PressedBlock(interface.block, interface, [Spring()] * 4, mode)
+    pressed = LawContactProblem(interface.block, interface, [Spring()] * 4, mode)
     pressed.newton.snes.ksp.setTolerances(rtol=1e-12)
     pressed.newton._forcing = False
     assert pressed.press(Control(approach=5e-3)).newton_iterations == 1
 
 
 def test_tilt_is_about_the_middle(interface):
-    press = PressedBlock(interface.block, interface, [Spring()] * 4).press
+    press = LawContactProblem(interface.block, interface, [Spring()] * 4).press
     level, tilted = press(Control(approach=5e-3)), press(Control(approach=5e-3, tilt=(2e-3, 0.0)))
     assert tilted.force == pytest.approx(level.force, rel=1e-7)  # exact for linear laws
     np.testing.assert_array_equal(tilted.pressure > level.pressure, [False, False, True, True])
@@ -80,7 +80,7 @@ def test_tilt_is_about_the_middle(interface):
 
 def test_failure_is_named_and_keeps_what_was_known(interface):
     laws = [Spring(k=1e3 * (i + 1), touch=1e-3 * i) for i in range(4)]
-    pressed = PressedBlock(interface.block, interface, laws)
+    pressed = LawContactProblem(interface.block, interface, laws)
     before = pressed.press(Control(approach=2e-3))
     known = len(pressed._basis)
     pressed.newton.snes.setTolerances(max_it=1)
@@ -92,7 +92,7 @@ def test_failure_is_named_and_keeps_what_was_known(interface):
 
 
 def test_a_pressed_block_is_freed(interface):
-    pressed = PressedBlock(interface.block, interface, [Spring()] * 4)
+    pressed = LawContactProblem(interface.block, interface, [Spring()] * 4)
     pressed.press(Control(approach=1e-3))
     gone = [weakref.ref(part) for part in (pressed, pressed.equilibrium, pressed.newton)]
     del pressed
@@ -102,7 +102,7 @@ def test_a_pressed_block_is_freed(interface):
 
 @pytest.mark.parametrize("law", [Spring(), Broken()])
 def test_the_block_alone_stays_what_it_is(interface, law):
-    pressed = PressedBlock(interface.block, interface, [law] * 4)
+    pressed = LawContactProblem(interface.block, interface, [law] * 4)
     if isinstance(law, Broken):
         with pytest.raises(NotConverged):
             pressed.press(Control(approach=5e-3))
@@ -118,14 +118,14 @@ def test_the_block_alone_stays_what_it_is(interface, law):
 
 def test_pressure_without_value_is_a_failure(interface):
     with pytest.raises(NotConverged, match="DIVERGED_F"):
-        PressedBlock(interface.block, interface, [Broken()] * 4).press(Control(approach=1e-3))
+        LawContactProblem(interface.block, interface, [Broken()] * 4).press(Control(approach=1e-3))
 
 
 def test_the_users_tolerances_win(interface):
     options = PETSc.Options("patchlaw_")
     options["snes_rtol"], options["ksp_rtol"] = 1e-4, 1e-3
     try:
-        pressed = PressedBlock(interface.block, interface, [Spring()] * 4)
+        pressed = LawContactProblem(interface.block, interface, [Spring()] * 4)
         state = pressed.press(Control(approach=5e-3))
     finally:
         options.delValue("snes_rtol"), options.delValue("ksp_rtol")
@@ -134,7 +134,7 @@ def test_the_users_tolerances_win(interface):
 
 
 def test_basis_is_orthonormal_limited_and_ignores_what_it_knows(interface):
-    pressed = PressedBlock(interface.block, interface, [Spring()] * 4)
+    pressed = LawContactProblem(interface.block, interface, [Spring()] * 4)
     basis = DisplacementBasis(pressed.equilibrium, interface.patchwise, size=3)
     loads = [interface.load(pressures) for pressures in np.eye(4)]
     for load in (*loads, loads[-1]):
@@ -152,7 +152,9 @@ def test_fields_are_written_for_paraview(element, tmp_path):
         block_mesh(shape, MPI.COMM_SELF), Material(young_modulus=4000.0, poisson_ratio=0.15)
     )
     interface = Interface(block, PatchGrid(grid=(2, 1), lengths=(1.0, 1.0)))
-    state = PressedBlock(block, interface, [Spring(), Spring(k=5e3)]).press(Control(approach=1e-3))
+    state = LawContactProblem(block, interface, [Spring(), Spring(k=5e3)]).press(
+        Control(approach=1e-3)
+    )
     write_fields(tmp_path / "fields.xdmf", interface, state.displacement, state.pressure)
     h5py = pytest.importorskip("h5py")
     with h5py.File(tmp_path / "fields.h5") as file:

@@ -7,7 +7,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from geometry import BlockShape, InputError, RefinedShape, Spectrum, Surface, synthesise
-from macro import Block, Material, ObstacleBlock, rough_block_mesh
+from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 
 COMM = MPI.COMM_SELF
 CUBE = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(8, 8, 6))
@@ -56,7 +56,9 @@ def test_quality_of_tetrahedra_is_the_jacobian(element, slack):
 def test_all_nodes_of_the_top_lie_on_the_surface(element):
     surface = wave(0.02, waves=2)
     mesh, _ = rough_block_mesh(refined(element, coarse=0.1), surface, COMM)
-    block = ObstacleBlock(Block(mesh, Material(young_modulus=1.0, poisson_ratio=0.3)), 0.02)
+    block = UnilateralContactProblem(
+        Block(mesh, Material(young_modulus=1.0, poisson_ratio=0.3)), 0.02
+    )
     # the nodes of the displacements: those in the middle of edges are no means of the ends
     top = block.top
     np.testing.assert_allclose(top.height, surface.height_at(top.x, top.y), atol=1e-12)

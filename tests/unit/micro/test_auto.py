@@ -50,7 +50,7 @@ def test_promised_tolerances_are_kept(grid, hurst, band):
     for tolerance in (0.03, 0.05, 0.1):
         choice = choose(surface, contact_modulus=1.0, approach=approach, tolerance=tolerance)
         assert choice.taken.expected_error <= tolerance
-        assert choice.model.datum == surface.highest
+        assert choice.model.reference_height == surface.highest
         np.testing.assert_allclose(force(choice.model, loads), truth, rtol=tolerance)
 
 

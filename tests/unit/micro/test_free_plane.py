@@ -129,7 +129,7 @@ def test_mirrors_and_turns(model, turn, given):
     lengths = surface.lengths[::-1] if turn == "axes exchanged" else surface.lengths
     other = replace(model, surface=Surface(heights=field(surface.heights), lengths=lengths))
     one = model.equilibrium(Control(**given, tilt=None))
-    same = replace(other, highest=model.datum).equilibrium(Control(**given, tilt=None))
+    same = replace(other, highest=model.reference_height).equilibrium(Control(**given, tilt=None))
     assert same.force == pytest.approx(one.force, rel=1e-8)
     assert same.approach == pytest.approx(one.approach, rel=1e-8)
     assert same.plane.tilt == pytest.approx(tilt(one.plane.tilt), rel=1e-7, abs=1e-10)

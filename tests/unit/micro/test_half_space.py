@@ -177,7 +177,7 @@ def test_what_cannot_be_reached_is_said(surface):
 def test_the_approach_counts_from_the_height_given(surface):
     model = HalfSpaceModel(surface=surface, contact_modulus=E_STAR)
     above = replace(model, highest=surface.highest + 2e-3)
-    assert above.datum == surface.highest + 2e-3
+    assert above.reference_height == surface.highest + 2e-3
     assert above.first_touch == pytest.approx(model.first_touch + 2e-3, abs=1e-15)
     means = patch_means(surface, PATCHES)
     near, far = (
@@ -187,7 +187,7 @@ def test_the_approach_counts_from_the_height_given(surface):
     assert far.force[0] == pytest.approx(near.force[0], rel=1e-7)  # tolerance of the solutions
     np.testing.assert_allclose(far.patch_separation, near.patch_separation, atol=1e-9)
     alone, _ = above.of_patch(PATCHES, 1)
-    assert alone.datum == above.datum
+    assert alone.reference_height == above.reference_height
 
 
 @pytest.mark.parametrize("length", [0.3, 1.0, 7.3])

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from geometry import Spectrum, Surface, synthesise
 from micro.islands.volumes import Relief
-from micro.islands.watersheds import catchments, passes_between, sampled
+from micro.islands.watersheds import passes_between, sampled, watersheds
 
 EIGHT = np.ones((3, 3))
 
@@ -42,13 +42,13 @@ def climb(heights, cell):
 def test_catchments(levels):
     heights = np.random.default_rng(1).random((13, 9))
     heights = np.floor(levels * heights) if levels else heights
-    owner, peak = catchments(heights)
+    owner, peak = watersheds(heights)
     for flat, cell in enumerate(np.ndindex(heights.shape)):
         assert np.unravel_index(peak[owner[flat]], heights.shape) == climb(heights, cell)
 
 
 def test_flat_surface_has_one_catchment():
-    owner, peak = catchments(np.zeros((5, 7)))
+    owner, peak = watersheds(np.zeros((5, 7)))
     assert peak.tolist() == [34] and not owner.any()
 
 
@@ -56,7 +56,7 @@ def test_flat_surface_has_one_catchment():
 def test_regions_are_those_of_an_image(levels):
     heights = np.random.default_rng(2).random((21, 17))
     heights = np.floor(levels * heights) if levels else heights
-    owner, peak = catchments(heights)
+    owner, peak = watersheds(heights)
     passes = passes_between(heights, owner.reshape(heights.shape))
     assert np.all(passes.first < passes.second)
     pairs = set(zip(passes.first.tolist(), passes.second.tolist(), strict=True))
@@ -85,7 +85,7 @@ def test_sampling_divides_cells(surface):
 
 def test_caps_are_sums_over_cells(surface, relief):
     heights, rng = sampled(surface), np.random.default_rng(4)
-    owner, _ = catchments(heights)
+    owner, _ = watersheds(heights)
     x = np.stack(np.meshgrid(*((np.arange(n) + 0.5) / n for n in heights.shape), indexing="ij"))
     x = x.reshape(2, -1) * np.array([[1.2], [1.0]])
     height = rng.uniform(0.3, 1.0, len(relief)) * np.ptp(heights)

@@ -155,7 +155,7 @@ def test_models_by_name(surface):
     assert plain.name == "circular"
     model = micro_model("circular", surface, contact_modulus=1.0, border="include")
     assert model.name == "circular, curvature summit, border include"
-    assert model.datum == surface.highest
+    assert model.reference_height == surface.highest
 
 
 def test_patches_alone_hold_all_asperities(surface):

@@ -10,11 +10,11 @@ from scene_inputs import scenes, takes_long
 
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
-from multiscale.compare.level_results import LevelResult
-from multiscale.compare.measures import Curves
-from multiscale.compare.outcomes import AGAINST
-from multiscale.compare.report import comparison_html
-from multiscale.compare.run_comparison import compare
+from multiscale.comparison.compare import compare
+from multiscale.comparison.level_results import LevelResult
+from multiscale.comparison.measures import Curves
+from multiscale.comparison.outcomes import AGAINST
+from multiscale.comparison.report import comparison_html
 from multiscale.scene.scene import Scene
 from multiscale.storage.whole_files import write_csv
 
@@ -28,8 +28,8 @@ asked = st.tuples(
 
 def ended(dice, level, seconds):
     """Return how a level may end: well, early or badly, with odd numbers."""
-    status, programme = dice.choice(STATUSES), level.scene.loading.programme
-    whole = len(programme.targets)
+    status, load_history = dice.choice(STATUSES), level.scene.loading.load_history
+    whole = len(load_history.targets)
     steps = np.arange(1.0, 1.0 + (whole if status == "done" else dice.randrange(whole)))
     patches = PatchGrid(grid=level.scene.patches.grid, lengths=(1.0, 1.0))
     numbers = {

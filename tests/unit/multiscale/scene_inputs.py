@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from geometry.errors import InputError, NotConverged
 from multiscale.planning.forecast import forecast
 from multiscale.planning.plan import statements, warnings
-from multiscale.resolution.problem_setup import make_stage
+from multiscale.resolution.problem_setup import make_setup
 from multiscale.run import run
 from multiscale.scene.scene import Scene
 
@@ -231,9 +231,9 @@ def planned(path, overrides=()):
         scene = Scene.load(path, overrides)
         if takes_long(scene):
             return "not tried"
-        stage = make_stage(scene)
-        made = forecast(stage)
-        told = [*(text for _, text in statements(stage, made)), *warnings(stage)]
+        setup = make_setup(scene)
+        made = forecast(setup)
+        told = [*(text for _, text in statements(setup, made)), *warnings(setup)]
         assert all(np.isfinite(part) for part in (made.total, made.memory)), told
     except InputError as error:
         told = str(error)
@@ -253,14 +253,14 @@ def ran(path):
         scene = Scene.load(path)
         if takes_long(scene):
             return "not tried"
-        stage = make_stage(scene)
-        meshes = [] if stage.meshes is None else stage.meshes.unknowns
+        setup = make_setup(scene)
+        meshes = [] if setup.meshes is None else setup.meshes.unknowns
         large = (
-            stage.surface.heights.size > 600
-            or stage.patches.count > 16
+            setup.surface.heights.size > 600
+            or setup.patches.count > 16
             or scene.loading.steps > 9
             or sum(meshes) > 5000
-            or math.prod(stage.shape.cells) > 800
+            or math.prod(setup.shape.cells) > 800
         )
         if large or (scene.block.margin and scene.block.margin_cells > 4):
             return "not tried"

@@ -12,7 +12,7 @@ from multiscale.restart.checkpoint import read_checkpoint, write_checkpoint
 from multiscale.restart.resuming import checkpoint_of
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
-from multiscale.storage.checksummed_hdf5 import seal
+from multiscale.storage.checksummed_hdf5 import checksum
 
 ODD = (
     np.zeros(0), np.zeros(1), np.zeros((3, 3)), np.full(5, np.nan), np.full(5, 1e308), np.arange(5),
@@ -63,7 +63,7 @@ def rewritten(draw, whole):
                     file.create_group(name)
                 elif change == "link":
                     file[name] = h5py.ExternalLink("/etc/passwd", "/")
-    return seal(image.getvalue())
+    return checksum(image.getvalue())
 
 
 def read(path, reader):

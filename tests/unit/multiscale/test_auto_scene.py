@@ -8,7 +8,7 @@ from geometry.errors import InputError
 from micro import choose
 from multiscale.output.provenance import provenance
 from multiscale.planning.plan import statements, warnings
-from multiscale.resolution.problem_setup import make_stage
+from multiscale.resolution.problem_setup import make_setup
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
 
@@ -27,15 +27,15 @@ def scene(load=None, coupling="analytic", **micro):
 
 
 def test_the_plan_says_what_was_chosen_and_why():
-    stage = make_stage(scene(model="auto", tolerance=0.1))
-    said = dict(statements(stage))["micro model"]
-    assert said == f"auto: {stage.choice.sentence}"
+    setup = make_setup(scene(model="auto", tolerance=0.1))
+    said = dict(statements(setup))["micro model"]
+    assert said == f"auto: {setup.choice.sentence}"
     assert "tolerance of 10 %" in said
-    assert stage.model is stage.choice.model
+    assert setup.model is setup.choice.model
 
 
 def test_without_a_tolerance_two_per_cent_are_asked():
-    assert "tolerance of 2 %" in make_stage(scene(model="auto")).choice.sentence
+    assert "tolerance of 2 %" in make_setup(scene(model="auto")).choice.sentence
 
 
 def chosen_for(monkeypatch, load):
@@ -46,7 +46,7 @@ def chosen_for(monkeypatch, load):
         return choose(*given, **options)
 
     monkeypatch.setattr("multiscale.resolution.micro_model.choose", watched)
-    make_stage(scene(load, model="auto", tolerance=0.1))
+    make_setup(scene(load, model="auto", tolerance=0.1))
     return asked
 
 
@@ -61,27 +61,27 @@ def test_the_model_is_chosen_for_the_nearest_the_plane_comes(monkeypatch):
 @pytest.mark.parametrize("tilt", [[0.0, 0.0], "free"])
 def test_under_a_force_a_half_space_tells_how_near_that_is(monkeypatch, tilt):
     asked = chosen_for(monkeypatch, {"force": 1.0, "tilt": tilt})
-    by_cells = make_stage(scene({"force": 1.0, "tilt": tilt}, model="half-space"))
-    approach, slopes = by_cells.furthest
+    by_cells = make_setup(scene({"force": 1.0, "tilt": tilt}, model="half-space"))
+    approach, slopes = by_cells.plane_at_largest_load
     rise = 0.5 * (abs(slopes[0]) + abs(slopes[1]))
     assert asked["approach"] == pytest.approx(approach + rise, rel=1e-6)  # both on 64² cells
 
 
 def test_a_chosen_asperity_model_counts_and_warns_as_a_stated_one(monkeypatch):
     monkeypatch.setattr("micro.choice.candidates.contact_error", lambda kind, at: 1e-5)
-    stage = make_stage(scene({"approach": 0.02}, model="auto", tolerance=0.45))
-    assert stage.by_summits
-    assert stage.ignores_border
-    stated = make_stage(scene({"approach": 0.02}, model=stage.choice.taken.label))
-    assert dict(statements(stage))["contact"] == dict(statements(stated))["contact"]
-    assert list(warnings(stage)) == list(warnings(stated))
-    assert stage.table_tolerance == stated.table_tolerance
+    setup = make_setup(scene({"approach": 0.02}, model="auto", tolerance=0.45))
+    assert setup.by_summits
+    assert setup.ignores_border
+    stated = make_setup(scene({"approach": 0.02}, model=setup.choice.taken.label))
+    assert dict(statements(setup))["contact"] == dict(statements(stated))["contact"]
+    assert list(warnings(setup)) == list(warnings(stated))
+    assert setup.table_tolerance == stated.table_tolerance
 
 
 def test_asperities_with_those_of_the_border_ignore_nothing():
-    stage = make_stage(scene(model="elliptic", curvature="contact", border="include"))
-    assert stage.by_summits
-    assert not stage.ignores_border
+    setup = make_setup(scene(model="elliptic", curvature="contact", border="include"))
+    assert setup.by_summits
+    assert not setup.ignores_border
 
 
 @pytest.mark.parametrize(
@@ -99,7 +99,7 @@ def test_refuses(micro, problem):
 def test_results_record_the_chosen_model():
     done = Run(scene(model="auto", tolerance=0.1))
     recorded = provenance(done, options=[])
-    choice = done.stage.choice
+    choice = done.setup.choice
     assert recorded["micro_model"]["chosen"]["label"] == choice.taken.label
     assert recorded["micro_model"]["chosen"]["checked_error"] == choice.checked_error
     assert recorded["notes"] == [f"micro model chosen: {choice.sentence}"]

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from micro import BodyModes, FiniteSlopes, FreeSides
-from multiscale import Scene, make_stage
+from multiscale import Scene, make_setup
 from multiscale.costs.contact_work import press_work
 from multiscale.couplings.blocks import contact_model, free_sides, patch_displacements
 
 
-def stage(kind="concurrent", model="half-space", patches=4, coupling=None, slopes=None, **block):
+def setup(kind="concurrent", model="half-space", patches=4, coupling=None, slopes=None, **block):
     spectrum = {"hurst": 0.95, "waves": [2, 8], "rms_slope": 0.215, "seed": 1}
     material = {"height": 0.8, "young_modulus": 4000.0, "poisson_ratio": 0.15, "cells": [8, 8, 5]}
     micro = {"model": model} | ({} if slopes is None else {"finite_slopes": slopes})
-    return make_stage(
+    return make_setup(
         Scene.from_dict(
             {
                 "surface": {"spectrum": spectrum, "grid": [32, 32], "lengths": [1.0, 1.0]},
@@ -38,7 +38,7 @@ def stage(kind="concurrent", model="half-space", patches=4, coupling=None, slope
     ],
 )
 def test_cells_know_the_free_sides_of_their_block(kind, coupling):
-    found = stage(kind, coupling=coupling)
+    found = setup(kind, coupling=coupling)
     # a quarter of the block's height, its shortest side
     expected = FreeSides(lengths=(1.0, 1.0), poisson_ratio=0.15, reach=0.2)
     assert free_sides(found) == expected
@@ -54,7 +54,7 @@ def test_cells_know_the_free_sides_of_their_block(kind, coupling):
     [{"sides": "roller"}, {"margin": 0.5, "margin_cells": 2}, {"model": "islands"}],
 )
 def test_other_bodies_have_their_sides_in_the_body_term(given):
-    found = stage(slopes=False, **given)
+    found = setup(slopes=False, **given)
     assert free_sides(found) is None
     model = contact_model(found, None)
     assert isinstance(model.body, BodyModes)
@@ -62,28 +62,28 @@ def test_other_bodies_have_their_sides_in_the_body_term(given):
 
 
 def test_patches_alone_lie_on_a_half_space():
-    model = contact_model(stage("isolated"), None)
+    model = contact_model(setup("isolated"), None)
     assert (model.sides, model.body, model.slopes) == (None, None, None)
 
 
 @pytest.mark.parametrize("kind", ["analytic", "concurrent", "consistent"])
 @pytest.mark.parametrize("slopes", [None, True, False])
 def test_slopes_are_finite_unless_the_scene_says_otherwise(kind, slopes):
-    found = stage(kind, slopes=slopes)
+    found = setup(kind, slopes=slopes)
     model = contact_model(found, None)
     assert (model.slopes is not None) == (slopes is not False)
     assert (model.body is not None) == (kind != "analytic")
 
 
 def test_slopes_and_bodies_are_more_work():
-    flat, rough = stage(slopes=False), stage()
+    flat, rough = setup(slopes=False), setup()
     assert press_work(rough).transform > 2.0 * press_work(flat).transform
-    assert press_work(flat).transform > press_work(stage("analytic", slopes=False)).transform
+    assert press_work(flat).transform > press_work(setup("analytic", slopes=False)).transform
 
 
 @pytest.mark.parametrize("way", ["decomposed", "finite-element"])
 def test_displacements_of_patches_are_those_of_the_macro_model(way):
-    found = stage("consistent", patches=2, coupling={"compliance": way, "newton": "condensed"})
+    found = setup("consistent", patches=2, coupling={"compliance": way, "newton": "condensed"})
     dense = patch_displacements(found, None, dense=True)
     pressures = np.array([[0.0, 0.0, 0.0, 0.0], [1.0, 2.0, 0.0, 4.0]])
     sunk = dense(pressures)

@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from multiscale.compare.causes import Best, Value, causes
+from multiscale.comparison.causes import Best, Value, causes
 
 ROUNDING = 1e-12  # sums of five doubles of order one
 FIRST, WHOLE = -0.025, -0.03

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from geometry.errors import InputError
-from multiscale import Scene, make_stage
+from multiscale import Scene, make_setup
 from multiscale.planning.plan import statements, warnings
-from multiscale.resolution.auto_keys import couplings, open_keys, settled_keys
+from multiscale.resolution.auto_keys import auto_keys, couplings, resolved_keys
 
 
 def scene(source=None, **sections):
@@ -40,44 +40,44 @@ def test_tighter_accuracies_measure_smaller_errors_on_finer_grids():
     source = {"spectrum": {"hurst": 0.7, "waves": [2, 8], "rms_slope": 0.2}, "grid": "auto"}
     coupling = {"kind": "analytic"}
     found = [
-        make_stage(scene(source, accuracy=accuracy, coupling=coupling))
+        make_setup(scene(source, accuracy=accuracy, coupling=coupling))
         for accuracy in (0.2, 0.02, 0.005)
     ]
-    errors = [stage.decision.error for stage in found]
-    grids = [stage.surface.grid for stage in found]
+    errors = [setup.decision.error for setup in found]
+    grids = [setup.surface.grid for setup in found]
     assert errors == sorted(errors, reverse=True)
     assert grids == sorted(grids)
     assert grids[0] < grids[-1]
-    for stage in found:
-        assert stage.decision.kept
-        assert not [text for text in warnings(stage) if "accuracy" in text]
+    for setup in found:
+        assert setup.decision.kept
+        assert not [text for text in warnings(setup) if "accuracy" in text]
 
 
 def test_open_keys_become_values_and_the_plan_says_what_was_measured():
-    stage = make_stage(scene({"grid": "auto"}, accuracy=0.05, **OPEN))
-    settled = stage.scene
+    setup = make_setup(scene({"grid": "auto"}, accuracy=0.05, **OPEN))
+    settled = setup.scene
     assert settled.coupling.kind in ("concurrent", "consistent")
     assert settled.patches.grid == (8, 8)
-    assert settled.surface.grid == stage.surface.grid == stage.micro.surface.grid
+    assert settled.surface.grid == setup.surface.grid == setup.micro.surface.grid
     assert settled.micro.model == "half-space"
     assert settled.block.cells == "auto"  # of no mesh
-    assert set(stage.decision.errors) == {"body", "slopes", "grid"}
-    assert stage.decision.error <= stage.decision.accuracy == 0.05
-    assert dict(statements(stage))["choice"] == stage.decision.sentence
+    assert set(setup.decision.errors) == {"body", "slopes", "grid"}
+    assert setup.decision.error <= setup.decision.accuracy == 0.05
+    assert dict(statements(setup))["choice"] == setup.decision.sentence
 
 
 def test_what_a_run_began_with_is_what_it_goes_on_with():
     given = scene(accuracy=0.05)
-    stage = make_stage(given)
-    kept = json.loads(json.dumps(settled_keys(stage, given)))
-    again = make_stage(given, kept)
-    assert again.scene == stage.scene
-    np.testing.assert_array_equal(again.micro.surface.heights, stage.micro.surface.heights)
-    assert again.micro.datum == stage.micro.datum == stage.surface.highest
+    setup = make_setup(given)
+    kept = json.loads(json.dumps(resolved_keys(setup, given)))
+    again = make_setup(given, kept)
+    assert again.scene == setup.scene
+    np.testing.assert_array_equal(again.micro.surface.heights, setup.micro.surface.heights)
+    assert again.micro.reference_height == setup.micro.reference_height == setup.surface.highest
 
 
 def test_a_grid_of_heights_is_resampled_for_the_accuracy():
-    fine = make_stage(scene({"grid": [256, 256]}, accuracy=0.1))
+    fine = make_setup(scene({"grid": [256, 256]}, accuracy=0.1))
     assert fine.surface.grid == (256, 256)
     assert fine.micro.surface.grid[0] < 256  # a coarse one will do
     assert fine.decision.kept
@@ -85,9 +85,9 @@ def test_a_grid_of_heights_is_resampled_for_the_accuracy():
 
 def test_finite_slopes_left_out_are_an_error():
     stated = {"model": "half-space", "finite_slopes": False}
-    stage = make_stage(scene({"grid": "auto"}, accuracy=0.01, micro=stated))
-    assert stage.decision.errors["slopes"] > 0.01
-    (said,) = [text for text in warnings(stage) if "accuracy" in text]
+    setup = make_setup(scene({"grid": "auto"}, accuracy=0.01, micro=stated))
+    assert setup.decision.errors["slopes"] > 0.01
+    (said,) = [text for text in warnings(setup) if "accuracy" in text]
     assert "an accuracy of 1 % is not kept" in said
     assert "most of it by slopes" in said
 
@@ -95,18 +95,18 @@ def test_finite_slopes_left_out_are_an_error():
 def test_few_steps_press_together_and_many_steps_make_laws():
     for steps, kind in ((1, "concurrent"), (3000, "consistent")):
         load = {"approach": 0.004, "steps": steps}
-        stage = make_stage(scene(load=load, accuracy=0.2, micro={"model": "half-space"}))
-        assert stage.decision.kept
-        assert stage.scene.coupling.kind == kind
-    assert stage.table_tolerance == pytest.approx(0.02)  # a tenth of the accuracy
+        setup = make_setup(scene(load=load, accuracy=0.2, micro={"model": "half-space"}))
+        assert setup.decision.kept
+        assert setup.scene.coupling.kind == kind
+    assert setup.table_tolerance == pytest.approx(0.02)  # a tenth of the accuracy
 
 
 def test_cells_are_left_to_the_plan_only_under_laws_on_a_mesh():
     meshed = {"kind": "consistent", "compliance": "finite-element"}
     for coupling, free in (({}, False), ({"kind": "concurrent"}, False), (meshed, True)):
         given = scene(coupling=coupling, block=block(cells="auto"))
-        assert open_keys(given) == ({"block.cells"} if free else set())
-    assert make_stage(given).scene.block.cells is None  # as by default
+        assert auto_keys(given) == ({"block.cells"} if free else set())
+    assert make_setup(given).scene.block.cells is None  # as by default
 
 
 @pytest.mark.parametrize(
@@ -121,7 +121,7 @@ def test_cells_are_left_to_the_plan_only_under_laws_on_a_mesh():
     ],
 )
 def test_stated_keys_are_respected(stated):
-    settled = make_stage(scene(accuracy=0.05, **stated)).scene
+    settled = make_setup(scene(accuracy=0.05, **stated)).scene
     for section, keys in stated.items():
         for key, value in keys.items():
             found = getattr(getattr(settled, section), key)
@@ -141,57 +141,57 @@ def test_stated_keys_are_respected(stated):
 def test_other_keys_narrow_the_couplings(coupling, kinds):
     given = scene(coupling=coupling | {"kind": "auto"})
     assert {section.kind for section in couplings(given)} == kinds
-    assert make_stage(given).scene.coupling.kind in kinds
+    assert make_setup(given).scene.coupling.kind in kinds
 
 
 def test_without_accuracy_and_auto_nothing_is_open():
-    assert open_keys(scene()) == frozenset()
-    assert open_keys(scene(accuracy=0.1)) == {"micro.model", "coupling.kind", "patches.grid"}
-    assert make_stage(scene()).decision is None
+    assert auto_keys(scene()) == frozenset()
+    assert auto_keys(scene(accuracy=0.1)) == {"micro.model", "coupling.kind", "patches.grid"}
+    assert make_setup(scene()).decision is None
 
 
 def test_patches_are_nearly_square():
-    stage = make_stage(scene({"grid": [96, 48], "lengths": [2.0, 1.0]}, patches={"grid": "auto"}))
-    assert stage.patches.grid == (16, 8)
-    assert stage.decision is None  # patches gather results, and have no error
+    setup = make_setup(scene({"grid": [96, 48], "lengths": [2.0, 1.0]}, patches={"grid": "auto"}))
+    assert setup.patches.grid == (16, 8)
+    assert setup.decision is None  # patches gather results, and have no error
 
 
 def test_a_stated_reference_gets_a_grid_and_patches(monkeypatch):
     monkeypatch.setattr("multiscale.resolution.accuracy._Search._of_meshes", lambda *given: 0.001)
-    stage = make_stage(scene({"grid": "auto"}, accuracy=0.05, coupling={"kind": "reference"}))
-    assert stage.surface.grid == (96, 96)  # 16 heights along each of 6 waves
-    assert stage.patches.grid == (8, 8)
-    assert stage.decision.kept
+    setup = make_setup(scene({"grid": "auto"}, accuracy=0.05, coupling={"kind": "reference"}))
+    assert setup.surface.grid == (96, 96)  # 16 heights along each of 6 waves
+    assert setup.patches.grid == (8, 8)
+    assert setup.decision.kept
 
 
 def test_models_without_measure_say_so():
-    stage = make_stage(scene(accuracy=0.05, micro={"model": "elliptic"}))
-    assert not stage.decision.errors
-    assert not stage.decision.kept
-    assert "which is not measured beforehand" in stage.decision.sentence
-    assert dict(statements(stage))["error"].startswith("not known: elliptic")
+    setup = make_setup(scene(accuracy=0.05, micro={"model": "elliptic"}))
+    assert not setup.decision.errors
+    assert not setup.decision.kept
+    assert "which is not measured beforehand" in setup.decision.sentence
+    assert dict(statements(setup))["error"].startswith("not known: elliptic")
 
 
 def test_a_reference_is_taken_where_nothing_else_keeps_the_accuracy(monkeypatch):
     monkeypatch.setattr("multiscale.resolution.accuracy._Search._of_meshes", lambda *given: 0.001)
-    stage = make_stage(scene(accuracy=0.0015))
-    assert stage.scene.coupling.kind == "reference"
-    assert stage.micro is None
-    assert stage.decision.kept
-    assert sum(stage.decision.missed.values()) > 0.0015
-    assert "without meshing the roughness measured" in stage.decision.sentence
+    setup = make_setup(scene(accuracy=0.0015))
+    assert setup.scene.coupling.kind == "reference"
+    assert setup.micro is None
+    assert setup.decision.kept
+    assert sum(setup.decision.missed.values()) > 0.0015
+    assert "without meshing the roughness measured" in setup.decision.sentence
 
 
 def test_meshes_are_refined_until_their_bar_keeps_the_accuracy(monkeypatch):
-    def error(search, stage):
-        return float((stage.meshes.sizes[-1] / 0.03) ** 3)
+    def error(search, setup):
+        return float((setup.meshes.sizes[-1] / 0.03) ** 3)
 
     monkeypatch.setattr("multiscale.resolution.accuracy._Search._of_meshes", error)
     coupling = {"kind": "reference"}
-    coarse, fine = (make_stage(scene(accuracy=a, coupling=coupling)) for a in (0.1, 0.01))
+    coarse, fine = (make_setup(scene(accuracy=a, coupling=coupling)) for a in (0.1, 0.01))
     assert fine.meshes.sizes[-1] < coarse.meshes.sizes[-1]
     assert fine.decision.error <= 0.01
-    stated = make_stage(scene(accuracy=0.01, coupling=coupling, reference={"fine": 0.03}))
+    stated = make_setup(scene(accuracy=0.01, coupling=coupling, reference={"fine": 0.03}))
     assert stated.meshes.sizes[-1] == pytest.approx(0.03)
     assert "most of it by mesh" in stated.decision.warning
 
@@ -244,13 +244,13 @@ def test_sizes_that_fit_no_memory_are_refused_before_anything_is_made(
     pages = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 4_000_000}  # 16 GB
     monkeypatch.setattr("multiscale.machine.nodes.os.sysconf", pages.__getitem__)
     with pytest.raises(InputError, match=problem):
-        make_stage(scene(**sections))
+        make_setup(scene(**sections))
 
 
 def test_open_keys_survive_a_dump_and_are_in_the_schema():
     given = scene({"grid": "auto"}, accuracy=0.03, **OPEN)
     again = Scene.from_dict(given.model_dump(by_alias=True, mode="json"))
-    assert open_keys(again) == open_keys(given) == {
+    assert auto_keys(again) == auto_keys(given) == {
         "surface.grid", "micro.model", "coupling.kind", "patches.grid",
     }  # fmt: skip
     patches = Scene.model_json_schema(by_alias=True)["$defs"]["PatchesSection"]
@@ -258,5 +258,5 @@ def test_open_keys_survive_a_dump_and_are_in_the_schema():
 
 
 def test_the_plan_says_how_fine_the_heights_are():
-    said = dict(statements(make_stage(scene())))["surface"]
+    said = dict(statements(make_setup(scene())))["surface"]
     assert "8 heights along the shortest wavelength" in said  # 48 heights, 6 waves

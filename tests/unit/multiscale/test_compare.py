@@ -13,10 +13,10 @@ from geometry.patches import PatchGrid
 from multiscale import compare
 from multiscale.cli.command_line import main
 from multiscale.cli.compare import budget_seconds, compare_scene
-from multiscale.compare.level_process import level_result
-from multiscale.compare.level_results import LevelResult
-from multiscale.compare.levels import SMALL_SLOPES
-from multiscale.compare.measures import Curves
+from multiscale.comparison.level_process import level_result
+from multiscale.comparison.level_results import LevelResult
+from multiscale.comparison.levels import SMALL_SLOPES
+from multiscale.comparison.measures import Curves
 from multiscale.run import run
 from multiscale.scene.scene import Scene
 
@@ -220,7 +220,7 @@ def call(capsys, *words):
 
 
 def test_command_writes_table_figures_and_report(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr("multiscale.compare.level_runs.launch_process", launched)
+    monkeypatch.setattr("multiscale.comparison.level_runs.launch_process", launched)
     code, shown, err = call(capsys, "--out", str(tmp_path))
     assert (code, err) == (0, "")
     assert "They are compared with “concurrent, half-space 64 × 64" in shown
@@ -242,14 +242,14 @@ def test_command_writes_table_figures_and_report(capsys, tmp_path, monkeypatch):
         assert not level.is_own and not level.name.startswith(PICKED)
         return launched(level, seconds)
 
-    monkeypatch.setattr("multiscale.compare.level_runs.launch_process", none_again)
+    monkeypatch.setattr("multiscale.comparison.level_runs.launch_process", none_again)
     code, shown, _ = call(capsys, "--out", str(tmp_path))
     assert code == 0
     assert f"{OWN_NAME}: done, kept" in shown
 
 
 def test_command_tells_when_the_measure_was_not_reached(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr("multiscale.compare.level_runs.launch_process", launched)
+    monkeypatch.setattr("multiscale.comparison.level_runs.launch_process", launched)
     code, shown, err = call(capsys, "--out", str(tmp_path), "--against", "reference")
     assert code == 3
     assert "the comparison against reference did not converge: LEVEL_NOT_REACHED" in err

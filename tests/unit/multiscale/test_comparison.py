@@ -7,8 +7,8 @@ import pytest
 
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
-from multiscale.compare.comparison import Comparison, Row
-from multiscale.compare.measures import Measures
+from multiscale.comparison.comparison import Comparison, Row
+from multiscale.comparison.measures import Measures
 
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
 

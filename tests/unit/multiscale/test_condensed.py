@@ -11,7 +11,7 @@ from multiscale import Run, Scene, run
 from multiscale.couplings.blocks import patch_compliance
 from multiscale.couplings.newton_choice import newton_choice
 from multiscale.planning.plan import statements
-from multiscale.resolution.problem_setup import make_stage
+from multiscale.resolution.problem_setup import make_setup
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 SMALL = [
@@ -71,7 +71,7 @@ def test_way_down_is_the_way_up(way):
 
 def compliance(way, cells):
     words = [f"coupling.compliance={way}", "coupling.newton=condensed", f"block.cells={cells}"]
-    return patch_compliance(make_stage(scene(*words)), None)
+    return patch_compliance(make_setup(scene(*words)), None)
 
 
 def test_a_users_loose_solver_leaves_nothing_to_later_runs(monkeypatch, tmp_path):
@@ -169,7 +169,7 @@ def test_fields_are_those_of_the_patch_pressures():
     ],
 )
 def test_newton_is_chosen_by_cost(overrides, condensed, why):
-    choice = newton_choice(make_stage(scene(*overrides)))
+    choice = newton_choice(make_setup(scene(*overrides)))
     assert choice.condensed == condensed
     assert why in choice.why
 
@@ -178,5 +178,5 @@ def test_cells_of_a_decomposed_block_do_not_matter():
     """Its body term has a mesh of its own."""
     coarse, fine = (compliance("decomposed", cells) for cells in ([8, 8, 5], [64, 64, 40]))
     np.testing.assert_array_equal(coarse, fine)
-    text = dict(statements(make_stage(scene("coupling.compliance=decomposed"))))["block"]
+    text = dict(statements(make_setup(scene("coupling.compliance=decomposed"))))["block"]
     assert "from finite elements of high order" in text

@@ -8,12 +8,12 @@ import pytest
 
 from geometry import BlockShape
 from micro import HalfSpaceModel
-from multiscale import Run, Scene, make_stage
+from multiscale import Run, Scene, make_setup
 from multiscale.costs.block_work import mesh_unknowns, reference_work
 from multiscale.costs.contact_work import step_count
 from multiscale.costs.prediction import predicted_cost
 from multiscale.costs.work import Work
-from multiscale.loading.stepper import Programme
+from multiscale.loading.stepper import LoadHistory
 from multiscale.machine.rates import Machine, this_machine
 
 
@@ -77,7 +77,7 @@ def test_a_load_step_is_one_solution(solved, load, kind):
     run = Run(scene(kind, load=load | {"steps": 4}))
     solved.clear()
     list(run.load_steps())
-    assert solved == {64**2: step_count(run.scene.loading.programme)}
+    assert solved == {64**2: step_count(run.scene.loading.load_history)}
 
 
 @pytest.mark.parametrize("kind", ["consistent", "isolated"])
@@ -85,9 +85,9 @@ def test_rows_of_laws_are_as_many_as_predicted(solved, kind):
     run = Run(scene(kind))
     solved.clear()
     run.make_laws()
-    tables = run.stage.reached_patches if kind == "isolated" else 1
+    tables = run.setup.reached_patches if kind == "isolated" else 1
     # a patch alone is pressed on the cells under it
-    cells = 64**2 if kind == "consistent" else 64**2 // run.stage.patches.count
+    cells = 64**2 if kind == "consistent" else 64**2 // run.setup.patches.count
     # refinement takes 33 to 65 rows of the 56 that are predicted, and some to find its ends
     assert 56 * tables / 1.7 <= solved[cells] <= 1.7 * 56 * tables
 
@@ -101,15 +101,15 @@ def test_unknowns_of_a_mesh(element):
 
 def test_work_grows_with_what_is_asked():
     def total(**sections):
-        stage = make_stage(scene(**sections))
-        return predicted_cost(stage, Unit()).total
+        setup = make_setup(scene(**sections))
+        return predicted_cost(setup, Unit()).total
 
     assert total(load={"approach": 0.008, "steps": 40}) > total()
     assert total(grid=128) > total()
     assert total(output={"figures": True}) > total()
     assert total(kind="analytic") < total()
     meshes = [{"mesh": "hexahedra", "cells": [n, n, n // 2]} for n in (16, 32)]
-    coarse, fine = (make_stage(scene("reference", reference=mesh)).meshes for mesh in meshes)
+    coarse, fine = (make_setup(scene("reference", reference=mesh)).meshes for mesh in meshes)
     costs = [total(kind="reference", reference=mesh) for mesh in meshes]
     assert costs[0] < costs[1]
     made, pressed = reference_work(fine, 8)
@@ -121,9 +121,9 @@ def test_work_grows_with_what_is_asked():
 
 
 def test_steps_that_may_be_halved_are_counted():
-    plain = Programme(quantity="approach", points=(0.008, 0.002), steps=3, tilt=(0.0, 0.0))
+    plain = LoadHistory(quantity="approach", points=(0.008, 0.002), steps=3, tilt=(0.0, 0.0))
     assert step_count(plain) == 6
-    fine = Programme(
+    fine = LoadHistory(
         quantity="approach", points=(0.008,), steps=3, tilt=(0.0, 0.0), force_change=0.05
     )
     assert step_count(fine) == 20

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scene_inputs import BASE, KEYS, damaged, odd_text, planned, put, ran, scenes, toml
 
 from geometry.errors import InputError
-from multiscale.resolution.problem_setup import make_stage
+from multiscale.resolution.problem_setup import make_setup
 from multiscale.scene.files import MOST_BYTES, parsed
 from multiscale.scene.scene import Scene
 
@@ -56,7 +56,7 @@ def refused(tmp_path, key, value, *, kind="isolated"):
     path = tmp_path / "scene.toml"
     path.write_text(toml(put(put(BASE, "coupling.kind", kind), key, value)), encoding="utf-8")
     with pytest.raises(InputError) as refusal:
-        make_stage(Scene.load(path))
+        make_setup(Scene.load(path))
     return str(refusal.value)
 
 
@@ -90,7 +90,7 @@ def test_a_law_for_every_patch_takes_memory(tmp_path, monkeypatch):
     with pytest.raises(
         InputError, match=r"\[12, 12\]: a law for every patch needs about 0.00216 GB"
     ):
-        make_stage(Scene.load(path))
+        make_setup(Scene.load(path))
 
 
 def test_more_bombs(tmp_path):
@@ -100,7 +100,7 @@ def test_more_bombs(tmp_path):
     data = put(put(BASE, "coupling.kind", "isolated"), "block.margin", "1 mm")
     path.write_text(toml(put(data, "block.margin_cells", 10**9)), encoding="utf-8")
     with pytest.raises(InputError, match=r"block.margin_cells = 1000000000: needs about 5e\+14 GB"):
-        make_stage(Scene.load(path))
+        make_setup(Scene.load(path))
 
 
 def test_block_of_a_kilometre_needs_no_layers_to_be_counted(tmp_path):
@@ -132,7 +132,7 @@ def test_force_beyond_the_block(tmp_path):
     path.write_text(toml(data), encoding="utf-8")
     message = r"load.force = \[1.0, 5000.0\]: presses the block to nothing \(allowed: at most E t"
     with pytest.raises(InputError, match=message):
-        make_stage(Scene.load(path))
+        make_setup(Scene.load(path))
 
 
 @pytest.mark.parametrize(

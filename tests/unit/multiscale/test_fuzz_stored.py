@@ -13,7 +13,7 @@ from stored_inputs import READERS, flipped, originals, read, rewritten
 from geometry.errors import InputError
 from multiscale.laws.files import read_laws
 from multiscale.restart.checkpoint import read_checkpoint
-from multiscale.storage.checksummed_hdf5 import seal
+from multiscale.storage.checksummed_hdf5 import checksum
 
 few = settings(
     derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)
@@ -47,7 +47,7 @@ def changed_laws(tmp_path, whole, change):
     path.write_bytes(whole[0])
     with h5py.File(path, "r+") as file:
         change(file)
-    path.write_bytes(seal(path.read_bytes()))
+    path.write_bytes(checksum(path.read_bytes()))
     with pytest.raises(InputError) as refusal:
         read_laws(path)
     return str(refusal.value).removeprefix(f"{path}: ")

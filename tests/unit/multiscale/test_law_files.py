@@ -11,7 +11,7 @@ from geometry.patches import PatchGrid
 from multiscale.laws.files import LawTable, read_laws, write_laws
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.plane_path import PlanePath
-from multiscale.storage.checksummed_hdf5 import seal, sealed
+from multiscale.storage.checksummed_hdf5 import checksum, checksummed
 
 COLUMNS = ("closure", "pressure", "approach", "contact_area_fraction", "contacts", "relief")
 
@@ -77,10 +77,10 @@ def test_other_files_are_refused(tmp_path):
     path = tmp_path / "laws.h5"
     with pytest.raises(InputError, match="is not a readable law file"):
         read_laws(path)
-    path.write_bytes(seal(b"no HDF5"))
+    path.write_bytes(checksum(b"no HDF5"))
     with pytest.raises(InputError, match=r"laws.h5: is not a readable law file: "):
         read_laws(path)
-    path.write_bytes(sealed(lambda file: file.create_dataset("x", data=1)))
+    path.write_bytes(checksummed(lambda file: file.create_dataset("x", data=1)))
     with pytest.raises(InputError, match=r"laws.h5: is not a law file of patchlaw"):
         read_laws(path)
 
@@ -108,7 +108,7 @@ def change(path, what):
     """Change the content of a law file, with a checksum that fits."""
     with h5py.File(path, "r+") as file:
         what(file)
-    path.write_bytes(seal(path.read_bytes()))
+    path.write_bytes(checksum(path.read_bytes()))
 
 
 def test_missing_column_is_refused(table, tmp_path):

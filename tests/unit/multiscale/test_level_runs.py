@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from geometry.errors import InputError, NotConverged
-from multiscale.compare import level_process, level_runs
-from multiscale.compare.level_results import LevelResult, read_result, write_result
-from multiscale.compare.level_runs import check_launchable, launch_process, run_levels
-from multiscale.compare.levels import levels
+from multiscale.comparison import level_process, level_runs
+from multiscale.comparison.level_results import LevelResult, read_result, write_result
+from multiscale.comparison.level_runs import check_launchable, launch_process, run_levels
+from multiscale.comparison.levels import levels
 from multiscale.run import Run, run
 from multiscale.scene.scene import Scene
 

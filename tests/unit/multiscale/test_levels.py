@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from geometry.patches import PatchGrid
-from multiscale.compare.level import pressure_grid
-from multiscale.compare.level_results import LevelResult
-from multiscale.compare.levels import SMALL_SLOPES, levels
-from multiscale.compare.measures import Curves
-from multiscale.compare.outcomes import Outcome, ranked, refinements
-from multiscale.compare.run_comparison import settled_scene
-from multiscale.resolution.auto_keys import open_keys
+from multiscale.comparison.compare import resolved_scene
+from multiscale.comparison.level import pressure_grid
+from multiscale.comparison.level_results import LevelResult
+from multiscale.comparison.levels import SMALL_SLOPES, levels
+from multiscale.comparison.measures import Curves
+from multiscale.comparison.outcomes import Outcome, ranked, refinements
+from multiscale.resolution.auto_keys import auto_keys
 from multiscale.scene.scene import Scene
 from multiscale.setup.checks import EMBEDDED_CELLS
 
@@ -96,7 +96,7 @@ def test_only_couplings_use_ranks():
 def test_all_levels_take_the_same_steps():
     for level in made("load.force_change=0.2", "load.steps=3"):
         assert level.scene.loading.force_change is None
-        targets = np.divide(level.scene.loading.programme.targets, level.scale)
+        targets = np.divide(level.scene.loading.load_history.targets, level.scale)
         assert targets == pytest.approx([8e-3 / 3, 16e-3 / 3, 8e-3])
 
 
@@ -138,15 +138,15 @@ def test_scene_that_leaves_all_open_has_levels_that_stand(tmp_path):
     )
     (tmp_path / "open.toml").write_text(text, encoding="utf-8")
     scene = Scene.load(tmp_path / "open.toml")
-    settled = settled_scene(scene, tmp_path)
-    assert settled_scene(scene, tmp_path) == settled  # what was kept
+    settled = resolved_scene(scene, tmp_path)
+    assert resolved_scene(scene, tmp_path) == settled  # what was kept
     found = levels(settled)
     (own,) = [level for level in found if level.is_own]
     assert own.scene.coupling.kind in ("consistent", "concurrent")
     assert (own.scene.accuracy, own.scene.micro.model) == (0.05, "auto")
     for level in found:
-        assert open_keys(level.scene) <= {"micro.model"}
-        assert not open_keys(level.scene) or level.is_own or level.kind == "reference"
+        assert auto_keys(level.scene) <= {"micro.model"}
+        assert not auto_keys(level.scene) or level.is_own or level.kind == "reference"
     meshed = [level.scene.block.cells for level in found if "elements" in level.name]
     assert EMBEDDED_CELLS in meshed  # laws on a mesh are not left with what a smooth rest needs
 

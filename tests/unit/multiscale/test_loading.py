@@ -5,7 +5,7 @@ import pytest
 
 from geometry.errors import NotConverged
 from multiscale.loading.load_step import LoadStep, PatchState
-from multiscale.loading.stepper import BeyondLaws, Programme, load_steps
+from multiscale.loading.stepper import BeyondLaws, LoadHistory, load_steps
 
 
 class Spring:
@@ -41,30 +41,30 @@ class Spring:
         )
 
 
-def programme(*points, quantity="approach", **more):
-    return Programme(quantity=quantity, points=points, **more)
+def load_history(*points, quantity="approach", **more):
+    return LoadHistory(quantity=quantity, points=points, **more)
 
 
 def test_legs_are_divided_evenly():
-    targets = programme(8.0, 2.0, 5.0, steps=3).targets
+    targets = load_history(8.0, 2.0, 5.0, steps=3).targets
     np.testing.assert_allclose(targets, [8 / 3, 16 / 3, 8, 6, 4, 2, 3, 4, 5], rtol=1e-15)
-    assert programme(8.0, 2.0, 5.0, steps=3).count == len(targets)
+    assert load_history(8.0, 2.0, 5.0, steps=3).count == len(targets)
 
 
 def test_steps_are_numbered_through():
-    steps = list(load_steps(Spring(), programme(1.0, 0.5, steps=2)))
+    steps = list(load_steps(Spring(), load_history(1.0, 0.5, steps=2)))
     assert [step.step for step in steps] == [1, 2, 3, 4]
     assert [step.approach_mm for step in steps] == [0.5, 1.0, 0.75, 0.5]
 
 
 def test_controls_carry_quantity_and_tilt():
-    control = programme(2.0, quantity="force", tilt=None).control(1.5)
+    control = load_history(2.0, quantity="force", tilt=None).control(1.5)
     assert (control.approach, control.force, control.tilt) == (None, 1.5, None)
 
 
 def test_failing_step_is_halved_and_its_work_is_counted():
     spring = Spring(0.3)
-    (step,) = load_steps(spring, programme(1.0, steps=1))
+    (step,) = load_steps(spring, load_history(1.0, steps=1))
     assert spring.tried == [1.0, 0.5, 0.25, 0.5, 1.0, 0.75, 1.0]
     assert step.newton_iterations == 3 * 2 + 4 * 3
     assert step.linear_iterations == 40
@@ -73,7 +73,7 @@ def test_failing_step_is_halved_and_its_work_is_counted():
 def test_hopeless_step_keeps_those_before_it():
     spring, steps = Spring(0.5), []
     with pytest.raises(NotConverged, match=r"load step 3 .approach .* DIVERGED after 2") as error:
-        for step in load_steps(spring, programme(1.2, steps=3)):
+        for step in load_steps(spring, load_history(1.2, steps=3)):
             steps.append(step.step)
             spring.largest_step = 0.5 if step.step < 2 else 0.0
     assert steps == [1, 2]
@@ -84,13 +84,13 @@ def test_hopeless_step_keeps_those_before_it():
 def test_end_of_a_law_is_not_approached_by_halves():
     spring = Spring(end=0.6)
     with pytest.raises(NotConverged, match=r"load step 2 .*LAW_RANGE: short"):
-        list(load_steps(spring, programme(1.0, steps=2)))
+        list(load_steps(spring, load_history(1.0, steps=2)))
     assert spring.tried == [0.5, 1.0]
 
 
 @pytest.mark.parametrize("quantity", ["approach", "force"])
 def test_force_changes_by_no_more_than_asked(quantity):
-    drive = programme(1.0, 0.1, quantity=quantity, steps=2, force_change=0.2)
+    drive = load_history(1.0, 0.1, quantity=quantity, steps=2, force_change=0.2)
     steps = list(load_steps(Spring(), drive))
     force = np.array([step.force_N for step in steps])
     largest = np.maximum.accumulate(force)
@@ -106,4 +106,4 @@ def test_force_changes_by_no_more_than_asked(quantity):
 
 
 def test_first_step_from_nothing_may_be_any():
-    assert len(list(load_steps(Spring(), programme(1.0, steps=1, force_change=0.1)))) == 1
+    assert len(list(load_steps(Spring(), load_history(1.0, steps=1, force_change=0.1)))) == 1

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from multiscale import Scene, make_stage, run
+from multiscale import Scene, make_setup, run
 from multiscale.couplings.blocks import patch_displacements
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
@@ -16,11 +16,11 @@ SMALL = [
 
 
 def test_the_mesh_gives_those_of_its_compliance():
-    stage = make_stage(Scene.load(PAPER, SMALL))
+    setup = make_setup(Scene.load(PAPER, SMALL))
     pressures = np.random.default_rng(1).uniform(0.0, 50.0, (3, 8))
     pressures[1] = 0.0  # before the first touch
     dense, meshed = (
-        patch_displacements(stage, None, dense=dense)(pressures) for dense in (True, False)
+        patch_displacements(setup, None, dense=dense)(pressures) for dense in (True, False)
     )
     np.testing.assert_allclose(meshed, dense, rtol=1e-8, atol=1e-12)  # linear solves to 1e-10
     assert np.all(meshed[1] == 0.0)

@@ -101,11 +101,11 @@ def test_a_prescribed_force_has_an_error_of_the_approach():
 
 
 def test_laws_under_a_plane_free_to_turn_are_compared_with_one_free_to_turn():
-    stage = Run(scene("concurrent")).stage
-    probe = ErrorProbe(model=stage.micro, on_body=on_body(stage, None), order=0, by_laws=True)
+    setup = Run(scene("concurrent")).setup
+    probe = ErrorProbe(model=setup.micro, on_body=on_body(setup, None), order=0, by_laws=True)
     free = Control(approach=0.006, tilt=None)
-    turned = probe.on_body(stage.micro, 0).equilibrium(free)
-    level = probe.on_body(stage.micro, 0).solve(0.006)
+    turned = probe.on_body(setup.micro, 0).equilibrium(free)
+    level = probe.on_body(setup.micro, 0).solve(0.006)
     assert max(map(abs, turned.plane.tilt)) > 1e-4
     for turns, force in ((True, turned.force), (False, level.force)):
         found = probe.measure(force + 0.1, 0.006, (0.0, 0.0), turns=turns)
@@ -157,11 +157,11 @@ def test_a_run_that_goes_on_measures_the_same(tmp_path):
 
 
 def test_fewer_modes_are_solved_on_the_body_itself():
-    stage = Run(scene("concurrent")).stage
-    body = on_body(stage, None)
-    probe = ErrorProbe(model=stage.micro, on_body=body, order=2)
+    setup = Run(scene("concurrent")).setup
+    body = on_body(setup, None)
+    probe = ErrorProbe(model=setup.micro, on_body=body, order=2)
     stiff = replace(probe, on_body=lambda model, order: replace(body(model, order), body=None))
-    force = body(stage.micro, 2).solve(0.006).force
+    force = body(setup.micro, 2).solve(0.006).force
     assert probe.measure(force, 0.006, (0.0, 0.0)).parts["body"] > 0.0
     assert "body" not in stiff.measure(force, 0.006, (0.0, 0.0)).parts
 

@@ -6,7 +6,7 @@ from scipy.stats import wasserstein_distance
 
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
-from multiscale.compare.measures import Curves, measures, on_grid, uncertainty
+from multiscale.comparison.measures import Curves, measures, on_grid, uncertainty
 
 ROUNDING = 1e-12  # sums of a few dozen doubles
 

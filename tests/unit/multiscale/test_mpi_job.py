@@ -6,7 +6,7 @@ import pytest
 
 from geometry.errors import InputError
 from multiscale.cli.command_line import main
-from multiscale.machine.mpi_job import refuse_strangers, strangers
+from multiscale.machine.mpi_job import detached_processes, refuse_detached_processes
 
 PAPER = "demos/scenes/paper.toml"
 
@@ -28,7 +28,7 @@ PAPER = "demos/scenes/paper.toml"
 def test_what_launchers_tell(monkeypatch, told, found):
     for name, value in told.items():
         monkeypatch.setenv(name, value)
-    assert strangers() == found
+    assert detached_processes() == found
 
 
 @pytest.mark.parametrize("command", ["run", "plan", "laws", "surface"])
@@ -44,13 +44,13 @@ def test_nothing_is_computed_many_times(monkeypatch, tmp_path, capsys, command):
 
 
 def test_one_process_is_no_stranger():
-    refuse_strangers()
+    refuse_detached_processes()
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PMI_SIZE", "2")
         with pytest.raises(
             InputError, match="the launcher is not that of mpi4py's MPI; start with"
         ):
-            refuse_strangers()
+            refuse_detached_processes()
 
 
 def test_a_user_without_home_is_told_what_to_set(monkeypatch, capsys):

@@ -11,10 +11,16 @@ import pytest
 from mpi4py import MPI
 
 from geometry.errors import InputError
-from multiscale import Scene, make_stage
+from multiscale import Scene, make_setup
 from multiscale.cli.command_line import main
 from multiscale.machine import nodes
-from multiscale.machine.nodes import Need, Nodes, group_memory, node_memory, nodes_of
+from multiscale.machine.nodes import (
+    ClusterNodes,
+    MemoryRequest,
+    group_memory,
+    node_memory,
+    nodes_of,
+)
 from multiscale.planning.memory import shortages
 from multiscale.setup.checks import check_size, needs
 
@@ -28,7 +34,7 @@ def scene(*words):
 
 
 def of(count, *, ranks=1, memory=64.0):
-    return Nodes(ranks=(ranks,) * count, memory=memory * GB)
+    return ClusterNodes(ranks=(ranks,) * count, memory=memory * GB)
 
 
 class Job:
@@ -58,9 +64,11 @@ class Job:
 
 def test_nodes_of_a_job():
     job = Job("aabbbc", [64 * GB, 64 * GB, 32 * GB, 48 * GB, 48 * GB, 64 * GB])
-    assert nodes_of(job) == Nodes(ranks=(2, 3, 1), memory=32 * GB)
+    assert nodes_of(job) == ClusterNodes(ranks=(2, 3, 1), memory=32 * GB)
     assert job.freed == 1  # communicators are few
-    assert nodes_of(None) == nodes_of(Job("a")) == Nodes() == Nodes(memory=node_memory())
+    assert (
+        nodes_of(None) == nodes_of(Job("a")) == ClusterNodes() == ClusterNodes(memory=node_memory())
+    )
 
 
 def test_a_block_of_many_nodes_is_let_through_there():
@@ -78,8 +86,8 @@ def test_a_block_of_many_nodes_is_let_through_there():
         check_size(given, of(3, ranks=64))
     # two nodes of 16, where the fullest would have 15/16 of the block
     with pytest.raises(InputError, match=r"2 nodes of 200 GB with 15 ranks; 2 such nodes would do"):
-        check_size(given, Nodes(ranks=(15, 1), memory=200 * GB))
-    check_size(given, Nodes(ranks=(8, 8), memory=200 * GB))
+        check_size(given, ClusterNodes(ranks=(15, 1), memory=200 * GB))
+    check_size(given, ClusterNodes(ranks=(8, 8), memory=200 * GB))
 
 
 def test_what_every_rank_holds_is_counted_for_all_on_a_node():
@@ -119,39 +127,39 @@ def test_isolated_laws_are_dealt_to_the_ranks():
         )
         for kind in ("isolated", "consistent")
     }
-    assert laws["isolated"] == Need(held=40_000 * 3_600, shared=40_000 * 11_400)
-    assert laws["consistent"] == Need(held=40_000 * 3_600, once=40_000 * 11_400)
+    assert laws["isolated"] == MemoryRequest(held=40_000 * 3_600, shared=40_000 * 11_400)
+    assert laws["consistent"] == MemoryRequest(held=40_000 * 3_600, once=40_000 * 11_400)
 
 
 def test_a_plan_says_what_nodes_a_run_needs():
     one = of(1)
-    stage = make_stage(scene(*LARGE), nodes=replace(one, more=True))
-    (told,) = shortages(stage, one)
+    setup = make_setup(scene(*LARGE), nodes=replace(one, more=True))
+    (told,) = shortages(setup, one)
     assert told == (
         "block.cells = (500, 500, 200): needs about 250 GB of memory; there is one node of 64 GB; "
         "4 such nodes would do, filled evenly by mpirun over several hosts"
     )
-    assert not list(shortages(stage, of(4)))
+    assert not list(shortages(setup, of(4)))
     with pytest.raises(InputError, match="one node of 30 GB"):  # of which no number helps
         words = ("patches.grid=[64, 64]", "surface.grid=[20000, 20000]")
-        make_stage(scene(*words), nodes=replace(of(1, memory=30.0), more=True))
+        make_setup(scene(*words), nodes=replace(of(1, memory=30.0), more=True))
 
 
 def test_the_reference_is_shared_but_for_gmsh():
     hexahedra = ("coupling.kind=reference", "reference.cells=[400, 400, 100]", "reference.meshes=1")
     with pytest.raises(InputError, match=r"the reference needs about .* such nodes would do"):
-        make_stage(scene(*hexahedra), nodes=of(1))
-    stage = make_stage(scene(*hexahedra), nodes=of(8))
-    assert stage.meshes.gathered == 0.0
-    assert "the reference needs about" in next(iter(shortages(stage, of(1))))
+        make_setup(scene(*hexahedra), nodes=of(1))
+    setup = make_setup(scene(*hexahedra), nodes=of(8))
+    assert setup.meshes.gathered == 0.0
+    assert "the reference needs about" in next(iter(shortages(setup, of(1))))
     tetrahedra = ("coupling.kind=reference", "reference.mesh=tetrahedra", "reference.meshes=1")
-    stage = make_stage(scene(*tetrahedra))
-    least = stage.meshes.gathered
-    assert 0.0 < least < 0.2 * stage.meshes.bytes
-    many = Nodes(ranks=(1,) * 1000, memory=0.9 * least)
+    setup = make_setup(scene(*tetrahedra))
+    least = setup.meshes.gathered
+    assert 0.0 < least < 0.2 * setup.meshes.bytes
+    many = ClusterNodes(ranks=(1,) * 1000, memory=0.9 * least)
     text = r"gmsh on rank 0, which meshes the reference, needs about .*1000 nodes of .* GB; or few"
     with pytest.raises(InputError, match=text):
-        make_stage(scene(*tetrahedra), nodes=many)
+        make_setup(scene(*tetrahedra), nodes=many)
 
 
 @pytest.mark.parametrize("kind", ["analytic", "concurrent", "consistent", "reference"])
@@ -187,7 +195,7 @@ def test_control_groups_limit_a_node(monkeypatch, tmp_path, group, folder, names
     monkeypatch.setattr(nodes, "_GROUPS", tmp_path / "groups")
     monkeypatch.setattr(nodes, "_OWN", tmp_path / "mine")
     assert list(group_memory()) == found
-    assert node_memory() == (found[0][0] if found else Nodes().memory)
+    assert node_memory() == (found[0][0] if found else ClusterNodes().memory)
     monkeypatch.setattr(nodes, "_OWN", tmp_path / "nowhere")
     assert list(group_memory()) == []
     assert node_memory() > 1e8
@@ -195,11 +203,18 @@ def test_control_groups_limit_a_node(monkeypatch, tmp_path, group, folder, names
 
 def test_limit_of_a_process_counts():
     limited = replace(of(2, ranks=4), process=4 * GB)
-    assert limited.fit(Need(shared=31 * GB)) and not limited.fit(Need(shared=33 * GB))
-    assert limited.fit(Need(once=3.9 * GB)) and not limited.fit(Need(once=4.1 * GB))
-    assert limited.enough(Need(shared=33 * GB)) == 3 and limited.enough(Need(held=4.1 * GB)) is None
+    assert limited.fit(MemoryRequest(shared=31 * GB)) and not limited.fit(
+        MemoryRequest(shared=33 * GB)
+    )
+    assert limited.fit(MemoryRequest(once=3.9 * GB)) and not limited.fit(
+        MemoryRequest(once=4.1 * GB)
+    )
+    assert (
+        limited.enough(MemoryRequest(shared=33 * GB)) == 3
+        and limited.enough(MemoryRequest(held=4.1 * GB)) is None
+    )
     text = "2 nodes of 64 GB with 4 ranks, 4 GB for a process (ulimit -v)"
-    assert limited.room(Need(held=4.1 * GB)) == text
+    assert limited.room(MemoryRequest(held=4.1 * GB)) == text
 
 
 LIMITED = """

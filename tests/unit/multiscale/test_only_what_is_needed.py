@@ -15,7 +15,7 @@ import micro.pairs.interaction
 import multiscale.output.results
 from geometry import Asperities, PatchGrid
 from micro import HalfSpaceModel, asperity_model
-from multiscale import Run, Scene, make_stage
+from multiscale import Run, Scene, make_setup
 from multiscale.cli.command_line import main
 from multiscale.output.results import write_results
 from multiscale.planning.forecast import forecast
@@ -107,8 +107,8 @@ def test_a_plan_solves_nothing_of_the_scene(monkeypatch, presses, kind):
     monkeypatch.setattr("multiscale.couplings.blocks.on_body", never)
     monkeypatch.setattr("multiscale.couplings.assembly.make_table", never)
     given = data(kind, grid=128)
-    stage = make_stage(Scene.from_dict(given))
-    made = forecast(stage)
+    setup = make_setup(Scene.from_dict(given))
+    made = forecast(setup)
     assert made.total > 0.0
     assert presses == []
 
@@ -116,7 +116,7 @@ def test_a_plan_solves_nothing_of_the_scene(monkeypatch, presses, kind):
 def test_patches_out_of_reach_build_no_law(monkeypatch):
     given = data("isolated", patches={"grid": [4, 4]}, load={"approach": 0.003, "steps": 1})
     run = Run(Scene.from_dict(given))
-    reached = run.stage.reached_patches
+    reached = run.setup.reached_patches
     assert 0 < reached < 16
     solved = set()
     state = HalfSpaceModel._state
@@ -169,8 +169,8 @@ def test_summits_out_of_reach_cost_nothing(monkeypatch):
 def test_a_scene_without_open_keys_weighs_no_alternatives(monkeypatch):
     monkeypatch.setattr("multiscale.resolution.accuracy.predicted_cost", never)
     monkeypatch.setattr("multiscale.resolution.problem_setup.accurate_stage", never)
-    stage = make_stage(Scene.from_dict(data("consistent")))
-    assert stage.decision is None
+    setup = make_setup(Scene.from_dict(data("consistent")))
+    assert setup.decision is None
 
 
 def test_a_run_predicts_nothing_and_writes_what_it_took(monkeypatch, tmp_path, capsys):

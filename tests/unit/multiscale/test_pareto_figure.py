@@ -7,9 +7,9 @@ import pytest
 from matplotlib.text import Text
 
 from geometry.patches import PatchGrid
-from multiscale.compare.comparison import Comparison, Row
-from multiscale.compare.measures import Measures
-from multiscale.compare.pareto_figure import pareto_figure
+from multiscale.comparison.comparison import Comparison, Row
+from multiscale.comparison.measures import Measures
+from multiscale.comparison.pareto_figure import pareto_figure
 
 KINDS = ("analytic", "isolated", "consistent", "concurrent", "reference")
 

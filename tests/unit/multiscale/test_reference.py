@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import InputError
-from multiscale import Scene, make_stage, run
+from multiscale import Scene, make_setup, run
 from multiscale.cli.command_line import main
 from multiscale.output.figures import history_figure, pressure_figure
 from multiscale.output.report import curve_cells
@@ -261,7 +261,7 @@ def test_fields_are_those_of_the_rough_block(capsys, tmp_path):
             next(iter(file[f"Function/{name}"].values()))[:]
             for name in ("displacement", "pressure")
         )
-    surface = make_stage(scene()).surface
+    surface = make_setup(scene()).surface
     top = pressure[:, 0] > 1e-9  # interpolation leaves rounding elsewhere
     assert 0 < top.sum() < 100
     heights = surface.height_at(points[top, 0], points[top, 1]) - surface.mean_height
@@ -273,27 +273,27 @@ def test_fields_are_those_of_the_rough_block(capsys, tmp_path):
 
 
 def test_tetrahedra_are_small_where_contact_can_occur():
-    stage = make_stage(scene(cells="reference.mesh=tetrahedra"))
-    statements = dict(plan.statements(stage))
+    setup = make_setup(scene(cells="reference.mesh=tetrahedra"))
+    statements = dict(plan.statements(setup))
     assert "tetrahedra (P2)" in statements["block"]
     assert "across a typical contact" in statements["block"]
     with pytest.raises(ValueError, match="a reference has no micro model"):
-        _ = stage.model
+        _ = setup.model
 
 
 def test_the_blocks_cells_are_not_the_references():
     """Of the paper's scene, which states cells under laws, by its kind alone."""
     given = Scene.load(PAPER, ["coupling.kind=reference"])
     assert given.block.cells == (40, 40, 25)
-    stage = make_stage(given)
-    default = make_stage(Scene.load(PAPER, ["coupling.kind=reference", "block.cells=auto"]))
-    assert not stage.meshes.hexahedral
-    assert stage.meshes.unknowns == default.meshes.unknowns
+    setup = make_setup(given)
+    default = make_setup(Scene.load(PAPER, ["coupling.kind=reference", "block.cells=auto"]))
+    assert not setup.meshes.hexahedral
+    assert setup.meshes.unknowns == default.meshes.unknowns
 
 
 def test_plan_of_hexahedra():
-    stage = make_stage(scene("reference.meshes=1", "block.grading=1"))
-    statements, told = dict(plan.statements(stage)), " ".join(plan.warnings(stage))
+    setup = make_setup(scene("reference.meshes=1", "block.grading=1"))
+    statements, told = dict(plan.statements(setup)), " ".join(plan.warnings(setup))
     assert "one mesh of 12 × 12 × 4 hexahedra (Q1)" in statements["block"]
     assert f"{3 * 13 * 13 * 5} unknowns" in statements["block"]
     assert "no error bar" in told
@@ -331,13 +331,13 @@ def test_hexahedra_need_their_number():
 
 def test_tetrahedra_too_small_for_the_memory_are_refused():
     with pytest.raises(InputError, match=r"reference\.fine = .*: the reference needs about"):
-        make_stage(scene(cells="reference.fine='1 nm'"))
+        make_setup(scene(cells="reference.fine='1 nm'"))
 
 
 @pytest.mark.parametrize(("overrides", "text"), REFUSED.values(), ids=REFUSED)
 def test_what_does_not_fit_is_refused(overrides, text):
     with pytest.raises(InputError, match=re.escape(str(PAPER)) + ".*" + re.escape(text)):
-        make_stage(scene(*overrides))
+        make_setup(scene(*overrides))
 
 
 def test_roughness_that_no_mesh_carries_names_file_and_key():

@@ -20,8 +20,8 @@ from multiscale.resolution import accuracy
 from multiscale.restart.checkpoint import read_checkpoint, write_checkpoint
 from multiscale.restart.folder_lock import FolderLock
 from multiscale.restart.journal import Journal, journalled
-from multiscale.restart.resuming import Keeper, checkpoint_of, kept_choices, with_journal
-from multiscale.storage.checksummed_hdf5 import seal
+from multiscale.restart.resuming import CheckpointWriter, checkpoint_of, kept_choices, with_journal
+from multiscale.storage.checksummed_hdf5 import checksum
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 ALONE = {"coupling": {"kind": "analytic"}, "micro": {"model": "half-space"}}
@@ -122,7 +122,7 @@ def ended():
 def interrupted(folder, ended, steps=2):
     """Leave in a folder what a run leaves that was killed after some steps."""
     run = Run(ended.scene)
-    keeper = Keeper(folder, run, FolderLock(folder))
+    keeper = CheckpointWriter(folder, run, FolderLock(folder))
     keeper.write()
     for step in run.load_steps():
         keeper.keep(step)
@@ -135,7 +135,7 @@ def interrupted(folder, ended, steps=2):
 
 def resumed(folder, changed):
     run = Run(changed)
-    found = Keeper(folder, run, FolderLock(folder)).resume()
+    found = CheckpointWriter(folder, run, FolderLock(folder)).resume()
     return run if found else None
 
 
@@ -180,7 +180,7 @@ def test_journal_of_another_run_is_not_taken(tmp_path, ended):
     [
         (lambda path: path.write_bytes(path.read_bytes()[:3000]), "its checksum does not fit its"),
         (lambda path: path.write_bytes(b"nothing of the kind"), "has no checksum before its conte"),
-        (lambda path: path.write_bytes(seal(b"no HDF5")), "cannot be read: "),
+        (lambda path: path.write_bytes(checksum(b"no HDF5")), "cannot be read: "),
         (lambda path: flip(path), "its checksum does not fit its content"),
         (lambda path: relabel(path), "'patchlaw checkpoint 99': is not a checkpoint of this"),
     ],
@@ -205,7 +205,7 @@ def flip(path):
 def relabel(path):
     with h5py.File(path, "r+") as file:
         file.attrs["format"] = "patchlaw checkpoint 99"
-    path.write_bytes(seal(path.read_bytes()))
+    path.write_bytes(checksum(path.read_bytes()))
 
 
 @pytest.mark.parametrize(
@@ -257,7 +257,7 @@ def test_folder_that_vanishes_comes_back_whole(tmp_path, ended):
     run, folder = Run(ended.scene), tmp_path / "out"
     lock = FolderLock(folder)
     lock.hold()
-    keeper = Keeper(folder, run, lock)
+    keeper = CheckpointWriter(folder, run, lock)
     keeper.write()
     for step in run.load_steps():
         if step.step == 2:
@@ -280,7 +280,7 @@ def test_two_runs_do_not_share_a_folder(tmp_path):
 
 @pytest.mark.parametrize("command", ["laws", "surface", "run", "compare"])
 def test_no_command_writes_where_a_run_does(tmp_path, capsys, monkeypatch, command):
-    monkeypatch.delattr("multiscale.compare.level_runs.launch_process")  # no level is begun
+    monkeypatch.delattr("multiscale.comparison.level_runs.launch_process")  # no level is begun
     out = tmp_path / "out"
     lock = FolderLock(out)
     lock.hold()
@@ -297,7 +297,7 @@ def test_folder_that_becomes_a_file_under_way_ends_with_5(tmp_path, ended):
     shutil.rmtree(path.parent)
     path.parent.touch()
     with pytest.raises(NotWritten, match="out: cannot be written to: ") as error:
-        Keeper(path.parent, ended, lock).write()
+        CheckpointWriter(path.parent, ended, lock).write()
     assert error.value.exit_code == 5
     lock.release()
 
@@ -368,7 +368,7 @@ def test_full_disk_leaves_the_earlier_checkpoint(tmp_path, ended, monkeypatch):
     with pytest.raises(
         NotWritten, match=r"checkpoint.h5: cannot be written: No space left"
     ) as error:
-        Keeper(path.parent, run, FolderLock(path.parent)).write()
+        CheckpointWriter(path.parent, run, FolderLock(path.parent)).write()
     assert error.value.exit_code == 5
     assert path.read_bytes() == before
     assert {each.name for each in path.parent.iterdir() if each.name != ".lock"} == {
@@ -514,7 +514,7 @@ def test_a_plan_stands_though_another_machine_would_choose_otherwise(tmp_path, m
     assert Run(left_open).scene != whole.scene  # the plan would be another one here
     again = Run(left_open, settled=kept.settled)
     assert again.scene == whole.scene
-    assert again.stage.micro.surface.grid == whole.stage.micro.surface.grid
+    assert again.setup.micro.surface.grid == whole.setup.micro.surface.grid
     again.resume(kept.steps, kept.position, kept.state, kept.laws)
     list(again.load_steps())
     np.testing.assert_allclose(columns(again.steps), columns(whole.steps), rtol=0.0, atol=0.0)

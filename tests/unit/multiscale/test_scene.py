@@ -10,7 +10,7 @@ import pint
 import pytest
 
 from geometry.errors import InputError
-from multiscale.resolution.problem_setup import make_stage
+from multiscale.resolution.problem_setup import make_setup
 from multiscale.scene.scene import Scene
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
@@ -135,9 +135,11 @@ def test_which_block_stands_under_the_patches(overrides, decomposed):
 def test_loads_in_newtons_up_and_down():
     data = Scene.load(PAPER).model_dump(by_alias=True)
     data["load"] = {"force": ["5 N", "1000 mN", 0, "2 N"], "steps": 2, "tilt": "free"}
-    programme = Scene.from_dict(data).loading.programme
-    assert (programme.quantity, programme.tilt) == ("force", None)
-    assert programme.targets == pytest.approx([2.5, 5, 3, 1, 0.5, 0, 1, 2], rel=1e-14)  # rounding
+    load_history = Scene.from_dict(data).loading.load_history
+    assert (load_history.quantity, load_history.tilt) == ("force", None)
+    assert load_history.targets == pytest.approx(
+        [2.5, 5, 3, 1, 0.5, 0, 1, 2], rel=1e-14
+    )  # rounding
 
 
 def test_no_load_is_refused():
@@ -239,7 +241,7 @@ def test_where_files_of_heights_are_looked_for(tmp_path, named, found):
     path.write_text(text + "load.approach = 0.01\n", encoding="utf-8")
     scene = Scene.load(path)
     assert scene.surface_path.resolve() == tmp_path / found
-    assert make_stage(scene).surface.source == str(scene.surface_path)
+    assert make_setup(scene).surface.source == str(scene.surface_path)
 
 
 def test_scene_is_frozen():

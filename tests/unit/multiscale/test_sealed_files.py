@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 
 from geometry.errors import InputError
-from multiscale.storage.checksummed_hdf5 import seal, sealed, unsealed
+from multiscale.storage.checksummed_hdf5 import checksum, checksummed, verified
 
 
 @pytest.fixture
 def path(tmp_path):
-    content = sealed(lambda file: file.create_dataset("x", data=np.arange(5.0)))
+    content = checksummed(lambda file: file.create_dataset("x", data=np.arange(5.0)))
     (tmp_path / "a.h5").write_bytes(content)
     return tmp_path / "a.h5"
 
 
 def test_every_reader_of_hdf5_opens_it(path):
-    with h5py.File(path) as file, h5py.File(unsealed(path)) as other:
+    with h5py.File(path) as file, h5py.File(verified(path)) as other:
         assert file["x"][()].tolist() == other["x"][()].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
     assert path.read_bytes().startswith(b"patchlaw, SHA-256 of all bytes from 512 on: ")
 
@@ -31,20 +31,20 @@ def test_any_changed_byte_is_found(path):
         damaged[at] ^= 0x10
         path.write_bytes(damaged)
         with pytest.raises(InputError, match=r"its checksum does not fit its content|has no check"):
-            unsealed(path)
+            verified(path)
     for damaged in (whole[:-1], whole + b"\0", whole[:300]):
         path.write_bytes(damaged)
         with pytest.raises(InputError, match="is damaged: its checksum does not fit its content"):
-            unsealed(path)
+            verified(path)
     path.write_bytes(b"")
     with pytest.raises(InputError, match="has no checksum before its content: it is none of ours"):
-        unsealed(path)
+        verified(path)
 
 
 def test_a_seal_fits_but_once(path):
     whole = path.read_bytes()
-    assert seal(whole) == whole
-    assert unsealed(path.open("rb")).getvalue() == whole
+    assert checksum(whole) == whole
+    assert verified(path.open("rb")).getvalue() == whole
 
 
 def test_damage_costs_no_memory(tmp_path):
@@ -53,10 +53,10 @@ def test_damage_costs_no_memory(tmp_path):
         "import resource, sys; from pathlib import Path\n"
         "from geometry.errors import InputError\n"
         "from multiscale.laws.files import read_laws\n"
-        "from multiscale.storage.checksummed_hdf5 import sealed\n"
+        "from multiscale.storage.checksummed_hdf5 import checksummed\n"
         "def fill(file): file.attrs['format'] = 'patchlaw laws 2'\n"
         "path = Path(sys.argv[1])\n"
-        "path.write_bytes(sealed(fill))\n"
+        "path.write_bytes(checksummed(fill))\n"
         "whole, before = path.read_bytes(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
         "for at in range(512, len(whole), 13):\n"
         "    path.write_bytes(whole[:at] + b'\\xff\\xff\\xff\\xff' + whole[at + 4:])\n"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import NotConverged
-from multiscale import Scene, make_stage, run
+from multiscale import Scene, make_setup, run
 from multiscale.couplings.load_steps import ContactCoupling
 from multiscale.planning.plan import statements, warnings
 
@@ -23,12 +23,16 @@ def scene(seed=1, coupling="consistent", **load):
 @pytest.mark.parametrize(("seed", "coupling"), [(1, "isolated"), (3, "consistent")])
 def test_small_force_on_the_lower_side_of_a_tilted_plane(seed, coupling):
     asked = scene(seed, coupling, force=5e-3, tilt=[0.01, 0.01])
-    stage = make_stage(asked)
-    assert stage.furthest[0] < 0.0  # at the middle the plane is clear of the surface
-    x, y = np.meshgrid(stage.surface.x - 0.5, stage.surface.y - 0.5, indexing="ij")
-    below = stage.furthest[0] + 0.01 * (x + y) - (stage.surface.highest - stage.surface.heights)
-    assert stage.deepest == pytest.approx(below.max(), rel=1e-12)
-    assert stage.deepest > 0.0
+    setup = make_setup(asked)
+    assert setup.plane_at_largest_load[0] < 0.0  # at the middle the plane is clear of the surface
+    x, y = np.meshgrid(setup.surface.x - 0.5, setup.surface.y - 0.5, indexing="ij")
+    below = (
+        setup.plane_at_largest_load[0]
+        + 0.01 * (x + y)
+        - (setup.surface.highest - setup.surface.heights)
+    )
+    assert setup.largest_interference == pytest.approx(below.max(), rel=1e-12)
+    assert setup.largest_interference > 0.0
     # Newton's residual of a prescribed force is below 1e-10 on the mesh
     assert run(asked).force_N[-1] == pytest.approx(5e-3, rel=1e-9)
 
@@ -36,7 +40,7 @@ def test_small_force_on_the_lower_side_of_a_tilted_plane(seed, coupling):
 @pytest.mark.parametrize("coupling", ["isolated", "consistent", "concurrent"])
 def test_plane_that_does_not_touch_carries_nothing(coupling):
     asked = scene(coupling=coupling, approach=1e-6)
-    assert make_stage(asked).model.first_touch > 1e-5  # cells miss the interpolant's highest point
+    assert make_setup(asked).model.first_touch > 1e-5  # cells miss the interpolant's highest point
     history = run(asked)
     assert (history.force_N[-1], history.contacts[-1]) == (0.0, 0)
 
@@ -50,7 +54,7 @@ def test_plane_that_does_not_touch_carries_nothing(coupling):
     ],
 )
 def test_plan_says_under_which_tilt_laws_are_made(tilt, coupling, load):
-    said = dict(statements(make_stage(scene(approach=8e-3, tilt=tilt))))
+    said = dict(statements(make_setup(scene(approach=8e-3, tilt=tilt))))
     assert coupling in said["coupling"]
     assert load in said["load"]
 
@@ -83,7 +87,7 @@ def test_the_plan_tells_of_flat_summits_that_carry_nothing(tmp_path, micro, told
             "load": {"approach": "4 um", "steps": 1},
         }
     )
-    said = [text for text in warnings(make_stage(stepped)) if "summits are flat" in text]
+    said = [text for text in warnings(make_setup(stepped)) if "summits are flat" in text]
     assert len(said) == told
 
 
@@ -101,20 +105,20 @@ class Shy(ContactCoupling):
 
 def test_free_plane_that_is_not_found_at_once_is_found_in_smaller_steps(monkeypatch):
     asked = scene(coupling="concurrent", approach=3e-3, tilt="free")
-    known = make_stage(asked).furthest
+    known = make_setup(asked).plane_at_largest_load
     monkeypatch.setattr("multiscale.resolution.micro_model.ContactCoupling", Shy)
-    approach, tilt = make_stage(asked).furthest
+    approach, tilt = make_setup(asked).plane_at_largest_load
     assert approach == known[0]
     np.testing.assert_allclose(tilt, known[1], rtol=1e-5)  # moments to 1e-8 of force times length
     Shy.reached = -1.0
     with pytest.raises(NotConverged, match=r"load step 1 \(approach .*: TOO_FAR .* halved 8 times"):
-        make_stage(asked)
+        make_setup(asked)
 
 
 @pytest.mark.parametrize(("given", "height"), [({}, 0.02), ({"height": "5 um"}, 0.005)])
 def test_a_block_is_as_high_as_the_shorter_side_unless_told(given, height):
     spectrum = {"hurst": 0.95, "waves": [2, 4], "rms_slope": 0.2, "seed": 1}
-    made = make_stage(
+    made = make_setup(
         Scene.from_dict(
             {
                 "surface": {"spectrum": spectrum, "grid": [32, 16], "lengths": ["40 um", "20 um"]},

@@ -127,7 +127,7 @@ def test_patches_of_the_half_space_press_alone(surface):
     alone = []
     for index in range(6):
         piece, patch = model.of_patch(patches, index)
-        assert piece.datum == model.datum
+        assert piece.reference_height == model.reference_height
         response = piece.respond([10e-3], patches=patch, mean_heights=means[index : index + 1])
         alone.append(response.force[0])
     assert np.sum(alone) > np.sum(whole)

@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from multiscale.compare.comparison import Comparison, Row
-from multiscale.compare.level import OWN
-from multiscale.compare.measures import on_grid
-from multiscale.compare.pareto_figure import COLOURS, MARKS, with_legend
+from multiscale.comparison.comparison import Comparison, Row
+from multiscale.comparison.level import OWN
+from multiscale.comparison.measures import on_grid
+from multiscale.comparison.pareto_figure import COLOURS, MARKS, with_legend
 from multiscale.output.figures import PRESSURE_LABEL, draw_pressures
 
 _STYLES = ("-", "--", "-.", ":")

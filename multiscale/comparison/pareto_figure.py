@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from multiscale.compare.comparison import Comparison, Row
+from multiscale.comparison.comparison import Comparison, Row
 
 Array = NDArray[np.float64]
 

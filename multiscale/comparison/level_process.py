@@ -11,7 +11,7 @@ from typing import Any
 
 from geometry.collective import on_root
 from geometry.errors import PatchlawError
-from multiscale.compare.level_results import STATUS_OF_EXIT, LevelResult, curves_of, write_result
+from multiscale.comparison.level_results import STATUS_OF_EXIT, LevelResult, curves_of, write_result
 from multiscale.machine.mpi_job import world
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
@@ -83,7 +83,7 @@ def level_result(scene: Scene, comm: Any, *, key: str) -> LevelResult:
         peak_MB=memory if comm is None else sum(comm.allgather(memory)),
         unknowns=None if run is None else run.unknowns,
         curves=None if run is None else curves_of(run.history()),
-        finite_slopes=run is not None and run.stage.finite_slopes,
+        finite_slopes=run is not None and run.setup.finite_slopes,
     )
 
 

@@ -19,9 +19,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from multiscale.compare.level import Level
-from multiscale.compare.levels import LOW_HEIGHTS, SMALL_SLOPES
-from multiscale.compare.outcomes import KINDS, Against, Outcome
+from multiscale.comparison.level import Level
+from multiscale.comparison.levels import LOW_HEIGHTS, SMALL_SLOPES
+from multiscale.comparison.outcomes import KINDS, Against, Outcome
 
 _PLACES = {"analytic": 0, "isolated": 1, "consistent": 1, "concurrent": 1, "reference": 2}
 

@@ -9,15 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from geometry.errors import InputError
-from multiscale.compare.comparison import Comparison
-from multiscale.compare.level import Level
-from multiscale.compare.level_results import LevelResult
-from multiscale.compare.level_runs import Launch, check_launchable, run_levels
-from multiscale.compare.levels import levels
-from multiscale.compare.outcomes import AGAINST, Against, Outcome
-from multiscale.compare.rows import compared
-from multiscale.resolution.auto_keys import open_keys, provisional, settled_keys, with_settled
-from multiscale.resolution.problem_setup import make_stage
+from multiscale.comparison.comparison import Comparison
+from multiscale.comparison.level import Level
+from multiscale.comparison.level_results import LevelResult
+from multiscale.comparison.level_runs import Launch, check_launchable, run_levels
+from multiscale.comparison.levels import levels
+from multiscale.comparison.outcomes import AGAINST, Against, Outcome
+from multiscale.comparison.rows import compared
+from multiscale.resolution.auto_keys import auto_keys, provisional, resolved_keys, with_resolved
+from multiscale.resolution.problem_setup import make_setup
 from multiscale.scene.scene import Scene
 from multiscale.storage.whole_files import write_json
 
@@ -79,7 +79,7 @@ def compare(
     outcomes = []
     with tempfile.TemporaryDirectory(prefix="patchlaw-compare-") as aside:
         place = Path(aside) if folder is None else folder
-        scene = settled_scene(scene, place)
+        scene = resolved_scene(scene, place)
         for level, result, kept in run_levels(
             levels(scene, ranks),
             folder=place,
@@ -93,7 +93,7 @@ def compare(
     return compared(scene, outcomes, against)
 
 
-def settled_scene(scene: Scene, folder: Path) -> Scene:
+def resolved_scene(scene: Scene, folder: Path) -> Scene:
     """Return a scene whose open keys, but for the micro model, are what the plan takes for them.
 
     They are kept: another call may find the machine in another mood, and levels of other patches.
@@ -102,7 +102,7 @@ def settled_scene(scene: Scene, folder: Path) -> Scene:
         scene: The scene.
         folder: Where finished levels are kept.
     """
-    free = open_keys(scene)
+    free = auto_keys(scene)
     if free <= {"micro.model"}:
         return scene
     path, given = folder / SETTLED, scene.model_dump(by_alias=True, mode="json")
@@ -112,6 +112,6 @@ def settled_scene(scene: Scene, folder: Path) -> Scene:
     except (OSError, ValueError, KeyError, TypeError):
         known = None
     if known is None:
-        known = settled_keys(make_stage(scene), scene)
+        known = resolved_keys(make_setup(scene), scene)
         write_json(path, {"scene": given, "settled": known})
-    return provisional(with_settled(scene, known), free & {"micro.model"})
+    return provisional(with_resolved(scene, known), free & {"micro.model"})

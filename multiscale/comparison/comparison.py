@@ -10,8 +10,8 @@ import numpy as np
 
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
-from multiscale.compare.causes import Causes
-from multiscale.compare.measures import Curves, Measures
+from multiscale.comparison.causes import Causes
+from multiscale.comparison.measures import Curves, Measures
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,7 +12,7 @@ import numpy as np
 
 from geometry.errors import PatchlawError
 from geometry.patches import PatchGrid
-from multiscale.compare.measures import Curves
+from multiscale.comparison.measures import Curves
 from multiscale.results.history import History
 from multiscale.storage.whole_files import write_json
 

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping
 from html import escape
 from pathlib import Path
 
-from multiscale.compare.comparison import Comparison, Row
-from multiscale.compare.measures import __doc__ as measures_text
+from multiscale.comparison.comparison import Comparison, Row
+from multiscale.comparison.measures import __doc__ as measures_text
 from multiscale.output.report import figure_element, page, table
 from multiscale.output.results import write_figure
 from multiscale.storage.whole_files import write_csv, write_text
@@ -38,8 +38,8 @@ def _drawn(folder: Path, comparison: Comparison) -> Iterator[tuple[str, Path]]:
     """Draw what there is to be seen; yield captions and files."""
     if not comparison.curves:
         return
-    from multiscale.compare import figures as compare_figures
-    from multiscale.compare import pareto_figure
+    from multiscale.comparison import figures as compare_figures
+    from multiscale.comparison import pareto_figure
 
     if comparison.measure is not None:
         yield (

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from multiscale.compare.level import Level
-from multiscale.compare.level_results import LevelResult
-from multiscale.compare.measures import Curves
+from multiscale.comparison.level import Level
+from multiscale.comparison.level_results import LevelResult
+from multiscale.comparison.measures import Curves
 
 Against = Literal["reference", "concurrent", "half-space"]
 

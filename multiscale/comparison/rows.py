@@ -7,11 +7,11 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from geometry.patches import PatchGrid
-from multiscale.compare.causes import Split
-from multiscale.compare.comparison import Comparison, Row
-from multiscale.compare.level import Level, pressure_grid
-from multiscale.compare.measures import Measures, measures, uncertainty
-from multiscale.compare.outcomes import AGAINST, Against, Outcome, ranked, refinements
+from multiscale.comparison.causes import Split
+from multiscale.comparison.comparison import Comparison, Row
+from multiscale.comparison.level import Level, pressure_grid
+from multiscale.comparison.measures import Measures, measures, uncertainty
+from multiscale.comparison.outcomes import AGAINST, Against, Outcome, ranked, refinements
 from multiscale.scene.scene import Scene
 
 _PHASES = {"laws": "seconds_laws", "load steps": "seconds_steps"}
@@ -31,12 +31,12 @@ def compared(
     tops = {one: ranked(outcomes, one) for one in AGAINST}
     reached = [one for one in AGAINST if tops[one]]
     chosen = against if against in reached else next(iter(reached), None)
-    programme = scene.loading.programme
+    load_history = scene.loading.load_history
     found = [one for one in outcomes if one.result.curves is not None]
     common: dict[str, Any] = {
         "scene": scene.name,
-        "quantity": programme.quantity,
-        "steps": programme.count,
+        "quantity": load_history.quantity,
+        "steps": load_history.count,
         "grid": _grid(scene, found),
         "curves": {one.level.name: one.curves for one in found},
     }
@@ -47,7 +47,7 @@ def compared(
     best = tops[chosen][0]
     pairs = [(coarse.curves, fine.curves) for coarse, fine in refinements(tops[chosen])]
     own = uncertainty(best.curves, pairs, common["grid"])
-    split = Split(outcomes, tops, chosen, programme.quantity)
+    split = Split(outcomes, tops, chosen, load_history.quantity)
     if not math.isfinite(getattr(own, f"{split.response}_max")):
         warnings.append(f"{best.level.name} has no error bar of its own: it is taken as exact")
     return Comparison(

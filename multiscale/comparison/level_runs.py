@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from geometry.errors import InputError
-from multiscale.compare.level import Level
-from multiscale.compare.level_results import LevelResult, read_result, write_result
+from multiscale.comparison.level import Level
+from multiscale.comparison.level_results import LevelResult, read_result, write_result
 from multiscale.restart.interruption import ENDING
 
 _NO_CACHE = {"PATCHLAW_CACHE": "off"}
@@ -142,7 +142,7 @@ def launch_process(level: Level, seconds: float | None) -> LevelResult:
 
 
 def _command(level: Level, request: Path) -> list[str]:
-    python = [sys.executable, "-m", "multiscale.compare.level_process", str(request)]
+    python = [sys.executable, "-m", "multiscale.comparison.level_process", str(request)]
     return python if level.ranks == 1 else ["mpirun", "-n", str(level.ranks), *python]
 
 

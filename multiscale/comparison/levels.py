@@ -14,7 +14,7 @@ from typing import Any
 from geometry.errors import InputError, NotConverged
 from geometry.typical_contact import suggested_fine
 from micro import MODEL_NAMES
-from multiscale.compare.level import (
+from multiscale.comparison.level import (
     OWN,
     Content,
     Grid,
@@ -26,7 +26,7 @@ from multiscale.compare.level import (
 )
 from multiscale.costs.prediction import predicted_cost
 from multiscale.machine.rates import Machine
-from multiscale.resolution.problem_setup import make_stage
+from multiscale.resolution.problem_setup import make_setup
 from multiscale.scene.scene import Scene
 from multiscale.setup.checks import EMBEDDED_CELLS, patch_grid
 from multiscale.setup.surface import make_surface
@@ -202,11 +202,11 @@ class _Family:
 
     def _finest_edge(self) -> float | None:
         """Return the edge of tetrahedra that fits the contacts; None where they are unknown."""
-        programme = self._scene.loading.programme
-        if programme.quantity == "force" or programme.tilt is None:
+        load_history = self._scene.loading.load_history
+        if load_history.quantity == "force" or load_history.tilt is None:
             return None
         surface = make_surface(self._scene)
-        return suggested_fine(surface, programme.largest, tilt=programme.tilt)
+        return suggested_fine(surface, load_history.largest, tilt=load_history.tilt)
 
     def _block(self, cells: Any) -> Content:
         block = {key: value for key, value in self._base["block"].items() if key != "cells"}
@@ -222,7 +222,7 @@ class _Family:
         cost, refusal = float("inf"), ""
         try:
             scene = Scene.from_dict(content)
-            cost = predicted_cost(make_stage(scene), self._machine).total
+            cost = predicted_cost(make_setup(scene), self._machine).total
         except (InputError, NotConverged) as error:
             if content["coupling"]["kind"] != "reference" or "GB of memory" not in str(error):
                 return None
