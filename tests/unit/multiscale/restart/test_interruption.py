@@ -15,7 +15,7 @@ from multiscale.cli.command_line import main
 from multiscale.restart.interruption import Ended, Interruption, Stopped, ended_by_signals
 from multiscale.scene.quantities import parse_duration
 
-PAPER = str(Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml")
+PAPER = str(Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml")
 SMALL = [
     "--set", "surface.grid=[32, 32]", "coupling.kind=analytic", "micro.model=half-space",
     "load.steps=4", "output.figures=false",

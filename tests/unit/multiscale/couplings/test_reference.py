@@ -18,7 +18,7 @@ from multiscale.output.report import curve_cells
 from multiscale.planning import plan
 from multiscale.results.reference_record import reference_record
 
-PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
+PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 COARSE = [
     "coupling.kind=reference",
     "surface.spectrum.waves=[1, 3]",

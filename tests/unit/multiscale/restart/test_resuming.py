@@ -23,7 +23,7 @@ from multiscale.restart.journal import Journal, journalled
 from multiscale.restart.resuming import CheckpointWriter, checkpoint_of, kept_choices, with_journal
 from multiscale.storage.checksummed_hdf5 import checksum
 
-PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
+PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 ALONE = {"coupling": {"kind": "analytic"}, "micro": {"model": "half-space"}}
 CUBE = {"block": {"cells": [4, 4, 3]}, "patches": {"grid": [2, 2]}}
 FORCE = {"force": ["3 N", "1 N", "2 N"], "steps": 1, "tilt": "free"}

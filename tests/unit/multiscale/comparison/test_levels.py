@@ -20,7 +20,7 @@ from multiscale.setup.checks import EMBEDDED_CELLS
 COLUMNS = (
     "approach", "force", "area", "separation", "approach_error", "force_error", "area_error",
 )  # fmt: skip
-PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
+PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 
 
 @cache

@@ -10,7 +10,7 @@ from multiscale import Scene, make_setup, run
 from multiscale.couplings.load_steps import ContactCoupling
 from multiscale.planning.plan import statements, warnings
 
-PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
+PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 
 
 def scene(seed=1, coupling="consistent", **load):

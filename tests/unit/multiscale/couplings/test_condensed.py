@@ -13,7 +13,7 @@ from multiscale.couplings.newton_choice import newton_choice
 from multiscale.planning.plan import statements
 from multiscale.resolution.problem_setup import make_setup
 
-PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
+PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 SMALL = [
     "surface.grid=[64, 64]", "block.cells=[8, 8, 5]", "patches.grid=[4, 2]", "load.steps=3",
 ]  # fmt: skip

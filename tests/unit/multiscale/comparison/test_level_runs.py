@@ -17,7 +17,7 @@ from multiscale.comparison.levels import levels
 from multiscale.run import Run, run
 from multiscale.scene.scene import Scene
 
-PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
+PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 TINY = ["surface.grid=[32, 32]", "load.steps=2", "patches.grid=[2, 2]"]
 
 

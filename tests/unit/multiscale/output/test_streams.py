@@ -12,7 +12,7 @@ import pytest
 
 from multiscale.output.streams import SturdyStream, sturdy_streams
 
-PAPER = str(Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml")
+PAPER = str(Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml")
 SMALL = [
     "--set", "surface.grid=[32, 32]", "coupling.kind=analytic", "micro.model=half-space",
     "load.steps=2", "output.figures=false",

@@ -20,7 +20,7 @@ from multiscale.comparison.measures import Curves
 from multiscale.run import run
 from multiscale.scene.scene import Scene
 
-PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
+PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 TINY = [
     "surface.grid=[64, 64]", "load.steps=2", "patches.grid=[2, 2]", "block.cells=[8, 8, 4]",
 ]  # fmt: skip

@@ -13,7 +13,7 @@ import pytest
 
 from multiscale.cli.command_line import main
 
-PAPER = str(Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml")
+PAPER = str(Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml")
 SMALL = [
     "surface.grid=[64, 64]", "block.cells=[8, 8, 4]", "patches.grid=[2, 2]", "load.steps=2",
 ]  # fmt: skip
@@ -164,7 +164,7 @@ def test_version_loads_no_finite_elements():
         "try: main(['--version'])\n"
         "finally: print('dolfinx' in sys.modules)"
     )
-    root = Path(__file__).parents[3]
+    root = Path(__file__).parents[4]
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=False
     )

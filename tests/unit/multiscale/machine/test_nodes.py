@@ -24,7 +24,7 @@ from multiscale.machine.nodes import (
 from multiscale.planning.memory import shortages
 from multiscale.setup.checks import check_size, needs
 
-PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
+PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 LARGE = ("block.cells=[500, 500, 200]",)  # 5·10⁷ cells, 250 GB
 GB = 1e9
 

@@ -13,7 +13,7 @@ from geometry.errors import InputError
 from multiscale.resolution.problem_setup import make_setup
 from multiscale.scene.scene import Scene
 
-PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
+PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 
 REFUSED = {
     "unknown key": ("block.young=3", "block.young: unknown key; did you mean 'young_modulus'?"),

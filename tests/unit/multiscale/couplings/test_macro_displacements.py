@@ -8,7 +8,7 @@ import pytest
 from multiscale import Scene, make_setup, run
 from multiscale.couplings.blocks import patch_displacements
 
-PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
+PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 SMALL = [
     "surface.grid=[32, 32]", "block.cells=[8, 8, 5]", "patches.grid=[4, 2]", "load.steps=2",
     "micro.model=half-space", "coupling.kind=consistent", "coupling.compliance=finite-element",
