@@ -74,9 +74,6 @@ _HOMES = {
     **dict.fromkeys(_MULTISCALE, "multiscale"),
 }
 
-INTERRUPTED = 130
-"""Exit code after SIGINT, as shells have it."""
-
 
 def __getattr__(name: str) -> Any:
     if name in _HOMES:
@@ -91,30 +88,21 @@ def __dir__() -> list[str]:
 def main() -> int:
     """Run the command line; see `multiscale.cli.command_line.main`.
 
-    SIGINT before and after it ends the process quietly: nothing is open then.
+    SIGINT before and after the command ends the process quietly: nothing is open then. Where a
+    shell ignores SIGINT for what it starts in the background, it stays ignored.
 
     Returns:
         The exit code.
     """
-    former = signal.getsignal(signal.SIGINT)
-    if former is not signal.default_int_handler:  # a shell ignores it for what it starts aside
-        from multiscale.cli.command_line import main as command
-
-        return command()
-    signal.signal(signal.SIGINT, _end)
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _end)
     from multiscale.cli.command_line import main as command
 
-    signal.signal(signal.SIGINT, former)
-    try:
-        return command()
-    except KeyboardInterrupt:
-        return INTERRUPTED
-    finally:
-        signal.signal(signal.SIGINT, _end)
+    return command()
 
 
 def _end(number: int, frame: FrameType | None) -> None:
-    os._exit(INTERRUPTED)
+    os._exit(128 + number)
 
 
 if __name__ == "__main__":

@@ -1,224 +1,202 @@
-"""The command ``patchlaw``: parses words, runs a command, turns errors into exit codes."""
+"""The command ``patchlaw``: parses its words, then loads and runs one command.
+
+Nothing but the standard library is imported before the words are understood, so that ``--help``
+takes a tenth of a second.
+"""
 
 from __future__ import annotations
 
 import argparse
-import itertools
-import os
+import signal
 import sys
-import time
-import traceback
-from collections.abc import Sequence
-from importlib.metadata import PackageNotFoundError, version
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 from typing import Any, NoReturn
 
-from geometry.errors import InputError, NotWritten, OutOfMemory, PatchlawError
-from multiscale.cli import commands
-from multiscale.cli import compare as compare_command
-from multiscale.cli import doctor as doctor_command
-from multiscale.machine.mpi_job import check_address_space, petsc_leaves_signals, world
-from multiscale.output import terminal
 from multiscale.output.streams import sturdy_streams
-from multiscale.restart.interruption import Ended, ended_by_signals
 
-_MOST_PATIENT = 5.0  # with other ranks, at the end [s]
-_OPTION_FILES = ("-options_file", "-options_file_yaml")
-_SIGNALLED = (129, 130, 143)
-_SOLVER_OPTIONS = ("-snes_", "-ksp_", "-pc_", "-mg_")
+COMPARE_ENDING = "-compare"
+"""What the results folder of a comparison is called after the scene's name."""
+
+
+_INTERRUPTED = 130  # exit code after SIGINT, as shells have it
+
+
+class Ended(KeyboardInterrupt):
+    """A signal told this process to end now.
+
+    Args:
+        number: The signal.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.exit_code = 128 + number
+
+
+class UsageError(Exception):
+    """The words of the command line are not understood."""
 
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        raise InputError(f"{message} (see: {self.prog} --help)", key="command line")
+        raise UsageError(f"{message} (see: {self.prog} --help)")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command.
-
-    Works the same under ``mpirun``: rank 0 talks and writes.
+    """Run one command. Works the same under ``mpirun``, where rank 0 prints and writes.
 
     Args:
         arguments: Words of the command line after the program's name; what follows ``--`` are
             PETSc options.
 
     Returns:
-        0 done; 2 the input is wrong and nothing was written; 3 not converged, the state up to
-        there kept; 4 stopped in time; 5 a file cannot be written, or what was to be printed; 129,
-        130 and 143 stopped by SIGHUP, SIGINT and SIGTERM; 1 a bug. After all but 0, 1 and 2
-        ``patchlaw run --resume`` goes on from the last load step.
+        0 done; 2 the input is wrong and nothing was written; 3 not converged, the results up to
+        there are written; 4 stopped in time; 5 a file or the output cannot be written, or memory
+        ran out; 129, 130 and 143 stopped by SIGHUP, SIGINT and SIGTERM; 1 a bug. After all but
+        0, 1 and 2 ``patchlaw run --resume`` goes on from the last load step.
 
     Note:
         Collective over all processes of the MPI job.
     """
-    with sturdy_streams() as (output, errors), ended_by_signals():
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    with sturdy_streams() as (output, errors), signals_raise():
         try:
-            code = _run(arguments)
+            code = _run(words)
         except SystemExit:  # of --help and --version
             code = 0
-        except KeyboardInterrupt:
-            code = 130
-        except Ended as told:
-            code = told.exit_code
+        except KeyboardInterrupt as error:
+            code = getattr(error, "exit_code", _INTERRUPTED)
         output.flush()
         failure = output.failure or errors.failure
-        if failure is None or isinstance(failure, BrokenPipeError) or code in (1, *_SIGNALLED):
+        if failure is None or isinstance(failure, BrokenPipeError) or code == 1 or code > 128:
             return code  # whoever closed a pipe has read enough
-        name = "standard output" if failure is output.failure else "standard error"
-        problem = failure.strerror or failure
-        terminal.complain(None, NotWritten(f"{name}: cannot be written: {problem}"))
-        return NotWritten.exit_code
+        from multiscale.cli.execution import complain_of_stream
+
+        return complain_of_stream("error" if output.failure is None else "output", failure)
 
 
-def _run(arguments: Sequence[str] | None) -> int:
-    """Run one command and return its exit code."""
-    petsc_leaves_signals()
-    try:
-        check_address_space()
-        comm = world()
-    except InputError as error:
-        terminal.complain(None, error)
-        return error.exit_code
-    meeting = None if comm is None else comm.Dup()  # none else must send anything through it
-    words = list(sys.argv[1:] if arguments is None else arguments)
+def _run(words: list[str]) -> int:
+    """Parse the words, then run the command; return its exit code."""
     cut = words.index("--") if "--" in words else len(words)
+    choice: argparse.Namespace | str
     try:
-        choice = _parser().parse_args(words[:cut])
-        choice.command(choice, _given_to_petsc(words[cut + 1 :]), comm)
-    except PatchlawError as error:
-        if _met_by_all(meeting):
-            terminal.complain(comm, error)
-            return error.exit_code
-        terminal.complain(None, error)
-        return _ended(comm, error.exit_code)
-    except KeyboardInterrupt:
-        return _ended(comm, 130)
-    except Ended as told:
-        return _ended(comm, told.exit_code)
-    except MemoryError as error:
-        terminal.complain(None, OutOfMemory(f"memory ran out: {error or 'none is left'}"))
-        return _ended(comm, OutOfMemory.exit_code)
-    except Exception:
-        if comm is not None:
-            time.sleep(min(comm.rank, _MOST_PATIENT))  # of ranks with the same error, one tells it
-        traceback.print_exc()
-        return _ended(comm, 1)
-    _met_by_all(meeting)
-    return 0
+        choice = parser().parse_args(words[:cut])
+    except UsageError as error:  # for rank 0 to say, which is known once MPI has started
+        choice = str(error)
+    from multiscale.cli.execution import execute
+
+    return execute(choice, words[cut + 1 :])
 
 
-def _met_by_all(comm: Any) -> bool:
-    """Wait for the other ranks at the end of a command; False when some do not come.
+class _ShowVersions(argparse.Action):
+    """Prints the versions of patchlaw and of dolfinx, which is not loaded for it."""
 
-    An error that only this rank met leaves them waiting in the middle of something.
+    def __call__(self, *given: Any) -> NoReturn:
+        from importlib import metadata  # takes longer than all else that --help needs
+
+        found = []
+        for name, distribution in (("patchlaw", "patchlaw"), ("dolfinx", "fenics-dolfinx")):
+            try:
+                found.append(f"{name} {metadata.version(distribution)}")
+            except metadata.PackageNotFoundError:
+                found.append(f"{name} not installed")
+        print(", ".join(found))
+        raise SystemExit(0)
+
+
+@contextmanager
+def signals_raise() -> Iterator[None]:
+    """Let SIGINT, SIGTERM and SIGHUP raise `Ended`, so that files and child processes are cleared.
+
+    A signal that is ignored, as SIGHUP is under ``nohup``, stays ignored. The former handlers come
+    back at the end.
     """
-    if comm is None:
-        return True
-    barrier = comm.Ibarrier()
-    until = time.monotonic() + _MOST_PATIENT
-    while not barrier.Test():
-        if time.monotonic() > until:
-            return False
-        time.sleep(0.01)
-    return True
+    former: dict[int, Any] = {}
+    if threading.current_thread() is threading.main_thread():  # no other thread may set handlers
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            if signal.getsignal(number) != signal.SIG_IGN:
+                former[number] = signal.signal(number, _raise)
+    try:
+        yield
+    finally:
+        for watched, handler in former.items():
+            signal.signal(watched, handler)
 
 
-def _ended(comm: Any, code: int) -> int:
-    """End all ranks of a job at once; a process on its own is left to return."""
-    if comm is not None:
-        sys.stderr.flush()
-        comm.Abort(code)
-    return code
+def _raise(number: int, frame: FrameType | None) -> None:
+    raise Ended(number)
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line; ``command`` is the name of the command."""
+    top = _Parser(
         prog="patchlaw",
         description="Multiscale contact of rough surfaces.",
         epilog="PETSc options follow after --, such as: patchlaw run scene.toml -- -ksp_monitor",
     )
-    parser.add_argument("--version", action="version", version=_versions())
-    subparsers = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=_Parser)
-    for name, command in {
-        "run": commands.run_scene,
-        "plan": commands.plan_scene,
-        "compare": compare_command.compare_scene,
-        "laws": commands.tabulate_scene,
-        "surface": commands.describe_surface,
-    }.items():
-        sub = subparsers.add_parser(name, help=_summary(command), description=_summary(command))
-        sub.set_defaults(command=command)
-        if name == "run":
-            _add_interruption(sub)
-        sub.add_argument("scene", type=Path, help="scene file (TOML)")
-        ending = compare_command.ENDING if name == "compare" else ""
-        text = f"folder of the results (default: results/SCENE{ending}, by the file's name)"
-        if name == "plan":
-            text = "for the words of a run: a plan writes nothing"
-        sub.add_argument("--out", type=Path, metavar="DIR", help=text)
-        sub.add_argument(
-            "--set",
-            nargs="+",
-            action="extend",
-            default=[],
-            metavar="KEY=VALUE",
-            help="change keys of the scene, such as load.approach='4 um'",
-        )
-        if command is compare_command.compare_scene:
-            compare_command.add_options(sub)
-    schema = subparsers.add_parser("schema", help=_summary(commands.print_schema))
-    schema.set_defaults(command=commands.print_schema)
-    doctor_command.add_commands(subparsers)
-    return parser
+    top.add_argument("--version", action=_ShowVersions, nargs=0, help="show versions and exit")
+    commands = top.add_subparsers(
+        required=True, metavar="COMMAND", dest="command", parser_class=_Parser
+    )
 
+    def command(name: str, summary: str) -> argparse.ArgumentParser:
+        return commands.add_parser(name, help=summary, description=summary)
 
-def _versions() -> str:
-    """Return the versions of patchlaw and of the finite elements, which are not loaded for it."""
-    found = []
-    for name, distribution in (("patchlaw", "patchlaw"), ("dolfinx", "fenics-dolfinx")):
-        try:
-            found.append(f"{name} {version(distribution)}")
-        except PackageNotFoundError:
-            found.append(f"{name} not installed")
-    return ", ".join(found)
-
-
-def _add_interruption(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
+    run = command("run", "Run a scene; write history, laws, figures and report.")
+    run.add_argument(
         "--resume", action="store_true", help="go on after the last load step of an interrupted run"
     )
-    parser.add_argument(
+    run.add_argument(
         "--max-time", metavar="TIME", help="stop cleanly before so much wall time is over, as 55m"
     )
+    _add_scene(run)
+    _add_scene(
+        command("plan", "Say what a run would do, and why; run nothing expensive."),
+        folder="accepted so that the words of a run can be reused: a plan writes nothing",
+    )
+    compare = command("compare", "Run a scene in every sensible way; draw error against time.")
+    _add_scene(compare, ending=COMPARE_ENDING)
+    compare.add_argument(
+        "--against",
+        metavar="LEVEL",
+        help="compare with reference, concurrent, half-space; by default the best that is reached",
+    )
+    compare.add_argument(
+        "--budget", metavar="TIME", help="wall time for all levels, such as 5min; by default any"
+    )
+    compare.add_argument(
+        "--ranks", type=int, default=1, metavar="N", help="processes of each level, under mpirun"
+    )
+    _add_scene(command("laws", "Tabulate the patch laws of a scene; write and draw them."))
+    _add_scene(command("surface", "Describe and draw the surface of a scene."))
+    command("schema", "Print the JSON Schema of scene files.")
+    doctor = command(
+        "doctor", "Check versions, MPI, threads, form compiler and memory; solve a small block."
+    )
+    doctor.add_argument("--json", action="store_true", help="results as JSON, for scripts")
+    warm = command(
+        "warm", "Compile all finite element forms now, so that later runs need no compiler."
+    )
+    warm.add_argument(
+        "--element", nargs="+", default=[], metavar="NAME", help="Q1, Q2, P1, P2; all by default"
+    )
+    return top
 
 
-def _summary(command: Any) -> str:
-    """Return the first line of a command's docstring, which ``python -OO`` leaves out."""
-    return (command.__doc__ or "").partition("\n")[0]
-
-
-def _given_to_petsc(options: list[str]) -> list[str]:
-    """Hand options to PETSc before it starts; solver options get the prefix of our solver."""
-    if not options:
-        return []
-    import petsc4py
-
-    prefixed = [
-        f"-patchlaw_{word[1:]}" if word.startswith(_SOLVER_OPTIONS) else word for word in options
-    ]
-    _check_files(options)
-    try:
-        # a misspelt option is no error for PETSc; at the end it names those that nobody asked for
-        petsc4py.init(["patchlaw", *prefixed, "-options_left"])
-    except Exception as error:
-        raise InputError(
-            "PETSc does not start with these options", key="--", value=" ".join(options)
-        ) from error
-    return prefixed
-
-
-def _check_files(options: list[str]) -> None:
-    """Refuse files of options that PETSc could not read: it would not start, at great length."""
-    for name, value in itertools.pairwise([*options, ""]):
-        if name in _OPTION_FILES and not os.access(value, os.R_OK):
-            raise InputError("this file of options cannot be read", key=name, value=value)
+def _add_scene(command: argparse.ArgumentParser, *, folder: str = "", ending: str = "") -> None:
+    """Add what every command on a scene takes: the file, the results folder, changes of keys."""
+    command.add_argument("scene", type=Path, help="scene file (TOML)")
+    where = f"folder of the results (default: results/SCENE{ending}, by the file's name)"
+    command.add_argument("--out", type=Path, metavar="DIR", help=folder or where)
+    command.add_argument(
+        "--set",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change keys of the scene, such as load.approach='4 um'",
+    )

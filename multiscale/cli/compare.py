@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from geometry.errors import InputError, NotConverged
-from multiscale.cli.commands import scene_and_folder
+from multiscale.cli.command_line import COMPARE_ENDING
+from multiscale.cli.inputs import scene_and_folder, wall_time
 from multiscale.comparison.compare import compare
 from multiscale.comparison.comparison import Comparison
 from multiscale.comparison.level import Level
@@ -17,29 +18,10 @@ from multiscale.comparison.outcomes import AGAINST
 from multiscale.comparison.report import bargains, headline, write_comparison
 from multiscale.output import terminal
 from multiscale.restart.folder_lock import locked
-from multiscale.scene.quantities import parse_duration
 from multiscale.scene.scene import Scene
 
-KEPT = "levels"
+LEVELS_FOLDER = "levels"
 """Folder of finished levels within the results."""
-
-ENDING = "-compare"
-"""What the folder's name has behind the scene's."""
-
-
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the words that only this command knows."""
-    parser.add_argument(
-        "--against",
-        metavar="LEVEL",
-        help=f"compare with {', '.join(AGAINST)}; by default the best that is reached",
-    )
-    parser.add_argument(
-        "--budget", metavar="TIME", help="wall time for all levels, such as 5min; by default any"
-    )
-    parser.add_argument(
-        "--ranks", type=int, default=1, metavar="N", help="processes of each level, under mpirun"
-    )
 
 
 def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -51,7 +33,7 @@ def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         comm: MPI communicator; None for a process on its own.
     """
     check_launchable(choice.ranks)
-    budget = None if choice.budget is None else budget_seconds(choice.budget)
+    budget = wall_time(choice.budget, "--budget")
     if choice.against is not None and choice.against not in AGAINST:
         allowed = ", ".join(AGAINST)
         raise InputError(
@@ -59,9 +41,9 @@ def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         )
     if options:
         raise InputError("levels take no PETSc options", key="--", value=" ".join(options))
-    scene, folder = scene_and_folder(choice, comm, ending=ENDING)
+    scene, folder = scene_and_folder(choice, comm, ending=COMPARE_ENDING)
     with locked(folder, comm):
-        found = _followed(scene, choice, comm, budget, folder / KEPT)
+        found = _followed(scene, choice, comm, budget, folder / LEVELS_FOLDER)
         for text in (*headline(found), *bargains(found), *found.warnings):
             terminal.say(comm, text)
         terminal.show_files(comm, write_comparison(folder, found))
@@ -101,18 +83,3 @@ def _line(level: Level, result: LevelResult, kept: bool) -> str:
     status = f"{result.status}, kept" if kept else result.status
     why = f": {result.message}" if result.message else ""
     return f"{spent}  {level.name}: {status}{why}"
-
-
-def budget_seconds(text: str) -> float:
-    """Return a budget in seconds.
-
-    Raises:
-        InputError: When the text is no time, or none at all.
-    """
-    try:
-        return parse_duration(text)
-    except ValueError as error:
-        problem, _, allowed = str(error).partition(" (allowed: ")
-        raise InputError(
-            problem, key="--budget", value=text, allowed=allowed.rstrip(")") or None
-        ) from None

@@ -18,22 +18,6 @@ from multiscale.output import terminal
 _COLOUR = {"ok": "green", "warning": "yellow", "fail": "bold red"}
 
 
-def add_commands(subparsers: Any) -> None:
-    """Add the commands to those of the command line.
-
-    Args:
-        subparsers: argparse's subparsers.
-    """
-    doctor = subparsers.add_parser("doctor", help=_summary(examine_machine))
-    doctor.set_defaults(command=examine_machine)
-    doctor.add_argument("--json", action="store_true", help="findings as JSON, for scripts")
-    ahead = subparsers.add_parser("warm", help=_summary(compile_ahead))
-    ahead.set_defaults(command=compile_ahead)
-    ahead.add_argument(
-        "--element", nargs="+", default=[], metavar="NAME", help="Q1, Q2, P1, P2; all by default"
-    )
-
-
 def examine_machine(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
     """Check versions, MPI, threads, form compiler and memory; solve a small block.
 
@@ -75,7 +59,3 @@ def _show(findings: list[Finding]) -> None:
         console.print(f"{head}{escape(finding.text)}")
         if finding.remedy:
             console.print(f"{'':22}→ {escape(finding.remedy)}")
-
-
-def _summary(command: Any) -> str:
-    return (command.__doc__ or "").partition("\n")[0]

@@ -1,9 +1,11 @@
-"""What a run needs to go on where it was interrupted, as a checksummed HDF5 file."""
+"""Writes what a run needs to go on where it was interrupted, and lets it go on from there."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+import time
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -11,9 +13,13 @@ from typing import Any
 import h5py
 import numpy as np
 
-from geometry.errors import InputError
+from geometry.collective import on_root
+from geometry.errors import InputError, NotWritten
 from multiscale.loading.load_step import LoadStep, PatchState
 from multiscale.loading.stepper import LoadPosition
+from multiscale.restart.folder_lock import FolderLock
+from multiscale.run import Run
+from multiscale.scene.scene import Scene
 from multiscale.storage.checksummed_hdf5 import checksummed, verified
 from multiscale.storage.serialisation import (
     Arrays,
@@ -25,10 +31,15 @@ from multiscale.storage.serialisation import (
     text_array,
     unpacked,
 )
-from multiscale.storage.whole_files import write_bytes
+from multiscale.storage.whole_files import remove_partial, write_bytes
 
-FORMAT = "patchlaw checkpoint 2"
-_PATCH = "patches."
+FORMAT = "patchlaw checkpoint 3"
+FILE_NAME = "checkpoint.h5"
+
+LEAST_INTERVAL = 1.0
+"""Wall time between two writes, at least [s]; a kill loses the load steps of this time."""
+_LEAST_RATIO = 20.0
+"""Wall time between two writes over that of a write, at least: writing takes 5 % at most."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -36,24 +47,155 @@ class Checkpoint:
     """A run between two load steps. Nothing in it depends on the number of ranks.
 
     Attributes:
-        run: Random name of the run, which its journal bears too.
         scene: The scene as it was given, as nested dictionaries.
-        settled: What its open keys became.
+        resolved: Values that were found for the keys that the scene leaves open.
         heights: SHA-256 of the surface's heights.
-        laws: The law file's bytes; empty without laws.
+        laws: Bytes of the law file; empty without laws.
         steps: The accepted load steps.
-        position: Where the load programme has come to.
+        position: Where the load history has come to.
         state: What the coupling's next load step starts from.
     """
 
-    run: str
     scene: dict[str, Any]
-    settled: dict[str, Any]
+    resolved: dict[str, Any]
     heights: str
     laws: bytes
     steps: tuple[LoadStep, ...] = ()
     position: LoadPosition
     state: Arrays
+
+
+class CheckpointWriter:
+    """Writes the checkpoint of a run to its results folder, as one file that is replaced whole.
+
+    Every accepted load step is kept in memory and written at once, unless the last write was less
+    than a second ago or writing takes long (200 load steps on 16 patches: 8 ms and 0.2 MB; 10,000
+    load steps: 0.4 s and 6 MB). What is not written yet is written when the run ends, by an
+    error or a signal too. A process that is killed loses it; the resumed run computes it again.
+
+    Args:
+        folder: Folder of the results.
+        run: The run.
+        lock: The lock on the folder, held by rank 0.
+
+    Attributes:
+        path: The file.
+    """
+
+    def __init__(self, folder: Path, run: Run, lock: FolderLock) -> None:
+        self.path = folder / FILE_NAME
+        self._run, self._lock = run, lock
+        self._pending: Checkpoint | None = None
+        self._due = 0.0
+
+    def __enter__(self) -> CheckpointWriter:
+        """Return the writer."""
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Write what is not written yet, on rank 0; an error that ends the run is what to tell."""
+        with suppress(NotWritten, MemoryError):
+            self._write_pending()
+
+    def resume(self) -> bool:
+        """Let the run go on from the folder's checkpoint, if it has one.
+
+        Returns:
+            Whether there was one.
+
+        Raises:
+            InputError: When it is damaged, or of another scene.
+
+        Note:
+            Collective.
+        """
+
+        def read() -> Checkpoint | None:
+            if not self.path.exists():
+                return None
+            found = read_checkpoint(self.path)
+            _refuse_changes(self.path.parent, self._run, found.scene, found.heights)
+            return found
+
+        found = on_root(self._run.comm, read)
+        if found is not None:
+            self._run.resume(found.steps, found.position, found.state, found.laws)
+        return found is not None
+
+    def accept(self) -> None:
+        """Keep the load steps that the run has accepted so far, and write them if it is time.
+
+        Raises:
+            NotWritten: When that fails; the earlier file stays.
+
+        Note:
+            Collective.
+        """
+        state = self._run.state()
+
+        def keep() -> None:
+            self._pending = checkpoint_of(self._run, state)
+            if time.monotonic() >= self._due:
+                self._write_pending()
+
+        on_root(self._run.comm, keep)
+
+    def write(self) -> None:
+        """Write the run as it is now, like `accept`, but at once."""
+        self._due = 0.0
+        self.accept()
+
+    def write_pending(self) -> None:
+        """Write what was accepted since the last write.
+
+        Raises:
+            NotWritten: When that fails; the earlier file stays.
+
+        Note:
+            Collective.
+        """
+        on_root(self._run.comm, self._write_pending)
+
+    def remove(self) -> None:
+        """Remove the file and forget what is not written; the run needs it no longer.
+
+        Note:
+            Collective.
+        """
+        self._pending = None
+        on_root(self._run.comm, lambda: self.path.unlink(missing_ok=True))
+
+    def _write_pending(self) -> None:
+        if self._pending is None:
+            return
+        began = time.monotonic()
+        try:
+            self._lock.hold()  # again, where the folder was removed in the meantime
+        except InputError as error:  # the folder was good when the run began
+            raise NotWritten(f"{self.path.parent}: {error.problem}") from None
+        remove_partial(self.path.parent)
+        write_checkpoint(self.path, self._pending)
+        self._pending = None
+        now = time.monotonic()
+        self._due = now + max(LEAST_INTERVAL, _LEAST_RATIO * (now - began))
+
+
+def checkpoint_of(run: Run, state: Arrays) -> Checkpoint:
+    """Return all that is needed to go on with a run from here.
+
+    Args:
+        run: The run.
+        state: What `Run.state` returned.
+    """
+    return Checkpoint(
+        scene=_given(run.given),
+        resolved=run.settled,
+        heights=run.heights,
+        laws=run.law_bytes,
+        steps=tuple(run.steps),
+        position=run.position,
+        state=state,
+    )
 
 
 def write_checkpoint(path: Path, checkpoint: Checkpoint) -> Path:
@@ -66,7 +208,20 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> Path:
     Raises:
         NotWritten: When the file cannot be written.
     """
-    arrays = _arrays(checkpoint)
+    facts = {name: getattr(checkpoint, name) for name in ("scene", "resolved", "heights")}
+    columns = [field.name for field in fields(LoadStep) if field.name != "patches"]
+    rows = [[getattr(step, name) for name in columns] for step in checkpoint.steps]
+    patches = {
+        field.name: np.array([getattr(step.patches, field.name) for step in checkpoint.steps])
+        for field in fields(PatchState)
+    }
+    arrays = {
+        "facts": text_array(json.dumps(facts)),
+        "laws": np.frombuffer(checkpoint.laws, np.uint8),
+        **prefixed("progress/", packed((columns, rows, checkpoint.position))),
+        **prefixed("patches/", patches),
+        **prefixed("state/", checkpoint.state),
+    }
 
     def fill(file: Any) -> None:
         file.attrs["format"] = FORMAT
@@ -85,88 +240,123 @@ def read_checkpoint(path: Path) -> Checkpoint:
     Raises:
         InputError: When it is none, is of another format or damaged.
     """
+    problem: str
+    told: dict[str, Any] = {}
     if not path.is_file():  # a pipe would be waited for
-        raise _refused(path, "is no file")
-    try:
-        with h5py.File(verified(path), "r") as file:
-            form = str(file.attrs.get("format", ""))
-            if form != FORMAT:
-                raise InputError("is not a checkpoint of this patchlaw", value=form, allowed=FORMAT)
-            arrays: Arrays = {}
-
-            def read(name: str, item: Any) -> None:
-                if isinstance(item, h5py.Dataset):
-                    arrays[name] = stored_numbers(item)
-
-            file.visititems(read)
-        return _checkpoint(arrays)
-    except InputError as error:
-        raise _refused(path, error.problem, error) from None
-    except OSError as error:
-        raise _refused(path, f"cannot be read: {error}") from None
-    except Exception as error:  # a sound checksum over what this version cannot understand
-        raise _refused(path, f"is not understood: {error!r}") from None
-
-
-def _refused(path: Path, problem: str, cause: InputError | None = None) -> InputError:
-    told: dict[str, Any] = {} if cause is None else {"value": cause.value, "allowed": cause.allowed}
-    return InputError(
+        problem = "is no file"
+    else:
+        try:
+            return _read(path)
+        except InputError as error:
+            problem, told = error.problem, {"value": error.value, "allowed": error.allowed}
+        except OSError as error:
+            problem = f"cannot be read: {error}"
+        except Exception as error:  # the checksum fits content that this version does not know
+            problem = f"is not understood: {error!r}"
+    raise InputError(
         f"{problem}; remove it, or run without --resume to begin anew", file=str(path), **told
     )
 
 
-def _arrays(checkpoint: Checkpoint) -> Arrays:
-    facts = {name: getattr(checkpoint, name) for name in ("run", "scene", "settled", "heights")}
-    return {
-        "facts": text_array(json.dumps(facts)),
-        "laws": np.frombuffer(checkpoint.laws, np.uint8),
-        **prefixed("steps/", _columns(checkpoint.steps)),
-        **prefixed("position/", packed(checkpoint.position)),
-        **prefixed("state/", checkpoint.state),
-    }
+def _read(path: Path) -> Checkpoint:
+    arrays: Arrays = {}
 
+    def read(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset):
+            arrays[name] = stored_numbers(item)
 
-def _checkpoint(arrays: Arrays) -> Checkpoint:
+    with h5py.File(verified(path), "r") as file:
+        form = str(file.attrs.get("format", ""))
+        if form != FORMAT:
+            raise InputError("was written by another patchlaw", value=form, allowed=FORMAT)
+        file.visititems(read)
+    columns, rows, position = unpacked(part(arrays, "progress/"), (LoadPosition,))
+    patches = part(arrays, "patches/")
     return Checkpoint(
         **json.loads(as_text(arrays["facts"])),
         laws=arrays["laws"].tobytes(),
-        steps=_steps(part(arrays, "steps/")),
-        position=unpacked(part(arrays, "position/"), (LoadPosition,)),
+        steps=tuple(
+            LoadStep(
+                **dict(zip(columns, row, strict=True)),
+                patches=PatchState(**{name: array[number] for name, array in patches.items()}),
+            )
+            for number, row in enumerate(rows)
+        ),
+        position=position,
         state=part(arrays, "state/"),
     )
 
 
-def _columns(steps: Sequence[LoadStep]) -> Arrays:
-    """Return the fields of load steps as columns: numbers as arrays, all else as JSON."""
-    columns: Arrays = {}
-    for field in fields(LoadStep):
-        values = [getattr(step, field.name) for step in steps]
-        if field.name == "patches":
-            for column in fields(PatchState):
-                stacked = [getattr(value, column.name) for value in values]
-                columns[_PATCH + column.name] = np.array(stacked)
-        elif values and all(type(value) in (int, float) for value in values):
-            columns[field.name] = np.array(values)
-        else:
-            columns[field.name] = text_array(json.dumps(values))
-    return columns
+def resolved_before(folder: Path, scene: Scene) -> dict[str, Any] | None:
+    """Return the values that an interrupted run found for the keys that its scene leaves open.
+
+    Args:
+        folder: Folder of its results.
+        scene: The present scene: values found for another one would not fit it.
+
+    Returns:
+        The values by key; None without a checkpoint.
+
+    Raises:
+        InputError: When the checkpoint is damaged, or of another scene.
+    """
+    path = folder / FILE_NAME
+    if not path.exists():
+        return None
+    found = read_checkpoint(path)
+    _refuse_changed_keys(folder, scene, found.scene)
+    return found.resolved
 
 
-def _steps(columns: Arrays) -> tuple[LoadStep, ...]:
-    listed: dict[str, Any] = {
-        name: _tuples(json.loads(as_text(column))) if column.dtype == np.uint8 else column.tolist()
-        for name, column in columns.items()
-        if not name.startswith(_PATCH)
-    }
-    patches = part(columns, _PATCH)
-    return tuple(
-        LoadStep(
-            **{name: values[row] for name, values in listed.items()},
-            patches=PatchState(**{name: array[row] for name, array in patches.items()}),
+def is_finished(folder: Path, run: Run) -> bool:
+    """Tell whether the results in a folder are those of a finished run of the same scene.
+
+    Args:
+        folder: The folder.
+        run: A run of the scene.
+    """
+    try:
+        facts = json.loads((folder / "provenance.json").read_text(encoding="utf-8"))
+        _refuse_changes(folder, run, facts["scene_given"], facts["surface"]["heights_sha256"])
+        return bool(facts["finished"])
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return False  # InputError is a ValueError
+
+
+def _refuse_changes(folder: Path, run: Run, scene: dict[str, Any], heights: str) -> None:
+    """Refuse to go on with a scene or heights other than those that a run began with."""
+    _refuse_changed_keys(folder, run.given, scene)
+    if heights != run.heights:
+        raise InputError(
+            f"the heights are not those that the run in {folder} began with; restore them, or "
+            "run without --resume to begin anew",
+            key="surface.file",
+            value=run.given.surface.file,
         )
-        for row in range(len(listed["step"]))
-    )
 
 
-def _tuples(value: Any) -> Any:
-    return tuple(map(_tuples, value)) if isinstance(value, list) else value
+def _refuse_changed_keys(folder: Path, now: Scene, then: dict[str, Any]) -> None:
+    """Refuse to go on with a scene in which a key has changed that can matter."""
+    old, new = dict(_dotted(then)), dict(_dotted(_given(now)))
+    for key in dict.fromkeys((*new, *old)):
+        if not key.startswith("output.") and old.get(key) != new.get(key):
+            raise InputError(
+                f"is not what the run in {folder} began with; restore it, or run without "
+                "--resume to begin anew",
+                key=key,
+                value=new.get(key),
+                allowed=repr(old.get(key)),
+            )
+
+
+def _given(scene: Scene) -> dict[str, Any]:
+    return scene.model_dump(by_alias=True, mode="json")
+
+
+def _dotted(scene: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the keys of nested dictionaries, dotted, with their values."""
+    for name, value in scene.items():
+        if isinstance(value, dict):
+            yield from _dotted(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import errno
-import fcntl
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from filelock import FileLock, Timeout
+
 from geometry.collective import on_root
 from geometry.errors import InputError
 
 _NAME = ".lock"
-_ATTEMPTS = 10
+_ATTEMPTS = 10  # while others make and remove the folder
+_PATIENCE = 0.2  # for another run that is just ending [s]
 _NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS)
 
 
@@ -27,7 +29,7 @@ def locked(folder: Path, comm: Any) -> Iterator[FolderLock]:
         comm: MPI communicator, or None.
 
     Yields:
-        The lock, which is rank 0's to use.
+        The lock, for rank 0 to use.
 
     Raises:
         InputError: When another run holds it, or the folder cannot be written to.
@@ -46,8 +48,8 @@ def locked(folder: Path, comm: Any) -> Iterator[FolderLock]:
 class FolderLock:
     """A lock on a folder of results, which the system lifts when the process ends, however it does.
 
-    A folder that is missing is made; it is removed again when nothing was written to it. Where
-    the file system has no locks, there is none.
+    A missing folder is made, and removed again when nothing was written to it. Where the file
+    system has no locks, nothing is locked: a lock that outlives a killed run would be worse.
 
     Args:
         folder: The folder.
@@ -55,62 +57,86 @@ class FolderLock:
 
     def __init__(self, folder: Path) -> None:
         self._path = folder / _NAME
-        self._file: int | None = None
+        self._lock = FileLock(
+            self._path, _PATIENCE, thread_local=False, poll_interval=0.02, fallback_to_soft=False
+        )
+        self._file: os.stat_result | None = None
         self._made = False
 
     def hold(self) -> None:
-        """Take the lock, also again when the folder was removed in the meantime.
+        """Take the lock; do nothing when it is held and its file is still there.
 
         Raises:
             InputError: When another process holds it, or the folder cannot be written to.
         """
+        if self._is_held():
+            return
+        self._lock.release()
         for attempt in range(_ATTEMPTS):
-            if self._holds():
-                return
             try:
                 self._made |= not self._path.parent.exists()
                 self._path.parent.mkdir(parents=True, exist_ok=True)
-                self._lock()
-            except BlockingIOError:
+                self._lock.acquire()
+                self._file = os.stat(self._path)
+                return
+            except Timeout:
                 raise self._refused("another run is writing to this folder") from None
             except OSError as error:
-                removed = isinstance(error, FileNotFoundError)  # between two calls, by its holder
-                if not removed or attempt == _ATTEMPTS - 1:
+                if error.errno in _NO_LOCKS:
+                    return
+                # another run may remove the folder between any two of these calls
+                if not isinstance(error, FileNotFoundError) or attempt == _ATTEMPTS - 1:
                     raise self._refused(f"cannot be written to: {error.strerror}") from None
+                self._lock.release()
 
     def release(self) -> None:
         """Lift the lock and leave nothing of it."""
-        if self._file is None:
-            return
-        with suppress(OSError):  # the folder may have become read-only; the lock is lifted anyway
-            if self._holds():
+        if self._is_held():
+            with suppress(OSError):  # in a folder that became read-only the file stays
                 self._path.unlink(missing_ok=True)
-        os.close(self._file)
+        self._lock.release()
         self._file = None
         if self._made:
             with suppress(OSError):  # results are there, or the folder is gone
                 self._path.parent.rmdir()
 
-    def _lock(self) -> None:
-        file = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    def _is_held(self) -> bool:
+        """Whether this lock is on the file of that name: others may have removed or made it."""
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            if error.errno not in _NO_LOCKS:
-                os.close(file)
-                raise
-        if self._file is not None:
-            os.close(self._file)
-        self._file = file
-
-    def _holds(self) -> bool:
-        """Whether the lock is held, and on the file of that name: its last holder removes it."""
-        if self._file is None:
-            return False
-        try:
-            return os.path.samestat(os.stat(self._path), os.fstat(self._file))
+            return self._file is not None and os.path.samestat(os.stat(self._path), self._file)
         except OSError:
             return False
 
     def _refused(self, problem: str) -> InputError:
         return InputError(problem, key="--out", value=str(self._path.parent))
+
+
+def check_writable(folder: Path) -> None:
+    """Refuse a folder that could not be written to, before anything is computed.
+
+    Args:
+        folder: The folder; it and those above it may be missing.
+
+    Raises:
+        InputError: When what is there is no folder, or may not be written to.
+    """
+    problem = ""
+    try:
+        nearest = next(path for path in (folder, *folder.absolute().parents) if _exists(path))
+        if not nearest.is_dir():
+            problem = f"{nearest} is not a folder"
+        elif not os.access(nearest, os.W_OK | os.X_OK):
+            problem = f"{nearest} cannot be written to"
+    except OSError as error:  # a name longer than any
+        problem = f"cannot be used: {error.strerror}"
+    if problem:
+        raise InputError(problem, key="--out", value=str(folder))
+
+
+def _exists(path: Path) -> bool:
+    """Tell whether a path exists; `Path.exists` of newer Pythons hides that a name is too long."""
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    return True

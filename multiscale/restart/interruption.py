@@ -6,9 +6,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Any
 
 from geometry.errors import PatchlawError
@@ -16,55 +14,22 @@ from geometry.errors import PatchlawError
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """Signals that end a process."""
 
-_WATCHED = (*ENDING, signal.SIGUSR1)
-_AT_ONCE = (signal.SIGTERM, signal.SIGHUP)
-_TIME_OVER = 0.5  # below the numbers of all signals
-_TOLD: dict[float, str] = {
+_TIME_OVER = 0.5  # stands for the limit of the time; below the numbers of all signals
+_REASONS: dict[float, str] = {
     _TIME_OVER: "the time is nearly over",
     signal.SIGINT: "interrupted (SIGINT)",
     signal.SIGTERM: "terminated (SIGTERM)",
     signal.SIGHUP: "hung up (SIGHUP)",
     signal.SIGUSR1: "told to stop (SIGUSR1)",
 }
-_LEAST_RESERVE, _MOST_RESERVE = 1.0, 20.0  # for writing results [s]
-_RESERVE = 0.05  # likewise, of the limit
-_LONGER = 1.5  # than the one before it a load step may take
+_IN_TIME = (_TIME_OVER, signal.SIGUSR1)
 
-
-class Ended(BaseException):
-    """This process was told by a signal to end now.
-
-    Args:
-        number: The signal.
-    """
-
-    def __init__(self, number: int) -> None:
-        super().__init__(number)
-        self.exit_code = 128 + number
-
-
-@contextmanager
-def ended_by_signals() -> Iterator[None]:
-    """Let SIGTERM and SIGHUP raise `Ended`: what was begun is cleared away, and children end too.
-
-    What ``nohup`` has ignored stays so.
-    """
-    former: dict[int, Any] = {}
-    if threading.current_thread() is threading.main_thread():  # no other can
-        former = {
-            number: signal.signal(number, _raise)
-            for number in _AT_ONCE
-            if signal.getsignal(number) == signal.SIG_DFL
-        }
-    try:
-        yield
-    finally:
-        for number, handler in former.items():
-            signal.signal(number, handler)
-
-
-def _raise(number: int, frame: FrameType | None) -> None:
-    raise Ended(number)
+_RESERVE = 0.05
+"""Share of the time limit that is left for writing results."""
+_LEAST_RESERVE, _MOST_RESERVE = 1.0, 20.0
+"""Bounds of that reserve [s]."""
+_GROWTH = 1.5
+"""Wall time that the next load step is expected to take, over that of the last one."""
 
 
 class Stopped(PatchlawError, RuntimeError):
@@ -86,49 +51,44 @@ class Stopped(PatchlawError, RuntimeError):
 class Interruption:
     """Watches on any rank for SIGINT, SIGTERM, SIGHUP, SIGUSR1, and for the end of the time.
 
-    The first signal asks for a stop after the load step under way; a second one, but for SIGUSR1,
-    ends the process as if nobody had watched. What ``nohup`` has ignored stays so.
+    The first signal asks for a stop after the load step under way. A second one, except SIGUSR1,
+    ends the process as if nobody had watched. A signal that is ignored, as SIGHUP is under
+    ``nohup``, stays ignored.
 
     Args:
         comm: MPI communicator, or None.
-        limit: Wall time that the run may take [s]; None sets no limit.
-        began: When it began, by `time.monotonic`.
+        limit: Wall time that the run may take from now on [s]; None sets no limit.
     """
 
-    def __init__(self, comm: Any, limit: float | None = None, began: float | None = None) -> None:
+    def __init__(self, comm: Any, limit: float | None = None) -> None:
         self._comm, self._limit = comm, limit
-        self._began = time.monotonic() if began is None else began
+        self._began = time.monotonic()
         self._seen = 0
         self._former: dict[int, Any] = {}
 
     def __enter__(self) -> Interruption:
         """Begin to watch."""
-        if threading.current_thread() is threading.main_thread():  # no other can
+        if threading.current_thread() is threading.main_thread():  # no other may set handlers
             self._former = {
                 number: signal.signal(number, self._see)
-                for number in _WATCHED
+                for number in (*ENDING, signal.SIGUSR1)
                 if number == signal.SIGUSR1 or signal.getsignal(number) != signal.SIG_IGN
             }
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """Give the signals back; a notice of the time limit that comes now must not kill."""
         for number, handler in self._former.items():
             late_notice = number == signal.SIGUSR1 and handler == signal.SIG_DFL
             signal.signal(number, signal.SIG_IGN if late_notice else handler)
         self._former.clear()
 
-    def check(self, where: str, took: float = 0.0) -> None:
+    def check(self, where: str, last_step: float = 0.0) -> None:
         """Raise on all ranks when any of them was told to stop, or time is too short to go on.
 
         Args:
             where: What was accomplished, for the message.
-            took: Wall time of the last load step, by which that of the next is judged [s].
+            last_step: Wall time of the last load step, by which that of the next is judged [s].
 
         Raises:
             Stopped: When the run is to stop here.
@@ -136,20 +96,18 @@ class Interruption:
         Note:
             Collective.
         """
-        reason = max(self._seen, _TIME_OVER if self._too_late(took) else 0)
+        reason = max(self._seen, _TIME_OVER if self._is_late(last_step) else 0)
         if self._comm is not None:
             reason = max(self._comm.allgather(reason))
         if reason:
-            in_time = reason in (_TIME_OVER, signal.SIGUSR1)
-            message = f"{_TOLD[reason]}: stopped {where}; go on with --resume"
-            raise Stopped(message, 4 if in_time else 128 + int(reason))
+            message = f"{_REASONS[reason]}: stopped {where}; go on with --resume"
+            raise Stopped(message, 4 if reason in _IN_TIME else 128 + int(reason))
 
-    def _too_late(self, took: float) -> bool:
+    def _is_late(self, last_step: float) -> bool:
         if self._limit is None:
             return False
         reserve = min(max(_RESERVE * self._limit, _LEAST_RESERVE), _MOST_RESERVE)
-        ahead = time.monotonic() + _LONGER * took + reserve
-        return ahead > self._began + self._limit
+        return time.monotonic() + _GROWTH * last_step + reserve > self._began + self._limit
 
     def _see(self, number: int, frame: FrameType | None) -> None:
         self._seen = max(self._seen, number)

@@ -5,23 +5,26 @@ import resource
 import signal
 import sys
 import time
+from importlib import import_module
+from itertools import count
 
 from mpi4py import MPI
 
 from geometry.errors import NotConverged
-from multiscale.cli import commands, main
+from multiscale.cli import main
 from multiscale.couplings.condensed import CondensedCoupling
 
+command = import_module("multiscale.cli.run")
 run = sys.modules["multiscale.run"]  # the package's attribute of that name is the function
 PLACES = {
     "surface": (run, "on_root"),
-    "plan": (commands.terminal, "show_plan"),
+    "plan": (command.terminal, "show_plan"),
     "laws": (run, "make_table"),
     "block": (run, "assemble"),
     "load step": (CondensedCoupling, "press"),
-    "checkpoint": (commands.CheckpointWriter, "keep"),
-    "output": (commands, "write_fields"),
-    "writing on rank 0": (commands, "write_results"),
+    "checkpoint": (command.CheckpointWriter, "accept"),
+    "output": (command, "write_fields"),
+    "writing on rank 0": (command, "write_results"),
 }
 
 
@@ -33,10 +36,10 @@ def one_sided(*arguments):
     raise NotConverged("one rank alone", reason="DIVERGED", iterations=1, remedy="none")
 
 
-def signalled(self, step):
+def signalled(self):
     """Send a signal to this rank alone."""
-    keep(self, step)
-    if step.step == 2:
+    accept(self)
+    if next(accepted) == 2:
         os.kill(os.getpid(), signal.SIGUSR1)
 
 
@@ -52,8 +55,9 @@ def full(folder, run):
     return write_fields(folder, run)
 
 
-keep, press = commands.CheckpointWriter.keep, CondensedCoupling.press
-write_fields = commands.write_fields
+accept, press = command.CheckpointWriter.accept, CondensedCoupling.press
+write_fields = command.write_fields
+accepted = count(0)  # the first call is made before any load step
 rank, what, place, *words = int(sys.argv[1]), *sys.argv[2:]
 if MPI.COMM_WORLD.rank == rank:
     actions = {"bug": bug, "one-sided": one_sided, "signal": signalled, "slow": slow, "full": full}

@@ -72,7 +72,7 @@ class Runs:
         self.root, self.environment = root, os.environ | environment
         self.forks = multiprocessing.get_context("forkserver")
         self.forks.set_forkserver_preload(
-            ["multiscale.cli.command_line", "multiscale.output.report", "scipy.fft"]
+            ["multiscale.cli.run", "multiscale.output.report", "scipy.fft"]
         )
 
     def forked(self, words, log, over, number=signal.SIGKILL):
@@ -122,7 +122,9 @@ def enter(words, log, root):
     os.dup2(file, 1)
     os.dup2(file, 2)
     from multiscale.cli.command_line import main
+    from multiscale.restart import checkpoint
 
+    checkpoint.LEAST_INTERVAL = 0.02  # these runs take less than the second between two writes
     sys.exit(main(words))
 
 
@@ -202,7 +204,7 @@ def campaign(runs, scene, kills, folder, *, seed, every=2):
         elif dice.random() < 0.5:
             over = after(dice.uniform(0.0, lasts))
         else:
-            over = after(dice.uniform(0.0, 0.2 * lasts), out / "checkpoint.journal")
+            over = after(dice.uniform(0.0, 0.2 * lasts), out / "checkpoint.h5")
         sessions += 1
         if sessions % every == 0:
             code = runs.on_two_ranks(words_of(out, scene, *words), log, over)

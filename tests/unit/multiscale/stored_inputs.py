@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 
 from geometry.errors import InputError
 from multiscale.laws.files import read_laws, write_laws
-from multiscale.restart.checkpoint import read_checkpoint, write_checkpoint
-from multiscale.restart.resuming import checkpoint_of
+from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
 from multiscale.storage.checksummed_hdf5 import checksum
@@ -25,7 +24,7 @@ def originals(base, folder):
     """Return the bytes of a law file and of a checkpoint of a small run."""
     run = Run(Scene.from_dict(base | {"coupling": {"kind": "isolated"}}))
     write_laws(folder / "whole.laws", run.make_laws())
-    write_checkpoint(folder / "whole.h5", checkpoint_of(run, "name", {}))
+    write_checkpoint(folder / "whole.h5", checkpoint_of(run, {}))
     return (folder / "whole.laws").read_bytes(), (folder / "whole.h5").read_bytes()
 
 

@@ -153,7 +153,7 @@ def test_version(capsys, monkeypatch):
     patchlaw, dolfinx = capsys.readouterr().out.strip().split(", ")
     assert patchlaw == f"patchlaw {metadata.version('patchlaw')}"
     assert re.fullmatch(r"dolfinx \d+\.\d+.*", dolfinx)
-    monkeypatch.setattr("multiscale.cli.command_line.version", missing)
+    monkeypatch.setattr(metadata, "version", missing)
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == "patchlaw not installed, dolfinx not installed\n"
 

@@ -12,7 +12,8 @@ from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from multiscale import compare
 from multiscale.cli.command_line import main
-from multiscale.cli.compare import budget_seconds, compare_scene
+from multiscale.cli.compare import compare_scene
+from multiscale.cli.inputs import wall_time
 from multiscale.comparison.level_process import level_result
 from multiscale.comparison.level_results import LevelResult
 from multiscale.comparison.levels import SMALL_SLOPES
@@ -193,7 +194,7 @@ def test_wrong_arguments(arguments, text):
     ("text", "seconds"), [("5min", 300.0), ("90 s", 90.0), ("0.5 h", 1800.0), ("1e3 ms", 1.0)]
 )
 def test_budget(text, seconds):
-    assert budget_seconds(text) == pytest.approx(seconds, rel=1e-12)  # a change of unit
+    assert wall_time(text, "--budget") == pytest.approx(seconds, rel=1e-12)  # a change of unit
 
 
 @pytest.mark.parametrize(
@@ -210,7 +211,7 @@ def test_budget(text, seconds):
 )
 def test_no_budget(text, problem):
     with pytest.raises(InputError, match=problem):
-        budget_seconds(text)
+        wall_time(text, "--budget")
 
 
 def call(capsys, *words):

@@ -17,7 +17,7 @@ from multiscale.errors.measured import ErrorProbe, MeasuredErrors
 from multiscale.output.report import curve_cells, with_error
 from multiscale.output.results import write_results
 from multiscale.output.tables import write_tables
-from multiscale.restart.resuming import checkpoint_of
+from multiscale.restart.checkpoint import checkpoint_of
 
 
 def scene(kind="analytic", grid=40, *, check="last", load=None, seed=4, **micro):
@@ -148,7 +148,7 @@ def test_a_run_that_goes_on_measures_the_same(tmp_path):
     whole = Run(scene("concurrent"))
     steps = whole.load_steps()
     next(steps)
-    kept = checkpoint_of(whole, "name", whole.state())
+    kept = checkpoint_of(whole, whole.state())
     list(steps)
     again = Run(scene("concurrent"))
     again.resume(kept.steps, kept.position, kept.state, kept.laws)

@@ -17,10 +17,14 @@ from multiscale import Run, Scene
 from multiscale.cli.command_line import main
 from multiscale.output.field_files import write_fields
 from multiscale.resolution import accuracy
-from multiscale.restart.checkpoint import read_checkpoint, write_checkpoint
+from multiscale.restart.checkpoint import (
+    CheckpointWriter,
+    checkpoint_of,
+    read_checkpoint,
+    resolved_before,
+    write_checkpoint,
+)
 from multiscale.restart.folder_lock import FolderLock
-from multiscale.restart.journal import Journal, journalled
-from multiscale.restart.resuming import CheckpointWriter, checkpoint_of, kept_choices, with_journal
 from multiscale.storage.checksummed_hdf5 import checksum
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
@@ -76,7 +80,7 @@ def test_resumed_run_is_as_if_never_stopped(tmp_path, changes):
     whole = Run(scene(changes))
     for step in whole.load_steps():
         path = tmp_path / f"{step.step}.h5"
-        write_checkpoint(path, checkpoint_of(whole, "name", whole.state()))
+        write_checkpoint(path, checkpoint_of(whole, whole.state()))
     count = len(whole.steps)
     assert count >= 3
     wanted = columns(whole.steps)
@@ -97,9 +101,9 @@ def test_resumed_run_is_as_if_never_stopped(tmp_path, changes):
 def test_checkpoint_keeps_every_bit(tmp_path):
     run = Run(scene(CUBE | {"load": {"approach": "8 um", "steps": 2, "tilt": [1e-3, 0.0]}}))
     list(run.load_steps())
-    kept = checkpoint_of(run, "name", run.state())
+    kept = checkpoint_of(run, run.state())
     found = read_checkpoint(write_checkpoint(tmp_path / "c.h5", kept))
-    assert (found.run, found.scene, found.heights) == ("name", kept.scene, kept.heights)
+    assert (found.scene, found.heights) == (kept.scene, kept.heights)
     assert (found.position, found.laws) == (kept.position, kept.laws)
     for one, other in zip(found.steps, kept.steps, strict=True):
         for field in fields(one):
@@ -120,17 +124,17 @@ def ended():
 
 
 def interrupted(folder, ended, steps=2):
-    """Leave in a folder what a run leaves that was killed after some steps."""
+    """Leave in a folder what a run leaves that is stopped after some steps."""
     run = Run(ended.scene)
-    keeper = CheckpointWriter(folder, run, FolderLock(folder))
-    keeper.write()
-    for step in run.load_steps():
-        keeper.keep(step)
-        if step.step == steps:
-            break
-    keeper._journal.close()
-    keeper._lock.release()
-    return folder / "checkpoint.h5", folder / "checkpoint.journal"
+    lock = FolderLock(folder)
+    with CheckpointWriter(folder, run, lock) as writer:
+        writer.write()
+        for step in run.load_steps():
+            writer.accept()
+            if step.step == steps:
+                break
+    lock.release()
+    return folder / "checkpoint.h5"
 
 
 def resumed(folder, changed):
@@ -139,40 +143,34 @@ def resumed(folder, changed):
     return run if found else None
 
 
-def test_journal_goes_on_where_the_checkpoint_ends(tmp_path, ended):
-    path, journal = interrupted(tmp_path / "out", ended)
-    assert not read_checkpoint(path).steps  # all within the second that it may be old
-    found = with_journal(read_checkpoint(path), journal)
-    np.testing.assert_array_equal(columns(found.steps), columns(ended.steps[:2]))
-    assert len(resumed(tmp_path / "out", ended.scene).steps) == 2
+def test_load_steps_of_the_last_second_are_written_when_the_run_ends(tmp_path, ended):
+    run, lock = Run(ended.scene), FolderLock(tmp_path / "out")
+    path = tmp_path / "out" / "checkpoint.h5"
+    with (
+        pytest.raises(RuntimeError, match="a bug"),
+        CheckpointWriter(path.parent, run, lock) as w,
+    ):
+        w.write()
+        for _ in run.load_steps():
+            w.accept()
+            if len(run.steps) == 2:
+                break
+        assert not read_checkpoint(path).steps  # what a kill would leave here
+        raise RuntimeError("a bug")
+    lock.release()
+    np.testing.assert_array_equal(columns(read_checkpoint(path).steps), columns(ended.steps[:2]))
+    assert len(resumed(path.parent, ended.scene).steps) == 2
 
 
-def test_torn_record_is_dropped(tmp_path, ended):
-    _, journal = interrupted(tmp_path / "out", ended)
-    whole = journal.read_bytes()
-    name, counts = run_of(tmp_path), []
-    for size in (*np.linspace(0, len(whole) - 1, 40, dtype=int), len(whole)):
-        journal.write_bytes(whole[:size])
-        counts.append(len(list(journalled(journal, name))))
-    assert (counts[0], counts[-2], counts[-1]) == (0, 1, 2)
-    assert sorted(counts) == counts
-    half = bytearray(whole)
-    half[len(half) // 4] ^= 1
-    journal.write_bytes(half)
-    assert not list(journalled(journal, name))
-
-
-def run_of(folder):
-    return read_checkpoint(folder / "out" / "checkpoint.h5").run
-
-
-def test_journal_of_another_run_is_not_taken(tmp_path, ended):
-    path, journal = interrupted(tmp_path / "one", ended)
-    _, other = interrupted(tmp_path / "two", ended, steps=1)
-    shutil.copy(journal, other)
-    assert len(resumed(tmp_path / "one", ended.scene).steps) == 2
-    assert not resumed(tmp_path / "two", ended.scene).steps
-    assert path.exists()
+def test_checkpoint_is_replaced_whole_and_removed(tmp_path, ended):
+    run, lock = Run(ended.scene), FolderLock(tmp_path / "out")
+    with CheckpointWriter(tmp_path / "out", run, lock) as writer:
+        for step in run.load_steps():
+            writer.write()
+            assert len(read_checkpoint(writer.path).steps) == step.step
+        writer.remove()
+    lock.release()
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(
@@ -182,12 +180,12 @@ def test_journal_of_another_run_is_not_taken(tmp_path, ended):
         (lambda path: path.write_bytes(b"nothing of the kind"), "has no checksum before its conte"),
         (lambda path: path.write_bytes(checksum(b"no HDF5")), "cannot be read: "),
         (lambda path: flip(path), "its checksum does not fit its content"),
-        (lambda path: relabel(path), "'patchlaw checkpoint 99': is not a checkpoint of this"),
+        (lambda path: relabel(path), "'patchlaw checkpoint 2': was written by another pa"),
     ],
     ids=["cut", "foreign", "no HDF5", "a bit flipped", "another format"],
 )
 def test_damaged_checkpoint_is_refused_and_stays(tmp_path, ended, capsys, damage, text):
-    path, _ = interrupted(tmp_path / "out", ended)
+    path = interrupted(tmp_path / "out", ended)
     damage(path)
     before = {each.name: each.read_bytes() for each in path.parent.iterdir()}
     with pytest.raises(InputError, match=text) as error:
@@ -199,12 +197,12 @@ def test_damaged_checkpoint_is_refused_and_stays(tmp_path, ended, capsys, damage
 
 def flip(path):
     with h5py.File(path, "r+") as file:
-        file["position/structure"][3] ^= 1
+        file["progress/structure"][3] ^= 1
 
 
 def relabel(path):
     with h5py.File(path, "r+") as file:
-        file.attrs["format"] = "patchlaw checkpoint 99"
+        file.attrs["format"] = "patchlaw checkpoint 2"
     path.write_bytes(checksum(path.read_bytes()))
 
 
@@ -228,11 +226,11 @@ def test_changed_scene_is_refused_with_the_key(tmp_path, ended, changes, text):
 def test_choices_for_another_scene_are_not_taken(tmp_path, ended):
     # they may not fit it: a micro model on a grid that the new surface does not have
     interrupted(tmp_path / "out", ended)
-    assert kept_choices(tmp_path / "out", ended.scene) == {}
+    assert resolved_before(tmp_path / "out", ended.scene) == {}
     other = scene(ALONE | {"surface": {"grid": [32, 32]}})
     with pytest.raises(InputError, match=r"surface.grid = \[32, 32\].*allowed: \[48, 48\]"):
-        kept_choices(tmp_path / "out", other)
-    assert kept_choices(tmp_path / "elsewhere", other) is None
+        resolved_before(tmp_path / "out", other)
+    assert resolved_before(tmp_path / "elsewhere", other) is None
 
 
 def test_other_outputs_may_be_asked_for(tmp_path, ended):
@@ -257,12 +255,12 @@ def test_folder_that_vanishes_comes_back_whole(tmp_path, ended):
     run, folder = Run(ended.scene), tmp_path / "out"
     lock = FolderLock(folder)
     lock.hold()
-    keeper = CheckpointWriter(folder, run, lock)
-    keeper.write()
-    for step in run.load_steps():
-        if step.step == 2:
-            shutil.rmtree(folder)
-        keeper.keep(step)
+    with CheckpointWriter(folder, run, lock) as writer:
+        writer.write()
+        for step in run.load_steps():
+            if step.step == 2:
+                shutil.rmtree(folder)
+            writer.accept()
     lock.release()
     assert len(resumed(folder, ended.scene).steps) == len(ended.steps)
 
@@ -291,7 +289,7 @@ def test_no_command_writes_where_a_run_does(tmp_path, capsys, monkeypatch, comma
 
 
 def test_folder_that_becomes_a_file_under_way_ends_with_5(tmp_path, ended):
-    path, _ = interrupted(tmp_path / "out", ended)
+    path = interrupted(tmp_path / "out", ended)
     lock = FolderLock(path.parent)
     lock.hold()
     shutil.rmtree(path.parent)
@@ -355,7 +353,7 @@ def test_wrong_input_met_late_leaves_nothing(capsys, tmp_path, monkeypatch):
 
 
 def test_full_disk_leaves_the_earlier_checkpoint(tmp_path, ended, monkeypatch):
-    path, _ = interrupted(tmp_path / "out", ended)
+    path = interrupted(tmp_path / "out", ended)
     before = path.read_bytes()
 
     def full(self, data):
@@ -371,19 +369,7 @@ def test_full_disk_leaves_the_earlier_checkpoint(tmp_path, ended, monkeypatch):
         CheckpointWriter(path.parent, run, FolderLock(path.parent)).write()
     assert error.value.exit_code == 5
     assert path.read_bytes() == before
-    assert {each.name for each in path.parent.iterdir() if each.name != ".lock"} == {
-        "checkpoint.h5", "checkpoint.journal",
-    }  # fmt: skip
-
-
-def test_journal_cut_short_by_a_full_disk_is_told(tmp_path, ended):
-    journal = Journal(tmp_path / "journal", "name")
-    journal.begin()
-    journal._file.close()
-    journal._file = open("/dev/full", "wb", buffering=0)
-    with pytest.raises(NotWritten, match=r"journal: cannot be written: No space left on device"):
-        journal.append(ended.steps[0], ended.position, {})
-    journal.close()
+    assert {each.name for each in path.parent.iterdir()} == {".lock", "checkpoint.h5"}
 
 
 WORDS = [
@@ -445,7 +431,7 @@ def test_run_on_a_full_disk_ends_with_5_and_goes_on(capsys, tmp_path, size, file
     assert done.stderr == f"patchlaw: {out / file}: cannot be written: File too large\n"
     assert done.returncode == 5
     kept = {path.name for path in out.iterdir()} if out.exists() else set()
-    assert kept == (left | {"checkpoint.h5", "checkpoint.journal"} if left else set())
+    assert kept == (left | {"checkpoint.h5"} if left else set())
     assert main(words) == 0
     assert ("goes on after load step 2" in capsys.readouterr().out) == bool(left)
     assert (out / "surface.png").exists()
@@ -464,7 +450,7 @@ def test_fields_on_a_full_disk_end_with_5_and_leave_nothing_half_written(tmp_pat
     assert done.returncode == 5, done.stderr
     assert f"patchlaw: {out}/fields.xdmf: cannot be written: " in done.stderr
     assert {path.name for path in out.iterdir()} == {
-        "history.csv", "patches.csv", "provenance.json", "checkpoint.h5", "checkpoint.journal",
+        "history.csv", "patches.csv", "provenance.json", "checkpoint.h5",
     }  # fmt: skip
 
 
@@ -502,7 +488,7 @@ def test_a_plan_stands_though_another_machine_would_choose_otherwise(tmp_path, m
     }).model_copy(update={"accuracy": 0.4})  # fmt: skip
     whole = Run(left_open)
     next(steps := whole.load_steps())
-    path = write_checkpoint(tmp_path / "c.h5", checkpoint_of(whole, "name", whole.state()))
+    path = write_checkpoint(tmp_path / "c.h5", checkpoint_of(whole, whole.state()))
     list(steps)
     kept = read_checkpoint(path)
 
@@ -512,7 +498,7 @@ def test_a_plan_stands_though_another_machine_would_choose_otherwise(tmp_path, m
     ticks, predicted = iter(range(1, 1000)), accuracy.predicted_cost
     monkeypatch.setattr(accuracy, "predicted_cost", reversed_costs)
     assert Run(left_open).scene != whole.scene  # the plan would be another one here
-    again = Run(left_open, settled=kept.settled)
+    again = Run(left_open, settled=kept.resolved)
     assert again.scene == whole.scene
     assert again.setup.micro.surface.grid == whole.setup.micro.surface.grid
     again.resume(kept.steps, kept.position, kept.state, kept.laws)

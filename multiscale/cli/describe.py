@@ -1,0 +1,121 @@
+"""The commands that describe a scene without running it: plan, laws, surface, schema."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from geometry.collective import on_root
+from geometry.statistics import roughness
+from multiscale.cli.inputs import scene_and_folder
+from multiscale.costs.prediction import Cost
+from multiscale.couplings.blocks import load_together
+from multiscale.laws.files import write_laws
+from multiscale.machine.mpi_job import for_large
+from multiscale.machine.nodes import nodes_of
+from multiscale.output import terminal
+from multiscale.output.results import write_figure
+from multiscale.planning import plan
+from multiscale.planning.forecast import forecast
+from multiscale.planning.memory import shortages
+from multiscale.resolution.problem_setup import make_setup
+from multiscale.restart.folder_lock import locked
+from multiscale.run import Run
+from multiscale.scene.scene import Scene
+from multiscale.setup.problem import ProblemSetup
+from multiscale.storage.whole_files import write_whole
+
+
+def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
+    """Say what a run would do, and why; run nothing expensive.
+
+    Args:
+        choice: Parsed words of the command line.
+        options: PETSc options given by the user.
+        comm: MPI communicator; None for a process on its own.
+    """
+    scene, _ = scene_and_folder(choice, comm, writes=False)
+    load_together(scene, comm)
+    nodes = nodes_of(comm)
+
+    def planned() -> tuple[ProblemSetup, Cost]:
+        setup = make_setup(
+            scene, nodes=replace(nodes, more=True)
+        )  # of any number, if it takes them
+        return setup, forecast(setup)
+
+    setup, cost = on_root(for_large(comm), planned)
+    terminal.show_plan(comm, setup, cost, list(shortages(setup, nodes)))
+
+
+def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
+    """Tabulate the patch laws of a scene; write and draw them.
+
+    Args:
+        choice: Parsed words of the command line.
+        options: PETSc options given by the user.
+        comm: MPI communicator; None for a process on its own.
+    """
+    scene, folder = scene_and_folder(choice, comm)
+    with locked(folder, comm):
+        run = Run(scene, comm)
+        terminal.show_plan(comm, run.setup)
+        table = run.make_laws()
+
+        def write() -> list[Path]:
+            from multiscale.output.figures import law_figure
+
+            laws = write_whole(folder / "laws.h5", lambda path: write_laws(path, table))
+            return [laws, write_figure(folder / "laws.png", law_figure(table))]
+
+        terminal.show_files(comm, on_root(comm, write))
+    for note in run.history().notes:
+        terminal.say(comm, f"note: {note}")
+
+
+def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
+    """Describe and draw the surface of a scene.
+
+    Args:
+        choice: Parsed words of the command line.
+        options: PETSc options given by the user.
+        comm: MPI communicator; None for a process on its own.
+    """
+    scene, folder = scene_and_folder(choice, comm)
+    nodes = replace(nodes_of(comm), more=True)  # a surface needs no memory for its block
+    setup = on_root(for_large(comm), lambda: make_setup(scene, nodes=nodes))
+    rough = roughness(setup.surface)
+    pairs = [
+        ("surface", plan.surface_statement(setup)),
+        ("Sa, Sq, Sz", f"{1e3 * rough.sa:.4g}, {1e3 * rough.sq:.4g}, {1e3 * rough.sz:.4g} µm"),
+        ("Ssk, Sku, Sdq", f"{rough.ssk:.4g}, {rough.sku:.4g}, {rough.sdq:.4g}"),
+        ("m0, m2, m4", f"{rough.m0:.4g} mm², {rough.m2:.4g}, {rough.m4:.4g} 1/mm² (profile)"),
+        ("Nayak α", f"{rough.nayak:.3g} (profile), {rough.nayak_radial:.3g} (radial moments)"),
+        ("highest point", f"{1e3 * setup.surface.highest:.6g} µm"),
+        ("summits", f"{setup.asperities.count}, border maxima {setup.asperities.border_x.size}"),
+    ]
+    terminal.show_pairs(comm, pairs)
+
+    def write() -> list[Path]:
+        from multiscale.output.figures import surface_figure
+
+        figure = surface_figure(setup.surface, setup.asperities, setup.patches)
+        return [write_figure(folder / "surface.png", figure)]
+
+    with locked(folder, comm):
+        terminal.show_files(comm, on_root(comm, write))
+
+
+def print_schema(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
+    """Print the JSON Schema of scene files.
+
+    Args:
+        choice: Parsed words of the command line.
+        options: PETSc options given by the user.
+        comm: MPI communicator; None for a process on its own.
+    """
+    if terminal.speaks(comm):
+        print(json.dumps(Scene.model_json_schema(by_alias=True), indent=2))

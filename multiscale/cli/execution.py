@@ -1,0 +1,138 @@
+"""Runs one parsed command on all ranks of an MPI job and turns errors into exit codes."""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import os
+import sys
+import time
+import traceback
+from importlib import import_module
+from typing import Any
+
+from geometry.errors import InputError, NotWritten, OutOfMemory, PatchlawError
+from multiscale.machine.mpi_job import check_address_space, petsc_leaves_signals, world
+from multiscale.output import terminal
+
+_COMMANDS = {
+    "run": "run.run_scene",
+    "plan": "describe.plan_scene",
+    "laws": "describe.tabulate_laws",
+    "surface": "describe.describe_surface",
+    "schema": "describe.print_schema",
+    "compare": "compare.compare_scene",
+    "doctor": "doctor.examine_machine",
+    "warm": "doctor.compile_ahead",
+}
+"""Module and function of every command; the module is imported when its command runs."""
+
+_LONGEST_WAIT = 5.0  # for other ranks at the end of a command [s]
+_OPTION_FILES = ("-options_file", "-options_file_yaml")
+_SOLVER_OPTIONS = ("-snes_", "-ksp_", "-pc_", "-mg_")
+
+
+def execute(choice: argparse.Namespace | str, options: list[str]) -> int:
+    """Run one command and return its exit code, see `multiscale.cli.command_line.main`.
+
+    Args:
+        choice: The parsed words, or why they are not understood.
+        options: PETSc options given by the user.
+
+    Note:
+        Collective over all processes of the MPI job, which starts here.
+    """
+    petsc_leaves_signals()
+    try:
+        check_address_space()
+        comm = world()
+    except InputError as error:
+        terminal.complain(None, error)
+        return error.exit_code
+    meeting = None if comm is None else comm.Dup()  # for the barrier at the end alone
+    try:
+        if isinstance(choice, str):
+            raise InputError(choice, key="command line")
+        module, _, function = _COMMANDS[choice.command].partition(".")
+        command = getattr(import_module(f"multiscale.cli.{module}"), function)
+        command(choice, _start_petsc(options), comm)
+    except PatchlawError as error:
+        if _all_arrive(meeting):
+            terminal.complain(comm, error)
+            return error.exit_code
+        terminal.complain(None, error)
+        return _end_all(comm, error.exit_code)
+    except KeyboardInterrupt as error:
+        if comm is None:
+            raise
+        return _end_all(comm, getattr(error, "exit_code", 1))
+    except MemoryError as error:
+        terminal.complain(None, OutOfMemory(f"memory ran out: {error or 'none is left'}"))
+        return _end_all(comm, OutOfMemory.exit_code)
+    except Exception:
+        if comm is not None:
+            # several ranks may meet the same error: the first ends the others before they print it
+            time.sleep(min(comm.rank, _LONGEST_WAIT))
+        traceback.print_exc()
+        return _end_all(comm, 1)
+    _all_arrive(meeting)
+    return 0
+
+
+def complain_of_stream(name: str, failure: OSError) -> int:
+    """Say that a standard stream took no more, and return the exit code of that.
+
+    Args:
+        name: ``"output"`` or ``"error"``.
+        failure: What the system said.
+    """
+    problem = failure.strerror or failure
+    terminal.complain(None, NotWritten(f"standard {name}: cannot be written: {problem}"))
+    return NotWritten.exit_code
+
+
+def _all_arrive(comm: Any) -> bool:
+    """Wait for the other ranks at the end of a command; return False when some do not come.
+
+    An error that only this rank met leaves the others waiting in the middle of something.
+    """
+    if comm is None:
+        return True
+    barrier = comm.Ibarrier()
+    until = time.monotonic() + _LONGEST_WAIT
+    while not barrier.Test():
+        if time.monotonic() > until:
+            return False
+        time.sleep(0.01)
+    return True
+
+
+def _end_all(comm: Any, code: int) -> int:
+    """End all ranks of a job at once; a process on its own is left to return."""
+    if comm is not None:
+        sys.stderr.flush()
+        comm.Abort(code)
+    return code
+
+
+def _start_petsc(options: list[str]) -> list[str]:
+    """Start PETSc with the user's options; solver options get the prefix of our solver."""
+    if not options:
+        return []
+    import petsc4py
+
+    prefixed = [
+        f"-patchlaw_{word[1:]}" if word.startswith(_SOLVER_OPTIONS) else word for word in options
+    ]
+    for name, value in itertools.pairwise([*options, ""]):
+        # PETSc would not start without its file of options, and say so at great length
+        if name in _OPTION_FILES and not os.access(value, os.R_OK):
+            raise InputError("this file of options cannot be read", key=name, value=value)
+    try:
+        # a misspelt option is no error for PETSc: -options_left names unused options at the end
+        petsc4py.init(["patchlaw", *prefixed, "-options_left"])
+    except Exception as error:
+        raise InputError(
+            "PETSc does not start with these options", key="--", value=" ".join(options)
+        ) from error
+    return prefixed

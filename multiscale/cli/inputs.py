@@ -1,0 +1,63 @@
+"""What the commands on a scene have in common: the scene, its results folder, wall times."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from geometry.collective import on_root
+from geometry.errors import InputError
+from multiscale.machine.mpi_job import refuse_detached_processes
+from multiscale.restart.folder_lock import check_writable
+from multiscale.scene.quantities import parse_duration
+from multiscale.scene.scene import Scene
+
+
+def scene_and_folder(
+    choice: argparse.Namespace, comm: Any, *, ending: str = "", writes: bool = True
+) -> tuple[Scene, Path]:
+    """Read the scene on rank 0 and find the folder of its results.
+
+    Args:
+        choice: Parsed words of the command line.
+        comm: MPI communicator; None for a process on its own.
+        ending: What the folder is called after the scene's name, unless the user names a folder.
+        writes: Whether anything will be written to it.
+
+    Returns:
+        The scene and the folder, the same on every rank.
+
+    Raises:
+        InputError: When the scene or the folder cannot be used, or this process is one of several
+            that should be one MPI job and are not.
+
+    Note:
+        Collective.
+    """
+    refuse_detached_processes()
+
+    def read() -> tuple[Scene, Path]:
+        scene = Scene.load(choice.scene, choice.set)
+        folder = choice.out or Path("results") / f"{scene.name}{ending}"
+        if writes:
+            check_writable(folder)
+        return scene, folder
+
+    return on_root(comm, read)
+
+
+def wall_time(text: str | None, key: str) -> float | None:
+    """Return a wall time in seconds; None for none.
+
+    Args:
+        text: What the user typed, such as ``"55m"``.
+        key: The option, for the message.
+
+    Raises:
+        InputError: When the text is no time, or not positive.
+    """
+    try:
+        return None if text is None else parse_duration(text)
+    except ValueError as error:
+        raise InputError(str(error), key=key, value=text) from None

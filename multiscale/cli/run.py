@@ -1,0 +1,92 @@
+"""The command ``patchlaw run``."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from geometry.collective import on_root
+from geometry.errors import InputError, NotConverged, PatchlawError
+from multiscale.cli.inputs import scene_and_folder, wall_time
+from multiscale.output import terminal
+from multiscale.output.field_files import write_fields
+from multiscale.output.results import write_results
+from multiscale.restart.checkpoint import CheckpointWriter, is_finished, resolved_before
+from multiscale.restart.folder_lock import locked
+from multiscale.restart.interruption import Interruption, Stopped
+from multiscale.run import Run
+
+
+def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
+    """Run a scene; write history, laws, figures and report.
+
+    Args:
+        choice: Parsed words of the command line.
+        options: PETSc options given by the user.
+        comm: MPI communicator; None for a process on its own.
+    """
+    with Interruption(comm, wall_time(choice.max_time, "--max-time")) as interruption:
+        scene, folder = scene_and_folder(choice, comm)
+        resolved = on_root(comm, lambda: resolved_before(folder, scene)) if choice.resume else None
+        run = Run(scene, comm, resolved)
+        with locked(folder, comm) as lock, CheckpointWriter(folder, run, lock) as checkpoints:
+            if not _announce(choice.resume, folder, run, checkpoints):
+                return
+            failure = _make_load_steps(run, checkpoints, interruption)
+            if run.steps:
+                checkpoints.write_pending()  # writing results may fail
+                terminal.show_history(comm, run.history())
+                files = write_results(folder, run, options=options)
+                if scene.output.fields:
+                    files += write_fields(folder, run)
+                terminal.show_times(comm, run.seconds)
+                terminal.show_files(comm, files)
+            if failure is not None:
+                raise failure
+            checkpoints.remove()
+
+
+def _announce(resume: bool, folder: Path, run: Run, checkpoints: CheckpointWriter) -> bool:
+    """Resume if asked to, and say what will be done; return False if nothing is left to do."""
+    comm, notice = run.comm, None
+    if resume and checkpoints.resume():
+        notice = f"goes on after load step {len(run.steps)}, kept in {folder}"
+    elif resume and on_root(comm, lambda: is_finished(folder, run)):
+        terminal.say(comm, f"this run is finished; its results are in {folder}")
+        return False
+    elif resume:
+        notice = f"nothing to resume in {folder}: begins with the first load step"
+    elif on_root(comm, checkpoints.path.exists):
+        notice = f"replaces the interrupted run in {folder} (to go on with it: --resume)"
+    terminal.show_plan(comm, run.setup)
+    if notice:
+        terminal.say(comm, notice)
+    return True
+
+
+def _make_load_steps(
+    run: Run, checkpoints: CheckpointWriter, interruption: Interruption
+) -> PatchlawError | None:
+    """Make the load steps with their checkpoints; return what ended them early, on all ranks."""
+    load_history = run.scene.loading.load_history
+    with terminal.progress(run.comm, load_history, len(run.steps)) as advance:
+        try:
+            if run.setup.by_laws:
+                run.make_laws()
+            checkpoints.write()
+            interruption.check("before the block was made")
+            run.make_coupling()
+            interruption.check(f"after load step {len(run.steps)}")
+            for step in run.load_steps():
+                checkpoints.accept()
+                advance(step)
+                if not run.finished:
+                    interruption.check(f"after load step {step.step}", step.wall_s)
+        except (Stopped, NotConverged) as error:  # the load steps before it are written
+            return error
+        except InputError:
+            if not run.steps:  # wrong input leaves nothing behind
+                checkpoints.remove()
+            raise
+    return None
