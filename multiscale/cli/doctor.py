@@ -4,16 +4,30 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
 
-from multiscale.doctor.examination import examine, verdict
-from multiscale.doctor.finding import Finding
-from multiscale.doctor.warm import checked_elements, warm
+from multiscale.doctor import forms, machine
+from multiscale.doctor.examination import Check, CheckResult, examine, refuse_failures
 from multiscale.output import terminal
+
+CHECKS: tuple[tuple[str, Check], ...] = (
+    ("packages", machine.packages),
+    ("PETSc", machine.petsc),
+    ("BLAS", machine.blas),
+    ("launcher", machine.launcher),
+    ("ranks", machine.ranks),
+    ("threads", machine.threads),
+    ("memory", machine.memory),
+    ("form compiler", forms.compiler_works),
+    ("form cache", forms.cache),
+    ("test solve", forms.known_solve),
+)
+"""Topics and checks of the doctor, in the order in which they are made and shown."""
 
 _COLOUR = {"ok": "green", "warning": "yellow", "fail": "bold red"}
 
@@ -29,13 +43,13 @@ def examine_machine(choice: argparse.Namespace, options: list[str], comm: Any) -
     Raises:
         InputError: When a check failed; exit code 2.
     """
-    findings = examine(comm)
+    results = examine(comm, CHECKS)
     if terminal.speaks(comm):
         if choice.json:
-            print(json.dumps([asdict(finding) for finding in findings], indent=2))
+            print(json.dumps([asdict(result) for result in results], indent=2))
         else:
-            _show(findings)
-    verdict(findings)
+            show(results)
+    refuse_failures(results)
 
 
 def compile_ahead(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -46,16 +60,20 @@ def compile_ahead(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    folder, count = warm(checked_elements(choice.element), comm)
+    folder, count = forms.warm(choice.element, comm)
     terminal.say(comm, f"{count} compiled forms in {folder}")
 
 
-def _show(findings: list[Finding]) -> None:
-    """Print a line for each finding, and its remedy below it."""
+def show(results: Sequence[CheckResult]) -> None:
+    """Print a line for each result, and its remedy below it.
+
+    Args:
+        results: The results.
+    """
     console = Console(highlight=False, soft_wrap=True)
-    for finding in findings:
-        colour = _COLOUR[finding.state]
-        head = f"[{colour}]{finding.state:8}[/][bold]{finding.topic:14}[/]"
-        console.print(f"{head}{escape(finding.text)}")
-        if finding.remedy:
-            console.print(f"{'':22}→ {escape(finding.remedy)}")
+    for result in results:
+        colour = _COLOUR[result.state]
+        head = f"[{colour}]{result.state:8}[/][bold]{result.topic:14}[/]"
+        console.print(f"{head}{escape(result.text)}")
+        if result.remedy:
+            console.print(f"{'':22}→ {escape(result.remedy)}")

@@ -1,1 +1,1 @@
-"""Is this machine fit for runs, and made ready for them?"""
+"""Checks whether this machine is fit for runs, and prepares it for them."""

@@ -1,70 +1,89 @@
-"""Examines what patchlaw stands on: packages, MPI, threads, form compiler, memory, a test solve."""
+"""Makes checks on all ranks and collects their results."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Literal
 
 from geometry.errors import InputError, PatchlawError
-from multiscale.doctor import forms, machine, packages
-from multiscale.doctor.finding import Finding
 
-Check = Callable[[Any], list[Finding]]
+State = Literal["ok", "warning", "fail"]
 
 
-def examine(comm: Any) -> list[Finding]:
-    """Make all checks; one that breaks is a finding as well.
+@dataclass(frozen=True, slots=True)
+class CheckResult:
+    """The result of one check.
+
+    Args:
+        topic: What was checked.
+        state: ``"ok"``; ``"warning"``: runs work but slowly, or may fail elsewhere; ``"fail"``:
+            runs cannot work.
+        text: What was found, in one line.
+        remedy: What to do; empty when all is well.
+    """
+
+    topic: str
+    state: State
+    text: str
+    remedy: str = ""
+
+
+Check = Callable[[Any], list[CheckResult]]
+"""A check takes the MPI communicator, or None, and is called on all ranks."""
+
+
+def examine(comm: Any, checks: Sequence[tuple[str, Check]]) -> list[CheckResult]:
+    """Make checks; one that raises an error has failed.
 
     Args:
         comm: MPI communicator; None for a process on its own.
+        checks: Topics and their checks.
 
     Returns:
-        The findings, the same on every rank.
+        The results of rank 0, the same on every rank. Where a check raised an error on any rank,
+        that error is its result.
 
     Note:
         Collective.
     """
-    checks: Sequence[tuple[str, Check]] = (
-        ("packages", packages.versions),
-        ("PETSc", packages.petsc),
-        ("BLAS", machine.blas),
-        ("launcher", machine.launcher),
-        ("ranks", machine.ranks),
-        ("threads", machine.threads),
-        ("memory", machine.memory),
-        ("form compiler", forms.compiler_works),
-        ("form cache", forms.cache),
-        ("test solve", forms.known_solve),
-    )
-    return [finding for topic, check in checks for finding in _made(topic, check, comm)]
+    return [result for topic, check in checks for result in _made(topic, check, comm)]
 
 
-def verdict(findings: Sequence[Finding]) -> None:
-    """Raise when a check failed.
+def _made(topic: str, check: Check, comm: Any) -> list[CheckResult]:
+    error, results = None, []
+    try:
+        results = check(comm)
+    except PatchlawError as failure:  # its text holds the remedy
+        error = CheckResult(topic, "fail", str(failure))
+    except Exception as failure:
+        text = f"{type(failure).__name__}: {failure}"
+        error = CheckResult(topic, "fail", text, "please report this with the lines above")
+    errors = [one for one in gathered(comm, error) if one is not None]
+    if errors:
+        return errors[:1]
+    return results if comm is None else comm.bcast(results, root=0)
+
+
+def refuse_failures(results: Sequence[CheckResult]) -> None:
+    """Raise when a check failed: a run would end with the same exit code or a worse one.
 
     Args:
-        findings: What `examine` found.
+        results: What `examine` returned.
 
     Raises:
-        InputError: Naming the failed checks; a run would end with the same exit code or a worse.
+        InputError: Naming the failed checks.
     """
-    failed = [finding.topic for finding in findings if finding.state == "fail"]
+    failed = [result.topic for result in results if result.state == "fail"]
     if failed:
         raise InputError(f"not fit to run: {', '.join(failed)}", key="doctor")
 
 
-def _made(topic: str, check: Check, comm: Any) -> list[Finding]:
-    """Make one check; the findings of rank 0 hold unless a check broke on any rank."""
-    error = None
-    findings: list[Finding] = []
-    try:
-        findings = check(comm)
-    except PatchlawError as told:  # its text holds the remedy
-        error = str(told), ""
-    except Exception as raised:
-        error = f"{type(raised).__name__}: {raised}", "please report this with the lines above"
-    errors = [error] if comm is None else comm.allgather(error)
-    broken = [told for told in errors if told is not None]
-    if broken:
-        return [Finding(topic, "fail", *broken[0])]
-    return findings if comm is None else comm.bcast(findings, root=0)
+def gathered(comm: Any, value: Any) -> list[Any]:
+    """Return the values of all ranks.
+
+    Args:
+        comm: MPI communicator, or None.
+        value: This rank's value.
+    """
+    return [value] if comm is None else comm.allgather(value)

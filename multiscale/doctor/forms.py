@@ -1,26 +1,33 @@
-"""The doctor's look at the form compiler and its cache, and a solve with a known answer."""
+"""The compiled forms of finite elements: compiler, cache, a test solve, and compiling ahead."""
 
 from __future__ import annotations
 
 import subprocess
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from multiscale.doctor.finding import Finding
+from geometry.collective import on_root
+from geometry.errors import InputError
+from multiscale.doctor.examination import CheckResult, gathered
 
 Array = NDArray[np.float64]
 
-_SLOW = 0.02  # seconds to make, read and remove a small file: local disks take far below 1 ms
-_MODULUS, _RATIO, _SPRING, _APPROACH = 4000.0, 0.15, 3000.0, 0.002
-_MOST_ITERATIONS = 60  # multigrid of any kind takes 5 to 30
+_SLOW_FILE = 0.02
+"""Time to make, read and remove a small file that deserves a warning [s]; local disks: < 1 ms."""
+_MOST_ITERATIONS = 60
+"""Iterations of the test solve that deserve a warning; multigrid of any kind takes 5 to 30."""
+_LARGEST_ERROR = 1e-8
+"""Relative error of the force in the test solve; residuals are driven to 1e-9 of the load."""
+_SPRING, _APPROACH = 3000.0, 0.002  # of the test solve [MPa/mm, mm]
 
 
-def compiler_works(comm: Any) -> list[Finding]:
+def compiler_works(comm: Any) -> list[CheckResult]:
     """Compile an empty C program on rank 0, where forms are compiled.
 
     Args:
@@ -33,7 +40,7 @@ def compiler_works(comm: Any) -> list[Finding]:
     path = jit.compiler()
     remedy = "apt-get install gcc libc6-dev; or run patchlaw warm where there is one"
     if path is None:
-        return [Finding("form compiler", "warning", "no C compiler on PATH", remedy)]
+        return [CheckResult("form compiler", "warning", "no C compiler on PATH", remedy)]
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / "empty.c"
         source.write_text("#include <math.h>\nint empty(void) { return 0; }\n", encoding="utf-8")
@@ -41,50 +48,49 @@ def compiler_works(comm: Any) -> list[Finding]:
         done = subprocess.run(words, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         text = (done.stderr.strip().splitlines() or [f"{path} fails"])[0]
-        return [Finding("form compiler", "warning", text, remedy)]
-    return [Finding("form compiler", "ok", path)]
+        return [CheckResult("form compiler", "warning", text, remedy)]
+    return [CheckResult("form compiler", "ok", path)]
 
 
-def cache(comm: Any) -> list[Finding]:
-    """Look at the cache of compiled forms, as every rank sees it.
+def cache(comm: Any, folder: Path | None = None) -> list[CheckResult]:
+    """Check the cache of compiled forms, as every rank sees it.
 
     Args:
         comm: MPI communicator, or None.
+        folder: Folder of the cache; by default dolfinx's.
     """
     from macro import form_cache as jit
     from macro.compat import form_cache
 
-    folder = form_cache()
-    finished = _compiled(folder)
-    writable = jit.writable(folder)
-    slowest = max(_gathered(comm, _small_file_s(folder) if writable else 0.0))
-    fewest = min(_gathered(comm, finished))
-    text = f"{folder}, {finished} compiled"
+    folder = folder or form_cache()
+    compiled, writable = _compiled(folder), jit.writable(folder)
+    slowest = max(gathered(comm, _small_file_seconds(folder) if writable else 0.0))
+    fewest = min(gathered(comm, compiled))
+    text, problem, remedy = f"{folder}, {compiled} compiled", "", ""
     if left := jit.left_locks(folder):
         text = f"{text}; {len(left)} compilation(s) cut short, such as {left[0].name}"
-        return [Finding("form cache", "fail", text, "clear them with: patchlaw warm")]
+        return [CheckResult("form cache", "fail", text, "clear them with: patchlaw warm")]
     if not writable:
+        problem = "; cannot be written to"
         remedy = "set XDG_CACHE_HOME to a folder that can, unless patchlaw warm filled this one"
-        return [Finding("form cache", "warning", f"{text}; cannot be written to", remedy)]
-    if fewest < finished:
-        text = f"{text}; another host sees {fewest}"
+    elif fewest < compiled:
+        problem = f"; another host sees {fewest}"
         remedy = "every host compiles for itself; run patchlaw warm on each, or share the folder"
-        return [Finding("form cache", "warning", text, remedy)]
-    if slowest > _SLOW:
-        text = f"{text}; {1e3 * slowest:.0f} ms for a small file"
+    elif slowest > _SLOW_FILE:
+        problem = f"; {1e3 * slowest:.0f} ms for a small file"
         remedy = "copy it to a local disk of each node and set XDG_CACHE_HOME (demos/hpc/README.md)"
-        return [Finding("form cache", "warning", text, remedy)]
-    return [Finding("form cache", "ok", text)]
+    return [CheckResult("form cache", "warning" if problem else "ok", text + problem, remedy)]
 
 
 def _compiled(folder: Path) -> int:
+    """Count the compiled forms."""
     try:
         return len(list(folder.glob("libffcx_*.c.cached")))
     except PermissionError:  # a folder on the way that this user may not enter
         return 0
 
 
-def _small_file_s(folder: Path) -> float:
+def _small_file_seconds(folder: Path) -> float:
     """Return the median time to make, read and remove a small file [s]."""
     folder.mkdir(parents=True, exist_ok=True)
     times = []
@@ -111,11 +117,12 @@ class _Spring:
         return np.full_like(closure, _SPRING)
 
 
-def known_solve(comm: Any) -> list[Finding]:
+def known_solve(comm: Any) -> list[CheckResult]:
     """Press a block between rollers and compare the force with the closed form.
 
-    Nothing moves sideways, so that a layer of height h yields by p h / M, with the confined
-    modulus M: p = δ / (1/k + h/M), exactly what trilinear elements give.
+    Nothing moves sideways, so that a block of height h shortens by p h / M under a pressure p, with
+    the confined modulus M. With a contact law p = k c the approach δ gives p = δ / (1/k + h/M),
+    which trilinear elements meet exactly.
 
     Args:
         comm: MPI communicator, or None.
@@ -128,7 +135,7 @@ def known_solve(comm: Any) -> list[Finding]:
     from macro import Block, Interface, LawContactProblem, Material, block_mesh
 
     began = time.perf_counter()
-    material = Material(young_modulus=_MODULUS, poisson_ratio=_RATIO)
+    material = Material(young_modulus=4000.0, poisson_ratio=0.15)
     shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(10, 10, 8))
     block = Block(block_mesh(shape, comm or MPI.COMM_SELF), material, sides="roller")
     patches = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
@@ -141,13 +148,70 @@ def known_solve(comm: Any) -> list[Finding]:
         f"{block.dofs} unknowns, {state.linear_iterations} iterations, force off by {error:.0e}, "
         f"{seconds:.1f} s"
     )
-    if error > 1e-8:  # residuals are driven to 1e-9 of the load
-        return [Finding("test solve", "fail", text, "please report this: numbers are wrong")]
+    if error > _LARGEST_ERROR:
+        return [CheckResult("test solve", "fail", text, "please report this: numbers are wrong")]
     if state.linear_iterations > _MOST_ITERATIONS:
         remedy = "the preconditioner is weak here; look at PETSc's options with -- -options_left"
-        return [Finding("test solve", "warning", text, remedy)]
-    return [Finding("test solve", "ok", text)]
+        return [CheckResult("test solve", "warning", text, remedy)]
+    return [CheckResult("test solve", "ok", text)]
 
 
-def _gathered(comm: Any, value: Any) -> list[Any]:
-    return [value] if comm is None else comm.allgather(value)
+def warm(elements: Sequence[str], comm: Any = None) -> tuple[Path, int]:
+    """Compile every form that scenes with these elements use.
+
+    Compilations that were cut short more than two minutes ago are cleared first.
+
+    Args:
+        elements: Elements of blocks, ``Q1``, ``Q2``, ``P1``, ``P2``; all of them when empty.
+        comm: MPI communicator; rank 0 compiles. None for a process on its own.
+
+    Returns:
+        The folder of the compiled forms, and how many are in it.
+
+    Raises:
+        InputError: When an element is unknown, or forms cannot be compiled or kept.
+
+    Note:
+        Collective.
+    """
+    from geometry.meshes.block import ELEMENTS
+
+    for name in elements:
+        if name not in ELEMENTS:
+            raise InputError(
+                "this element is unknown", key="--element", value=name, allowed=", ".join(ELEMENTS)
+            )
+    if comm is not None:  # PETSc starts on all ranks together; one rank alone must not
+        import macro  # noqa: F401
+
+    def compile_all() -> tuple[Path, int]:
+        from macro import form_cache as jit
+        from macro.compat import form_cache
+
+        folder = form_cache()
+        if jit.writable(folder):
+            for source in jit.left_locks(folder):
+                source.unlink(missing_ok=True)
+        for element in elements or ELEMENTS:
+            _use_all_forms(element)
+        return folder, _compiled(folder)
+
+    return on_root(comm, compile_all)
+
+
+def _use_all_forms(element: str) -> None:
+    """Do on a tiny block whatever compiles a form: make its problems and write its fields."""
+    from mpi4py import MPI
+
+    from geometry.meshes.block import BlockShape
+    from geometry.patches import PatchGrid
+    from macro import Block, Interface, Material, UnilateralContactProblem, block_mesh, write_fields
+
+    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(2, 2, 2), element=element)
+    block = Block(block_mesh(shape, MPI.COMM_SELF), Material(young_modulus=1.0, poisson_ratio=0.3))
+    UnilateralContactProblem(block, 0.0)
+    rest = block.stiffness.createVecRight()
+    block.reaction(rest)
+    interface = Interface(block, PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)))
+    with tempfile.TemporaryDirectory() as folder:
+        write_fields(Path(folder) / "fields.xdmf", interface, rest.array_r, np.zeros(1))

@@ -13,12 +13,11 @@ def test_doctor_tells_ranks_and_hosts_once(mpirun):
 
 def test_a_check_that_fails_on_one_rank_fails_for_all(mpirun):
     code = (
-        "import sys; from mpi4py import MPI; from multiscale.doctor import machine;"
-        "from multiscale.cli.command_line import main\n"
+        "import sys; from mpi4py import MPI; from multiscale.cli import doctor, main\n"
         "def broken(comm):\n"
         "    if comm.rank == 1: raise OSError('only here')\n"
         "    return []\n"
-        "machine.blas = broken\n"
+        "doctor.CHECKS = (('BLAS', broken),)\n"
         "sys.exit(main(['doctor']))"
     )
     done = mpirun(2, "-c", code, timeout=100)

@@ -2,17 +2,16 @@
 
 import json
 import os
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 from geometry.errors import InputError
 from multiscale.cli.command_line import main
-from multiscale.doctor import forms as doctor_forms
-from multiscale.doctor import machine as doctor_machine
-from multiscale.doctor import packages as doctor_packages
-from multiscale.doctor.examination import examine, verdict
-from multiscale.doctor.finding import Finding
+from multiscale.cli.doctor import show
+from multiscale.doctor import forms, machine
+from multiscale.doctor.examination import CheckResult, examine, refuse_failures
 
 OPEN_MPI = "Open MPI v4.1.4"
 
@@ -26,31 +25,31 @@ def test_a_tested_machine_is_well(capsys):
     assert "dolfinx" in findings["packages"]["text"]
 
 
-def test_lines_come_with_remedies(capsys, monkeypatch):
-    finding = Finding("BLAS", "warning", "the reference [BLAS]", "apt-get install it")
-    monkeypatch.setattr(doctor_machine, "blas", lambda comm: [finding])
-    assert main(["doctor"]) == 0
+def test_lines_come_with_remedies(capsys):
+    show([CheckResult("BLAS", "warning", "the reference [BLAS]", "apt-get install it")])
     shown = capsys.readouterr().out
     assert "the reference [BLAS]" in shown  # no markup
     assert "→ apt-get install it" in shown
 
 
-def test_a_failed_check_fails(capsys, monkeypatch):
+def test_a_check_that_raises_has_failed():
     def broken(comm):
         raise RuntimeError("no such device")
 
-    monkeypatch.setattr(doctor_machine, "memory", broken)
-    assert main(["doctor"]) == 2
-    shown = capsys.readouterr()
-    assert "RuntimeError: no such device" in shown.out
-    assert shown.err == "patchlaw: doctor: not fit to run: memory\n"
+    def refused(comm):
+        raise InputError("has none", key="HOME")
+
+    checks = [("memory", broken), ("ranks", machine.ranks), ("form cache", refused)]
+    memory, ranks, cache = found = examine(None, checks)
+    assert (memory.state, memory.text) == ("fail", "RuntimeError: no such device")
+    assert ranks.text.startswith("1: 1 on ")
+    assert (cache.topic, cache.text) == ("form cache", "HOME: has none")
+    with pytest.raises(InputError, match=r"doctor: not fit to run: memory, form cache$"):
+        refuse_failures(found)
 
 
-def test_verdict_names_all_failures():
-    found = [Finding("a", "fail", ""), Finding("b", "warning", ""), Finding("c", "fail", "")]
-    with pytest.raises(InputError, match=r"a, c$"):
-        verdict(found)
-    verdict(found[1:2])
+def test_a_warning_is_no_failure():
+    refuse_failures([CheckResult("b", "warning", "")])
 
 
 @pytest.mark.parametrize(
@@ -65,13 +64,13 @@ def test_verdict_names_all_failures():
     ],
 )
 def test_launcher_is_compared_with_the_library(library, shown, state, text):
-    found = doctor_machine._match(library, shown)
+    found = machine.launcher_of(library, shown)
     assert (found.state, text in found.text) == (state, True), found
 
 
 def test_singletons_under_a_foreign_launcher_are_seen(monkeypatch):
     monkeypatch.setenv("PMI_SIZE", "4")
-    (found,) = doctor_machine.launcher(None)
+    (found,) = machine.launcher(None)
     assert found.state == "fail"
     assert "one of 4 processes" in found.text
     assert "Open MPI" in found.remedy or "MPICH" in found.remedy
@@ -79,7 +78,7 @@ def test_singletons_under_a_foreign_launcher_are_seen(monkeypatch):
 
 def test_too_many_threads_are_seen(monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", str(4 * os.cpu_count()))
-    (found,) = doctor_machine.threads(None)
+    (found,) = machine.threads(None)
     assert found.state == "warning"
 
 
@@ -95,47 +94,43 @@ class Ranks:
 
 def test_threads_of_all_ranks_count(monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", str(len(os.sched_getaffinity(0))))
-    assert doctor_machine.threads(None)[0].state == "ok"
-    assert doctor_machine.threads(Ranks)[0].state == "warning"
+    assert machine.threads(None)[0].state == "ok"
+    assert machine.threads(Ranks)[0].state == "warning"
     monkeypatch.delenv("OMP_NUM_THREADS")  # every rank would take all cores
-    assert doctor_machine.threads(Ranks)[0].state == "warning"
+    assert machine.threads(Ranks)[0].state == "warning"
 
 
-def test_memory_is_shared_by_the_ranks_of_a_host(monkeypatch):
-    monkeypatch.setattr(doctor_machine, "_free_bytes", lambda: 1.5e9)
-    assert doctor_machine.memory(None) == [Finding("memory", "ok", "1.5 GB free per rank")]
-    assert doctor_machine.memory(Ranks)[0].state == "warning"
+def test_memory_is_shared_by_the_ranks_of_a_host():
+    ok = CheckResult("memory", "ok", "1.5 GB free per rank")
+    assert machine.memory(None, free=1.5e9) == [ok]
+    assert machine.memory(Ranks, free=1.5e9)[0].state == "warning"
 
 
-def test_memory_of_a_control_group_is_what_is_left_of_it(monkeypatch):
-    monkeypatch.setattr(doctor_machine, "group_memory", lambda: [(9e18, 1e9), (3e9, 2.5e9)])
-    assert doctor_machine.memory(None)[0].text == "0.5 GB free per rank"
+def test_memory_of_a_control_group_is_what_is_left_of_it():
+    assert machine.free_memory([(9e18, 1e9), (3e9, 2.5e9)]) == 0.5e9
 
 
-def test_reference_blas_is_told(monkeypatch):
-    monkeypatch.setattr(doctor_machine, "_loaded", list)
-    (found,) = doctor_machine.blas(None)
+def test_reference_blas_is_told():
+    (found,) = machine.blas(None, libraries=[])
     assert "libopenblas0" in found.remedy
 
 
-def test_old_and_missing_packages_are_seen(monkeypatch):
+def test_old_and_missing_packages_are_seen():
     def load(name):
         if name == "gmsh":
             raise ImportError("no module named gmsh")
         return SimpleNamespace(__version__="0.1")
 
-    monkeypatch.setattr(doctor_packages.importlib, "import_module", load)
-    states = {found.topic: found.state for found in doctor_packages.versions(None)}
+    states = {found.topic: found.state for found in machine.packages(None, load)}
     assert states["gmsh"] == states["scipy"] == "fail"
 
 
-def test_left_lock_fails_and_names_the_command(monkeypatch, tmp_path):
-    monkeypatch.setattr("macro.compat.form_cache", lambda: tmp_path)
-    assert doctor_forms.cache(None)[0].state == "ok"
+def test_left_lock_fails_and_names_the_command(tmp_path):
+    assert forms.cache(None, tmp_path)[0].state == "ok"
     left = tmp_path / "libffcx_forms_1.c"
     left.touch()
     os.utime(left, (0, 0))
-    (found,) = doctor_forms.cache(None)
+    (found,) = forms.cache(None, tmp_path)
     assert (found.state, "patchlaw warm" in found.remedy) == ("fail", True)
 
 
@@ -143,23 +138,14 @@ def test_cache_that_may_not_be_entered_is_a_warning(monkeypatch, tmp_path):
     def refused(path, pattern=""):
         raise PermissionError(13, "Permission denied", str(path))
 
-    monkeypatch.setattr("macro.compat.form_cache", lambda: tmp_path)
-    monkeypatch.setattr(doctor_forms.Path, "exists", refused)
-    monkeypatch.setattr(doctor_forms.Path, "glob", refused)
-    (found,) = doctor_forms.cache(None)
+    monkeypatch.setattr(Path, "exists", refused)
+    monkeypatch.setattr(Path, "glob", refused)
+    (found,) = forms.cache(None, tmp_path)
     assert (found.state, "XDG_CACHE_HOME" in found.remedy) == ("warning", True)
 
 
 def test_compiler_that_fails_is_a_warning(monkeypatch):
-    assert doctor_forms.compiler_works(None)[0].state == "ok"
+    assert forms.compiler_works(None)[0].state == "ok"
     monkeypatch.setenv("CC", "/bin/false")
-    (found,) = doctor_forms.compiler_works(None)
+    (found,) = forms.compiler_works(None)
     assert (found.state, "patchlaw warm" in found.remedy) == ("warning", True)
-
-
-def test_broken_check_is_a_finding(monkeypatch):
-    monkeypatch.setattr(
-        doctor_forms, "known_solve", lambda comm: verdict([Finding("x", "fail", "")])
-    )
-    last = examine(None)[-1]
-    assert (last.topic, last.state) == ("test solve", "fail")
