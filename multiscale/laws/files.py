@@ -15,8 +15,7 @@ from geometry.patches import PatchGrid
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.plane_path import PlanePath
 from multiscale.laws.repair import evened_law
-from multiscale.storage.checksummed_hdf5 import checksummed, verified
-from multiscale.storage.serialisation import stored_numbers
+from multiscale.storage.serialisation import checksummed, stored_numbers, verified
 
 _COLUMNS = {
     "approach": "mm",
@@ -72,7 +71,7 @@ def write_laws(path: Path | BinaryIO, table: LawTable) -> None:
     """Write all laws to one HDF5 file: a group ``patch_IX_IY`` per patch, a dataset per column.
 
     A path is a group of its own. A checksum stands before the content; see
-    `multiscale.storage.checksummed_hdf5`.
+    `multiscale.storage.serialisation`.
 
     Args:
         path: File to write, by name or open; one that exists is replaced.

@@ -16,7 +16,7 @@ from geometry.errors import NotWritten
 
 @contextmanager
 def written(path: Path) -> Iterator[None]:
-    """Turn what the system says against writing a file into an error that names it.
+    """Turn an error of the system while a file is written into one that names the file.
 
     Args:
         path: The file.
@@ -30,7 +30,7 @@ def written(path: Path) -> Iterator[None]:
         raise NotWritten(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
-def write_whole(path: Path, write: Callable[[Path], None]) -> Path:
+def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
     """Write a file under a temporary name beside it and rename it when it is complete.
 
     Args:
@@ -57,10 +57,10 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> Path:
 
 
 def remove_partial(folder: Path) -> None:
-    """Remove what runs that were killed left half-written.
+    """Remove the half-written files of runs that were killed.
 
     Args:
-        folder: Where results are; nobody else may be writing there.
+        folder: Folder of results; no other run may be writing there.
     """
     for path in folder.glob(".*.partial-*"):
         if path.is_dir() and not path.is_symlink():
@@ -70,7 +70,7 @@ def remove_partial(folder: Path) -> None:
 
 
 def remove(path: Path) -> None:
-    """Remove a file, or a folder that ADIOS2 wrote, if it is there; no other folder is ours.
+    """Remove a file, or a folder written by ADIOS2, if it is there; leave all other folders.
 
     Args:
         path: Its name.
@@ -88,8 +88,7 @@ def write_json(path: Path, content: dict[str, Any]) -> Path:
         path: File to write.
         content: What JSON can hold; everything else is written as its text.
     """
-    text = json.dumps(content, indent=2, default=str) + "\n"
-    return write_whole(path, lambda partial: _write_text(partial, text))
+    return write_text(path, json.dumps(content, indent=2, default=str) + "\n")
 
 
 def write_bytes(path: Path, content: bytes) -> Path:
@@ -99,7 +98,7 @@ def write_bytes(path: Path, content: bytes) -> Path:
         path: File to write.
         content: Its content.
     """
-    return write_whole(path, lambda partial: _write_bytes(partial, content))
+    return write_whole(path, lambda partial: partial.write_bytes(content))
 
 
 def write_text(path: Path, text: str) -> Path:
@@ -109,7 +108,7 @@ def write_text(path: Path, text: str) -> Path:
         path: File to write.
         text: Its content.
     """
-    return write_whole(path, lambda partial: _write_text(partial, text))
+    return write_whole(path, lambda partial: partial.write_text(text, encoding="utf-8"))
 
 
 def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> Path:
@@ -118,7 +117,7 @@ def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) 
     Args:
         path: File to write.
         header: Names of the columns.
-        rows: Their values; what is not known, None or NaN, leaves a cell empty, in every table.
+        rows: Their values; an unknown value, None or NaN, leaves its cell empty.
     """
 
     def write(partial: Path) -> None:
@@ -128,14 +127,6 @@ def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) 
             writer.writerows([_plain(value) for value in row] for row in rows)
 
     return write_whole(path, write)
-
-
-def _write_bytes(path: Path, content: bytes) -> None:
-    path.write_bytes(content)
-
-
-def _write_text(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
 
 
 def _plain(value: Any) -> Any:

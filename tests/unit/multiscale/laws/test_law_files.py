@@ -11,7 +11,7 @@ from geometry.patches import PatchGrid
 from multiscale.laws.files import LawTable, read_laws, write_laws
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.plane_path import PlanePath
-from multiscale.storage.checksummed_hdf5 import checksum, checksummed
+from multiscale.storage.serialisation import checksum, checksummed
 
 COLUMNS = ("closure", "pressure", "approach", "contact_area_fraction", "contacts", "relief")
 

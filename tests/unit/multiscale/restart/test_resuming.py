@@ -25,7 +25,7 @@ from multiscale.restart.checkpoint import (
     write_checkpoint,
 )
 from multiscale.restart.folder_lock import FolderLock
-from multiscale.storage.checksummed_hdf5 import checksum
+from multiscale.storage.serialisation import checksum
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 ALONE = {"coupling": {"kind": "analytic"}, "micro": {"model": "half-space"}}
@@ -197,7 +197,7 @@ def test_damaged_checkpoint_is_refused_and_stays(tmp_path, ended, capsys, damage
 
 def flip(path):
     with h5py.File(path, "r+") as file:
-        file["progress/structure"][3] ^= 1
+        file["position/structure"][3] ^= 1
 
 
 def relabel(path):
