@@ -10,7 +10,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from multiscale.scene.scene import Scene, SpectrumSection
+from multiscale.scene.scene import Scene
+from multiscale.scene.sections import SpectrumSection
 from multiscale.setup.checks import patch_grid
 
 Content: TypeAlias = dict[str, Any]

@@ -9,8 +9,8 @@ from pydantic import ValidationError
 
 from geometry.surface import Surface
 from micro import HalfSpaceModel
+from multiscale.scene.coupling_sections import CouplingSection, ReferenceSection
 from multiscale.scene.scene import Scene
-from multiscale.scene.sections import CouplingSection, ReferenceSection
 from multiscale.setup.checks import PROVISIONAL_PATCHES
 from multiscale.setup.problem import ProblemSetup
 

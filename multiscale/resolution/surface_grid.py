@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from multiscale.scene.scene import Scene, SpectrumSection
+from multiscale.scene.scene import Scene
+from multiscale.scene.sections import SpectrumSection
 
 MOST_HEIGHTS = 2048
 """Heights along a side, at most, of grids that are chosen."""

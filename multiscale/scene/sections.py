@@ -1,14 +1,60 @@
-"""The sections of a scene on couplings and loads, and what all sections have in common."""
+"""The sections of a scene on surface, block, patches, micro model and output."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    model_validator,
+)
+from pydantic_core import CoreSchema, core_schema
 
-from multiscale.loading.stepper import LoadHistory
-from multiscale.scene.quantities import Approaches, Forces, Length, Tilt
+from geometry.spectrum import LARGEST_SEED, Spectrum
+from multiscale.scene.quantities import Length, Pressure, Slope, SpectralAmplitude
+
+Auto = Literal["auto"]
+"""Value of a key that is left to the plan."""
+
+
+@dataclass(frozen=True)
+class OrAuto:
+    """Allows ``"auto"`` beside the values of a type, without changing the type's error messages.
+
+    Args:
+        values: The type of all other values.
+    """
+
+    values: Any
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Return a schema that leaves ``"auto"`` as it is and checks all other values."""
+
+        def checked(value: Any, check: core_schema.ValidatorFunctionWrapHandler) -> Any:
+            return value if isinstance(value, str) and value == "auto" else check(value)
+
+        def unchanged(value: Any) -> Any:
+            return value
+
+        return core_schema.no_info_wrap_validator_function(
+            checked,
+            handler.generate_schema(self.values),
+            serialization=core_schema.plain_serializer_function_ser_schema(unchanged),
+        )
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """Return the JSON Schema of both."""
+        return {"anyOf": [{"const": "auto"}, handler(schema)]}
 
 
 def _number(value: Any) -> Any:
@@ -28,187 +74,157 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-class CouplingSection(Section):
-    """How micro and macro model are put together.
+Flag = Annotated[bool, Field(strict=True)]
+PositiveLength = Annotated[Length, Field(gt=0)]
+Pair = Annotated[tuple[Count, Count], Field(description="x, y")]
+Heights = Annotated[int, Field(ge=4, le=1_000_000_000, strict=True)]
+"""Number of heights along a side; fewer than four have no cubic interpolant."""
 
-    ``kind``: ``isolated`` takes every patch's law from what lies in it alone (Waddad et al. 2016);
-    ``consistent`` takes all laws from the whole surface in contact on the block under the tilt of
-    the load (where the plane is free, under the tilt that it takes at each approach);
-    ``concurrent`` solves the whole surface on the block at every load step, without laws;
-    ``analytic`` is the micro model alone on a half-space; ``reference`` meshes the rough surface
-    itself and has no micro model, see `ReferenceSection`; ``auto`` is concurrent or consistent,
-    whichever keeps the scene's accuracy at less cost.
+Band = Annotated[tuple[Number, Number], Field(description="lower, upper number of waves per side")]
 
-    ``compliance`` of the block under its patches: ``finite-element`` from the plain mesh under the
-    laws; ``decomposed`` is the half-space exactly and few smooth modes for what the block adds.
-    By default decomposed, but for isolated laws and laws at points.
 
-    ``newton``: ``condensed`` solves for the patches alone, with the compliance computed once;
-    ``full`` for all displacements of the mesh. By default what is predicted to cost less.
+class SpectrumSection(Section):
+    """A synthesised self-affine surface; see `geometry.Spectrum` for the meaning of each key."""
 
-    ``love``: an isolated patch's own displacement by its pressure, its ``mean`` or that at its
-    ``centre``. ``interface``: the closure is a mean over each patch, or taken at each point.
-    ``table_tolerance``: interpolation error of the laws, relative to the force; by default 1e-4,
-    and 5e-4 with micro models that see cells.
-    """
-
-    kind: Literal["isolated", "consistent", "concurrent", "analytic", "reference", "auto"] = (
-        "consistent"
-    )
-    compliance: Literal["auto", "finite-element", "decomposed"] = "auto"
-    newton: Literal["auto", "condensed", "full"] = "auto"
-    love: Literal["mean", "centre"] = "mean"
-    interface: Literal["patchwise", "pointwise"] = "patchwise"
-    table_tolerance: Annotated[Number, Field(gt=0, lt=0.1)] | None = None
+    hurst: Annotated[Number, Field(gt=0, le=1)]
+    waves: Band | None = None
+    waves_x: Band | None = None
+    waves_y: Band | None = None
+    rms_slope: Annotated[Slope, Field(gt=0)] | None = None
+    rms_height: PositiveLength | None = None
+    s0: Annotated[SpectralAmplitude, Field(gt=0)] | None = None
+    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED, strict=True)] = 0
 
     @model_validator(mode="after")
-    def _fits_together(self) -> Self:
-        for clash, problem, allowed in self._clashes():
-            if clash:
-                raise ValueError(f"{problem} (allowed: {allowed})")
+    def _makes_a_spectrum(self) -> Self:
+        self.spectrum()
         return self
 
-    def _clashes(self) -> Iterator[tuple[bool, str, str]]:
-        """Yield whether keys contradict each other, how, and what would do."""
-        if self.kind == "analytic":  # ignores what is about patches and finite elements
-            return
-        kind, points = f"kind = '{self.kind}'", self.interface == "pointwise"
-        if self.kind == "auto":
-            kind = "a kind that is left to the plan"
-        yield (
-            self.kind != "isolated" and self.love == "centre",
-            f"love = 'centre' does not go with {kind}",
-            "love = 'mean', or kind = 'isolated'",
-        )
-        lawless = self.kind in ("concurrent", "reference")
-        yield (
-            lawless and self.table_tolerance is not None,
-            f"table_tolerance = {self.table_tolerance} does not go with {kind}",
-            "leave it out: there are no laws",
-        )
-        for key, value, meant in (
-            ("compliance", self.compliance, "decomposed" if self.kind == "concurrent" else "auto"),
-            ("newton", self.newton, "auto"),
-            ("interface", self.interface, "patchwise"),
-        ):
-            yield (
-                lawless and value not in ("auto", meant),
-                f"{key} = '{value}' does not go with {kind}",
-                f"{key} = '{meant}'",
+    def spectrum(self) -> Spectrum:
+        """Return the geometric record."""
+        return Spectrum(**self.model_dump())
+
+
+class SurfaceSection(Section):
+    """Exactly one source of heights, and the rectangle it covers.
+
+    ``missing``: what is done with heights of a file that are not a number. They are refused, or
+    filled by the smoothest membrane between the others, see `geometry.missing.filled`.
+    """
+
+    spectrum: SpectrumSection | None = None
+    file: str | None = None
+    grid: (
+        Annotated[
+            tuple[Heights, Heights] | Auto,
+            OrAuto(tuple[Heights, Heights]),
+            Field(description="heights in x, y"),
+        ]
+        | None
+    ) = None
+    lengths: tuple[PositiveLength, PositiveLength] | None = None
+    detrend: Literal["none", "mean", "plane", "quadratic"] = "none"
+    missing: Literal["refuse", "fill"] = "refuse"
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if (self.spectrum is None) == (self.file is None):
+            raise ValueError("needs exactly one source (allowed: either 'spectrum' or 'file')")
+        if self.spectrum is not None and (self.grid is None or self.lengths is None):
+            raise ValueError("a 'spectrum' needs 'grid' and 'lengths' beside it")
+        if self.file is None and self.missing == "fill":
+            raise ValueError("missing = 'fill' needs a 'file' (allowed: leave it out)")
+        if self.file is not None and self.grid == "auto":
+            raise ValueError(
+                "grid = 'auto' needs a 'spectrum' (allowed: the grid of the file, or leave it out)"
             )
-        yield (
-            points and self.compliance == "decomposed",
-            "compliance = 'decomposed' does not go with interface = 'pointwise'",
-            "compliance = 'finite-element', or interface = 'patchwise'",
-        )
-        yield (
-            points and self.newton == "condensed",
-            "newton = 'condensed' does not go with interface = 'pointwise'",
-            "newton = 'full', or interface = 'patchwise'",
-        )
-        yield (
-            self.newton == "full" and self.compliance == "decomposed",
-            "newton = 'full' does not go with compliance = 'decomposed'",
-            "newton = 'condensed', or compliance = 'finite-element'",
-        )
-
-    @property
-    def decomposed(self) -> bool:
-        """Whether the block is the half-space and what a finite body adds to it.
-
-        A kind that is left to the plan becomes consistent or concurrent, alike in this.
-        """
-        if self.kind in ("analytic", "concurrent", "reference"):
-            return self.kind == "concurrent"
-        if self.compliance != "auto":
-            return self.compliance == "decomposed"
-        return self.kind != "isolated" and self.interface != "pointwise" and self.newton != "full"
-
-    @property
-    def on_mesh(self) -> bool:
-        """Whether laws lie on finite elements of the block, plain or condensed."""
-        return self.kind in ("isolated", "consistent", "auto") and not self.decomposed
-
-
-class ReferenceSection(Section):
-    """The rough surface meshed, for ``coupling.kind = "reference"``; other couplings ignore it.
-
-    ``method``: how contact is found, see `macro.UnilateralContactProblem`. ``mesh``: ``tetrahedra``
-    are small only where contact can occur, ``hexahedra`` are as many as ``cells`` says; by default
-    tetrahedra, unless ``cells`` is stated. ``meshes`` of falling size are pressed alike, and their
-    results extrapolated; one alone has no error bar. ``fine``: edge length of the finest tetrahedra
-    where contact can occur, by default from the surface and the load. ``cells``: hexahedra of the
-    finest mesh; their element and grading are those of ``[block]``.
-    """
-
-    method: Literal["active-set", "augmented-lagrangian"] = "active-set"
-    mesh: Literal["auto", "hexahedra", "tetrahedra"] = "auto"
-    meshes: Annotated[int, Field(ge=1, le=3, strict=True)] = 2
-    fine: Annotated[Length, Field(gt=0)] | None = None
-    cells: Annotated[tuple[Count, Count, Count], Field(description="cells in x, y, z")] | None = (
-        None
-    )
-
-    @model_validator(mode="after")
-    def _fits_together(self) -> Self:
-        for clash, problem, allowed in self._clashes():
-            if clash:
-                raise ValueError(f"{problem} (allowed: {allowed})")
         return self
 
-    def _clashes(self) -> Iterator[tuple[bool, str, str]]:
-        """Yield whether keys contradict each other, how, and what would do."""
-        mesh, fine, cells = f"mesh = '{self.mesh}'", self.fine, self.cells
-        yield (
-            self.mesh == "hexahedra" and cells is None,
-            f"{mesh} needs cells",
-            "cells along x, y and z; or mesh = 'tetrahedra'",
-        )
-        yield (
-            self.mesh == "tetrahedra" and cells is not None,
-            f"cells does not go with {mesh}",
-            "leave it out, and state fine; or mesh = 'hexahedra'",
-        )
-        yield (
-            fine is not None and cells is not None,
-            f"fine = {fine or 0.0:g} mm, of tetrahedra, does not go with cells, of hexahedra",
-            "one of them",
-        )
 
-    @property
-    def hexahedral(self) -> bool:
-        """Whether the meshes are of hexahedra."""
-        return self.cells is not None
+class BlockSection(Section):
+    """The elastic block below the surface, pressed by a rigid plane.
 
+    Its ``height`` is the shorter side of the surface when not given.
 
-class LoadSection(Section):
-    """The motion of the rigid plane: turning points of its approach, or of the force on it.
-
-    ``steps`` load steps lead to every turning point. ``tilt`` are the slopes of the approach along
-    x and y about the middle of the interface; ``"free"`` lets the plane turn until the pressures
-    have no moment. ``force_change`` is the largest change of the force in one step relative to the
-    largest force so far: larger steps are halved.
+    ``cells`` and the keys after it describe the mesh of the block with a flat top. That mesh is
+    made where patch laws need it (``coupling.compliance = "finite-element"``) and for fields
+    (``output.fields``); nothing else depends on it.
     """
 
-    approach: Approaches | None = None
-    force: Forces | None = None
-    steps: Annotated[int, Field(ge=1, le=1_000_000, strict=True)] = 8
-    tilt: Tilt = (0.0, 0.0)
-    force_change: Annotated[Number, Field(ge=1e-3, lt=1)] | None = None
+    height: PositiveLength | None = None
+    young_modulus: Annotated[Pressure, Field(gt=0)]
+    poisson_ratio: Annotated[Number, Field(gt=-1, lt=0.5)]
+    sides: Literal["free", "roller"] = "free"
+    cells: (
+        Annotated[
+            tuple[Count, Count, Count] | Auto,
+            OrAuto(tuple[Count, Count, Count]),
+            Field(description="cells in x, y, z of the mesh under laws and of fields"),
+        ]
+        | None
+    ) = None
+    element: Literal["Q1", "Q2", "P1", "P2"] = "Q1"
+    grading: Annotated[Number, Field(ge=1, le=1e6, description="bottom to top layer height")] = 1.0
+    margin: Annotated[Length, Field(ge=0, description="block beyond the interface")] = 0.0
+    margin_cells: Count = 8
+    margin_grading: Annotated[Number, Field(ge=1, le=1e6)] = 8.0
+
+    def height_under(self, lengths: tuple[float, float]) -> float:
+        """Return the height of the block under a surface of given sides [mm]."""
+        return min(lengths) if self.height is None else self.height
+
+
+class PatchesSection(Section):
+    """The partition of the interface."""
+
+    grid: Annotated[Pair | Auto, OrAuto(Pair)] = (4, 4)
+
+
+class MicroSection(Section):
+    """The micro model of the rough surface.
+
+    ``model = "auto"`` takes the cheapest model whose expected error of the force is below
+    ``tolerance`` at the largest load and at half of it, and measures that error at one load. By
+    default the tolerance is the share of the scene's accuracy that is left for the micro model, or
+    2 %. It holds for the micro model of the whole surface, not for what isolated laws leave out.
+    """
+
+    model: Literal[
+        "elliptic",
+        "circular",
+        "elliptic-independent",
+        "circular-independent",
+        "islands",
+        "half-space",
+        "auto",
+    ] = "elliptic"
+    tolerance: Annotated[Number, Field(gt=0, lt=0.5)] | None = None
+    solver: Literal["active-set", "truncated-newton"] = "active-set"
+    curvature: Literal["summit", "contact"] = "summit"
+    finite_slopes: Flag | None = None
+    border: Literal["ignore", "include"] = "ignore"
 
     @model_validator(mode="after")
-    def _one_load(self) -> Self:
-        if (self.approach is None) == (self.force is None):
-            raise ValueError("needs exactly one load (allowed: either 'approach' or 'force')")
+    def _chooses_or_states(self) -> Self:
+        if self.model != "auto" and self.tolerance is not None:
+            raise ValueError("'tolerance' needs model = 'auto' (allowed: leave it out)")
+        stated = (self.solver, self.curvature, self.border)
+        if self.model == "auto" and stated != ("active-set", "summit", "ignore"):
+            raise ValueError(
+                "'solver', 'curvature' and 'border' are chosen by model = 'auto' "
+                "(allowed: leave them out)"
+            )
         return self
 
-    @property
-    def load_history(self) -> LoadHistory:
-        """What the rigid plane is made to do."""
-        return LoadHistory(
-            quantity="approach" if self.force is None else "force",
-            points=self.approach or self.force or (),
-            steps=self.steps,
-            tilt=None if self.tilt == "free" else self.tilt,
-            force_change=self.force_change,
-        )
+
+class OutputSection(Section):
+    """What is written beside the tables of results.
+
+    ``check``: the load steps whose errors are measured by solving further contact problems, where
+    the micro model is ``half-space``.
+    """
+
+    figures: Flag = True
+    report: Flag = True
+    fields: Flag = False
+    check: Literal["last", "none", "all"] = "last"

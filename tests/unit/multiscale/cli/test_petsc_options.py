@@ -59,9 +59,10 @@ def test_misspelt_option_is_named_at_the_end(patchlaw):
     assert "-patchlaw_ksp_tpye" in shown.stdout
 
 
-def test_impossible_option_is_wrong_input(patchlaw):
+def test_impossible_option_is_wrong_input_and_leaves_nothing(patchlaw, tmp_path):
     done = patchlaw("-pc_type", "foo")
     assert done.returncode == 2
+    assert not list(tmp_path.iterdir())  # though laws were made, and a checkpoint written
     assert "patchlaw: command line: PETSc refuses the solver's options" in done.stderr
     assert "Traceback" not in done.stderr
 

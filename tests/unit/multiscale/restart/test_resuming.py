@@ -277,8 +277,7 @@ def test_two_runs_do_not_share_a_folder(tmp_path):
 
 
 @pytest.mark.parametrize("command", ["laws", "surface", "run", "compare"])
-def test_no_command_writes_where_a_run_does(tmp_path, capsys, monkeypatch, command):
-    monkeypatch.delattr("multiscale.comparison.level_runs.launch_process")  # no level is begun
+def test_no_command_writes_where_a_run_does(tmp_path, capsys, command):
     out = tmp_path / "out"
     lock = FolderLock(out)
     lock.hold()
@@ -340,16 +339,6 @@ def test_read_only_folder_is_refused_before_anything_is_made(tmp_path, capsys, m
     assert not told.out
     assert not list(tmp_path.iterdir())
     assert main(["plan", str(PAPER), "--set", "coupling.kind=analytic"]) == 0  # writes nothing
-
-
-def test_wrong_input_met_late_leaves_nothing(capsys, tmp_path, monkeypatch):
-    def refuse(*arguments):
-        raise InputError("does not go", key="command line")
-
-    monkeypatch.setattr(sys.modules["multiscale.run"], "assemble", refuse)
-    assert main([*WORDS[:2], "--out", str(tmp_path / "out"), *WORDS[2:]]) == 2
-    assert "patchlaw: command line: does not go" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
 
 
 def test_full_disk_leaves_the_earlier_checkpoint(tmp_path, ended, monkeypatch):

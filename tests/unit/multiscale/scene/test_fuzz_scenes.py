@@ -2,6 +2,7 @@
 
 import os
 import re
+import tomllib
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -83,7 +84,7 @@ def test_sizes_are_refused_before_anything_is_allocated(tmp_path, key, value, te
 
 
 def test_a_law_for_every_patch_takes_memory(tmp_path, monkeypatch):
-    monkeypatch.setattr("multiscale.machine.nodes.os.sysconf", lambda name: 1200)  # of 1.4 MB
+    monkeypatch.setattr(os, "sysconf", lambda name: 1200)  # of 1.4 MB
     path = tmp_path / "scene.toml"
     data = put(put(BASE, "coupling.kind", "isolated"), "block.cells", [4, 4, 2])
     path.write_text(toml(put(data, "patches.grid", [12, 12])), encoding="utf-8")
@@ -193,7 +194,7 @@ def test_override_of_endless_sections(tmp_path):
 )
 def test_deep_keys_are_refused_before_they_are_parsed(monkeypatch, line):
     """Thirty such lines took the parser of TOML more than eight minutes."""
-    monkeypatch.setattr("multiscale.scene.files.tomllib.loads", None)
+    monkeypatch.setattr(tomllib, "loads", None)
     with pytest.raises(ValueError, match="a line with more dots than any scene has"):
         parsed(line)
 
