@@ -12,6 +12,7 @@ from importlib import import_module
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
+# ruff: noqa: F401
 if TYPE_CHECKING:  # what `_HOMES` says, for editors and type checkers
     from geometry import (
         Control,
@@ -37,42 +38,15 @@ if TYPE_CHECKING:  # what `_HOMES` says, for editors and type checkers
         run,
     )
 
-__all__ = [
-    "Comparison",
-    "Control",
-    "HalfSpaceModel",
-    "History",
-    "InputError",
-    "LawTable",
-    "LoadStep",
-    "NotConverged",
-    "PatchGrid",
-    "Run",
-    "Scene",
-    "Spectrum",
-    "Surface",
-    "compare",
-    "main",
-    "make_setup",
-    "read_laws",
-    "read_surface",
-    "run",
+_NAMES = {
+    "geometry": "Control InputError NotConverged PatchGrid Spectrum Surface read_surface "
     "synthesise",
-]
-
-_GEOMETRY = (
-    "Control", "InputError", "NotConverged", "PatchGrid", "Spectrum", "Surface", "read_surface",
-    "synthesise",
-)  # fmt: skip
-_MULTISCALE = (
-    "Comparison", "History", "LawTable", "LoadStep", "Run", "Scene", "compare", "make_setup",
-    "read_laws", "run",
-)  # fmt: skip
-_HOMES = {
-    **dict.fromkeys(_GEOMETRY, "geometry"),
-    "HalfSpaceModel": "micro",
-    **dict.fromkeys(_MULTISCALE, "multiscale"),
+    "micro": "HalfSpaceModel",
+    "multiscale": "Comparison History LawTable LoadStep Run Scene compare make_setup read_laws run",
 }
+_HOMES = {name: package for package, names in _NAMES.items() for name in names.split()}
+
+__all__ = ["main", *_HOMES]
 
 
 def __getattr__(name: str) -> Any:

@@ -12,6 +12,7 @@ from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+# ruff: noqa: F401
 if TYPE_CHECKING:  # for editors and type checkers; at run time `_HOMES` says where names are
     from multiscale.comparison.compare import compare
     from multiscale.comparison.comparison import Comparison, Row
@@ -33,39 +34,6 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time `_HOMES` says wh
     from multiscale.run import Run, run
     from multiscale.scene.scene import Scene
     from multiscale.setup.problem import ProblemSetup
-
-__all__ = [
-    "Checkpoint",
-    "Comparison",
-    "CondensedCoupling",
-    "ContactCoupling",
-    "EmbeddedCoupling",
-    "Estimate",
-    "History",
-    "LawTable",
-    "LoadHistory",
-    "LoadStep",
-    "PatchLaw",
-    "PatchLaws",
-    "PatchState",
-    "ProblemSetup",
-    "ReferenceCoupling",
-    "ReferenceRecord",
-    "Row",
-    "Run",
-    "Scene",
-    "compare",
-    "consistent_laws",
-    "extrapolated",
-    "isolated_laws",
-    "load_steps",
-    "make_setup",
-    "read_checkpoint",
-    "read_laws",
-    "run",
-    "write_checkpoint",
-    "write_laws",
-]
 
 _MODULES = {
     "comparison.compare": "compare",
@@ -92,6 +60,8 @@ _MODULES = {
 _HOMES = {name: module for module, names in _MODULES.items() for name in names.split()}
 """Module of every public name, which is imported with the first use of the name, for speed."""
 
+__all__ = sorted(_HOMES)
+
 
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
@@ -100,7 +70,7 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return __all__
 
 
 class _Package(ModuleType):

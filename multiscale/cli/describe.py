@@ -37,7 +37,7 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    scene, _ = scene_and_folder(choice, comm, writes=False)
+    scene, _ = scene_and_folder(choice, comm)
     load_together(scene, comm)
     nodes = nodes_of(comm)
 
@@ -85,28 +85,35 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
         comm: MPI communicator; None for a process on its own.
     """
     scene, folder = scene_and_folder(choice, comm)
-    nodes = replace(nodes_of(comm), more=True)  # a surface needs no memory for its block
-    setup = on_root(for_large(comm), lambda: make_setup(scene, nodes=nodes))
+    with locked(folder, comm):
+        nodes = replace(nodes_of(comm), more=True)  # a surface needs no memory for its block
+        setup = on_root(for_large(comm), lambda: make_setup(scene, nodes=nodes))
+        terminal.show_pairs(comm, _surface_facts(setup))
+
+        def write() -> list[Path]:
+            from multiscale.output.figures import surface_figure
+
+            figure = surface_figure(setup.surface, setup.asperities, setup.patches)
+            return [write_figure(folder / "surface.png", figure)]
+
+        terminal.show_files(comm, on_root(comm, write))
+
+
+def _surface_facts(setup: ProblemSetup) -> list[tuple[str, str]]:
+    """Return statistics of a surface, each with its topic."""
     rough = roughness(setup.surface)
-    pairs = [
+    return [
         ("surface", plan.surface_statement(setup)),
         ("Sa, Sq, Sz", f"{1e3 * rough.sa:.4g}, {1e3 * rough.sq:.4g}, {1e3 * rough.sz:.4g} µm"),
         ("Ssk, Sku, Sdq", f"{rough.ssk:.4g}, {rough.sku:.4g}, {rough.sdq:.4g}"),
         ("m0, m2, m4", f"{rough.m0:.4g} mm², {rough.m2:.4g}, {rough.m4:.4g} 1/mm² (profile)"),
         ("Nayak α", f"{rough.nayak:.3g} (profile), {rough.nayak_radial:.3g} (radial moments)"),
         ("highest point", f"{1e3 * setup.surface.highest:.6g} µm"),
-        ("summits", f"{setup.asperities.count}, border maxima {setup.asperities.border_x.size}"),
+        (
+            "summits",
+            f"{setup.asperities.count}, border maxima {setup.asperities.border_x.size}",
+        ),
     ]
-    terminal.show_pairs(comm, pairs)
-
-    def write() -> list[Path]:
-        from multiscale.output.figures import surface_figure
-
-        figure = surface_figure(setup.surface, setup.asperities, setup.patches)
-        return [write_figure(folder / "surface.png", figure)]
-
-    with locked(folder, comm):
-        terminal.show_files(comm, on_root(comm, write))
 
 
 def print_schema(choice: argparse.Namespace, options: list[str], comm: Any) -> None:

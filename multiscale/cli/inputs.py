@@ -9,13 +9,12 @@ from typing import Any
 from geometry.collective import on_root
 from geometry.errors import InputError
 from multiscale.machine.mpi_job import refuse_detached_processes
-from multiscale.restart.folder_lock import check_writable
 from multiscale.scene.quantities import parse_duration
 from multiscale.scene.scene import Scene
 
 
 def scene_and_folder(
-    choice: argparse.Namespace, comm: Any, *, ending: str = "", writes: bool = True
+    choice: argparse.Namespace, comm: Any, *, ending: str = ""
 ) -> tuple[Scene, Path]:
     """Read the scene on rank 0 and find the folder of its results.
 
@@ -23,14 +22,13 @@ def scene_and_folder(
         choice: Parsed words of the command line.
         comm: MPI communicator; None for a process on its own.
         ending: What the folder is called after the scene's name, unless the user names a folder.
-        writes: Whether anything will be written to it.
 
     Returns:
         The scene and the folder, the same on every rank.
 
     Raises:
-        InputError: When the scene or the folder cannot be used, or this process is one of several
-            that should be one MPI job and are not.
+        InputError: When the scene cannot be used, or this process is one of several that should be
+            one MPI job and are not.
 
     Note:
         Collective.
@@ -39,10 +37,7 @@ def scene_and_folder(
 
     def read() -> tuple[Scene, Path]:
         scene = Scene.load(choice.scene, choice.set)
-        folder = choice.out or Path("results") / f"{scene.name}{ending}"
-        if writes:
-            check_writable(folder)
-        return scene, folder
+        return scene, choice.out or Path("results") / f"{scene.name}{ending}"
 
     return on_root(comm, read)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 from geometry.collective import on_root
@@ -12,7 +11,13 @@ from multiscale.cli.inputs import scene_and_folder, wall_time
 from multiscale.output import terminal
 from multiscale.output.field_files import write_fields
 from multiscale.output.results import write_results
-from multiscale.restart.checkpoint import CheckpointWriter, is_finished, resolved_before
+from multiscale.restart.checkpoint import (
+    Checkpoint,
+    CheckpointWriter,
+    find_checkpoint,
+    go_on,
+    is_finished,
+)
 from multiscale.restart.folder_lock import locked
 from multiscale.restart.interruption import Interruption, Stopped
 from multiscale.run import Run
@@ -28,29 +33,23 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
     """
     with Interruption(comm, wall_time(choice.max_time, "--max-time")) as interruption:
         scene, folder = scene_and_folder(choice, comm)
-        resolved = on_root(comm, lambda: resolved_before(folder, scene)) if choice.resume else None
-        run = Run(scene, comm, resolved)
-        with locked(folder, comm) as lock, CheckpointWriter(folder, run, lock) as checkpoints:
-            if not _announce(choice.resume, folder, run, checkpoints):
-                return
-            failure = _make_load_steps(run, checkpoints, interruption)
-            if run.steps:
-                checkpoints.write_pending()  # writing results may fail
-                terminal.show_history(comm, run.history())
-                files = write_results(folder, run, options=options)
-                if scene.output.fields:
-                    files += write_fields(folder, run)
-                terminal.show_times(comm, run.seconds)
-                terminal.show_files(comm, files)
-            if failure is not None:
-                raise failure
-            checkpoints.remove()
+        with locked(folder, comm) as lock:
+            found = None
+            if choice.resume:
+                found = on_root(comm, lambda: find_checkpoint(folder, scene))
+            run = Run(scene, comm, None if found is None else found.resolved)
+            with CheckpointWriter(folder, run, lock) as checkpoints:
+                if _announce(choice.resume, found, run, checkpoints):
+                    _run(run, checkpoints, interruption, options)
 
 
-def _announce(resume: bool, folder: Path, run: Run, checkpoints: CheckpointWriter) -> bool:
-    """Resume if asked to, and say what will be done; return False if nothing is left to do."""
-    comm, notice = run.comm, None
-    if resume and checkpoints.resume():
+def _announce(
+    resume: bool, found: Checkpoint | None, run: Run, checkpoints: CheckpointWriter
+) -> bool:
+    """Say what will be done, and resume if asked to; return False if nothing is left to do."""
+    comm, folder, notice = run.comm, checkpoints.path.parent, None
+    if found is not None:
+        go_on(run, found, folder)
         notice = f"goes on after load step {len(run.steps)}, kept in {folder}"
     elif resume and on_root(comm, lambda: is_finished(folder, run)):
         terminal.say(comm, f"this run is finished; its results are in {folder}")
@@ -63,6 +62,25 @@ def _announce(resume: bool, folder: Path, run: Run, checkpoints: CheckpointWrite
     if notice:
         terminal.say(comm, notice)
     return True
+
+
+def _run(
+    run: Run, checkpoints: CheckpointWriter, interruption: Interruption, options: list[str]
+) -> None:
+    """Make the load steps and write the results, also of a run that ends early."""
+    comm, folder = run.comm, checkpoints.path.parent
+    failure = _make_load_steps(run, checkpoints, interruption)
+    if run.steps:
+        checkpoints.write_pending()  # writing results may fail
+        terminal.show_history(comm, run.history())
+        files = write_results(folder, run, options=options)
+        if run.scene.output.fields:
+            files += write_fields(folder, run)
+        terminal.show_times(comm, run.seconds)
+        terminal.show_files(comm, files)
+    if failure is not None:
+        raise failure
+    checkpoints.remove()
 
 
 def _make_load_steps(

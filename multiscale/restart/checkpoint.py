@@ -99,31 +99,6 @@ class CheckpointWriter:
         with suppress(NotWritten, MemoryError):
             self._write_pending()
 
-    def resume(self) -> bool:
-        """Let the run go on from the folder's checkpoint, if it has one.
-
-        Returns:
-            Whether there was one.
-
-        Raises:
-            InputError: When it is damaged, or of another scene.
-
-        Note:
-            Collective.
-        """
-
-        def read() -> Checkpoint | None:
-            if not self.path.exists():
-                return None
-            found = read_checkpoint(self.path)
-            _refuse_changes(self.path.parent, self._run, found.scene, found.heights)
-            return found
-
-        found = on_root(self._run.comm, read)
-        if found is not None:
-            self._run.resume(found.steps, found.position, found.state, found.laws)
-        return found is not None
-
     def accept(self) -> None:
         """Keep the load steps that the run has accepted so far, and write them if it is time.
 
@@ -295,25 +270,37 @@ def _tuples(value: Any) -> Any:
     return tuple(map(_tuples, value)) if isinstance(value, list) else value
 
 
-def resolved_before(folder: Path, scene: Scene) -> dict[str, Any] | None:
-    """Return the values that an interrupted run found for the keys that its scene leaves open.
+def find_checkpoint(folder: Path, scene: Scene) -> Checkpoint | None:
+    """Return what an interrupted run of a scene left in its results folder; None without it.
 
     Args:
-        folder: Folder of its results.
-        scene: The present scene: values found for another one would not fit it.
-
-    Returns:
-        The values by key; None without a checkpoint.
+        folder: The folder.
+        scene: The present scene.
 
     Raises:
-        InputError: When the checkpoint is damaged, or of another scene.
+        InputError: When the checkpoint is damaged, or a key of the scene has changed.
     """
     path = folder / FILE_NAME
     if not path.exists():
         return None
     found = read_checkpoint(path)
     _refuse_changed_keys(folder, scene, found.scene)
-    return found.resolved
+    return found
+
+
+def go_on(run: Run, found: Checkpoint, folder: Path) -> None:
+    """Let a run go on from a checkpoint of the same scene.
+
+    Args:
+        run: The run, made with the resolved values of the checkpoint; nothing of it made yet.
+        found: The checkpoint.
+        folder: Folder of the results, for messages.
+
+    Raises:
+        InputError: When the heights have changed.
+    """
+    _refuse_changed_heights(folder, run, found.heights)
+    run.resume(found.steps, found.position, found.state, found.laws)
 
 
 def is_finished(folder: Path, run: Run) -> bool:
@@ -325,15 +312,15 @@ def is_finished(folder: Path, run: Run) -> bool:
     """
     try:
         facts = json.loads((folder / "provenance.json").read_text(encoding="utf-8"))
-        _refuse_changes(folder, run, facts["scene_given"], facts["surface"]["heights_sha256"])
+        _refuse_changed_keys(folder, run.given, facts["scene_given"])
+        _refuse_changed_heights(folder, run, facts["surface"]["heights_sha256"])
         return bool(facts["finished"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return False  # InputError is a ValueError
 
 
-def _refuse_changes(folder: Path, run: Run, scene: dict[str, Any], heights: str) -> None:
-    """Refuse to go on with a scene or heights other than those that a run began with."""
-    _refuse_changed_keys(folder, run.given, scene)
+def _refuse_changed_heights(folder: Path, run: Run, heights: str) -> None:
+    """Refuse to go on with heights other than those that a run began with."""
     if heights != run.heights:
         raise InputError(
             f"the heights are not those that the run in {folder} began with; restore them, or "

@@ -48,8 +48,9 @@ def locked(folder: Path, comm: Any) -> Iterator[FolderLock]:
 class FolderLock:
     """A lock on a folder of results, which the system lifts when the process ends, however it does.
 
-    A missing folder is made, and removed again when nothing was written to it. Where the file
-    system has no locks, nothing is locked: a lock that outlives a killed run would be worse.
+    A missing folder is made, with those above it, and removed again when nothing was written to
+    it. Where the file system has no locks, nothing is locked: a lock that outlives a killed run
+    would be worse.
 
     Args:
         folder: The folder.
@@ -61,7 +62,7 @@ class FolderLock:
             self._path, _PATIENCE, thread_local=False, poll_interval=0.02, fallback_to_soft=False
         )
         self._file: os.stat_result | None = None
-        self._made = False
+        self._made: list[Path] = []
 
     def hold(self) -> None:
         """Take the lock; do nothing when it is held and its file is still there.
@@ -72,22 +73,27 @@ class FolderLock:
         if self._is_held():
             return
         self._lock.release()
-        for attempt in range(_ATTEMPTS):
+        for _ in range(_ATTEMPTS):
             try:
-                self._made |= not self._path.parent.exists()
+                self._made += [folder for folder in self._path.parents if not folder.exists()]
                 self._path.parent.mkdir(parents=True, exist_ok=True)
                 self._lock.acquire()
                 self._file = os.stat(self._path)
                 return
             except Timeout:
-                raise self._refused("another run is writing to this folder") from None
+                problem = "another run is writing to this folder"
+                break
             except OSError as error:
                 if error.errno in _NO_LOCKS:
                     return
-                # another run may remove the folder between any two of these calls
-                if not isinstance(error, FileNotFoundError) or attempt == _ATTEMPTS - 1:
-                    raise self._refused(f"cannot be written to: {error.strerror}") from None
-                self._lock.release()
+                problem = f"cannot be written to: {error.strerror}"
+                if isinstance(error, FileExistsError | NotADirectoryError):
+                    problem = "is not a folder"
+                if not isinstance(error, FileNotFoundError):
+                    break
+                self._lock.release()  # another run removed the folder between two of these calls
+        self.release()
+        raise InputError(problem, key="--out", value=str(self._path.parent))
 
     def release(self) -> None:
         """Lift the lock and leave nothing of it."""
@@ -96,9 +102,9 @@ class FolderLock:
                 self._path.unlink(missing_ok=True)
         self._lock.release()
         self._file = None
-        if self._made:
-            with suppress(OSError):  # results are there, or the folder is gone
-                self._path.parent.rmdir()
+        with suppress(OSError):  # results are there, or a folder is gone
+            for folder in self._made:
+                folder.rmdir()
 
     def _is_held(self) -> bool:
         """Whether this lock is on the file of that name: others may have removed or made it."""
@@ -106,37 +112,3 @@ class FolderLock:
             return self._file is not None and os.path.samestat(os.stat(self._path), self._file)
         except OSError:
             return False
-
-    def _refused(self, problem: str) -> InputError:
-        return InputError(problem, key="--out", value=str(self._path.parent))
-
-
-def check_writable(folder: Path) -> None:
-    """Refuse a folder that could not be written to, before anything is computed.
-
-    Args:
-        folder: The folder; it and those above it may be missing.
-
-    Raises:
-        InputError: When what is there is no folder, or may not be written to.
-    """
-    problem = ""
-    try:
-        nearest = next(path for path in (folder, *folder.absolute().parents) if _exists(path))
-        if not nearest.is_dir():
-            problem = f"{nearest} is not a folder"
-        elif not os.access(nearest, os.W_OK | os.X_OK):
-            problem = f"{nearest} cannot be written to"
-    except OSError as error:  # a name longer than any
-        problem = f"cannot be used: {error.strerror}"
-    if problem:
-        raise InputError(problem, key="--out", value=str(folder))
-
-
-def _exists(path: Path) -> bool:
-    """Tell whether a path exists; `Path.exists` of newer Pythons hides that a name is too long."""
-    try:
-        path.stat()
-    except (FileNotFoundError, NotADirectoryError):
-        return False
-    return True

@@ -223,7 +223,7 @@ def test_concurrent_run_from_scene_to_fields(capsys, tmp_path):
         (("run", PAPER, "--out", PAPER + "/x"), "is not a folder"),
         (("run", PAPER, "--set", "surface.grid=[1000000, 1000000]"), "GB of memory"),
         (("run", PAPER, "--set", "block.cells=[10000, 10000, 1000]"), "GB of memory"),
-        (("run", PAPER, "--out", "x" * 300), "cannot be used: File name too long"),
+        (("run", PAPER, "--out", "x" * 300), "cannot be written to: File name too long"),
         (("run", "x" * 300), "cannot be read: File name too long"),
         (("run", "/dev/zero"), "/dev/zero: cannot be read: it is not a regular file"),
         (("run", PAPER, "--fast"), "unrecognized arguments: --fast (see: patchlaw --help)"),

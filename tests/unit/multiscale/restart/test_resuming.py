@@ -20,8 +20,9 @@ from multiscale.resolution import accuracy
 from multiscale.restart.checkpoint import (
     CheckpointWriter,
     checkpoint_of,
+    find_checkpoint,
+    go_on,
     read_checkpoint,
-    resolved_before,
     write_checkpoint,
 )
 from multiscale.restart.folder_lock import FolderLock
@@ -138,9 +139,13 @@ def interrupted(folder, ended, steps=2):
 
 
 def resumed(folder, changed):
-    run = Run(changed)
-    found = CheckpointWriter(folder, run, FolderLock(folder)).resume()
-    return run if found else None
+    """Return a run that goes on from the checkpoint in a folder; None without one."""
+    found = find_checkpoint(folder, changed)
+    if found is None:
+        return None
+    run = Run(changed, settled=found.resolved)
+    go_on(run, found, folder)
+    return run
 
 
 def test_load_steps_of_the_last_second_are_written_when_the_run_ends(tmp_path, ended):
@@ -226,11 +231,11 @@ def test_changed_scene_is_refused_with_the_key(tmp_path, ended, changes, text):
 def test_choices_for_another_scene_are_not_taken(tmp_path, ended):
     # they may not fit it: a micro model on a grid that the new surface does not have
     interrupted(tmp_path / "out", ended)
-    assert resolved_before(tmp_path / "out", ended.scene) == {}
+    assert find_checkpoint(tmp_path / "out", ended.scene).resolved == {}
     other = scene(ALONE | {"surface": {"grid": [32, 32]}})
     with pytest.raises(InputError, match=r"surface.grid = \[32, 32\].*allowed: \[48, 48\]"):
-        resolved_before(tmp_path / "out", other)
-    assert resolved_before(tmp_path / "elsewhere", other) is None
+        find_checkpoint(tmp_path / "out", other)
+    assert find_checkpoint(tmp_path / "elsewhere", other) is None
 
 
 def test_other_outputs_may_be_asked_for(tmp_path, ended):
@@ -293,7 +298,7 @@ def test_folder_that_becomes_a_file_under_way_ends_with_5(tmp_path, ended):
     lock.hold()
     shutil.rmtree(path.parent)
     path.parent.touch()
-    with pytest.raises(NotWritten, match="out: cannot be written to: ") as error:
+    with pytest.raises(NotWritten, match="out: is not a folder") as error:
         CheckpointWriter(path.parent, ended, lock).write()
     assert error.value.exit_code == 5
     lock.release()
@@ -322,8 +327,9 @@ def test_lock_is_lifted_where_its_file_must_stay(tmp_path, monkeypatch):
 
 def test_folder_of_a_file_cannot_be_locked(tmp_path):
     (tmp_path / "file").touch()
-    with pytest.raises(InputError, match="cannot be written to: Not a directory"):
-        FolderLock(tmp_path / "file" / "out").hold()
+    for path in (tmp_path / "file", tmp_path / "file" / "out"):
+        with pytest.raises(InputError, match=f"--out = '{path}': is not a folder"):
+            FolderLock(path).hold()
 
 
 def test_folder_that_cannot_be_made_is_refused():
@@ -331,14 +337,20 @@ def test_folder_that_cannot_be_made_is_refused():
         FolderLock(Path("/proc/nothing")).hold()
 
 
-def test_read_only_folder_is_refused_before_anything_is_made(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(os, "access", lambda path, mode: False)  # root may write everywhere
-    assert main(["run", str(PAPER), "--out", str(tmp_path / "out")]) == 2
-    told = capsys.readouterr()
-    assert f"--out = '{tmp_path}/out': {tmp_path} cannot be written to" in told.err
-    assert not told.out
+def test_folders_above_are_removed_as_well(tmp_path):
+    lock = FolderLock(tmp_path / "results" / "scene")
+    lock.hold()
+    assert (tmp_path / "results" / "scene" / ".lock").exists()
+    lock.release()
     assert not list(tmp_path.iterdir())
-    assert main(["plan", str(PAPER), "--set", "coupling.kind=analytic"]) == 0  # writes nothing
+
+
+def test_folder_that_cannot_be_written_to_is_refused_before_anything_is_made(capsys):
+    assert main([*WORDS[:2], "--out", "/proc/out", *WORDS[2:]]) == 2
+    told = capsys.readouterr()
+    assert "--out = '/proc/out': cannot be written to: " in told.err
+    assert not told.out
+    assert main(["plan", *WORDS[1:2], "--out", "/proc/out", *WORDS[2:]]) == 0  # writes nothing
 
 
 def test_full_disk_leaves_the_earlier_checkpoint(tmp_path, ended, monkeypatch):
