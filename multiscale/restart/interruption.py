@@ -100,8 +100,8 @@ class Interruption:
         if self._comm is not None:
             reason = max(self._comm.allgather(reason))
         if reason:
-            message = f"{_REASONS[reason]}: stopped {where}; go on with --resume"
-            raise Stopped(message, 4 if reason in _IN_TIME else 128 + int(reason))
+            code = 4 if reason in _IN_TIME else 128 + int(reason)
+            raise Stopped(f"{_REASONS[reason]}: stopped {where}; go on with --resume", code)
 
     def _is_late(self, last_step: float) -> bool:
         if self._limit is None:
