@@ -122,9 +122,9 @@ def enter(words, log, root):
     os.dup2(file, 1)
     os.dup2(file, 2)
     from multiscale.cli.command_line import main
-    from multiscale.restart import checkpoint
+    from multiscale.restart import resuming
 
-    checkpoint.LEAST_INTERVAL = 0.02  # these runs take less than the second between two writes
+    resuming.LEAST_INTERVAL = 0.02  # these runs take less than the second between two writes
     sys.exit(main(words))
 
 

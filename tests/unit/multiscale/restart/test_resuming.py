@@ -17,15 +17,9 @@ from multiscale import Run, Scene
 from multiscale.cli.command_line import main
 from multiscale.output.field_files import write_fields
 from multiscale.resolution import accuracy
-from multiscale.restart.checkpoint import (
-    CheckpointWriter,
-    checkpoint_of,
-    find_checkpoint,
-    go_on,
-    read_checkpoint,
-    write_checkpoint,
-)
+from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.restart.folder_lock import FolderLock
+from multiscale.restart.resuming import CheckpointWriter, find_checkpoint, go_on
 from multiscale.storage.serialisation import checksum
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"

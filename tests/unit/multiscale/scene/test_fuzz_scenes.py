@@ -11,8 +11,7 @@ from scene_inputs import BASE, KEYS, damaged, odd_text, planned, put, ran, scene
 
 from geometry.errors import InputError
 from multiscale.resolution.problem_setup import make_setup
-from multiscale.scene.files import MOST_BYTES, parsed
-from multiscale.scene.scene import Scene
+from multiscale.scene.scene import MOST_BYTES, Scene, parsed
 
 few = settings(
     derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)
