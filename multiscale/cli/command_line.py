@@ -118,7 +118,7 @@ def signals_raise() -> Iterator[None]:
     former: dict[int, Any] = {}
     if threading.current_thread() is threading.main_thread():  # no other thread may set handlers
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            if signal.getsignal(number) != signal.SIG_IGN:
+            if signal.getsignal(number) not in (None, signal.SIG_IGN):  # None: not of Python
                 former[number] = signal.signal(number, _raise)
     try:
         yield

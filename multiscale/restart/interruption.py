@@ -72,7 +72,8 @@ class Interruption:
             self._former = {
                 number: signal.signal(number, self._see)
                 for number in (*ENDING, signal.SIGUSR1)
-                if number == signal.SIGUSR1 or signal.getsignal(number) != signal.SIG_IGN
+                if number == signal.SIGUSR1
+                or signal.getsignal(number) not in (None, signal.SIG_IGN)  # None: not of Python
             }
         return self
 

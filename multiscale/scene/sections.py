@@ -80,6 +80,8 @@ Pair = Annotated[tuple[Count, Count], Field(description="x, y")]
 Heights = Annotated[int, Field(ge=4, le=1_000_000_000, strict=True)]
 """Number of heights along a side; fewer than four have no cubic interpolant."""
 
+HeightsGrid = Annotated[tuple[Heights, Heights] | Auto, OrAuto(tuple[Heights, Heights])]
+MeshCells = Annotated[tuple[Count, Count, Count] | Auto, OrAuto(tuple[Count, Count, Count])]
 Band = Annotated[tuple[Number, Number], Field(description="lower, upper number of waves per side")]
 
 
@@ -114,14 +116,7 @@ class SurfaceSection(Section):
 
     spectrum: SpectrumSection | None = None
     file: str | None = None
-    grid: (
-        Annotated[
-            tuple[Heights, Heights] | Auto,
-            OrAuto(tuple[Heights, Heights]),
-            Field(description="heights in x, y"),
-        ]
-        | None
-    ) = None
+    grid: Annotated[HeightsGrid, Field(description="heights in x, y")] | None = None
     lengths: tuple[PositiveLength, PositiveLength] | None = None
     detrend: Literal["none", "mean", "plane", "quadratic"] = "none"
     missing: Literal["refuse", "fill"] = "refuse"
@@ -155,14 +150,7 @@ class BlockSection(Section):
     young_modulus: Annotated[Pressure, Field(gt=0)]
     poisson_ratio: Annotated[Number, Field(gt=-1, lt=0.5)]
     sides: Literal["free", "roller"] = "free"
-    cells: (
-        Annotated[
-            tuple[Count, Count, Count] | Auto,
-            OrAuto(tuple[Count, Count, Count]),
-            Field(description="cells in x, y, z of the mesh under laws and of fields"),
-        ]
-        | None
-    ) = None
+    cells: Annotated[MeshCells, Field(description="cells in x, y, z")] | None = None
     element: Literal["Q1", "Q2", "P1", "P2"] = "Q1"
     grading: Annotated[Number, Field(ge=1, le=1e6, description="bottom to top layer height")] = 1.0
     margin: Annotated[Length, Field(ge=0, description="block beyond the interface")] = 0.0

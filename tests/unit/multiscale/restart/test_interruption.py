@@ -154,9 +154,9 @@ def test_nohup_is_obeyed():
         signal.signal(signal.SIGHUP, former)
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_what_is_told_to_end_clears_away(number):
-    left = []
+    left, former = [], signal.getsignal(number)
     with pytest.raises(Ended) as ended, signals_raise():
         try:
             os.kill(os.getpid(), number)
@@ -164,7 +164,7 @@ def test_what_is_told_to_end_clears_away(number):
             left.append("cleared")
     assert left == ["cleared"]
     assert ended.value.exit_code == 128 + number
-    assert signal.getsignal(number) == signal.SIG_DFL
+    assert signal.getsignal(number) == former
 
 
 HUNG_UP = """
