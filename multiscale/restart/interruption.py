@@ -6,6 +6,7 @@ import os
 import signal
 import threading
 import time
+from contextlib import suppress
 from types import FrameType
 from typing import Any
 
@@ -115,4 +116,5 @@ class Interruption:
         if number != signal.SIGUSR1:
             signal.signal(number, signal.SIG_DFL)
             # not through Python's buffers, which the interrupted code may be using
-            os.write(2, b"\npatchlaw: stops after this load step; once more ends it at once\n")
+            with suppress(OSError):  # standard error may be full
+                os.write(2, b"\npatchlaw: stops after this load step; once more ends it at once\n")
