@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from multiscale.cli.command_line import main
+from multiscale.comparison.outcomes import AGAINST
 
 PAPER = str(Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml")
 SMALL = [
@@ -158,17 +159,23 @@ def test_version(capsys, monkeypatch):
     assert capsys.readouterr().out == "patchlaw not installed, dolfinx not installed\n"
 
 
-def test_version_loads_no_finite_elements():
+@pytest.mark.parametrize("words", [["--help"], ["--version"], ["run", "--help"]])
+def test_help_and_version_load_the_standard_library_alone(root, words):
     code = (
         "import sys; from multiscale.cli.command_line import main\n"
-        "try: main(['--version'])\n"
-        "finally: print('dolfinx' in sys.modules)"
+        f"code = main({words})\n"
+        "heavy = {'numpy', 'scipy', 'pydantic', 'rich', 'mpi4py', 'dolfinx', 'geometry', 'micro'}\n"
+        "print(code, sorted(heavy & set(sys.modules)))"
     )
-    root = Path(__file__).parents[4]
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=False
     )
-    assert (done.returncode, done.stdout.splitlines()[-1]) == (0, "False"), done.stderr
+    assert (done.returncode, done.stdout.splitlines()[-1]) == (0, "0 []"), done.stderr
+
+
+def test_help_names_what_a_comparison_can_be_against(capsys):
+    assert main(["compare", "--help"]) == 0
+    assert ", ".join(AGAINST) in " ".join(capsys.readouterr().out.split())
 
 
 @pytest.mark.parametrize(("command", "file"), [("laws", "laws.h5"), ("surface", "surface.png")])
