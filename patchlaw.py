@@ -1,6 +1,6 @@
 """Contact of rough surfaces: what most users need, under one name, and the command ``patchlaw``.
 
-The code lives in `geometry`, `micro`, `macro` and `multiscale`, and is loaded when it is asked for.
+The code is in `geometry`, `micro`, `macro` and `multiscale`; a name is imported with its first use.
 """
 
 from __future__ import annotations

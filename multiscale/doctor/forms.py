@@ -169,7 +169,7 @@ def warm(elements: Sequence[str], comm: Any = None) -> tuple[Path, int]:
         The folder of the compiled forms, and how many are in it.
 
     Raises:
-        InputError: When an element is unknown, or forms cannot be compiled or kept.
+        InputError: When an element is unknown, or forms cannot be compiled or stored.
 
     Note:
         Collective.

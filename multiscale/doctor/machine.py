@@ -89,7 +89,7 @@ def blas(comm: Any, libraries: Sequence[dict[str, Any]] | None = None) -> list[C
 
     Args:
         comm: MPI communicator, or None.
-        libraries: What threadpoolctl says of the loaded libraries; by default it is asked.
+        libraries: What threadpoolctl finds of loaded libraries; by default those of this process.
     """
     if libraries is None:
         importlib.import_module("scipy.linalg")  # loads it
@@ -137,15 +137,15 @@ def launcher_of(library: str, shown: str) -> CheckResult:
     text, remedy = f"{library}, mpirun of the same family", ""
     mark = next((mark for mark in _LAUNCHERS if mark in shown), "")
     family = _LAUNCHERS.get(mark, shown)
-    ours, theirs = (re.search(r"(\d+)\.\d+", text) for text in (library, shown))
+    built, found = (re.search(r"(\d+)\.\d+", text) for text in (library, shown))
     if not shown:
         state, text = "warning", f"{library}, no mpirun on PATH"
         remedy = "for parallel runs: apt-get install mpi-default-bin"
     elif family not in library and not (mark == "Intel" and mark in library):
         state, text = "fail", f"mpi4py runs on {library}, but mpirun belongs to {family}"
         remedy = f"put the mpirun of {library} first on PATH"
-    elif ours and theirs and ours[1] != theirs[1]:
-        state, text = "warning", f"{library}, but mpirun is version {theirs[0]}"
+    elif built and found and built[1] != found[1]:
+        state, text = "warning", f"{library}, but mpirun is version {found[0]}"
         remedy = "put the mpirun of the same version on PATH"
     return CheckResult("launcher", state, text, remedy)
 

@@ -1,1 +1,1 @@
-"""What is kept of a run while it goes on, so that none is lost."""
+"""Checkpoints, signals and the folder lock: how a run is stopped and goes on later."""

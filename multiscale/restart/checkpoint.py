@@ -38,7 +38,7 @@ class Checkpoint:
 
     Attributes:
         scene: The scene as it was given, as nested dictionaries.
-        resolved: Values that were found for the keys that the scene leaves open.
+        resolved: Values of the scene's keys that are "auto" or not stated, by dotted key.
         heights: SHA-256 of the surface's heights.
         laws: Bytes of the law file; empty without laws.
         steps: The accepted load steps.
@@ -125,21 +125,21 @@ def read_checkpoint(path: Path) -> Checkpoint:
     Raises:
         InputError: When it is none, is of another format or damaged.
     """
-    problem: str
-    told: dict[str, Any] = {}
-    if not path.is_file():  # a pipe would be waited for
-        problem = "is no file"
-    else:
-        try:
-            return _read(path)
-        except InputError as error:
-            problem, told = error.problem, {"value": error.value, "allowed": error.allowed}
-        except OSError as error:
-            problem = f"cannot be read: {error}"
-        except Exception as error:  # the checksum fits content that this version does not know
-            problem = f"is not understood: {error!r}"
+    try:
+        if not path.is_file():  # a pipe would be waited for
+            raise InputError("is no file")
+        return _read(path)
+    except InputError as error:
+        found = error
+    except OSError as error:
+        found = InputError(f"cannot be read: {error}")
+    except Exception as error:  # the checksum fits content that this version does not know
+        found = InputError(f"is not understood: {error!r}")
     raise InputError(
-        f"{problem}; remove it, or run without --resume to begin anew", file=str(path), **told
+        f"{found.problem}; remove it, or run without --resume to begin anew",
+        file=str(path),
+        value=found.value,
+        allowed=found.allowed,
     )
 
 

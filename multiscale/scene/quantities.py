@@ -27,7 +27,7 @@ _UNITS = {
     "N": _Unit('"5 N"', (1e-30, 1e30), {"N": 1.0, "mN": 1e-3, "kN": 1e3}),
     "s": _Unit('"55 min"', (1e-3, 1e12), {"s": 1.0, "min": 60.0, "h": 3600.0}),
 }
-"""Target units in pint's notation; none is a ratio.
+"""Target units in pint's notation; an empty one is a ratio.
 
 Scenes with common spellings do without pint, whose import takes 0.25 to 0.34 s.
 """
@@ -47,7 +47,7 @@ def _registry() -> Any:
 
     try:
         return pint.UnitRegistry(cache_folder=":auto:")
-    except Exception:  # whatever reading a damaged cache, or writing where nobody may, raises
+    except Exception:  # the cache is damaged, or its folder cannot be written to
         return pint.UnitRegistry()
 
 

@@ -198,7 +198,7 @@ def stored_numbers(item: Any) -> NDArray[Any]:
     kind = getattr(getattr(item, "dtype", None), "kind", "")
     if not kind or kind not in "biuf":
         raise InputError(f"{item.name} is not a column of numbers")
-    # ours are neither packed nor spread over files: a small file promises no large array
+    # our columns are not compressed and lie in the file itself: larger than it, they are damaged
     if item.nbytes > item.id.get_storage_size() or item.external:
         raise InputError(f"{item.name} is not whole", value=item.shape)
     return np.asarray(item[()])
