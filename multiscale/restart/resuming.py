@@ -27,7 +27,7 @@ FILE_NAME = "checkpoint.h5"
 
 LEAST_INTERVAL = 1.0
 """Least wall time between two writes [s]; a kill loses the load steps of this time."""
-_LEAST_RATIO = 20.0
+LEAST_RATIO = 20.0
 """Least wall time between two writes over that of a write; so writing takes 5 % at most."""
 
 
@@ -119,7 +119,7 @@ class CheckpointWriter:
         write_checkpoint(self.path, self._pending)
         self._pending = None
         now = time.monotonic()
-        self._due = now + max(LEAST_INTERVAL, _LEAST_RATIO * (now - began))
+        self._due = now + max(LEAST_INTERVAL, LEAST_RATIO * (now - began))
 
 
 def find_checkpoint(folder: Path, scene: Scene) -> Checkpoint | None:

@@ -124,7 +124,8 @@ def enter(words, log, root):
     from multiscale.cli.command_line import main
     from multiscale.restart import resuming
 
-    resuming.LEAST_INTERVAL = 0.02  # these runs take less than the second between two writes
+    # these runs take less than the second between two writes
+    resuming.LEAST_INTERVAL = resuming.LEAST_RATIO = 0.0
     sys.exit(main(words))
 
 
