@@ -55,7 +55,7 @@ class Response:
         mean_separation: Average gap, shape (n,) [mm].
         iterations: Iterations of the solver, shape (n,).
         residual: Complementarity error relative to the largest required displacement, shape (n,).
-        engulfed: Pairs of merged asperities, shape (n,).
+        overlapping_contacts: Pairs of merged asperities, shape (n,).
         patch_force: Force on the patch, contacts across its border shared, shape (n, N) [N].
         patch_contact_area: Real contact area in the patch, shared likewise, shape (n, N) [mm²].
         patch_contacts: Number of contacts with their summit in the patch, shape (n, N).
@@ -79,7 +79,7 @@ class Response:
     mean_separation: Array
     iterations: Counts
     residual: Array
-    engulfed: Counts
+    overlapping_contacts: Counts
     patch_force: Array
     patch_contact_area: Array
     patch_contacts: Counts

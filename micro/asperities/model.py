@@ -182,7 +182,7 @@ class AsperityModel:
             contact_area=hertz.area * own,
             force=hertz.force * own**1.5,
             peak_pressure=hertz.peak_pressure * np.sqrt(own),
-            engulfed=solution.engulfed,
+            overlapping_contacts=solution.overlapping_contacts,
             iterations=solution.iterations,
             residual=solution.residual,
         )

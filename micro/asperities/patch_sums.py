@@ -81,7 +81,7 @@ class PatchSums:
             "mean_separation": np.average(separation, weights=self.patches.areas),
             "iterations": solution.iterations,
             "residual": solution.residual,
-            "engulfed": solution.engulfed,
+            "overlapping_contacts": solution.overlapping_contacts,
             "patch_force": self._summed(share.patch, share.force * force[share.contact]),
             "patch_contact_area": self._summed(share.patch, share.area * area[share.contact]),
             "patch_contacts": self._summed(self.owner[on], None),
@@ -96,7 +96,9 @@ class PatchSums:
 
     def _warning(self, name: str, row: dict[str, Any]) -> str:
         fraction = row["contact_area"] / np.prod(self.patches.sides)
-        alone = row["contacts"] + row["engulfed"] < 2  # in a small patch, say: Hertz's contact
+        alone = (
+            row["contacts"] + row["overlapping_contacts"] < 2
+        )  # in a small patch, say: Hertz's contact
         if fraction <= LARGEST_AREA_FRACTION or alone:
             return ""
         return (

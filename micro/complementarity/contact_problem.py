@@ -34,7 +34,7 @@ class Displacements(Protocol):
         """Displacement of every summit by the others, shape (n,) [mm]."""
 
     @property
-    def engulfed(self) -> int:
+    def overlapping_contacts(self) -> int:
         """Number of ordered pairs whose slope has reached c*."""
 
 
@@ -86,14 +86,14 @@ class Solution(NamedTuple):
         displacement: Displacements w of the summits, shape (n,) [mm].
         iterations: Linear systems solved on the way.
         residual: Complementarity error relative to the largest required displacement.
-        engulfed: Ordered pairs of asperities beyond the merging slope.
+        overlapping_contacts: Ordered pairs of asperities beyond the merging slope.
     """
 
     indentation: Array
     displacement: Array
     iterations: int
     residual: float
-    engulfed: int
+    overlapping_contacts: int
 
 
 Method = Callable[[ContactProblem[Any], Array], Solution]
@@ -106,7 +106,7 @@ def solution(
     """Put a solution together from its indentations, negative ones cut to 0, and their lift."""
     own = np.maximum(indentation, 0.0)
     residual = problem.residual(own, lift)
-    return Solution(own, own + lift.displacement, iterations, residual, lift.engulfed)
+    return Solution(own, own + lift.displacement, iterations, residual, lift.overlapping_contacts)
 
 
 def solve(problem: ContactProblem[Any], method: Method, start: Array) -> Solution:

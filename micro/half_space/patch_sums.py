@@ -56,7 +56,7 @@ class CellSums:
             "mean_separation": np.average(separation, weights=self.patches.areas),
             "iterations": state.iterations,
             "residual": state.residual,
-            "engulfed": 0,
+            "overlapping_contacts": 0,
             "patch_force": self._sums(state.pressure),
             "patch_contact_area": self._sums(area),
             "patch_contacts": np.bincount(owner, minlength=self.patches.count),

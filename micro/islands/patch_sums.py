@@ -67,7 +67,7 @@ class IslandSums:
             "mean_separation": np.average(separation, weights=self.patches.areas),
             "iterations": state.iterations,
             "residual": state.residual,
-            "engulfed": state.merged,
+            "overlapping_contacts": state.merged,
             "patch_force": state.force @ force_share,
             "patch_contact_area": state.contact_area @ area_share,
             "patch_contacts": np.bincount(owner, minlength=self.patches.count),

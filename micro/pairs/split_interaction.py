@@ -55,7 +55,7 @@ class SplitLift(NamedTuple):
     far: FarField
 
     @property
-    def engulfed(self) -> int:
+    def overlapping_contacts(self) -> int:
         """Number of ordered pairs (k, i) whose slope has reached c*."""
         return int(np.count_nonzero(self.slope >= MERGING_SLOPE * (1.0 - 1e-12)))
 

@@ -42,7 +42,7 @@ def test_against_brute_force(case, solver):
     model = asperity_model("elliptic", asperities, contact_modulus=E_STAR, solver=solver)
     state = model.solve(approach)
     assert np.flatnonzero(state.in_contact).tolist() == contacting
-    assert state.engulfed == 0  # the oracle has the exact kernel
+    assert state.overlapping_contacts == 0  # the oracle has the exact kernel
     # The oracle's quadratures are good to 1e-10 at these distances, the solver stops at 1e-10.
     assert state.force == pytest.approx(E_STAR * force, rel=1e-7, abs=1e-12)
     assert state.displacement == pytest.approx(displacement, rel=1e-8)

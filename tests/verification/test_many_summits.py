@@ -49,7 +49,7 @@ def test_displacements(name, way, worst, mean, size):
     lift = split(model.contacts.interaction, way, t).lift(t)
     error = np.abs(lift.displacement - exact.displacement) / exact.displacement.mean()
     assert error.max() < worst and np.sqrt(np.mean(error**2)) < mean
-    assert lift.engulfed == exact.engulfed
+    assert lift.overlapping_contacts == exact.overlapping_contacts
     assert lift.active.tolist() == exact.active.tolist()
     # Products take distant contacts as point forces: 1e-2 suffices for the iteration.
     change = np.zeros(1500)
@@ -69,13 +69,15 @@ def test_solutions(name):
         for way in PAIR_SUMS
     }
     direct = curve["direct"]
-    assert direct.contacts[-1] > 300 and direct.engulfed[-1] > 0
+    assert direct.contacts[-1] > 300 and direct.overlapping_contacts[-1] > 0
     for way, tolerance in (("multipole", 1e-9), ("mesh", 1e-5)):
         # Solved to 1e-10 of the approach, the multipoles good to 1e-11, the mesh to 1e-5.
         assert curve[way].force == pytest.approx(direct.force, rel=tolerance)
         assert curve[way].patch_force == pytest.approx(direct.patch_force, rel=10 * tolerance)
         assert curve[way].contact_area == pytest.approx(direct.contact_area, rel=tolerance)
-        assert np.abs(curve[way].engulfed - direct.engulfed).max() <= (way == "mesh")
+        assert np.abs(curve[way].overlapping_contacts - direct.overlapping_contacts).max() <= (
+            way == "mesh"
+        )
         assert curve[way].residual.max() <= 1e-10
 
 

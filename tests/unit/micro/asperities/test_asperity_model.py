@@ -170,7 +170,7 @@ def test_round_asperities_make_the_models_equal(summits):
 def test_surface_displacement(cluster, name):
     model = asperity_model(name, cluster, contact_modulus=E_STAR)
     state = model.solve(2e-4)  # small contacts: no kernel is continued
-    assert state.engulfed == 0
+    assert state.overlapping_contacts == 0
     summits = model.surface_displacement(state, cluster.x, cluster.y)
     assert summits == pytest.approx(state.displacement, rel=1e-12)
     far = model.surface_displacement(state, 1e3, 0.0)

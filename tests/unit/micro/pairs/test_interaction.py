@@ -34,7 +34,7 @@ def test_lift_is_hertz_displacement(cluster):
             local = apart * np.exp(-1j * cluster.angle[i])
             expected[k] += contact.displacement(local.real, local.imag)
     assert lift.displacement == pytest.approx(expected, rel=1e-13)  # same formula, pair by pair
-    assert lift.engulfed == 0
+    assert lift.overlapping_contacts == 0
 
 
 @both_shapes
@@ -62,7 +62,7 @@ def test_continuation_is_smooth(summits, circular):
     lifts = [kernel.lift(np.array([t, 0.0])) for t in depth]
     value = np.array([lift.displacement[1] for lift in lifts])
     slope = np.array([lift.slope[1, 0] for lift in lifts])
-    merged = np.array([lift.engulfed for lift in lifts]) > 0
+    merged = np.array([lift.overlapping_contacts for lift in lifts]) > 0
     first = np.flatnonzero(merged)[0]
     assert 0 < first < 4000 and np.all(merged[first:])
     assert np.all(np.diff(slope) >= -1e-15) and np.all(np.abs(slope[merged] - slope[-1]) < 1e-15)
@@ -78,7 +78,7 @@ def test_coincident_summits(summits, circular):
     twins = summits([0.5, 0.5], 0.5, major=0.2, minor=0.1)
     lift = interaction(twins, circular).lift(np.array([1e-3, 1e-3]))
     assert lift.displacement == pytest.approx(MERGING_SLOPE * np.full(2, 1e-3), rel=1e-14)
-    assert lift.engulfed == 2
+    assert lift.overlapping_contacts == 2
 
 
 def test_merging_slope_gives_twins_the_force_of_one():
