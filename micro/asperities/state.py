@@ -48,7 +48,7 @@ class AsperityState:
         contact_area: Areas π a b, shape (n,) [mm²].
         force: Forces P_k, shape (n,) [N].
         peak_pressure: Pressures at the centres of the contacts, shape (n,) [MPa].
-        overlapping_contacts: Number of ordered pairs (k, i) of summits within the plane's reach in which
+        overlapping_contacts: Number of ordered pairs (k, i) of summits below the plane in which
             contact i has come so close to summit k that `micro.pairs.interaction` limits its
             kernel.
         iterations: Linear systems solved; 0 for the models without interaction.

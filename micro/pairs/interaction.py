@@ -10,8 +10,8 @@ jump. The kernel is therefore exact only up to c* = 2^(2/3) − 1 ≈ 0.587 (for
 r_ik) and continued with the constant slope c* beyond, once continuously differentiable. With this
 c* two coincident equal asperities carry together exactly the force of one, as they should:
 t (1 + c*) = d and 2 t^(3/2) = d^(3/2). More than two at one place carry too little: n equal ones
-n (1 + (n − 1) c*)^(−3/2) of one, 0.94 for 3 and 0.82 for 5. Pairs beyond c* are called overlapping_contacts and
-are counted, so that a result can be judged.
+n (1 + (n − 1) c*)^(−3/2) of one, 0.94 for 3 and 0.82 for 5. Pairs beyond c* count as overlapping
+contacts, so that a result can be judged.
 """
 
 from __future__ import annotations
