@@ -6,10 +6,9 @@ along approaches each gives a `Response` of the surface and its patches; `love` 
 of pressure move the half-space.
 """
 
-from micro.asperities.many_summits import PAIR_SUMS
-from micro.asperities.model import MODELS, SOLVERS, AsperityModel, ModelKind, asperity_model
+from micro.asperities.contacts import SOLVERS, AsperityState
+from micro.asperities.model import MODELS, AsperityModel, ModelKind, asperity_model
 from micro.asperities.scaled_model import BORDERS, CURVATURES, ScaledModel
-from micro.asperities.state import AsperityState
 from micro.choice.candidates import Candidate, resampled
 from micro.choice.selection import Choice, choose
 from micro.closed_forms.boussinesq import HalfSpace
@@ -39,7 +38,7 @@ from micro.half_space.model import HalfSpaceModel
 from micro.half_space.slope_effect import finite_slope_effect
 from micro.half_space.state import HalfSpaceState
 from micro.islands.model import IslandModel
-from micro.islands.state import IslandState
+from micro.islands.shapes import IslandState
 from micro.model import MicroModel
 from micro.plane import RigidPlane
 from micro.response import Pressed, Response
@@ -49,7 +48,6 @@ __all__ = [
     "CURVATURES",
     "MODELS",
     "MODEL_NAMES",
-    "PAIR_SUMS",
     "SOLVERS",
     "START_KINDS",
     "AsperityModel",

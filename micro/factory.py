@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from geometry import Surface, find_asperities
 from geometry.errors import InputError
-from micro.asperities.model import MODELS, Balanced, asperity_model
+from micro.asperities.model import MODELS, Equilibrium, asperity_model
 from micro.asperities.scaled_model import ScaledModel
-from micro.complementarity.contact_problem import Solution
 from micro.half_space.model import HalfSpaceModel
+from micro.interaction.contact_problem import Solution
 from micro.islands.model import IslandModel
 from micro.model import MicroModel
 from micro.plane import RigidPlane
@@ -15,7 +15,7 @@ from micro.plane import RigidPlane
 MODEL_NAMES = (*MODELS, "islands", "half-space")
 """Names of all micro models, the cheapest kinds first."""
 
-START_KINDS: tuple[type, ...] = (RigidPlane, Balanced, Solution)
+START_KINDS: tuple[type, ...] = (RigidPlane, Equilibrium, Solution)
 """Kinds of records that starts of `MicroModel.press` consist of, beside arrays and tuples."""
 
 

@@ -40,7 +40,7 @@ class Response:
     g_i = z_M − mean height − mean approach + mean displacement, per patch; for the models without
     interaction too, as their forces move the surface all the same. The paper's eq. 9 leaves the
     displacement out. Means over patches and over all of them are those of the models' pressures, to
-    the errors stated in `micro.patch_displacement`.
+    the errors stated in `micro.patch_sums`.
 
     Args:
         model: Name of the micro model.
@@ -54,7 +54,7 @@ class Response:
         contacts: Number of asperities in contact, shape (n,).
         mean_separation: Average gap, shape (n,) [mm].
         iterations: Iterations of the solver, shape (n,).
-        residual: Complementarity error relative to the largest required displacement, shape (n,).
+        residual: Complementarity error relative to the largest interference, shape (n,).
         overlapping_contacts: Pairs of merged asperities, shape (n,).
         patch_force: Force on the patch, contacts across its border shared, shape (n, N) [N].
         patch_contact_area: Real contact area in the patch, shared likewise, shape (n, N) [mm²].

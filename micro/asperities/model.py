@@ -1,9 +1,8 @@
-"""The four discrete models: asperities, elliptic or circular, with or without interaction.
+"""The four asperity models: elliptic or circular contacts, with or without interaction.
 
-A rigid plane that has approached by δ asks every summit for the displacement
-d_k = <δ(x_k) − (z_M − z_k)>. Without interaction each contact makes it alone, w_k = d_k; with
-interaction the displacements by all contacts add up to w_k
-(`micro.complementarity.contact_problem`).
+A rigid plane that has approached by δ interferes with every summit by d_k = <δ(x_k) − (z_M − z_k)>.
+Without interaction each contact makes this displacement alone, w_k = d_k. With interaction the
+displacements by all contacts add up to w_k (`micro.interaction.contact_problem`).
 """
 
 from __future__ import annotations
@@ -19,23 +18,25 @@ from numpy.typing import ArrayLike, NDArray
 
 from geometry import Asperities, Control, Partition, PatchGrid
 from geometry.errors import InputError
-from micro.asperities.contacts import SOLVERS, SummitContacts
-from micro.asperities.many_summits import PAIR_SUMS
-from micro.asperities.patch_sums import PatchSums
-from micro.asperities.state import AsperityState
-from micro.checks import checked_approaches, checked_means
-from micro.complementarity.contact_problem import Solution
+from micro.asperities.contacts import SOLVERS, AsperityContacts, AsperityState
+from micro.asperities.patch_shares import shares
 from micro.compliance.body_modes import BodyModes
+from micro.interaction.contact_problem import Solution
+from micro.model import checked_approaches, checked_patches
+from micro.patch_sums import EllipticContacts, PatchSums
 from micro.plane import RigidPlane
 from micro.plane_equilibrium import Held, Peaks, balanced
 from micro.response import Pressed, Response
 
 Array = NDArray[np.float64]
 
+LARGEST_AREA_FRACTION = 0.1
+"""Contact area fraction up to which summits count as separate; errors may be large before."""
+
 _LEVEL = (0.0, 0.0)
 
 
-class Balanced(NamedTuple):
+class Equilibrium(NamedTuple):
     """Contacts in equilibrium with a plane.
 
     Attributes:
@@ -72,12 +73,10 @@ MODELS: Mapping[str, ModelKind] = MappingProxyType(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AsperityModel:
-    """One of the four discrete models on given asperities.
+    """One of the four asperity models on given asperities.
 
-    How the interaction is summed over pairs follows from the number of summits in reach
-    (`micro.asperities.many_summits`): exactly up to 2000, through a mesh above. The truncated
-    Newton method sums every pair directly; its time and memory grow with the square of their
-    number.
+    The interaction is summed over all pairs of the summits that the plane reaches. Time and memory
+    grow with the square of their number, as far as the memory allows.
 
     Args:
         asperities: The n summits, with the highest point z_M that the approach counts from.
@@ -85,14 +84,12 @@ class AsperityModel:
         elliptic: Whether contacts are ellipses; circles of radius sqrt(R' R'') otherwise.
         interacting: Whether contacts displace each other's summits.
         solver: Solver of the models with interaction, a name in `SOLVERS`.
-        pairs: How to sum over pairs, a name in `PAIR_SUMS`, or ``"auto"`` by their number.
         body: What a finite body with its sides adds to the half-space, between all contacts, also
             those of the models without interaction; a half-space when not given. On thin blocks it
             takes away from the interaction: models without any may then have no solution.
 
     Raises:
-        InputError: When the modulus is not positive, the solver or the sum unknown, or the
-            truncated Newton method shall use another sum than the direct one.
+        InputError: When the modulus is not positive or the solver unknown.
 
     Source:
         Waddad et al. 2016, section 1.2, doi 10.1016/j.triboint.2015.12.023.
@@ -103,13 +100,10 @@ class AsperityModel:
     elliptic: bool
     interacting: bool
     solver: str = "active-set"
-    pairs: str = "auto"
     body: BodyModes | None = None
 
     def __post_init__(self) -> None:
-        _known(self.solver, SOLVERS, "solver")
-        allowed = ("auto", *PAIR_SUMS) if self.solver == "active-set" else ("auto", "direct")
-        _known(self.pairs, allowed, f"sum over pairs with the solver {self.solver}")
+        checked_name(self.solver, SOLVERS, "solver")
         _ = self.contacts.hertz  # checks the modulus
 
     @property
@@ -136,15 +130,14 @@ class AsperityModel:
         return alone, patches.single(index)
 
     @cached_property
-    def contacts(self) -> SummitContacts:
+    def contacts(self) -> AsperityContacts:
         """The contacts that the summits can make."""
-        return SummitContacts(
+        return AsperityContacts(
             asperities=self.asperities,
             contact_modulus=self.contact_modulus,
             elliptic=self.elliptic,
             interacting=self.interacting,
             solver=self.solver,
-            pairs=self.pairs,
             body=self.body,
         )
 
@@ -163,7 +156,8 @@ class AsperityModel:
             start: A solution nearby to start from.
 
         Raises:
-            InputError: When the approach or the tilt is not finite.
+            InputError: When the approach or the tilt is not finite, or the interaction of all
+                contacts does not fit into the memory.
             NotConverged: When the contact conditions cannot be met to 1e-10.
         """
         plane = RigidPlane.above(self.asperities, approach, tilt)
@@ -175,8 +169,8 @@ class AsperityModel:
         own, hertz = solution.indentation, self.contacts.hertz
         return AsperityState(
             approach=plane.approach,
-            required=plane.required(self.asperities),
-            displacement=own + self.contacts.lift(own),
+            interference=plane.required(self.asperities),
+            displacement=self.contacts.displacement(own),
             indentation=own,
             semi_axes=hertz.semi_axes * np.sqrt(own)[:, None],
             contact_area=hertz.area * own,
@@ -191,43 +185,46 @@ class AsperityModel:
         self,
         approaches: ArrayLike,
         *,
-        patches: Partition,
-        mean_heights: ArrayLike,
+        patches: Partition | None = None,
+        mean_heights: ArrayLike | None = None,
         tilt: tuple[float, float] = _LEVEL,
     ) -> Response:
         """Solve along approaches, each from the solution before it; see `MicroModel.respond`."""
         given = checked_approaches(approaches)
-        sums = self.sums(patches, mean_heights)
+        sums = PatchSums.of(self, *checked_patches(self.asperities, patches, mean_heights))
+        owner = sums.patches.index_of(self.asperities.x, self.asperities.y)
         rows: dict[int, dict[str, Any]] = {}
         own: Array = np.zeros(len(self.asperities))
         before = own
         for index in np.argsort(given, kind="stable"):
             plane = RigidPlane.above(self.asperities, given[index], tilt)
-            # Going on as before is right to second order when the steps are equal.
+            # With equal steps, linear extrapolation is right to second order.
             start = np.maximum(2.0 * own - before, 0.0)
-            found = self.contacts.solution(plane.overlap(self.asperities), start)
-            own, before = found.indentation, own
-            rows[int(index)] = sums.row(plane, found)
+            solution = self.contacts.solution(plane.overlap(self.asperities), start)
+            own, before = solution.indentation, own
+            rows[int(index)] = self.row(Equilibrium(plane, solution), sums, owner)
         return sums.response(self.name, [rows[index] for index in range(len(given))])
 
     def press(
         self,
         control: Control,
         *,
-        patches: Partition,
-        mean_heights: ArrayLike,
+        patches: Partition | None = None,
+        mean_heights: ArrayLike | None = None,
         start: Any = None,
     ) -> Pressed:
         """Solve one load step; see `MicroModel.press`."""
-        sums = self.sums(patches, mean_heights)
+        sums = PatchSums.of(self, *checked_patches(self.asperities, patches, mean_heights))
+        owner = sums.patches.index_of(self.asperities.x, self.asperities.y)
         found = self.equilibrium(control, start)
-        response = sums.response(self.name, [sums.row(found.plane, found.solution)])
+        response = sums.response(self.name, [self.row(found, sums, owner)])
         return Pressed(response, found.plane, found)
 
-    def equilibrium(self, control: Control, start: Balanced | None = None) -> Balanced:
+    def equilibrium(self, control: Control, start: Equilibrium | None = None) -> Equilibrium:
         """Solve the contacts, and the motions of the plane that are free.
 
-        Without force the plane touches first, under the slopes of the start where they are free.
+        Without force the plane is that of first touch; where its slopes are free they are those
+        of the start.
 
         Args:
             control: What is prescribed of the plane.
@@ -236,7 +233,7 @@ class AsperityModel:
         Raises:
             InputError: When the start is of other asperities.
             NotConverged: When the contact conditions cannot be met to 1e-10, or no plane is in
-                balance.
+                equilibrium.
         """
         own, spent = np.zeros(len(self.asperities)), 0
         if start is not None:
@@ -249,27 +246,28 @@ class AsperityModel:
             )
         peaks, first = self._peaks, self.first_plane(control, start)
 
-        def evaluate(motion: Array) -> tuple[Held, Balanced]:
+        def evaluate(motion: Array) -> tuple[Held, Equilibrium]:
             nonlocal own, spent
             plane = self._plane(motion)
             found = self.contacts.solution(plane.overlap(self.asperities), own)
             own, spent = found.indentation, spent + found.iterations
             loads = peaks.lever.T @ (self.contacts.hertz.force * own**1.5)
-            known = Balanced(plane, found._replace(iterations=spent))
+            known = Equilibrium(plane, found._replace(iterations=spent))
             return Held(loads, self.contacts.stiffness(own, peaks.lever)), known
 
         motion = np.array([first.approach, *first.tilt])
         return balanced(evaluate, control, motion, peaks)[1]
 
-    def first_plane(self, control: Control, start: Balanced | None = None) -> RigidPlane:
-        """Return the plane that an equilibrium is looked for from.
+    def first_plane(self, control: Control, start: Equilibrium | None = None) -> RigidPlane:
+        """Return the plane that the search for an equilibrium starts from.
 
         Args:
             control: What is prescribed of the plane.
-            start: A solution nearby; without, contacts that do not see each other tell.
+            start: A solution nearby; without it the plane is that of contacts that do not
+                displace each other's summits.
 
         Raises:
-            NotConverged: When no plane can be in balance.
+            NotConverged: When no plane can be in equilibrium.
         """
         near = None
         if start is not None and (start.solution.indentation.any() or control.force == 0.0):
@@ -282,7 +280,7 @@ class AsperityModel:
 
     @property
     def _peaks(self) -> Peaks:
-        """The summits as the plane sees them; not kept, for models are sent between processes."""
+        """The summits under the plane; not cached, because models are sent between processes."""
         a = self.asperities
         middle, sides = 0.5 * np.asarray(a.lengths), np.hypot(*a.lengths)
         lever = np.stack([np.ones(len(a)), a.x - middle[0], a.y - middle[1]], axis=1)
@@ -312,27 +310,55 @@ class AsperityModel:
             total += contact.displacement(cos * dx + sin * dy, cos * dy - sin * dx)
         return total
 
-    def sums(
-        self, patches: Partition, mean_heights: ArrayLike, home: Asperities | None = None
-    ) -> PatchSums:
-        """Return what sums the results of this model over patches.
+    def row(
+        self,
+        found: Equilibrium,
+        sums: PatchSums,
+        owner: NDArray[np.intp],
+        name: str | None = None,
+    ) -> dict[str, Any]:
+        """Return the fields of a response for one plane.
+
+        A contact that straddles borders is shared among patches by the integral of its pressure
+        (`micro.asperities.patch_shares`); as a contact it counts for the patch that holds its
+        summit. The paper assigns it whole.
 
         Args:
-            patches: Patches; every asperity lies in one.
-            mean_heights: Mean heights of the surface on the patches, shape (N,) [mm].
-            home: The summits, where they are not the centres of the contacts.
-
-        Raises:
-            InputError: When a summit lies outside the patches, or the mean heights do not fit.
+            found: The plane and the contacts under it.
+            sums: The sums over patches.
+            owner: Flat index of the patch that holds each summit, shape (n,).
+            name: Name of the model in warnings; its own when not given.
         """
-        return PatchSums(
-            asperities=self.asperities,
-            home=self.asperities if home is None else home,
-            patches=patches,
-            mean_heights=checked_means(mean_heights, patches),
-            hertz=self.contacts.hertz,
-            contact_modulus=self.contact_modulus,
-            body=self.contacts.points,
+        (plane, solution), a, hertz = found, self.asperities, self.contacts.hertz
+        on = np.flatnonzero(solution.indentation > 0.0)
+        t = solution.indentation[on]
+        contacts = EllipticContacts(
+            position=np.stack([a.x[on], a.y[on]], axis=1),
+            angle=a.angle[on],
+            semi_axes=hertz.semi_axes[on] * np.sqrt(t)[:, None],
+            area=hertz.area[on] * t,
+            force=hertz.force[on] * t**1.5,
+        )
+        share = shares(sums.patches, contacts.position, contacts.semi_axes, contacts.angle)
+        fraction = contacts.area.sum() / np.prod(sums.patches.sides)
+        warning = ""
+        # A single contact, in a small patch say, is Hertz's at any area.
+        if fraction > LARGEST_AREA_FRACTION and len(on) + solution.overlapping_contacts > 1:
+            warning = (
+                f"at an approach of {plane.approach:.4g} mm the contacts cover {fraction:.1%} of"
+                f" the surface: the model {name or self.name} of separate summits stands for up to"
+                f" {LARGEST_AREA_FRACTION:.0%}"
+            )
+        return sums.row(
+            plane,
+            contacts,
+            owner[on],
+            patch_force=share.sums(share.force, contacts.force, sums.patches),
+            patch_contact_area=share.sums(share.area, contacts.area, sums.patches),
+            iterations=solution.iterations,
+            residual=solution.residual,
+            overlapping_contacts=solution.overlapping_contacts,
+            warning=warning,
         )
 
 
@@ -342,7 +368,6 @@ def asperity_model(
     *,
     contact_modulus: float,
     solver: str = "active-set",
-    pairs: str = "auto",
     body: BodyModes | None = None,
 ) -> AsperityModel:
     """Return the model of a given name on some asperities.
@@ -352,23 +377,26 @@ def asperity_model(
         asperities: The summits.
         contact_modulus: E* [MPa].
         solver: A name in `SOLVERS`, for the models with interaction.
-        pairs: A name in `PAIR_SUMS` or ``"auto"``, for the models with interaction.
         body: What a finite body adds to the half-space.
 
     Raises:
         InputError: When a name is unknown or the modulus not positive.
     """
-    _known(name, MODELS, "micro model")
+    checked_name(name, MODELS, "micro model")
     return AsperityModel(
         asperities=asperities,
         contact_modulus=contact_modulus,
         solver=solver,
-        pairs=pairs,
         body=body,
         **MODELS[name]._asdict(),
     )
 
 
-def _known(name: str, table: Collection[str], what: str) -> None:
+def checked_name(name: str, table: Collection[str], what: str) -> None:
+    """Refuse a name that is not in a table.
+
+    Raises:
+        InputError: When it is not.
+    """
     if name not in table:
         raise InputError(f"this {what} is unknown", value=name, allowed=", ".join(table))

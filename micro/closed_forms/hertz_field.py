@@ -9,8 +9,8 @@ underlying integral vanishes at its lower limit, so dU/ds = κ RF(1+v, β+v, v) 
 Both functions below return U/κ and (dU/ds)/κ.
 
 Held at a fixed v, U is linear in s; a lower bound on v therefore continues U linearly, with
-continuous slope, from the size at which the root falls below the bound. `micro.pairs.interaction`
-uses this for merging contacts.
+continuous slope, from the size at which the root falls below the bound.
+`micro.interaction.hertz_pairs` uses this for merging contacts.
 
 Source:
     Waddad et al. 2016, eqs. 10, 17, 18, doi 10.1016/j.triboint.2015.12.023; Carlson's integrals

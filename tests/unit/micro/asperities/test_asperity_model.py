@@ -35,7 +35,7 @@ def test_single_asperity_is_hertz(summits, name):
     hertz = HertzContact(
         contact_modulus=E_STAR, radius_major=radii[0], radius_minor=radii[1], indentation=4e-3
     )
-    assert state.required == pytest.approx([4e-3])
+    assert state.interference == pytest.approx([4e-3])
     assert state.displacement == pytest.approx([4e-3])
     assert state.force == pytest.approx([hertz.force])
     assert state.contact_area == pytest.approx([hertz.area])
@@ -57,7 +57,7 @@ def test_neighbours_share_the_load(cluster, name):
     state = asperity_model(name, cluster, contact_modulus=E_STAR).solve(3e-3)
     assert np.all(state.force <= alone.force)
     assert state.force.sum() < 0.9 * alone.force.sum()
-    assert np.all(state.displacement >= state.required - 1e-10 * 3e-3)
+    assert np.all(state.displacement >= state.interference - 1e-10 * 3e-3)
     assert np.all(state.displacement > state.indentation)  # the others press every summit
 
 
