@@ -1,8 +1,8 @@
-"""Hertz contacts of all asperities of a surface under a given plane, and their stiffness."""
+"""Hertz contacts of all asperities of a surface at a given interference, and their stiffness."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geometry import Asperities
+from geometry.errors import InputError
 from micro.closed_forms.hertz import HertzContact
 from micro.compliance.body_modes import BodyModes
 from micro.interaction.body_points import BodyPoints
@@ -60,23 +61,35 @@ class HertzCoefficients(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AsperityContacts:
-    """The contacts of n asperities; see `micro.AsperityModel` for the fields.
+    """The contacts of n asperities.
+
+    The interaction is summed over all pairs of the summits that the plane reaches. Time and memory
+    grow with the square of their number, as far as the memory allows.
 
     Args:
-        asperities: The summits.
+        asperities: The n summits, with the highest point z_M that the approach counts from.
         contact_modulus: E* [MPa].
-        elliptic: Whether contacts are ellipses.
+        elliptic: Whether contacts are ellipses; circles of radius sqrt(R' R'') otherwise.
         interacting: Whether contacts displace each other's summits through the half-space.
-        solver: A name in `SOLVERS`.
-        body: What a finite body adds to the half-space; None leaves the half-space alone.
+        solver: Solver of the models with interaction, a name in `SOLVERS`.
+        body: What a finite body with its sides adds to the half-space, between all contacts, also
+            those of the models without interaction; a half-space when not given. On thin blocks it
+            takes away from the interaction: models without any may then have no solution.
+
+    Raises:
+        InputError: When the modulus is not positive or the solver unknown.
     """
 
     asperities: Asperities
     contact_modulus: float
     elliptic: bool
     interacting: bool
-    solver: str
-    body: BodyModes | None
+    solver: str = "active-set"
+    body: BodyModes | None = None
+
+    def __post_init__(self) -> None:
+        checked_name(self.solver, SOLVERS, "solver")
+        _ = self.hertz  # checks the modulus
 
     def contact(self, indentation: ArrayLike, index: int | slice = slice(None)) -> HertzContact:
         """Return the Hertz contacts of some asperities.
@@ -225,3 +238,13 @@ class AsperityState:
     def in_contact(self) -> NDArray[np.bool_]:
         """Which asperities carry a force, shape (n,)."""
         return self.indentation > 0.0
+
+
+def checked_name(name: str, table: Collection[str], what: str) -> None:
+    """Refuse a name that is not in a table.
+
+    Raises:
+        InputError: When it is not.
+    """
+    if name not in table:
+        raise InputError(f"this {what} is unknown", value=name, allowed=", ".join(table))

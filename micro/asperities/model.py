@@ -7,9 +7,8 @@ displacements by all contacts add up to w_k (`micro.interaction.contact_problem`
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from types import MappingProxyType
 from typing import Any, NamedTuple, Self
 
@@ -18,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from geometry import Asperities, Control, Partition, PatchGrid
 from geometry.errors import InputError
-from micro.asperities.contacts import SOLVERS, AsperityContacts, AsperityState
+from micro.asperities.contacts import AsperityContacts, AsperityState, checked_name
 from micro.asperities.patch_shares import shares
 from micro.compliance.body_modes import BodyModes
 from micro.interaction.contact_problem import Solution
@@ -72,39 +71,12 @@ MODELS: Mapping[str, ModelKind] = MappingProxyType(
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class AsperityModel:
-    """One of the four asperity models on given asperities.
-
-    The interaction is summed over all pairs of the summits that the plane reaches. Time and memory
-    grow with the square of their number, as far as the memory allows.
-
-    Args:
-        asperities: The n summits, with the highest point z_M that the approach counts from.
-        contact_modulus: E* [MPa].
-        elliptic: Whether contacts are ellipses; circles of radius sqrt(R' R'') otherwise.
-        interacting: Whether contacts displace each other's summits.
-        solver: Solver of the models with interaction, a name in `SOLVERS`.
-        body: What a finite body with its sides adds to the half-space, between all contacts, also
-            those of the models without interaction; a half-space when not given. On thin blocks it
-            takes away from the interaction: models without any may then have no solution.
-
-    Raises:
-        InputError: When the modulus is not positive or the solver unknown.
+class AsperityModel(AsperityContacts):
+    """One of the four asperity models on given asperities; see `AsperityContacts` for its fields.
 
     Source:
         Waddad et al. 2016, section 1.2, doi 10.1016/j.triboint.2015.12.023.
     """
-
-    asperities: Asperities
-    contact_modulus: float
-    elliptic: bool
-    interacting: bool
-    solver: str = "active-set"
-    body: BodyModes | None = None
-
-    def __post_init__(self) -> None:
-        checked_name(self.solver, SOLVERS, "solver")
-        _ = self.contacts.hertz  # checks the modulus
 
     @property
     def name(self) -> str:
@@ -129,18 +101,6 @@ class AsperityModel:
         alone = replace(self, asperities=self.asperities.subset(own), body=None)
         return alone, patches.single(index)
 
-    @cached_property
-    def contacts(self) -> AsperityContacts:
-        """The contacts that the summits can make."""
-        return AsperityContacts(
-            asperities=self.asperities,
-            contact_modulus=self.contact_modulus,
-            elliptic=self.elliptic,
-            interacting=self.interacting,
-            solver=self.solver,
-            body=self.body,
-        )
-
     def solve(
         self,
         approach: float,
@@ -162,15 +122,15 @@ class AsperityModel:
         """
         plane = RigidPlane.above(self.asperities, approach, tilt)
         first = np.zeros(len(self.asperities)) if start is None else start.indentation
-        return self.state(plane, self.contacts.solution(plane.overlap(self.asperities), first))
+        return self.state(plane, self.solution(plane.overlap(self.asperities), first))
 
     def state(self, plane: RigidPlane, solution: Solution) -> AsperityState:
         """Return the contacts of a solution under a plane."""
-        own, hertz = solution.indentation, self.contacts.hertz
+        own, hertz = solution.indentation, self.hertz
         return AsperityState(
             approach=plane.approach,
             interference=plane.required(self.asperities),
-            displacement=self.contacts.displacement(own),
+            displacement=self.displacement(own),
             indentation=own,
             semi_axes=hertz.semi_axes * np.sqrt(own)[:, None],
             contact_area=hertz.area * own,
@@ -200,7 +160,7 @@ class AsperityModel:
             plane = RigidPlane.above(self.asperities, given[index], tilt)
             # With equal steps, linear extrapolation is right to second order.
             start = np.maximum(2.0 * own - before, 0.0)
-            solution = self.contacts.solution(plane.overlap(self.asperities), start)
+            solution = self.solution(plane.overlap(self.asperities), start)
             own, before = solution.indentation, own
             rows[int(index)] = self.row(Equilibrium(plane, solution), sums, owner)
         return sums.response(self.name, [rows[index] for index in range(len(given))])
@@ -249,11 +209,11 @@ class AsperityModel:
         def evaluate(motion: Array) -> tuple[Held, Equilibrium]:
             nonlocal own, spent
             plane = self._plane(motion)
-            found = self.contacts.solution(plane.overlap(self.asperities), own)
+            found = self.solution(plane.overlap(self.asperities), own)
             own, spent = found.indentation, spent + found.iterations
-            loads = peaks.lever.T @ (self.contacts.hertz.force * own**1.5)
+            loads = peaks.lever.T @ (self.hertz.force * own**1.5)
             known = Equilibrium(plane, found._replace(iterations=spent))
-            return Held(loads, self.contacts.stiffness(own, peaks.lever)), known
+            return Held(loads, self.stiffness(own, peaks.lever)), known
 
         motion = np.array([first.approach, *first.tilt])
         return balanced(evaluate, control, motion, peaks)[1]
@@ -284,7 +244,7 @@ class AsperityModel:
         a = self.asperities
         middle, sides = 0.5 * np.asarray(a.lengths), np.hypot(*a.lengths)
         lever = np.stack([np.ones(len(a)), a.x - middle[0], a.y - middle[1]], axis=1)
-        force = self.contacts.hertz.force
+        force = self.hertz.force
 
         def alone(overlap: Array) -> float:
             return float(force @ np.maximum(overlap, 0.0) ** 1.5)
@@ -304,7 +264,7 @@ class AsperityModel:
         total = np.zeros(np.broadcast_shapes(np.shape(x), np.shape(y)))
         a = self.asperities
         for k in np.flatnonzero(state.in_contact):  # one field at a time bounds the memory
-            contact = self.contacts.contact(state.indentation[k], int(k))
+            contact = self.contact(state.indentation[k], int(k))
             dx, dy = np.asarray(x, float) - a.x[k], np.asarray(y, float) - a.y[k]
             cos, sin = np.cos(a.angle[k]), np.sin(a.angle[k])
             total += contact.displacement(cos * dx + sin * dy, cos * dy - sin * dx)
@@ -329,7 +289,7 @@ class AsperityModel:
             owner: Flat index of the patch that holds each summit, shape (n,).
             name: Name of the model in warnings; its own when not given.
         """
-        (plane, solution), a, hertz = found, self.asperities, self.contacts.hertz
+        (plane, solution), a, hertz = found, self.asperities, self.hertz
         on = np.flatnonzero(solution.indentation > 0.0)
         t = solution.indentation[on]
         contacts = EllipticContacts(
@@ -390,13 +350,3 @@ def asperity_model(
         body=body,
         **MODELS[name]._asdict(),
     )
-
-
-def checked_name(name: str, table: Collection[str], what: str) -> None:
-    """Refuse a name that is not in a table.
-
-    Raises:
-        InputError: When it is not.
-    """
-    if name not in table:
-        raise InputError(f"this {what} is unknown", value=name, allowed=", ".join(table))

@@ -19,14 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 from geometry import Asperities, Control, Partition, PatchGrid, Surface
 from geometry.errors import NotConverged
 from micro.asperities.contact_scale import ScaledAsperities
-from micro.asperities.contacts import SOLVERS, AsperityState
-from micro.asperities.model import (
-    MODELS,
-    AsperityModel,
-    Equilibrium,
-    asperity_model,
-    checked_name,
-)
+from micro.asperities.contacts import SOLVERS, AsperityState, checked_name
+from micro.asperities.model import MODELS, AsperityModel, Equilibrium, asperity_model
 from micro.closed_forms.hertz import checked_modulus
 from micro.compliance.body_modes import BodyModes
 from micro.interaction.contact_problem import Solution
