@@ -40,7 +40,10 @@ SINE_MERGED = float(np.sin(0.5 * np.pi * MERGING_SLOPE))
 
 _ARRAYS = ("x", "y", "angle", "beta", "integral", "size", "v_merged")
 _NEWTON_STEPS = 30
-_PAIRS_AT_ONCE = 2**17  # fields of more pairs leave the cache
+
+_PAIRS_AT_ONCE = 2**16
+"""Pairs whose fields are evaluated at once. 2,000 elliptic contacts took 141 ms of one core in such
+blocks and 283 ms in one piece, whose arrays leave the cache."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
