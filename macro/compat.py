@@ -264,7 +264,7 @@ def assemble_vector(form: Any) -> PETSc.Vec:
     return vector
 
 
-def free_dropped(comm: PETSc.Comm) -> None:
+def collect_garbage(comm: PETSc.Comm) -> None:
     """Free the matrices and vectors that Python has dropped on all ranks, and every rank's own.
 
     PETSc from 3.18 on keeps them until it is asked, because ranks drop them at different times;

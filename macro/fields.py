@@ -109,7 +109,7 @@ def _vertex_pressures(obstacle: UnilateralContactProblem, state: UnilateralConta
     force, area = (
         PETSc.Vec().createMPI((numbers.size_local, None), comm=block.mesh.comm) for _ in range(2)
     )
-    for vector, values in ((force, state.pressing), (area, top.area)):
+    for vector, values in ((force, state.nodal_force), (area, top.area)):
         vector.setValues(rows, (shares[node] * values[:, None]).ravel(), addv=True)
         vector.assemble()
     known = area.array_r > 0.0

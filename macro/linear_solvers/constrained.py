@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.errors import NotConverged
-from macro.linear_solvers.constrained_preconditioner import HeldPreconditioner
+from macro.linear_solvers.constrained_preconditioner import ConstrainedPreconditioner
 from macro.linear_solvers.options import PREFIX, reason_name
 from macro.linear_solvers.projection import Projection
-from macro.linear_solvers.weak_contexts import Borrowed
+from macro.linear_solvers.weak_contexts import WeakContext
 
 Array = NDArray[np.float64]
 
@@ -24,16 +24,16 @@ tetrahedra, of 12 and 30.
 """
 
 
-def asked_tolerance() -> float:
+def contact_tolerance() -> float:
     """Return `TOLERANCE`, or what the user asks for by ``-patchlaw_ksp_rtol``."""
     return float(PETSc.Options(PREFIX).getReal("ksp_rtol", TOLERANCE))
 
 
-class FreeSolver:
+class ConstrainedSolver:
     """Conjugate gradients where some degrees of freedom are held, or move together.
 
     With P the orthogonal projection on the vectors that are left, the operator is P A P and the
-    preconditioner P M P, mended (see `HeldPreconditioner`). Held degrees of freedom that a rigid
+    preconditioner P M P, mended (see `ConstrainedPreconditioner`). Held degrees of freedom that a rigid
     plane takes along add as many unknowns as the plane has motions, and no second solve.
 
     Args:
@@ -49,7 +49,7 @@ class FreeSolver:
         self._left = Projection(matrix.comm.tompi4py())
         self._projected = _Projected(matrix, self._left)
         operator = PETSc.Mat().createPython(
-            matrix.getSizes(), Borrowed(self._projected), comm=matrix.comm
+            matrix.getSizes(), WeakContext(self._projected), comm=matrix.comm
         )
         operator.setUp()
         self._ksp = PETSc.KSP().create(matrix.comm)
@@ -58,8 +58,8 @@ class FreeSolver:
         self._ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
         self._ksp.setTolerances(max_it=1000)
         self._ksp.pc.setType("python")
-        self._mended = HeldPreconditioner(matrix, preconditioner, self._left, layers)
-        self._ksp.pc.setPythonContext(Borrowed(self._mended))
+        self._mended = ConstrainedPreconditioner(matrix, preconditioner, self._left, layers)
+        self._ksp.pc.setPythonContext(WeakContext(self._mended))
 
     def hold(self, dofs: NDArray[np.intp], motions: Array | None = None) -> None:
         """Hold degrees of freedom but for common motions, and free all others.

@@ -16,7 +16,7 @@ _SWEEPS = 2
 _FROM_ZERO = int(PETSc.Mat.SORType.SYMMETRY_SWEEP) | int(PETSc.Mat.SORType.ZERO_INITIAL_GUESS)
 
 
-class HeldPreconditioner:
+class ConstrainedPreconditioner:
     """The preconditioner M of all degrees of freedom, mended around those that are held.
 
     P M P, with P the projection on what is left, errs most beside held degrees of freedom: what M

@@ -25,7 +25,7 @@ class Projection:
         self._motions: Array = np.empty((0, 0))
 
     def hold(self, dofs: NDArray[np.intp], motions: Array) -> None:
-        """Hold degrees of freedom but for motions Q; see `FreeSolver.hold`."""
+        """Hold degrees of freedom but for motions Q; see `ConstrainedSolver.hold`."""
         self._dofs, self._motions = dofs, motions
 
     def project(self, vector: PETSc.Vec) -> None:

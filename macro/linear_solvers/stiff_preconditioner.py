@@ -8,9 +8,9 @@ from petsc4py import PETSc
 from scipy.sparse import csc_array, csr_array
 from scipy.sparse.linalg import splu
 
-from macro.linear_solvers.constrained_preconditioner import HeldPreconditioner
+from macro.linear_solvers.constrained_preconditioner import ConstrainedPreconditioner
 from macro.linear_solvers.projection import Projection
-from macro.linear_solvers.weak_contexts import Borrowed
+from macro.linear_solvers.weak_contexts import WeakContext
 
 Array = NDArray[np.float64]
 
@@ -19,7 +19,7 @@ class StiffPreconditioner:
     """M⁻¹ = P B P + (1 − P) S⁻¹ (1 − P), for a matrix K + C with stiff springs C at some dofs.
 
     B is a preconditioner of K. P holds the dofs with springs but for their motions with the plane,
-    and P B P is mended around them (see `HeldPreconditioner`); S is the part of K + C between
+    and P B P is mended around them (see `ConstrainedPreconditioner`); S is the part of K + C between
     them, factorised by every rank for what it owns. The stiffer the springs, the less the two
     parts see of each other.
 
@@ -48,7 +48,7 @@ class StiffPreconditioner:
         self.pc = PETSc.PC().create(matrix.comm)
         self.pc.setOperators(matrix)
         self.pc.setType("python")
-        self.pc.setPythonContext(Borrowed(self._split))
+        self.pc.setPythonContext(WeakContext(self._split))
 
     def update(self, slope: Array, dofs: NDArray[np.intp], motions: Array) -> None:
         """Move to other springs.
@@ -84,7 +84,7 @@ class _Split:
 
     def __init__(self, matrix: PETSc.Mat, preconditioner: PETSc.PC, layers: int) -> None:
         self._part, self._left = matrix.createVecRight(), Projection(matrix.comm.tompi4py())
-        self._mended = HeldPreconditioner(matrix, preconditioner, self._left, layers)
+        self._mended = ConstrainedPreconditioner(matrix, preconditioner, self._left, layers)
         self._dofs: NDArray[np.intp] = np.empty(0, dtype=np.intp)
         self._factors: object = None
 

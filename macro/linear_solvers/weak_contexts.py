@@ -8,11 +8,11 @@ from typing import Any
 from petsc4py import PETSc
 
 
-class Borrowed:
+class WeakContext:
     """What a PETSc matrix or preconditioner calls, which its owner must keep alive.
 
     A context that PETSc keeps lets go of its matrices only while PETSc frees dropped objects
-    (`macro.compat.free_dropped`), and those that are dropped meanwhile are never freed.
+    (`macro.compat.collect_garbage`), and those that are dropped meanwhile are never freed.
 
     Args:
         context: Has ``mult`` or ``apply``, as petsc4py asks of contexts.
