@@ -1,7 +1,7 @@
 """The elastic block in dolfinx, pressed by a rigid plane through one contact law per patch.
 
 BlockShape → block_mesh → Block (with a Material) → Interface (with a PatchGrid)
-→ LawContactProblem (with one ContactLaw per patch) → PressState for every load step.
+→ LawContactProblem (with one ContactLaw per patch) → LawContactState for every load step.
 
 `face_compliance` is the displacement of the contact face in smooth modes; rough_block_mesh → Block
 → UnilateralContactProblem meshes the roughness itself, as a reference.
@@ -28,16 +28,16 @@ __all__ = [
     "FaceCompliance",
     "Interface",
     "LawContactProblem",
+    "LawContactState",
     "Material",
     "MeshQuality",
-    "PressState",
     "UnilateralContactProblem",
     "UnilateralContactState",
     "block_mesh",
     "cached_face_compliance",
     "displacements_under",
     "face_compliance",
-    "plain_compliance",
+    "patch_compliance_matrix",
     "rough_block_mesh",
     "write_fields",
     "write_rough_fields",

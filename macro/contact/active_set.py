@@ -155,7 +155,7 @@ class PrimalDualActiveSet:
         scale = self._norm(residual.array_r[dofs])
         residual.array[dofs] -= motions @ (held.T @ task.wanted)
         scale = max(scale, float(np.linalg.norm(held.T @ task.wanted)), self._nothing)
-        self._solver.hold(dofs, motions)
+        self._solver.constrain(dofs, motions)
         allowed = 0.5 * tolerance * scale
         spent = self._solver.improve(displacement, residual, allowed)
         if spent:

@@ -10,7 +10,7 @@ from petsc4py import PETSc
 from macro.block import Block
 from macro.contact.contact_law import Contact
 from macro.contact.law_interface import Sampling
-from macro.linear_solvers.weak_contexts import WeakContext
+from macro.linear_solvers.options import WeakContext
 
 Array = NDArray[np.float64]
 

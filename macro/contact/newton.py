@@ -11,8 +11,13 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.errors import NotConverged
-from macro.linear_solvers.options import KRYLOV_DEFAULTS, PREFIX, default_options, reason_name
-from macro.linear_solvers.weak_contexts import WeakContext
+from macro.linear_solvers.options import (
+    KRYLOV_DEFAULTS,
+    PREFIX,
+    WeakContext,
+    default_options,
+    reason_name,
+)
 
 NONLINEAR_DEFAULTS: Mapping[str, object] = {
     "snes_type": "newtonls",

@@ -1,10 +1,12 @@
-"""PETSc's solvers under one prefix: defaults that the user's options override."""
+"""PETSc's solvers under one prefix, with defaults that the user's options override."""
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 from petsc4py import PETSc
 
@@ -182,3 +184,33 @@ def reason_name(reasons: type, code: int) -> str:
     names = [name for name, value in vars(reasons).items() if value == code and name.isupper()]
     # short aliases such as MAX_IT exist: the longest name is the one that PETSc documents
     return max(names, key=len, default=f"reason {code}")
+
+
+class WeakContext:
+    """The Python context of a PETSc matrix or preconditioner, which its owner must keep alive.
+
+    PETSc holds this object and this object holds the real context weakly. A context that PETSc
+    held itself would let go of its own matrices only while PETSc frees dropped objects
+    (`macro.compat.collect_garbage`), and what is dropped during that is never freed.
+
+    Args:
+        context: Has ``mult`` or ``apply``, as petsc4py asks of contexts.
+    """
+
+    def __init__(self, context: Any) -> None:
+        self._context = weakref.ref(context)
+
+    def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write a matrix's product y with x."""
+        self._owned.mult(matrix, x, y)
+
+    def apply(self, preconditioner: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write a preconditioner's y for x."""
+        self._owned.apply(preconditioner, x, y)
+
+    @property
+    def _owned(self) -> Any:
+        context = self._context()
+        if context is None:
+            raise ReferenceError("the owner of a PETSc context is gone")
+        return context

@@ -29,8 +29,8 @@ def test_what_is_free_solves_and_what_is_held_stays(block):
     held = RANDOM.choice(count, count // 4, replace=False)
     start, right = RANDOM.standard_normal((2, count))
     solver, found = ConstrainedSolver(block.stiffness, block.solver.pc), vector_of(start)
-    solver.hold(np.arange(5))  # forgotten by the next
-    solver.hold(held)
+    solver.constrain(np.arange(5))  # forgotten by the next
+    solver.constrain(held)
     assert solver.improve(found, vector_of(right - matrix @ start), 1e-8) > 0
     residual = right - matrix @ found.array_r
     free = np.setdiff1d(np.arange(count), held)
@@ -58,7 +58,7 @@ def test_held_degrees_of_freedom_move_together(block):
     motions = np.linalg.qr(RANDOM.standard_normal((len(held), 2)))[0]
     start, right = RANDOM.standard_normal((2, count))
     solver, found = ConstrainedSolver(block.stiffness, block.solver.pc), vector_of(start)
-    solver.hold(held, motions)
+    solver.constrain(held, motions)
     solver.improve(found, vector_of(right - matrix @ start), 1e-8)
     free = np.setdiff1d(np.arange(count), held)
     ways = np.zeros((count, len(free) + 2))

@@ -8,8 +8,7 @@ from petsc4py import PETSc
 from geometry import BlockShape
 from macro import Block, Material, block_mesh
 from macro.linear_solvers.constrained import TOLERANCE, ConstrainedSolver, contact_tolerance
-from macro.linear_solvers.constrained_preconditioner import ConstrainedPreconditioner
-from macro.linear_solvers.projection import Projection
+from macro.linear_solvers.constrained_preconditioner import ConstrainedPreconditioner, Projection
 
 MATERIAL = Material(young_modulus=4e3, poisson_ratio=0.2)
 
@@ -33,10 +32,10 @@ def test_it_is_symmetric_and_positive(layers, motions):
     dofs, count = pressed_dofs(block, 0.3), block.dofs
     q = np.full((len(dofs), motions), len(dofs) ** -0.5)
     left = Projection(MPI.COMM_SELF)
-    left.hold(dofs, q)
+    left.constrain(dofs, q)
     mended = ConstrainedPreconditioner(block.stiffness, block.solver.pc, left, layers)
-    mended.hold(np.arange(7))  # forgotten by the next
-    mended.hold(dofs)
+    mended.constrain(np.arange(7))  # forgotten by the next
+    mended.constrain(dofs)
     free = np.setdiff1d(np.arange(count), dofs)
     ways = np.zeros((count, len(free) + motions))  # an orthonormal basis of what is left
     ways[free, np.arange(len(free))] = 1.0
@@ -64,7 +63,7 @@ def test_held_unknowns_cost_few_iterations(cells, options, layers):
 
     def iterations(held, reach):
         solver = ConstrainedSolver(block.stiffness, block.solver.pc, layers=reach)
-        solver.hold(held)
+        solver.constrain(held)
         sag, load = (block.stiffness.createVecRight() for _ in range(2))
         sag.array[dofs] = -1.0
         block.stiffness.mult(sag, load)
