@@ -131,7 +131,7 @@ def transfers(lattice: Lattice, free: PETSc.Vec) -> Iterator[Transfer]:
 def _node_weights(
     grid: Sequence[Lines], kept: Kept, nodes: Indices, comm: PETSc.Comm
 ) -> tuple[sparse.csr_matrix, Indices]:
-    """Return trilinear weights, shape (nodes of this rank, all coarse nodes), and the kept nodes."""
+    """Return trilinear weights (nodes of this rank, all coarse nodes), and the kept nodes."""
     shares = [lines.shares(of) for lines, of in zip(grid, kept, strict=True)]
     before = np.stack([share[0][nodes[:, k]] for k, share in enumerate(shares)], axis=1)
     ahead = np.stack([share[1][nodes[:, k]] for k, share in enumerate(shares)], axis=1)

@@ -27,7 +27,7 @@ class Lines:
 
     Args:
         ticks: Their coordinates, ascending, shape (n,) [mm].
-        middle: Whether a plane holds the nodes in the middle of elements of degree 2, shape (n,). It
+        middle: Whether a plane holds the middle nodes of elements of degree 2, shape (n,). It
             cannot be kept without both of its neighbours.
     """
 
@@ -36,7 +36,7 @@ class Lines:
 
     @classmethod
     def of_elements(cls, ticks: Array, degree: int) -> Lines:
-        """Return the planes that hold the nodes of elements of degree 1 or 2 between grid planes."""
+        """Return the planes through the nodes of elements of degree 1 or 2 between grid planes."""
         count = degree * (len(ticks) - 1) + 1
         finer = np.interp(np.arange(count) / degree, np.arange(len(ticks)), ticks)
         return cls(finer, np.arange(count) % degree > 0)
@@ -49,7 +49,7 @@ class Lines:
         return Lines(self.ticks[kept], self.middle[kept])
 
     def merged(self, longest: float) -> NDArray[np.intp]:
-        """Return the planes that are kept when pairs of intervals merge, starting at the last plane.
+        """Return the planes that are kept when pairs of intervals merge, from the last one down.
 
         Args:
             longest: Largest length of a merged pair [mm].

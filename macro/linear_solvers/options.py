@@ -59,7 +59,7 @@ def users_options() -> tuple[tuple[str, str], ...]:
 
 @contextmanager
 def default_options(prefix: str, defaults: Mapping[str, object]) -> Iterator[None]:
-    """Set defaults in PETSc's option database where the user set nothing, and remove them at the end.
+    """Set defaults in PETSc's option database where the user set none; remove them at the end.
 
     Args:
         prefix: Prefix of the options. Without one other solvers would see the defaults.
