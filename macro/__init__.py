@@ -7,13 +7,13 @@ BlockShape → block_mesh → Block (with a Material) → Interface (with a Patc
 → UnilateralContactProblem meshes the roughness itself, as a reference.
 """
 
+from geometry.materials import Material
 from macro.block import Block
 from macro.compliance.face_compliance import FaceCompliance, cached_face_compliance, face_compliance
 from macro.compliance.patch_compliance import displacements_under, patch_compliance_matrix
 from macro.contact.law_interface import ContactLaw, Interface
 from macro.contact.law_problem import LawContactProblem, LawContactState
 from macro.contact.unilateral_problem import UnilateralContactProblem, UnilateralContactState
-from macro.elasticity import Material
 from macro.fields import write_fields, write_rough_fields
 from macro.mesh.block import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
 from macro.mesh.rough_surface import MeshQuality, rough_block_mesh

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.errors import InputError
+from geometry.materials import Material
 from macro import compat
-from macro.elasticity import Material, rigid_body_modes, stiffness_form
+from macro.elasticity import rigid_body_modes, stiffness_form
 from macro.linear_solvers.multigrid import Lattice, lattice_of
 from macro.linear_solvers.options import solve_linear
 from macro.linear_solvers.selection import block_solver

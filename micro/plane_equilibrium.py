@@ -20,7 +20,7 @@ from scipy.optimize import brentq, linprog
 
 from geometry import Control
 from geometry.errors import NotConverged
-from micro.plane import RigidPlane
+from geometry.rigid_plane import RigidPlane
 
 Array = NDArray[np.float64]
 T = TypeVar("T")

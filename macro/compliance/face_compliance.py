@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from geometry.collective import together
 from geometry.errors import InputError
+from geometry.materials import Material
 from macro.block import Sides
 from macro.compliance.cache import Arrays, cached
 from macro.compliance.division import division
 from macro.compliance.quarter import Parity, Quarter, Response
-from macro.elasticity import Material
 
 Array = NDArray[np.float64]
 

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import bmat, csr_matrix, kron
 
+from geometry.materials import Material
 from macro.block import Sides
 from macro.compliance.division import Division
 from macro.compliance.line import Line, mode_integrals
-from macro.elasticity import Material
 from macro.linear_solvers.direct import set_up
 
 Array = NDArray[np.float64]

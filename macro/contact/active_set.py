@@ -20,7 +20,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from geometry.control import Control
+from geometry.rigid_plane import Control
 from macro.block import Block
 from macro.contact.extrapolated_start import Start, StepHistory
 from macro.contact.face_nodes import TopNodes

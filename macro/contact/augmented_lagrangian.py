@@ -17,8 +17,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from geometry.control import Control
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
 from macro.block import Block
 from macro.contact.augmented_law import AugmentedLaw, facet_sizes
 from macro.contact.augmented_newton import LOOSEST, SPARE, FacetNewton

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
-from geometry.control import Control
+from geometry.rigid_plane import Control
 from macro import compat
 from macro.contact.augmented_law import AugmentedLaw
 from macro.contact.equilibrium import Equilibrium

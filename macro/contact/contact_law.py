@@ -10,7 +10,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from geometry.collective import together
-from geometry.control import Control
+from geometry.rigid_plane import Control
 from macro.contact.law_interface import ContactLaw, Interface, Sampling
 from macro.contact.plane_equilibrium import LOOSE, Excess, settle, touch
 

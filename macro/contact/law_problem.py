@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.collective import together
-from geometry.control import Control
 from geometry.errors import InputError
+from geometry.rigid_plane import Control
 from macro import compat
 from macro.block import Block
 from macro.contact.contact_law import Contact

@@ -8,8 +8,8 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from geometry.control import Control
 from geometry.errors import NotConverged
+from geometry.rigid_plane import Control
 from macro.contact.plane_equilibrium import LOOSE, Excess, settle
 
 Array = NDArray[np.float64]

@@ -7,9 +7,9 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.control import Control
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
 from macro import compat
 from macro.block import Block
 from macro.contact.active_set import PrimalDualActiveSet

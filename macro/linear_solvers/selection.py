@@ -21,9 +21,9 @@ from typing import Any
 
 from petsc4py import PETSc
 
+from geometry.materials import Material
 from geometry.meshes.block import BlockShape
 from geometry.meshes.refined_block import RefinedShape
-from macro.elasticity import Material
 from macro.linear_solvers.direct import DIRECT_DEFAULTS
 from macro.linear_solvers.multigrid import Lattice, coarser_grids
 from macro.linear_solvers.multigrid_degrees import QUADRATIC_DEFAULTS, vertex_grid

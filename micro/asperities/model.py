@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from geometry import Asperities, Control, Partition, PatchGrid
 from geometry.errors import InputError
+from geometry.rigid_plane import RigidPlane
 from micro.asperities.contacts import SOLVERS, SummitContacts
 from micro.asperities.many_summits import PAIR_SUMS
 from micro.asperities.patch_sums import PatchSums
@@ -26,7 +27,6 @@ from micro.asperities.state import AsperityState
 from micro.checks import checked_approaches, checked_means
 from micro.complementarity.contact_problem import Solution
 from micro.compliance.body_modes import BodyModes
-from micro.plane import RigidPlane
 from micro.plane_equilibrium import Held, Peaks, balanced
 from micro.response import Pressed, Response
 
@@ -168,14 +168,14 @@ class AsperityModel:
         """
         plane = RigidPlane.above(self.asperities, approach, tilt)
         first = np.zeros(len(self.asperities)) if start is None else start.indentation
-        return self.state(plane, self.contacts.solution(plane.overlap(self.asperities), first))
+        return self.state(plane, self.contacts.solution(self.asperities.interference(plane), first))
 
     def state(self, plane: RigidPlane, solution: Solution) -> AsperityState:
         """Return the contacts of a solution under a plane."""
         own, hertz = solution.indentation, self.contacts.hertz
         return AsperityState(
             approach=plane.approach,
-            required=plane.required(self.asperities),
+            required=np.maximum(self.asperities.interference(plane), 0.0),
             displacement=own + self.contacts.lift(own),
             indentation=own,
             semi_axes=hertz.semi_axes * np.sqrt(own)[:, None],
@@ -205,7 +205,7 @@ class AsperityModel:
             plane = RigidPlane.above(self.asperities, given[index], tilt)
             # Going on as before is right to second order when the steps are equal.
             start = np.maximum(2.0 * own - before, 0.0)
-            found = self.contacts.solution(plane.overlap(self.asperities), start)
+            found = self.contacts.solution(self.asperities.interference(plane), start)
             own, before = found.indentation, own
             rows[int(index)] = sums.row(plane, found)
         return sums.response(self.name, [rows[index] for index in range(len(given))])
@@ -252,7 +252,7 @@ class AsperityModel:
         def evaluate(motion: Array) -> tuple[Held, Balanced]:
             nonlocal own, spent
             plane = self._plane(motion)
-            found = self.contacts.solution(plane.overlap(self.asperities), own)
+            found = self.contacts.solution(self.asperities.interference(plane), own)
             own, spent = found.indentation, spent + found.iterations
             loads = peaks.lever.T @ (self.contacts.hertz.force * own**1.5)
             known = Balanced(plane, found._replace(iterations=spent))

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geometry import Control, Partition, PatchGrid, Surface
+from geometry.rigid_plane import RigidPlane
 from micro.checks import checked_approaches, checked_means, whole_patch
 from micro.closed_forms.hertz import checked_modulus
 from micro.compliance.body_modes import BodyModes
@@ -34,7 +35,6 @@ from micro.islands.shapes import total_force
 from micro.islands.state import IslandState
 from micro.islands.volumes import Relief
 from micro.pairs.body_points import BodyPoints
-from micro.plane import RigidPlane
 from micro.plane_equilibrium import Peaks
 from micro.response import Pressed, Response
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
 from multiscale.laws.tangent import Tangent
 from multiscale.loading.stepper import described
 

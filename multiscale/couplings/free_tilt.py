@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.control import Control
 from geometry.errors import NotConverged
+from geometry.rigid_plane import Control
 from multiscale.couplings.load_steps import beyond_law, embedded_step
 from multiscale.laws.files import LawTable
 from multiscale.laws.packed import PatchLaws

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.collective import on_root
-from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
 from micro import START_KINDS, MicroModel, Response, RigidPlane
 from multiscale.laws.files import LawTable
 from multiscale.loading.load_step import LoadStep, PatchState

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.control import Control
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
 from multiscale.couplings.blocks import block_material
 from multiscale.couplings.load_steps import embedded_step
 from multiscale.loading.load_step import LoadStep, PatchState

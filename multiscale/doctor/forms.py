@@ -122,9 +122,9 @@ def known_solve(comm: Any) -> list[Finding]:
     """
     from mpi4py import MPI
 
-    from geometry.control import Control
     from geometry.meshes.block import BlockShape
     from geometry.patches import PatchGrid
+    from geometry.rigid_plane import Control
     from macro import Block, Interface, LawContactProblem, Material, block_mesh
 
     began = time.perf_counter()

@@ -9,8 +9,8 @@ from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 
-from geometry.control import Control
 from geometry.errors import NotConverged
+from geometry.rigid_plane import Control
 from multiscale.loading.load_step import LoadStep
 from multiscale.storage.serialisation import Arrays
 

@@ -13,9 +13,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "verification"))
 from block_cases import PowerLaw, block_of, interface_of, uneven_laws
 
 import geometry.meshes.block
-from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from geometry.meshes.block import BlockShape
+from geometry.rigid_plane import Control
 from macro import LawContactProblem, block_mesh
 
 COMM = MPI.COMM_WORLD

@@ -6,7 +6,7 @@ from block_cases import PowerLaw, block_of, interface_of, uneven_laws
 from petsc4py import PETSc
 from scipy.optimize import brentq
 
-from geometry.control import Control
+from geometry.rigid_plane import Control
 from macro import LawContactProblem
 
 MODES = ["patchwise", "pointwise"]

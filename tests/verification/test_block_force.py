@@ -6,9 +6,9 @@ from block_cases import PowerLaw, block_of, interface_of, uneven_laws
 from petsc4py import PETSc
 from scipy.optimize import brentq, root
 
-from geometry.control import Control
 from geometry.errors import NotConverged
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
 from macro import Interface, LawContactProblem
 
 MODES = ["patchwise", "pointwise"]

@@ -6,7 +6,7 @@ import pytest
 from mpi4py import MPI
 
 from geometry import RefinedShape, places_in_reach
-from geometry.control import Control
+from geometry.rigid_plane import Control
 from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from micro import FiniteSlopes
 from multiscale import Scene, make_setup

@@ -14,7 +14,7 @@ from geometry import (
     reference_shapes,
     synthesise,
 )
-from geometry.control import Control
+from geometry.rigid_plane import Control
 from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from micro import FreeSides, HalfSpaceModel, finite_slope_effect
 

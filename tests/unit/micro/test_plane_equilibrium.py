@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import brentq
 
 from geometry import Control, NotConverged
-from micro.plane import RigidPlane
+from geometry.rigid_plane import RigidPlane
 from micro.plane_equilibrium import Held, Peaks, balanced, contact_stiffness
 
 X = np.array([-0.4, 0.3, 0.1, -0.2, 0.45])

@@ -9,10 +9,10 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
 from macro import Block, Interface, LawContactProblem, Material, block_mesh, compat, write_fields
 from macro.contact.energy_start import DisplacementBasis
 

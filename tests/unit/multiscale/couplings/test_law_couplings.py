@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from geometry.control import Control
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
 from multiscale.couplings.load_steps import EmbeddedCoupling
 from multiscale.laws.files import LawTable
 from multiscale.laws.patch_law import PatchLaw
