@@ -29,7 +29,7 @@ class FaceCompliance:
 
     Args:
         normal: C, downwards, symmetric, shape (K², K²) [mm/N].
-        growth: Derivative of C with respect to the height of the block, symmetric, shape (K², K²) [1/N].
+        growth: Derivative of C with respect to the block's height, symmetric, (K², K²) [1/N].
         stresses: The same for the stresses σ_xx, σ_yy and σ_xy in the face, shape (3, K², K²)
             [1/mm²].
     """

@@ -134,7 +134,7 @@ class Quarter:
 
     @property
     def _top(self) -> tuple[list[NDArray[np.intp]], list[NDArray[np.intp]]]:
-        """Free unknowns that are values on the top, by component, and their flat places (ix, iy)."""
+        """Free unknowns with values on the top, by component, and their flat indices (ix, iy)."""
         top, place, before = [], [], 0
         for free in self._free:
             number = before + np.cumsum(free).reshape(free.shape) - 1
