@@ -9,7 +9,7 @@ at points to the loads of the plane: the force and its two first moments about t
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,7 @@ from geometry.errors import InputError
 from geometry.patches import Partition
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 
 class Rectangular(Protocol):
@@ -63,8 +64,19 @@ class Control:
         if self.tilt is not None:
             _check_tilt(self.tilt)
 
+    def __str__(self) -> str:
+        """Say what presses, as in "force 2 N"."""
+        if self.force is not None:
+            return f"force {self.force:.6g} N"
+        return f"approach {self.approach:.6g} mm"
+
     @property
-    def free(self) -> NDArray[np.bool_]:
+    def loads(self) -> Array:
+        """Loads along free motions: the force, and no moments, shape (3,) [N, N mm]."""
+        return np.array([self.force or 0.0, 0.0, 0.0])
+
+    @property
+    def free(self) -> Flags:
         """Which of approach and slopes follow from the loads, shape (3,).
 
         Without force nothing turns the plane, and it is placed where it touches first.
@@ -137,31 +149,84 @@ class RigidPlane:
         return float(np.sum(force * (x - xc))), float(np.sum(force * (y - yc)))
 
 
-def lever_matrix(x: Array, y: Array, centre: ArrayLike) -> Array:
-    """Return what unit motions of a plane move points by: columns 1, x − xc, y − yc.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlaneLevers:
+    """How the motions of a plane move points, and how forces at the points load the plane.
 
     Args:
-        x: Abscissae of the points, shape (n,) [mm].
-        y: Their ordinates, shape (n,) [mm].
-        centre: Centre (xc, yc) that the plane turns about [mm].
+        matrix: Displacements of this rank's points by unit motions, columns 1, x − xc, y − yc,
+            shape (n, 3) [1, mm, mm].
+        half: Half the diagonal of the interface, by which moments are compared with forces [mm].
+        comm: MPI communicator (mpi4py) whose ranks share the points; None for a single process.
 
-    Returns:
-        Levers, shape (n, 3) [1, mm, mm].
+    Note:
+        Methods that sum over the points are collective.
     """
-    xc, yc = np.asarray(centre)
-    return np.column_stack((np.ones_like(x), x - xc, y - yc))
 
+    matrix: Array
+    half: float
+    comm: Any = None
 
-def half_diagonal(lengths: tuple[float, float]) -> float:
-    """Return half the diagonal of a rectangle, by which moments are compared with forces [mm]."""
-    return 0.5 * float(np.hypot(*lengths))
+    @classmethod
+    def at(
+        cls,
+        x: Array,
+        y: Array,
+        lengths: tuple[float, float],
+        *,
+        centre: ArrayLike | None = None,
+        comm: Any = None,
+    ) -> Self:
+        """Return the levers of points.
+
+        Args:
+            x: Abscissae of the points, shape (n,) [mm].
+            y: Their ordinates, shape (n,) [mm].
+            lengths: Sides (Lx, Ly) of the interface [mm].
+            centre: Centre (xc, yc) that the plane turns about [mm]; by default that of an interface
+                that begins at the origin.
+            comm: MPI communicator (mpi4py); None for a single process.
+        """
+        xc, yc = 0.5 * np.asarray(lengths) if centre is None else np.asarray(centre)
+        matrix = np.column_stack((np.ones_like(x), x - xc, y - yc))
+        return cls(matrix=matrix, half=0.5 * float(np.hypot(*lengths)), comm=comm)
+
+    @property
+    def unit(self) -> Array:
+        """Approach and slopes by which the interface's corner moves 1 mm, shape (3,)."""
+        return motion_units(self.half)
+
+    def scaled(self, free: Flags) -> Array:
+        """Return what the free motions in `unit` move the points by, shape (n, k)."""
+        return self.matrix[:, free] * self.unit[free]
+
+    def loads(self, forces: Array) -> Array:
+        """Return force and first moments about the centre, shape (3,) [N, N mm].
+
+        Args:
+            forces: Forces at the points, shape (n,) [N].
+        """
+        return self.summed(self.matrix.T @ forces)
+
+    def stiffness(self, rates: Array) -> Array:
+        """Return the derivative of the loads by the motions, shape (3, 3).
+
+        Args:
+            rates: Derivatives of the forces at the points by their displacements, shape (n,)
+                [N/mm].
+        """
+        return self.summed(self.matrix.T @ (rates[:, None] * self.matrix))
+
+    def summed(self, values: Array) -> Array:
+        """Return the sum over all ranks."""
+        return values if self.comm is None else self.comm.allreduce(values)
 
 
 def motion_units(half: float) -> Array:
-    """Return the motions that move the far corner of a rectangle by at most 1 mm, shape (3,).
+    """Return approach and slopes by which an interface's corner moves 1 mm, shape (3,).
 
     Args:
-        half: Half the diagonal of the rectangle [mm].
+        half: Half the diagonal of the interface [mm].
     """
     return np.array([1.0, 1.0 / half, 1.0 / half])
 

@@ -27,7 +27,7 @@ from macro.contact.equilibrium import Equilibrium
 from macro.contact.extrapolated_start import Start, StepHistory
 from macro.contact.face_nodes import TopNodes
 from macro.contact.law_interface import Interface
-from macro.contact.rigid_plane import RigidPlane, not_found
+from macro.contact.plane_over_nodes import PlaneOverNodes, not_found
 from macro.contact.unilateral_state import Found
 from macro.linear_solvers.constrained import contact_tolerance
 
@@ -61,13 +61,19 @@ class AugmentedLagrangian:
     """
 
     def __init__(
-        self, block: Block, top: TopNodes, plane: RigidPlane, penalty: float | None, *, exact: bool
+        self,
+        block: Block,
+        top: TopNodes,
+        plane: PlaneOverNodes,
+        penalty: float | None,
+        *,
+        exact: bool,
     ) -> None:
         self._block, self._top, self._plane, self._exact = block, top, plane, exact
         whole = PatchGrid(grid=(1, 1), lengths=block.mesh.shape.interface)
         self._interface = interface = Interface(block, whole, degree=2 * block.degree)
         self._sampling = sampling = interface.pointwise
-        (rest,) = top.spread(plane.rest)
+        (rest,) = top.spread(plane.distance)
         points = interface.quadrature
         unit = block.material.contact_modulus / facet_sizes(points.cell, points.weight)
         self._stiff = _HARD * unit if penalty is None else np.full_like(unit, penalty)
@@ -88,9 +94,8 @@ class AugmentedLagrangian:
                 stay what they were.
         """
         start = self._history.start(control)
-        task = self._plane.task(control, start.plane)
         contact, law = self._contact, self._law
-        contact.plane, contact.free, contact.force = task.plane, task.free, task.force
+        contact.control, contact.plane = control, self._plane.placed(control, start.plane)
         law.multiplier = np.maximum(start.contact, 0.0) if self._exact else 0.0 * start.contact
         displacement = self._block.stiffness.createVecRight()
         displacement.array[:] = start.displacement
@@ -124,12 +129,14 @@ class AugmentedLagrangian:
         samples.array[:] = pressure
         self._sampling.operator.mult(samples, load)
         nodal_force = -load.array_r[self._top.dofs]
-        gap = -self._plane.closure(plane, -displacement.array_r[self._top.dofs])
+        gap = -self._plane.penetration(plane, -displacement.array_r[self._top.dofs])
         touching = nodal_force > _NO_FORCE * self._largest(nodal_force)
         if self._exact and self._largest(nodal_force):
             touching |= gap < self._penetration * self._largest(displacement.array_r)
         values = displacement.array_r.copy()
-        self._history.add(Start(plane, values, pressure), float(self._plane.loads(nodal_force)[0]))
+        self._history.add(
+            Start(plane, values, pressure), float(self._plane.levers.loads(nodal_force)[0])
+        )
         reason = "CONVERGED_MULTIPLIERS" if self._exact else "CONVERGED_PENALTY"
         return Found(
             plane=plane,

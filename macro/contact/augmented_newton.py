@@ -11,7 +11,7 @@ from macro.contact.augmented_law import AugmentedLaw
 from macro.contact.equilibrium import Equilibrium
 from macro.contact.face_nodes import TopNodes
 from macro.contact.law_interface import Interface
-from macro.contact.rigid_plane import RigidPlane, not_found
+from macro.contact.plane_over_nodes import PlaneOverNodes, not_found
 from macro.linear_solvers.options import reason_name
 from macro.linear_solvers.stiff_preconditioner import StiffPreconditioner
 
@@ -43,7 +43,7 @@ class FacetNewton:
         law: AugmentedLaw,
         interface: Interface,
         top: TopNodes,
-        plane: RigidPlane,
+        plane: PlaneOverNodes,
     ) -> None:
         self._equilibrium, self._law, self._interface = equilibrium, law, interface
         self._top, self._plane, block = top, plane, equilibrium.block
@@ -100,8 +100,9 @@ class FacetNewton:
         rows, columns = np.nonzero((np.abs(points.values) > _ON) & (slope > 0.0)[:, None])
         marks = self._top.collect(points.nodes[rows, columns], np.ones(len(rows)))
         sprung = marks > 0.0
-        free = self._equilibrium.contact.free
-        motions = self._plane.levers(free)[sprung] @ self._plane.held(free, sprung)
+        free = self._equilibrium.contact.control.free
+        motions = self._plane.levers.scaled(free)[sprung]
+        motions = motions @ self._plane.supported_motions(free, sprung)
         self._preconditioner.update(slope / points.weight, self._top.dofs[sprung], motions)
 
     def _advance(

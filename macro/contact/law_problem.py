@@ -107,7 +107,7 @@ class LawContactProblem:
     def solve(self, control: Control) -> LawContactState:
         """Find the equilibrium of one load step.
 
-        A force and a moment of zero are met to `macro.contact.plane_equilibrium.TOLERANCE`. Without
+        A force and a moment of zero are met to `geometry.plane_equilibrium.TOLERANCE`. Without
         any force the plane just touches the highest patch, as it is tilted or was last.
 
         Args:
@@ -123,7 +123,7 @@ class LawContactProblem:
         solution = equilibrium.block.stiffness.createVecRight()
         self._basis.start(solution)
         report = self.newton.solve(
-            solution, what=_described(control), remedy="take more load steps (load.steps)"
+            solution, what=f"the block at {control}", remedy="take more load steps (load.steps)"
         )
         self._basis.add(solution)
         comm = equilibrium.block.mesh.comm
@@ -190,9 +190,3 @@ class LawContactProblem:
             reason=report.reason,
             wall_s=wall_s,
         )
-
-
-def _described(control: Control) -> str:
-    if control.force is not None:
-        return f"the block under a force of {control.force:g} N"
-    return f"the block at an approach of {control.approach:g} mm"

@@ -15,7 +15,7 @@ from macro.block import Block
 from macro.contact.active_set import PrimalDualActiveSet
 from macro.contact.augmented_lagrangian import AugmentedLagrangian
 from macro.contact.face_nodes import TopNodes
-from macro.contact.rigid_plane import RigidPlane
+from macro.contact.plane_over_nodes import PlaneOverNodes
 from macro.contact.unilateral_state import UnilateralContactState, measured
 
 Array = NDArray[np.float64]
@@ -66,7 +66,7 @@ class UnilateralContactProblem:
         patches = patches or PatchGrid(grid=(1, 1), lengths=lengths)
         _check_top(block, patches)
         self.block, self.top = block, TopNodes(block, patches)
-        self._plane = RigidPlane(
+        self._plane = PlaneOverNodes(
             self.top.x, self.top.y, highest - self.top.height, lengths, block.mesh.comm
         )
         self._method: PrimalDualActiveSet | AugmentedLagrangian

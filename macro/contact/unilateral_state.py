@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from macro.block import Block
 from macro.contact.face_nodes import TopNodes
-from macro.contact.rigid_plane import RigidPlane
+from macro.contact.plane_over_nodes import PlaneOverNodes
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -87,7 +87,7 @@ class Found(NamedTuple):
 
 
 def measured(
-    block: Block, top: TopNodes, plane: RigidPlane, found: Found
+    block: Block, top: TopNodes, plane: PlaneOverNodes, found: Found
 ) -> UnilateralContactState:
     """Measure what is told of a solution.
 
@@ -103,9 +103,9 @@ def measured(
     displacement = block.stiffness.createVecRight()
     displacement.array[:] = found.displacement
     sag = -found.displacement[top.dofs]
-    gap = -plane.closure(found.plane, sag)
-    loads = plane.loads(found.nodal_force)
-    lean = (top.patches.centres - plane.middle) @ found.plane[1:]
+    gap = -plane.penetration(found.plane, sag)
+    loads = plane.levers.loads(found.nodal_force)
+    lean = (top.patches.centres - plane.centre) @ found.plane[1:]
     nodal_force, touching = np.maximum(found.nodal_force, 0.0), found.touching
     area = np.where(touching, top.area, 0.0)
     weight = np.stack([top.area, top.area * gap, area, touching], axis=1)

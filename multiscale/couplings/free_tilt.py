@@ -12,7 +12,6 @@ from multiscale.laws.files import LawTable
 from multiscale.laws.packed import PatchLaws
 from multiscale.laws.whole_surface import Displacements
 from multiscale.loading.load_step import LoadStep, PatchState
-from multiscale.loading.stepper import described
 
 Array = NDArray[np.float64]
 
@@ -81,7 +80,7 @@ class TurningCoupling:
         missed /= float(np.abs(local).max()) or 1.0
         if missed > _OTHER_BODY:
             raise NotConverged(
-                f"the patches at {described(control)}",
+                f"the patches at {control}",
                 reason="OTHER_BODY",
                 iterations=0,
                 remedy=f"their closures miss {missed:.1%} of the approach: make the laws for this "

@@ -15,7 +15,7 @@ from geometry.rigid_plane import Control
 from micro import START_KINDS, MicroModel, Response, RigidPlane
 from multiscale.laws.files import LawTable
 from multiscale.loading.load_step import LoadStep, PatchState
-from multiscale.loading.stepper import BeyondLaws, described
+from multiscale.loading.stepper import BeyondLaws
 from multiscale.storage.serialisation import Arrays, packed, unpacked
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
@@ -243,7 +243,7 @@ def beyond_law(
             "'condensed', which goes on, or coupling.kind = 'concurrent', which needs no law"
         )
     return BeyondLaws(
-        f"the patches at {described(control)}",
+        f"the patches at {control}",
         reason=f"LAW_RANGE: {problem}",
         iterations=0,
         remedy=whole if coupling == "consistent" else alone,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from geometry import Control, InputError, Surface
-from geometry.rigid_plane import RigidPlane, lever_matrix
+from geometry.rigid_plane import PlaneLevers, RigidPlane
 
 SQUARE = Surface(heights=np.zeros((4, 4)), lengths=(1.0, 1.0))
 
@@ -43,7 +43,9 @@ def test_tilt_turns_about_the_centre():
     x, y = np.array([0.5, 0.9, 0.1]), np.array([0.5, 0.5, 1.0])
     plane = RigidPlane.above(SQUARE, 1e-3, (1e-2, -2e-2))
     assert plane.at(x, y) == pytest.approx([1e-3, 5e-3, -1.3e-2])
-    assert lever_matrix(x, y, plane.centre) @ plane.motion == pytest.approx(plane.at(x, y))
+    assert PlaneLevers.at(x, y, SQUARE.lengths).matrix @ plane.motion == pytest.approx(
+        plane.at(x, y)
+    )
     assert RigidPlane.moved(SQUARE, plane.motion) == plane
 
 

@@ -84,7 +84,7 @@ def test_failure_is_named_and_keeps_what_was_known(interface):
     before = pressed.solve(Control(approach=2e-3))
     known = len(pressed._basis)
     pressed.newton.snes.setTolerances(max_it=1)
-    with pytest.raises(NotConverged, match=r"approach of 0\.008 mm .* DIVERGED_MAX_IT after 1"):
+    with pytest.raises(NotConverged, match=r"approach 0\.008 mm .* DIVERGED_MAX_IT after 1"):
         pressed.solve(Control(approach=8e-3))
     assert len(pressed._basis) == known
     pressed.newton.snes.setTolerances(max_it=20)

@@ -177,7 +177,7 @@ def test_failed_step_changes_nothing(monkeypatch):
     found = obstacle()
     found.solve(Control(approach=4e-3))
     monkeypatch.setattr(active_nodes, "_MOST_SOLVES", 1)
-    message = r"the contact of the rough block under an approach of 0\.02 mm did not .*: ACTIVE_SET"
+    message = r"the contact of the rough block at approach 0\.02 mm did not .*: ACTIVE_SET"
     with pytest.raises(NotConverged, match=message):
         found.solve(Control(approach=20e-3))
     monkeypatch.undo()
