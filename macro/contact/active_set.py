@@ -26,7 +26,7 @@ from macro.contact.extrapolated_start import Start, StepHistory
 from macro.contact.face_nodes import TopNodes
 from macro.contact.plane_over_nodes import PlaneOverNodes, not_found
 from macro.contact.unilateral_state import Found
-from macro.linear_solvers.constrained import FreeSolver, asked_tolerance
+from macro.linear_solvers.constrained import ConstrainedSolver, contact_tolerance
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -39,7 +39,7 @@ _ROUNDING = 1e-15  # of the block's size: nothing
 _SOFT = 8.0  # springs under a plane that nothing holds yet: E* times this over the block's width
 
 
-class ActiveNodes:
+class PrimalDualActiveSet:
     """Presses the nodes of a rough top; see the module.
 
     Args:
@@ -54,15 +54,15 @@ class ActiveNodes:
     def __init__(self, block: Block, top: TopNodes, plane: PlaneOverNodes) -> None:
         self._block, self._top, self._plane = block, top, plane
         # one layer of quadratic elements reaches as far as two of linear ones
-        self._solver = FreeSolver(block.stiffness, block.solver.pc, layers=3 - block.degree)
-        self._tolerance = asked_tolerance()
+        self._solver = ConstrainedSolver(block.stiffness, block.solver.pc, layers=3 - block.degree)
+        self._tolerance = contact_tolerance()
         self._residual = block.stiffness.createVecRight()
         self._history = StepHistory(block.owned_dofs, len(top.dofs))
         modulus, half = block.material.contact_modulus, plane.levers.half
         self._nothing = 1e-17 * modulus * half**2  # N
         self._springs = top.area * modulus * _SOFT / (2.0 * half)
 
-    def press(self, control: Control) -> Found:
+    def solve(self, control: Control) -> Found:
         """Find the contact of a load step, starting from those before.
 
         Raises:
@@ -158,7 +158,7 @@ class ActiveNodes:
         scale = self._norm(residual.array_r[dofs])
         residual.array[dofs] -= motions @ (held.T @ wanted)
         scale = max(scale, float(np.linalg.norm(held.T @ wanted)), self._nothing)
-        self._solver.hold(dofs, motions)
+        self._solver.constrain(dofs, motions)
         allowed = 0.5 * tolerance * scale
         spent = self._solver.improve(displacement, residual, allowed)
         if spent:
@@ -179,20 +179,20 @@ class ActiveNodes:
         depth = self._depth(plane, displacement)
         displacement.array[self._top.dofs] -= np.where(active, depth, np.maximum(depth, 0.0))
         self._update_residual(displacement)
-        pressing = np.where(active, np.maximum(self._forces, 0.0), 0.0)
+        nodal_force = np.where(active, np.maximum(self._forces, 0.0), 0.0)
         # vertices of quadratic triangles touch without a force
         touching = active | (depth > -_CLOSED * self._largest(displacement.array_r))
         found = Found(
             plane=plane,
             displacement=displacement.array_r.copy(),
-            pressing=pressing,
+            nodal_force=nodal_force,
             touching=touching,
             active_sets=sets,
             linear_iterations=spent,
             reason="CONVERGED_ACTIVE_SET" if self._count(active) else "CONVERGED_NO_CONTACT",
         )
-        force = float(self._plane.levers.loads(found.pressing)[0])
-        self._history.add(Start(plane, found.displacement, found.pressing), force)
+        force = float(self._plane.levers.loads(found.nodal_force)[0])
+        self._history.add(Start(plane, found.displacement, found.nodal_force), force)
         return found
 
     def _put_on(self, plane: Array, displacement: PETSc.Vec, active: Flags) -> None:

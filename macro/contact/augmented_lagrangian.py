@@ -29,7 +29,7 @@ from macro.contact.face_nodes import TopNodes
 from macro.contact.law_interface import Interface
 from macro.contact.plane_over_nodes import PlaneOverNodes, not_found
 from macro.contact.unilateral_state import Found
-from macro.linear_solvers.constrained import asked_tolerance
+from macro.linear_solvers.constrained import contact_tolerance
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ _NO_FORCE = 1e-6  # of the largest nodal force: none
 _TINY = 1e-300
 
 
-class AugmentedFacets:
+class AugmentedLagrangian:
     """Presses the facets of a rough top; see the module.
 
     Args:
@@ -78,7 +78,7 @@ class AugmentedFacets:
         unit = block.material.contact_modulus / facet_sizes(points.cell, points.weight)
         self._stiff = _HARD * unit if penalty is None else np.full_like(unit, penalty)
         self._soft = np.minimum(_SOFT * unit, self._stiff)
-        self._tolerance = asked_tolerance()
+        self._tolerance = contact_tolerance()
         self._penetration = PENETRATION[block.degree]
         self._law = AugmentedLaw(np.sum(points.values * rest[points.nodes], axis=1))
         self._contact = Contact(interface, sampling, [self._law])
@@ -86,7 +86,7 @@ class AugmentedFacets:
         self._newton = FacetNewton(self._equilibrium, self._law, interface, top, plane)
         self._history = StepHistory(block.owned_dofs, len(points.x))
 
-    def press(self, control: Control) -> Found:
+    def solve(self, control: Control) -> Found:
         """Find the contact of a load step, starting from those before.
 
         Raises:
@@ -128,24 +128,24 @@ class AugmentedFacets:
         samples = self._sampling.operator.createVecRight()
         samples.array[:] = pressure
         self._sampling.operator.mult(samples, load)
-        pressing = -load.array_r[self._top.dofs]
+        nodal_force = -load.array_r[self._top.dofs]
         gap = -self._plane.penetration(plane, -displacement.array_r[self._top.dofs])
-        touching = pressing > _NO_FORCE * self._largest(pressing)
-        if self._exact and self._largest(pressing):
+        touching = nodal_force > _NO_FORCE * self._largest(nodal_force)
+        if self._exact and self._largest(nodal_force):
             touching |= gap < self._penetration * self._largest(displacement.array_r)
         values = displacement.array_r.copy()
         self._history.add(
-            Start(plane, values, pressure), float(self._plane.levers.loads(pressing)[0])
+            Start(plane, values, pressure), float(self._plane.levers.loads(nodal_force)[0])
         )
         reason = "CONVERGED_MULTIPLIERS" if self._exact else "CONVERGED_PENALTY"
         return Found(
             plane=plane,
             displacement=values,
-            pressing=pressing,
+            nodal_force=nodal_force,
             touching=touching,
             active_sets=steps,
             linear_iterations=spent,
-            reason=reason if self._largest(pressing) else "CONVERGED_NO_CONTACT",
+            reason=reason if self._largest(nodal_force) else "CONVERGED_NO_CONTACT",
         )
 
     def _largest(self, values: Array) -> float:

@@ -89,7 +89,7 @@ class FacetNewton:
                 name = reason_name(PETSc.KSP.ConvergedReason, self._ksp.reason)
                 raise not_found(control, name, spent)
             self._advance(displacement, residual, step, control)
-            compat.free_dropped(displacement.comm)  # a field of every step
+            compat.collect_garbage(displacement.comm)  # a field of every step
         raise not_found(control, "NEWTON", _MOST_STEPS)
 
     def _linearise(self, displacement: PETSc.Vec) -> None:

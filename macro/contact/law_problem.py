@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PressState:
+class LawContactState:
     """Equilibrium of the block at one load step; the same on every rank but for the displacement.
 
     Args:
@@ -82,7 +82,7 @@ class LawContactProblem:
         InputError: When there is not one law per patch, or no such mode.
 
     Note:
-        Construction and ``press`` are collective.
+        Construction and ``solve`` are collective.
     """
 
     def __init__(
@@ -104,7 +104,7 @@ class LawContactProblem:
         self._plane: Array = np.zeros(3)
         self._closure: Array = np.zeros(len(self._sampling.weight))
 
-    def press(self, control: Control) -> PressState:
+    def solve(self, control: Control) -> LawContactState:
         """Find the equilibrium of one load step.
 
         A force and a moment of zero are met to `geometry.plane_equilibrium.TOLERANCE`. Without
@@ -129,7 +129,7 @@ class LawContactProblem:
         comm = equilibrium.block.mesh.comm
         seconds = comm.allreduce(time.perf_counter() - began, op=MPI.MAX)
         state = self._state(solution, report, seconds)
-        compat.free_dropped(solution.comm)
+        compat.collect_garbage(solution.comm)
         return state
 
     def start_from(self, pressure: Array) -> None:
@@ -168,14 +168,14 @@ class LawContactProblem:
         values = together(comm, lambda: sampling.by_patch(functions, self._closure))
         return sampling.patch_sums(values) / self._interface.areas
 
-    def _state(self, solution: PETSc.Vec, report: NewtonReport, wall_s: float) -> PressState:
+    def _state(self, solution: PETSc.Vec, report: NewtonReport, wall_s: float) -> LawContactState:
         contact, sampling = self.equilibrium.contact, self._sampling
         self._closure = closure = self.equilibrium.closure(solution)
         self._plane = plane = contact.plane.copy()
         pressure = contact.pressure(closure)
         forces, load = sampling.patch_sums(pressure), contact.loads(pressure)
         areas = self._interface.areas
-        return PressState(
+        return LawContactState(
             approach=float(plane[0]),
             tilt=(float(plane[1]), float(plane[2])),
             displacement=solution.array_r.copy(),

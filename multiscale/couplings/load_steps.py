@@ -19,7 +19,7 @@ from multiscale.loading.stepper import BeyondLaws
 from multiscale.storage.serialisation import Arrays, packed, unpacked
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import LawContactProblem, PressState
+    from macro import LawContactProblem, LawContactState
 
 Array = NDArray[np.float64]
 
@@ -77,7 +77,7 @@ class EmbeddedCoupling:
 
     def __init__(self, pressed: LawContactProblem, table: LawTable) -> None:
         self._pressed, self._table = pressed, table
-        self._last: PressState | None = None
+        self._last: LawContactState | None = None
 
     @property
     def displacement(self) -> Array:
@@ -93,7 +93,7 @@ class EmbeddedCoupling:
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `Coupling.press`."""
         try:
-            state = self._pressed.press(control)
+            state = self._pressed.solve(control)
         except NotConverged as error:
             if not any(law.is_punch for law in self._table.laws):
                 raise
@@ -117,9 +117,9 @@ class EmbeddedCoupling:
         if state:
             approach, tilt, pressure = unpacked(state, ())
             self._pressed.start_from(pressure)
-            self._last = self._pressed.press(Control(approach=approach, tilt=tilt))
+            self._last = self._pressed.solve(Control(approach=approach, tilt=tilt))
 
-    def _step(self, control: Control, press: PressState) -> LoadStep:
+    def _step(self, control: Control, press: LawContactState) -> LoadStep:
         """Read area, contacts and separation off the laws at the converged closures."""
         laws = self._table.laws
         try:

@@ -82,7 +82,7 @@ class ReferenceCoupling:
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step on every mesh; see `Coupling.press`."""
-        self._last = tuple(block.press(control) for block in self._blocks)
+        self._last = tuple(block.solve(control) for block in self._blocks)
         return self._step(self._last)
 
     def state(self) -> Arrays:
@@ -93,7 +93,7 @@ class ReferenceCoupling:
         """Press every mesh by its plane again; see `Restorable`."""
         planes = unpacked(state, ()) if state else ()
         self._last = tuple(
-            block.press(Control(approach=approach, tilt=(tx, ty)))
+            block.solve(Control(approach=approach, tilt=(tx, ty)))
             for block, (approach, tx, ty) in zip(self._blocks, planes, strict=False)
         )
 

@@ -33,7 +33,7 @@ def law(end=1.0):
 class EasyBlock:
     """Stands for a block that gives way to nothing: closures are the approach."""
 
-    def press(self, control):
+    def solve(self, control):
         self.approach = approach = control.approach
         return SimpleNamespace(
             approach=approach,
