@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 from scipy.special import roots_jacobi
 
 from geometry import Partition
+from geometry.rigid_plane import RigidPlane
 from micro.closed_forms.love import corner_integral
 from micro.compliance.body_modes import BodyModes
 from micro.interaction.body_points import BodyPoints
-from micro.plane import RigidPlane
 from micro.response import Response
 
 Array = NDArray[np.float64]

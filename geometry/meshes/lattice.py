@@ -6,9 +6,11 @@ import ctypes
 import itertools
 import math
 import signal
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -76,21 +78,32 @@ Axes = tuple[Sequence[Segment], Sequence[Segment], Sequence[Segment]]
 
 
 @contextmanager
-def sigint_kept() -> Iterator[None]:
-    """Leave SIGINT to who has it: gmsh takes it, some releases already when they are imported.
+def sigint_untouched() -> Iterator[None]:
+    """Import or call gmsh without its replacing the process's handler of SIGINT.
 
-    Blocking the signal would not do: the threads of others let it end the process meanwhile.
+    gmsh does so when a session begins and ends, and release 4.8 already when it is imported. Inside
+    this context gmsh has a copy of the module ``signal`` whose function ``signal`` ignores SIGINT.
+    Restoring the handler afterwards would leave a moment in which SIGINT ends the process, and
+    would fail outside the main thread.
     """
-    original = signal.signal
 
-    def guarded(number: int, handler: Any) -> Any:
-        return signal.getsignal(number) if number == signal.SIGINT else original(number, handler)
+    def ignoring_sigint(number: int, handler: Any) -> Any:
+        if number == signal.SIGINT:
+            return signal.getsignal(number)
+        return signal.signal(number, handler)
 
-    signal.signal = guarded  # type: ignore[assignment]
+    copy: Any = ModuleType("signal")
+    vars(copy).update(vars(signal) | {"signal": ignoring_sigint})
+    if "gmsh" in sys.modules:
+        sys.modules["gmsh"].signal = copy  # type: ignore[attr-defined]
+    else:
+        sys.modules["signal"] = copy  # for gmsh's own import of it
     try:
         yield
     finally:
-        signal.signal = original
+        sys.modules["signal"] = signal
+        if "gmsh" in sys.modules:
+            sys.modules["gmsh"].signal = signal  # type: ignore[attr-defined]
 
 
 @contextmanager
@@ -103,7 +116,7 @@ def gmsh_session(name: str) -> Iterator[Any]:
     Yields:
         The gmsh module.
     """
-    with sigint_kept():
+    with sigint_untouched():
         import gmsh  # here, so that everything without a mesh works without gmsh
 
         owned = not is_initialised(gmsh)
@@ -118,7 +131,7 @@ def gmsh_session(name: str) -> Iterator[Any]:
         yield gmsh
     finally:
         if owned:
-            with sigint_kept():
+            with sigint_untouched():
                 gmsh.finalize()
         else:
             gmsh.model.setCurrent(name)

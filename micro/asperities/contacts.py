@@ -27,7 +27,7 @@ from micro.interaction.contact_problem import (
 )
 from micro.interaction.hertz_pairs import MERGING_SLOPE, HertzPairs
 from micro.interaction.truncated_newton import truncated_newton
-from micro.plane_equilibrium import contact_stiffness
+from micro.plane_on_peaks import contact_stiffness
 
 Array = NDArray[np.float64]
 

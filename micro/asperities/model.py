@@ -17,14 +17,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from geometry import Asperities, Control, Partition, PatchGrid
 from geometry.errors import InputError
+from geometry.plane_equilibrium import PlaneResponse
+from geometry.rigid_plane import PlaneLevers, RigidPlane
 from micro.asperities.contacts import AsperityContacts, AsperityState, checked_name
 from micro.asperities.patch_shares import shares
 from micro.compliance.body_modes import BodyModes
 from micro.interaction.contact_problem import Solution
 from micro.model import checked_approaches, checked_patches
 from micro.patch_sums import EllipticContacts, PatchSums
-from micro.plane import RigidPlane
-from micro.plane_equilibrium import Held, Peaks, balanced
+from micro.plane_on_peaks import Peaks
 from micro.response import Pressed, Response
 
 Array = NDArray[np.float64]
@@ -122,14 +123,14 @@ class AsperityModel(AsperityContacts):
         """
         plane = RigidPlane.above(self.asperities, approach, tilt)
         first = np.zeros(len(self.asperities)) if start is None else start.indentation
-        return self.state(plane, self.solution(plane.overlap(self.asperities), first))
+        return self.state(plane, self.solution(self.asperities.interference(plane), first))
 
     def state(self, plane: RigidPlane, solution: Solution) -> AsperityState:
         """Return the contacts of a solution under a plane."""
         own, hertz = solution.indentation, self.hertz
         return AsperityState(
             approach=plane.approach,
-            interference=plane.required(self.asperities),
+            interference=np.maximum(self.asperities.interference(plane), 0.0),
             displacement=self.displacement(own),
             indentation=own,
             semi_axes=hertz.semi_axes * np.sqrt(own)[:, None],
@@ -160,7 +161,7 @@ class AsperityModel(AsperityContacts):
             plane = RigidPlane.above(self.asperities, given[index], tilt)
             # With equal steps, linear extrapolation is right to second order.
             start = np.maximum(2.0 * own - before, 0.0)
-            solution = self.solution(plane.overlap(self.asperities), start)
+            solution = self.solution(self.asperities.interference(plane), start)
             own, before = solution.indentation, own
             rows[int(index)] = self.row(Equilibrium(plane, solution), sums, owner)
         return sums.response(self.name, [rows[index] for index in range(len(given))])
@@ -206,17 +207,19 @@ class AsperityModel(AsperityContacts):
             )
         peaks, first = self._peaks, self.first_plane(control, start)
 
-        def evaluate(motion: Array) -> tuple[Held, Equilibrium]:
+        def respond(motion: Array) -> PlaneResponse[Equilibrium]:
             nonlocal own, spent
-            plane = self._plane(motion)
-            found = self.solution(plane.overlap(self.asperities), own)
+            plane = RigidPlane.moved(self.asperities, motion)
+            found = self.solution(self.asperities.interference(plane), own)
             own, spent = found.indentation, spent + found.iterations
-            loads = peaks.lever.T @ (self.hertz.force * own**1.5)
             known = Equilibrium(plane, found._replace(iterations=spent))
-            return Held(loads, self.stiffness(own, peaks.lever)), known
+            return PlaneResponse(
+                loads=peaks.levers.loads(self.hertz.force * own**1.5),
+                stiffness=lambda: self.stiffness(known.solution.indentation, peaks.lever),
+                state=known,
+            )
 
-        motion = np.array([first.approach, *first.tilt])
-        return balanced(evaluate, control, motion, peaks)[1]
+        return peaks.equilibrium(respond, control, first.motion)[1]
 
     def first_plane(self, control: Control, start: Equilibrium | None = None) -> RigidPlane:
         """Return the plane that the search for an equilibrium starts from.
@@ -232,24 +235,17 @@ class AsperityModel(AsperityContacts):
         near = None
         if start is not None and (start.solution.indentation.any() or control.force == 0.0):
             near = start.plane
-        return self._plane(self._peaks.first_plane(control, near))
-
-    def _plane(self, motion: Array) -> RigidPlane:
-        approach, *tilt = map(float, motion)
-        return RigidPlane.above(self.asperities, approach, (tilt[0], tilt[1]))
+        return RigidPlane.moved(self.asperities, self._peaks.first_plane(control, near))
 
     @property
     def _peaks(self) -> Peaks:
         """The summits under the plane; not cached, because models are sent between processes."""
-        a = self.asperities
-        middle, sides = 0.5 * np.asarray(a.lengths), np.hypot(*a.lengths)
-        lever = np.stack([np.ones(len(a)), a.x - middle[0], a.y - middle[1]], axis=1)
-        force = self.hertz.force
-
-        def alone(overlap: Array) -> float:
-            return float(force @ np.maximum(overlap, 0.0) ** 1.5)
-
-        return Peaks(lever=lever, below=a.highest - a.z, force=alone, half=0.5 * sides)
+        a, force = self.asperities, self.hertz.force
+        return Peaks(
+            levers=PlaneLevers.at(a.x, a.y, a.lengths),
+            depth=a.highest - a.z,
+            force=lambda interference: float(force @ np.maximum(interference, 0.0) ** 1.5),
+        )
 
     def surface_displacement(self, state: AsperityState, x: ArrayLike, y: ArrayLike) -> Array:
         """Return the normal displacement of the surface at points, by all contacts [mm].

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from geometry import Asperities, Control, Partition, PatchGrid, Surface
 from geometry.errors import NotConverged
+from geometry.rigid_plane import RigidPlane
 from micro.asperities.contact_scale import ScaledAsperities
 from micro.asperities.contacts import SOLVERS, AsperityState, checked_name
 from micro.asperities.model import MODELS, AsperityModel, Equilibrium, asperity_model
@@ -27,7 +28,6 @@ from micro.interaction.contact_problem import Solution
 from micro.islands.equilibrium import Relaxation
 from micro.model import checked_approaches, checked_patches
 from micro.patch_sums import PatchSums
-from micro.plane import RigidPlane
 from micro.response import Pressed, Response
 
 Array = NDArray[np.float64]
@@ -209,11 +209,11 @@ class ScaledModel:
         own: Array | None = None,
     ) -> _Fitted:
         """Fit the curvatures to the contacts and solve for the contacts until both agree."""
-        required = plane.required(scaled.summits)
-        nothing = np.zeros_like(required)
+        interference = np.maximum(scaled.summits.interference(plane), 0.0)
+        nothing = np.zeros_like(interference)
         found = near or Equilibrium(plane, Solution(nothing, nothing, 0, 0.0, 0))
         own = found.solution.indentation if own is None else own
-        own = own if own.any() else required
+        own = own if own.any() else interference
         rounding = _ROUNDING * float(np.abs(scaled.summits.z).max(initial=0.0))
         relaxed, spent = Relaxation(), 0
         for _ in range(self.most_iterations):
@@ -221,7 +221,7 @@ class ScaledModel:
             found = model.equilibrium(control, found)
             spent += max(found.solution.iterations, 1)
             change = found.solution.indentation - own
-            scale = float(found.plane.required(scaled.summits).max(initial=0.0)) or 1.0
+            scale = float(scaled.summits.interference(found.plane).max(initial=0.0)) or 1.0
             if np.abs(change).max(initial=0.0) <= max(_TOLERANCE * scale, rounding):
                 solution = found.solution._replace(iterations=spent)
                 return _Fitted(model, Equilibrium(found.plane, solution))

@@ -31,8 +31,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.checks import process_memory
 from geometry.errors import InputError, NotConverged
-from geometry.memory import process_memory
 
 Array = NDArray[np.float64]
 

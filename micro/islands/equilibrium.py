@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from geometry import Control
 from geometry.errors import NotConverged
+from geometry.plane_equilibrium import PlaneResponse
 from micro.interaction.body_points import BodyPoints
 from micro.interaction.contact_problem import (
     ContactProblem,
@@ -29,7 +30,7 @@ from micro.interaction.contact_problem import (
 )
 from micro.islands.shapes import Islands, islands
 from micro.islands.watersheds import Watersheds
-from micro.plane_equilibrium import Held, Peaks, balanced, contact_stiffness
+from micro.plane_on_peaks import Peaks, contact_stiffness
 
 Array = NDArray[np.float64]
 
@@ -233,19 +234,22 @@ class IslandContact:
         x, y = sheds.x[top], sheds.y[top]
         arms = moved + np.stack([np.zeros(len(x)), found.x - x, found.y - y], axis=1)
 
-        def evaluate(trial: Array) -> tuple[Held, Array]:
+        def respond(trial: Array) -> PlaneResponse[Array]:
             nonlocal depth
             interference = over + moved @ (trial - self.motion)
-            depth = forces.solve(np.asarray(interference, float), depth)
-            loads = self.contact_modulus * (arms.T @ (forces.law * depth**1.5))
-            return Held(loads, self.contact_modulus * forces.stiffness(depth, arms)), depth
+            now = depth = forces.solve(np.asarray(interference, float), depth)
+            return PlaneResponse(
+                loads=self.contact_modulus * (arms.T @ (forces.law * now**1.5)),
+                stiffness=lambda: self.contact_modulus * forces.stiffness(now, arms),
+                state=now,
+            )
 
-        goal, depth = balanced(evaluate, control, motion, peaks)
+        goal, depth = peaks.equilibrium(respond, control, motion)
         # A plane that moves far would stand on other peaks than these islands have.
         most = float(found.depth.max())
         share = min(1.0, most / max(float(np.abs(lever @ (goal - motion)).max()), most))
         motion = goal if share == 1.0 else motion + share * (goal - motion)
         if share < 1.0:
-            depth = evaluate(motion)[1]
+            depth = respond(motion).state
         displacement = kernel @ (forces.law * depth**1.5) - lever @ (motion - self.motion)
         return _Effect(displacement, motion, found.under(depth))

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geometry import Control, Partition, PatchGrid, Surface
+from geometry.rigid_plane import PlaneLevers, RigidPlane
 from micro.closed_forms.hertz import checked_modulus
 from micro.compliance.body_modes import BodyModes
 from micro.interaction.body_points import BodyPoints
@@ -33,8 +34,7 @@ from micro.islands.shapes import IslandState, total_force
 from micro.islands.watersheds import Watersheds
 from micro.model import checked_approaches, checked_patches, whole_patch
 from micro.patch_sums import EllipticContacts, PatchSums
-from micro.plane import RigidPlane
-from micro.plane_equilibrium import Peaks
+from micro.plane_on_peaks import Peaks
 from micro.response import Pressed, Response
 
 Array = NDArray[np.float64]
@@ -177,7 +177,7 @@ class IslandModel:
         if not self._is_cached and (control.force or control.tilt is None):
             # Every peak is known, but not the samples below a floor, which follows from the plane.
             peaks = self._peaks(self._watersheds(plane), plane)
-            plane = self._deeper(self._plane(peaks.first_plane(control, near)))
+            plane = self._deeper(RigidPlane.moved(self.surface, peaks.first_plane(control, near)))
         for _ in range(_MOST_CUTS):
             found = self._found(self._watersheds(plane), plane, control, near)
             turn = np.hypot(*np.subtract(found.plane.tilt, plane.tilt)) * 0.5
@@ -189,23 +189,16 @@ class IslandModel:
             plane = self._deeper(near)
         return found
 
-    def _plane(self, motion: Array) -> RigidPlane:
-        approach, *tilt = map(float, motion)
-        return RigidPlane.above(self.surface, approach, (tilt[0], tilt[1]))
-
     def _deeper(self, plane: RigidPlane) -> RigidPlane:
         return replace(plane, approach=plane.approach + (_MARGIN - 1.0) * abs(plane.approach))
 
     def _peaks(self, watersheds: Watersheds, tilted: RigidPlane) -> Peaks:
         """Return the peaks of watersheds that were found under the slopes of a plane."""
-        middle, half = 0.5 * np.asarray(self.surface.lengths), 0.5 * np.hypot(*self.surface.lengths)
-        x, y = watersheds.x - middle[0], watersheds.y - middle[1]
-        lever = np.stack([np.ones(len(watersheds)), x, y], axis=1)
+        levers = PlaneLevers.at(watersheds.x, watersheds.y, self.surface.lengths)
         return Peaks(
-            lever=lever,
-            below=self.reference_height - watersheds.z + lever[:, 1:] @ tilted.tilt,
+            levers=levers,
+            depth=self.reference_height - watersheds.z + levers.matrix[:, 1:] @ tilted.tilt,
             force=lambda over: self.contact_modulus * total_force(watersheds, over),
-            half=half,
         )
 
     def _found(
@@ -232,7 +225,7 @@ class IslandModel:
             body=body,
         )
         found = contact.equilibrium()
-        return _Found(watersheds, self._plane(found.motion), found)
+        return _Found(watersheds, RigidPlane.moved(self.surface, found.motion), found)
 
     def _watersheds(self, plane: RigidPlane) -> Watersheds:
         """Return the watersheds that a plane and all above it need."""

@@ -15,10 +15,11 @@ from geometry import (
     patch_means,
     synthesise,
 )
+from geometry.rigid_plane import PlaneLevers
 from micro import IslandModel
 from micro.islands.equilibrium import IslandContact
 from micro.islands.watersheds import Watersheds
-from micro.plane_equilibrium import Peaks
+from micro.plane_on_peaks import Peaks
 
 PATCHES = PatchGrid(grid=(2, 3), lengths=(1.0, 1.0))
 
@@ -156,10 +157,10 @@ def test_refuses(surface, model):
 def test_islands_that_do_not_converge_are_an_error(surface):
     sheds = Watersheds.of(surface)
     below, count = surface.highest - sheds.z, len(sheds)
-    lever = np.stack([np.ones(count), sheds.x - 0.5, sheds.y - 0.5], axis=1)
+    levers = PlaneLevers.at(sheds.x, sheds.y, surface.lengths)
     contact = IslandContact(
         watersheds=sheds,
-        peaks=Peaks(lever=lever, below=below, force=lambda over: 0.0, half=np.sqrt(0.5)),
+        peaks=Peaks(levers=levers, depth=below, force=lambda over: 0.0),
         control=Control(approach=8e-3, tilt=(0.0, 0.0)),
         level=np.full(count, surface.highest - 8e-3),
         motion=np.array([8e-3, 0.0, 0.0]),
