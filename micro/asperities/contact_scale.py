@@ -12,6 +12,8 @@ exists has its volume and moments, hence a paraboloid. A summit cut in half gets
 3.2 times as slender, with its centre inside; what is missing carries nothing. Against half-space
 solutions on 256 × 256 cells a summit cut in half is 6 % low in force and 10 % in area, one cut to
 a quarter in a corner 10 % and 14 %.
+
+Theory: section 8 of ``demos/theory.md``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Hertz contacts of all asperities of a surface at a given interference, and their stiffness."""
+"""Hertz contacts of all asperities of a surface at a given interference, and their stiffness.
+
+Theory: section 8 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,8 @@
 A rigid plane that has approached by δ interferes with every summit by d_k = <δ(x_k) − (z_M − z_k)>.
 Without interaction each contact makes this displacement alone, w_k = d_k. With interaction the
 displacements by all contacts add up to w_k (`micro.interaction.contact_problem`).
+
+Theory: section 8 of ``demos/theory.md``.
 """
 
 from __future__ import annotations

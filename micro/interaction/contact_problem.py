@@ -17,6 +17,8 @@ together are the one equation
 Every U_ki starts with the slope 0 at t_i = 0, so G is continuously differentiable. Its Jacobian
 I + ∂U/∂t has columns for the active set {z_i > 0} alone.
 
+Theory: section 8 of ``demos/theory.md``, eq. 8.1.
+
 Source:
     Waddad et al. 2016, eqs. 10–12 and 23, doi 10.1016/j.triboint.2015.12.023;
     Robinson, Math. Oper. Res. 17 (1992) 691, doi 10.1287/moor.17.3.691 (normal maps).

@@ -5,6 +5,8 @@ is 0, so the Gauss–Newton model of O is exact in the limit. Its normal equatio
 conjugate gradients, and only to the accuracy that the step needs; `scipy.sparse.linalg.lsqr` is
 the stable form of that. Then summits with t_k < 0 leave A and summits with w_k < d_k enter it,
 until there are none of either.
+
+Theory: section 8 of ``demos/theory.md``.
 """
 
 from __future__ import annotations

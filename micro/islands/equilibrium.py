@@ -7,6 +7,8 @@ surface, let the islands displace each other, cut it again at the new levels.
 On a half-space with a prescribed plane the forces at the depths of the cut give the displacements
 at once. A finite body or a free motion of the plane couples the islands; then depths,
 displacements and plane follow from a contact problem (`micro.interaction.contact_problem`).
+
+Theory: section 9 of ``demos/theory.md``.
 """
 
 from __future__ import annotations

@@ -12,6 +12,8 @@ Volume and moments see the surface on the scale of the contact. Against half-spa
 square; 9 % at most) and the area within 5 % (14 %) from 0.1 to 5 % of contact area. Beyond 8 %
 regions grow together across the surface and stand for no ellipse. Every result says whether it
 lies within this range (`IslandState.warning`, `Response.warnings`).
+
+Theory: section 9 of ``demos/theory.md``.
 """
 
 from __future__ import annotations

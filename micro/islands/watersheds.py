@@ -3,6 +3,8 @@
 The samples of each watershed are sorted by depth below its peak, and their moments are summed up
 in that order. So the sums above a level, which may differ between watersheds, cost one search for
 each peak.
+
+Theory: section 9 of ``demos/theory.md``.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geometry import InputError, PatchGrid, Surface
+from geometry import Control, InputError, PatchGrid, Surface
 from micro import MODELS, AsperityModel, HertzContact, asperity_model, micro_model
 from micro.asperities.patch_shares import shares
 
@@ -114,6 +114,18 @@ def test_curve_is_made_of_states(cluster, name):
         share = shares(PATCHES, place, state.semi_axes, cluster.angle)
         by_patch = np.bincount(share.patch, share.force * state.force[share.contact], minlength=4)
         assert response.patch_force[row] == pytest.approx(by_patch, rel=1e-7, abs=1e-12)
+
+
+def test_without_patches_the_whole_surface_is_one(cluster):
+    model = asperity_model("elliptic", cluster, contact_modulus=E_STAR)
+    alone, given = model.respond([4e-3]), respond(model, [4e-3], ONE_PATCH)
+    assert alone.patch_force[0] == alone.force == given.force
+    assert alone.mean_separation == given.mean_separation
+    pressed = model.press(Control(force=float(alone.force[0]))).response
+    assert pressed.approach == pytest.approx([4e-3], rel=1e-8)  # forces are met to 1e-9
+    message = r"asperities do not know the mean heights of patches \(allowed: mean_heights, or no"
+    with pytest.raises(InputError, match=message):
+        model.respond([4e-3], patches=PATCHES)
 
 
 @every_model

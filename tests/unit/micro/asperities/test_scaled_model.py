@@ -140,6 +140,17 @@ def test_force_grows_with_the_approach(surface, curvature, border):
     assert np.all(np.diff(response.contact_area) > -1e-3 * response.contact_area[1:])
 
 
+@pytest.mark.parametrize("make", [scaled, islands])
+def test_patches_and_mean_heights_follow_from_the_surface(surface, make):
+    model, whole = make(surface), PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
+    for patches, wanted in ((None, whole), (PATCHES, PATCHES)):
+        short, given = model.respond([5e-3], patches=patches), respond(model, [5e-3], wanted)
+        np.testing.assert_array_equal(short.patch_separation, given.patch_separation)
+        step = model.press(Control(approach=5e-3), patches=patches).response
+        assert step.patch_separation.shape == given.patch_separation.shape
+        assert step.mean_separation == pytest.approx(given.mean_separation, rel=1e-9)
+
+
 def test_tilt_turns_the_load(surface):
     model = scaled(surface)
     left, right = (respond(model, [8e-3], tilt=(t, 0.0)).patch_force[0] for t in (-2e-2, 2e-2))
