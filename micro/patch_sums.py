@@ -16,8 +16,7 @@ and far from any border count as point forces, for which the same bound holds.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol, Self
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +60,10 @@ class ContactModel(Protocol):
     """A model whose contacts are Hertz's."""
 
     @property
+    def name(self) -> str:
+        """Name of the model."""
+
+    @property
     def reference_height(self) -> float:
         """Height z_M that the approach counts from [mm]."""
 
@@ -73,44 +76,22 @@ class ContactModel(Protocol):
         """What a finite body adds to the half-space."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class PatchSums:
-    """Sums and means over N patches of what contacts do to a surface.
+class PatchSums(NamedTuple):
+    """Sums and means over N patches of what the contacts of a model do to a surface.
 
-    Args:
+    Attributes:
+        model: The model.
         patches: The patches.
         mean_heights: Mean heights of the surface on the patches, shape (N,) [mm].
-        reference_height: Height z_M that the approach counts from [mm].
-        contact_modulus: E* [MPa].
-        body: What a finite body adds to the half-space; None leaves the half-space alone.
     """
 
+    model: ContactModel
     patches: Partition
     mean_heights: Array
-    reference_height: float
-    contact_modulus: float
-    body: BodyModes | None = None
 
-    @classmethod
-    def of(cls, model: ContactModel, patches: Partition, mean_heights: Array) -> Self:
-        """Return the sums of a model's contacts.
-
-        Args:
-            model: The model.
-            patches: The N patches.
-            mean_heights: Mean heights of the surface on the patches, shape (N,) [mm].
-        """
-        return cls(
-            patches=patches,
-            mean_heights=mean_heights,
-            reference_height=model.reference_height,
-            contact_modulus=model.contact_modulus,
-            body=model.body,
-        )
-
-    def response(self, name: str, rows: Sequence[dict[str, Any]]) -> Response:
-        """Put rows together to the response of a model of some name."""
-        return Response.of(rows, name, self.contact_modulus, self.patches)
+    def response(self, rows: Sequence[dict[str, Any]]) -> Response:
+        """Put rows together, in their order."""
+        return Response.of(rows, self.model.name, self.model.contact_modulus, self.patches)
 
     def row(
         self, plane: RigidPlane, contacts: EllipticContacts, owner: Indices, **others: Any
@@ -124,13 +105,13 @@ class PatchSums:
             others: The other fields of the row: the shared forces and areas, the solver's figures
                 and the warning.
         """
-        x, y = contacts.position.T
-        displacement = patch_displacements(self.patches, contacts, self.contact_modulus)
-        if self.body is not None:
-            points = BodyPoints.at(self.body, x, y, self.contact_modulus)
-            moment = contacts.force / (np.pi * self.contact_modulus)
-            displacement = displacement + points.patch_means(self.patches, moment)
-        below = self.reference_height - plane.means(self.patches)
+        (x, y), modulus = contacts.position.T, self.model.contact_modulus
+        displacement = patch_displacements(self.patches, contacts, modulus)
+        if self.model.body is not None:
+            points = BodyPoints.at(self.model.body, x, y, modulus)
+            force = contacts.force / (np.pi * modulus)
+            displacement = displacement + points.patch_means(self.patches, force)
+        below = self.model.reference_height - plane.means(self.patches)
         separation = below - self.mean_heights + displacement
         return {
             "approach": plane.approach,

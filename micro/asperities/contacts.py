@@ -9,7 +9,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,12 +54,6 @@ class HertzCoefficients(NamedTuple):
     area: Array
     semi_axes: Array
     peak_pressure: Array
-
-    @classmethod
-    def of(cls, contact: HertzContact) -> Self:
-        """Evaluate contacts whose indentation is 1 mm."""
-        axes = np.stack([contact.semi_major, contact.semi_minor], axis=-1)
-        return cls(contact.force, contact.area, axes, contact.peak_pressure)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -112,7 +106,9 @@ class AsperityContacts:
     @cached_property
     def hertz(self) -> HertzCoefficients:
         """Hertz's results at an indentation of 1 mm."""
-        return HertzCoefficients.of(self.contact(1.0))
+        unit = self.contact(1.0)
+        axes = np.stack([unit.semi_major, unit.semi_minor], axis=-1)
+        return HertzCoefficients(unit.force, unit.area, axes, unit.peak_pressure)
 
     @cached_property
     def pairs(self) -> HertzPairs:

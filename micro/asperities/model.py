@@ -154,7 +154,7 @@ class AsperityModel(AsperityContacts):
     ) -> Response:
         """Solve along approaches, each from the solution before it; see `MicroModel.respond`."""
         given = checked_approaches(approaches)
-        sums = PatchSums.of(self, *checked_patches(self.asperities, patches, mean_heights))
+        sums = PatchSums(self, *checked_patches(self.asperities, patches, mean_heights))
         owner = sums.patches.index_of(self.asperities.x, self.asperities.y)
         rows: dict[int, dict[str, Any]] = {}
         own: Array = np.zeros(len(self.asperities))
@@ -166,7 +166,7 @@ class AsperityModel(AsperityContacts):
             solution = self.solution(self.asperities.interference(plane), start)
             own, before = solution.indentation, own
             rows[int(index)] = self.row(Equilibrium(plane, solution), sums, owner)
-        return sums.response(self.name, [rows[index] for index in range(len(given))])
+        return sums.response([rows[index] for index in range(len(given))])
 
     def press(
         self,
@@ -177,10 +177,10 @@ class AsperityModel(AsperityContacts):
         start: Any = None,
     ) -> Pressed:
         """Solve one load step; see `MicroModel.press`."""
-        sums = PatchSums.of(self, *checked_patches(self.asperities, patches, mean_heights))
+        sums = PatchSums(self, *checked_patches(self.asperities, patches, mean_heights))
         owner = sums.patches.index_of(self.asperities.x, self.asperities.y)
         found = self.equilibrium(control, start)
-        response = sums.response(self.name, [self.row(found, sums, owner)])
+        response = sums.response([self.row(found, sums, owner)])
         return Pressed(response, found.plane, found)
 
     def equilibrium(self, control: Control, start: Equilibrium | None = None) -> Equilibrium:
@@ -273,7 +273,6 @@ class AsperityModel(AsperityContacts):
         found: Equilibrium,
         sums: PatchSums,
         owner: NDArray[np.intp],
-        name: str | None = None,
     ) -> dict[str, Any]:
         """Return the fields of a response for one plane.
 
@@ -283,9 +282,8 @@ class AsperityModel(AsperityContacts):
 
         Args:
             found: The plane and the contacts under it.
-            sums: The sums over patches.
+            sums: The sums over patches, of this model or of one that fits its asperities anew.
             owner: Flat index of the patch that holds each summit, shape (n,).
-            name: Name of the model in warnings; its own when not given.
         """
         (plane, solution), a, hertz = found, self.asperities, self.hertz
         on = np.flatnonzero(solution.indentation > 0.0)
@@ -304,7 +302,7 @@ class AsperityModel(AsperityContacts):
         if fraction > LARGEST_AREA_FRACTION and len(on) + solution.overlapping_contacts > 1:
             warning = (
                 f"at an approach of {plane.approach:.4g} mm the contacts cover {fraction:.1%} of"
-                f" the surface: the model {name or self.name} of separate summits stands for up to"
+                f" the surface: the model {sums.model.name} of separate summits stands for up to"
                 f" {LARGEST_AREA_FRACTION:.0%}"
             )
         return sums.row(

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -43,13 +43,6 @@ _TOLERANCE = 1e-9  # so that a load comes back on the way down as it was on the 
 _ROUNDING = 64.0 * np.finfo(float).eps
 _MARGIN = 1.2  # watersheds are kept so much below a plane, in units of the approach
 _FURTHER = 1.1  # so much beyond a plane that came out, lest it be found a third time
-
-
-class _Fitted(NamedTuple):
-    """Asperities fitted to their contacts, and the contacts."""
-
-    model: AsperityModel
-    found: Equilibrium
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -142,8 +135,9 @@ class ScaledModel:
         plane = RigidPlane.above(self.surface, approach, tilt)
         scaled = self._scaled(self._highest_approach(plane))
         own = None if start is None else start.indentation
-        fitted = self._fitted(scaled, Control(approach=approach, tilt=tilt), plane, own=own)
-        return fitted.model.state(*fitted.found)
+        given = Control(approach=approach, tilt=tilt)
+        model, found = self._fitted(scaled, given, plane, own=own)
+        return model.state(*found)
 
     def respond(
         self,
@@ -154,7 +148,7 @@ class ScaledModel:
         tilt: tuple[float, float] = _LEVEL,
     ) -> Response:
         """Solve along approaches, each from the solution before it; see `MicroModel.respond`."""
-        sums = PatchSums.of(self, *checked_patches(self.surface, patches, mean_heights))
+        sums = PatchSums(self, *checked_patches(self.surface, patches, mean_heights))
         planes = [
             RigidPlane.above(self.surface, approach, tilt)
             for approach in checked_approaches(approaches)
@@ -168,8 +162,8 @@ class ScaledModel:
             given = Control(approach=plane.approach, tilt=tilt)
             model, found = self._fitted(scaled, given, plane, own=own)
             own = found.solution.indentation
-            rows[int(index)] = model.row(found, sums, owner, self.name)
-        return sums.response(self.name, [rows[index] for index in range(len(planes))])
+            rows[int(index)] = model.row(found, sums, owner)
+        return sums.response([rows[index] for index in range(len(planes))])
 
     def press(
         self,
@@ -180,7 +174,7 @@ class ScaledModel:
         start: Any = None,
     ) -> Pressed:
         """Solve one load step; see `MicroModel.press`."""
-        sums = PatchSums.of(self, *checked_patches(self.surface, patches, mean_heights))
+        sums = PatchSums(self, *checked_patches(self.surface, patches, mean_heights))
         depth: float | None = None
         while True:
             scaled = self._scaled(depth or 0.0)
@@ -197,7 +191,7 @@ class ScaledModel:
                 break
             depth *= _FURTHER
         owner = sums.patches.index_of(scaled.summits.x, scaled.summits.y)
-        response = sums.response(self.name, [model.row(found, sums, owner, self.name)])
+        response = sums.response([model.row(found, sums, owner)])
         return Pressed(response, found.plane, found)
 
     def _fitted(
@@ -207,7 +201,7 @@ class ScaledModel:
         plane: RigidPlane,
         near: Equilibrium | None = None,
         own: Array | None = None,
-    ) -> _Fitted:
+    ) -> tuple[AsperityModel, Equilibrium]:
         """Fit the curvatures to the contacts and solve for the contacts until both agree."""
         interference = np.maximum(scaled.summits.interference(plane), 0.0)
         nothing = np.zeros_like(interference)
@@ -224,7 +218,7 @@ class ScaledModel:
             scale = float(scaled.summits.interference(found.plane).max(initial=0.0)) or 1.0
             if np.abs(change).max(initial=0.0) <= max(_TOLERANCE * scale, rounding):
                 solution = found.solution._replace(iterations=spent)
-                return _Fitted(model, Equilibrium(found.plane, solution))
+                return model, Equilibrium(found.plane, solution)
             own = np.maximum(relaxed.next(own, change), 0.0)
         raise NotConverged(
             f"the fit of curvatures to contacts at an approach of {found.plane.approach:.4g} mm",

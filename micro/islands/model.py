@@ -140,13 +140,13 @@ class IslandModel:
             RigidPlane.above(self.surface, approach, tilt)
             for approach in checked_approaches(approaches)
         ]
-        sums = PatchSums.of(self, *checked_patches(self.surface, patches, mean_heights))
+        sums = PatchSums(self, *checked_patches(self.surface, patches, mean_heights))
         watersheds = self._watersheds(max(planes, key=lambda plane: plane.approach))
         rows = []
         for plane in planes:
             given = Control(approach=plane.approach, tilt=tilt)
             rows.append(self._row(self._found(watersheds, plane, given), sums))
-        return sums.response(self.name, rows)
+        return sums.response(rows)
 
     def press(
         self,
@@ -162,9 +162,9 @@ class IslandModel:
         surface under a plane that turns are those under the slopes before, until it turns by no
         more than 1e-4 of the deepest contact.
         """
-        sums = PatchSums.of(self, *checked_patches(self.surface, patches, mean_heights))
+        sums = PatchSums(self, *checked_patches(self.surface, patches, mean_heights))
         found = self._pressed(control, start)
-        response = sums.response(self.name, [self._row(found, sums)])
+        response = sums.response([self._row(found, sums)])
         return Pressed(response, found.plane, found.plane)
 
     def _pressed(self, control: Control, near: RigidPlane | None) -> _Found:
