@@ -16,7 +16,7 @@ MODEL_NAMES = (*MODELS, "islands", "half-space")
 """Names of all micro models, the cheapest kinds first."""
 
 START_KINDS: tuple[type, ...] = (RigidPlane, Equilibrium, Solution)
-"""Kinds of records that starts of `MicroModel.press` consist of, beside arrays and tuples."""
+"""Records that `Pressed.start` may consist of, besides arrays and tuples."""
 
 
 def micro_model(
@@ -28,7 +28,7 @@ def micro_model(
     curvature: str = "summit",
     border: str = "ignore",
 ) -> MicroModel:
-    """Make a micro model of a surface whose border is free, as that of a block's top is.
+    """Return the micro model of a surface whose border is free, as that of a block's top is.
 
     Args:
         name: A name in `MODEL_NAMES`.
@@ -36,7 +36,7 @@ def micro_model(
         contact_modulus: E* [MPa].
         solver: Solver of the interacting asperity models.
         curvature: Where asperity models take the curvature, a name in `CURVATURES`.
-        border: What they make of maxima on the border, a name in `BORDERS`.
+        border: How asperity models treat maxima on the border, a name in `BORDERS`.
 
     Raises:
         InputError: When there is no such model, option or solver, or the modulus is not positive.

@@ -60,8 +60,8 @@ class HertzCoefficients(NamedTuple):
 class AsperityContacts:
     """The contacts of n asperities.
 
-    The interaction is summed over all pairs of the summits that the plane reaches. Time and memory
-    grow with the square of their number, as far as the memory allows.
+    The interaction is summed over all pairs of summits above the plane. Time and memory grow with
+    the square of their number; more than the memory holds are refused.
 
     Args:
         asperities: The n summits, with the highest point z_M that the approach counts from.
@@ -135,14 +135,14 @@ class AsperityContacts:
         return indentation + self.pairs.displacement(indentation)
 
     def solution(self, interference: Array, start: Array) -> Solution:
-        """Solve for the summits that the plane can reach.
+        """Solve for the summits above the plane.
 
-        Those are the summits above the undisplaced plane, and those that the body raises above it.
-        The displacements of all others are left at 0.
+        These are the undisplaced summits above it, and those that the body raises above it. The
+        displacements of all others stay 0.
 
         Args:
-            interference: How far the plane reaches below each undisplaced summit, negative for
-                summits below the plane, shape (n,) [mm].
+            interference: Depth of the plane below each undisplaced summit, negative for summits
+                below the plane, shape (n,) [mm].
             start: First guess of the indentations, shape (n,) [mm].
 
         Raises:
@@ -152,30 +152,30 @@ class AsperityContacts:
         if not self.interacting and self.body is None:
             alone = np.maximum(interference, 0.0)
             return Solution(alone, alone, 0, 0.0, 0)
-        reached = np.flatnonzero(interference > 0.0)
+        above = np.flatnonzero(interference > 0.0)
         own, displacement, spent = np.zeros_like(interference), np.zeros_like(interference), 0
-        if reached.size == 0:
+        if above.size == 0:
             return Solution(own, displacement, 0, 0.0, 0)
         while True:
             checked_pairs(
-                len(reached),
-                len(reached),
+                len(above),
+                len(above),
                 "asperities",
                 bytes_per_pair=BYTES_PER_PAIR * (2.0 if self.solver == "truncated-newton" else 1.0),
             )
-            among = self.pairs.subset(reached)
-            problem = ContactProblem(interaction=among, interference=interference[reached])
-            found = solve(problem, SOLVERS[self.solver], start[reached])
-            own[reached], displacement[reached] = found.indentation, found.displacement
+            pairs = self.pairs.subset(above)
+            problem = ContactProblem(interaction=pairs, interference=interference[above])
+            found = solve(problem, SOLVERS[self.solver], start[above])
+            own[above], displacement[above] = found.indentation, found.displacement
             spent += found.iterations
             if self.pairs.body is None:
                 break
             # Through the half-space contacts only press summits down; a body can raise them.
             raised = interference - self.pairs.body.displacement(self.pairs.scaled_force(own)) > 0.0
-            raised[reached] = False
+            raised[above] = False
             if not raised.any():
                 break
-            reached, start = np.sort(np.append(reached, np.flatnonzero(raised))), own
+            above, start = np.sort(np.append(above, np.flatnonzero(raised))), own
         return found._replace(indentation=own, displacement=displacement, iterations=spent)
 
     def stiffness(self, indentation: Array, lever: Array) -> Array:
@@ -208,7 +208,7 @@ class AsperityState:
 
     Args:
         approach: Rigid approach δ at the centre [mm].
-        interference: How far the plane reaches below each undisplaced summit, d_k ≥ 0, (n,) [mm].
+        interference: Depth d_k ≥ 0 of the plane below each undisplaced summit, shape (n,) [mm].
         displacement: Displacements w_k of the summits by all contacts, shape (n,) [mm].
         indentation: Part of w_k by the summit's own contact, shape (n,) [mm].
         semi_axes: Semi-axes (a, b) of the contacts, shape (n, 2) [mm].

@@ -1,10 +1,12 @@
 """The four asperity models with curvature at the scale of the contact and border asperities.
 
-The options repair what makes the paper's models 6 to 11 % low in force and 10 to 23 % low in area
-between 1 and 10 % of contact area. Against half-space solutions on 20 surfaces of Sets 1 and 2 the
-elliptic, interacting model with both is within 1 to 2.5 % in force (root mean square; 6 % at most)
-from 0.3 to 10 % of contact area, and within 7 % in area; with the fitted curvature alone it is
-3 to 7 % low in force, with the border's asperities alone 4 to 8 %.
+The paper's models are 6 to 11 % low in force and 10 to 23 % low in area between 1 and 10 % of
+contact area. The two options remove most of that. Against half-space solutions on 20 surfaces of
+Sets 1 and 2 the elliptic, interacting model with both is within 1 to 2.5 % in force (root mean
+square; 6 % at most) from 0.3 to 10 % of contact area, and within 7 % in area. With the fitted
+curvature but without border asperities it is 3 to 7 % low in force, the other way round 4 to 8 %.
+
+Theory: section 8 of ``demos/theory.md``.
 """
 
 from __future__ import annotations
@@ -41,8 +43,8 @@ BORDERS = ("ignore", "include")
 _LEVEL = (0.0, 0.0)
 _TOLERANCE = 1e-9  # so that a load comes back on the way down as it was on the way up
 _ROUNDING = 64.0 * np.finfo(float).eps
-_MARGIN = 1.2  # watersheds are kept so much below a plane, in units of the approach
-_FURTHER = 1.1  # so much beyond a plane that came out, lest it be found a third time
+_MARGIN = 1.2  # depth of the watersheds that are found, in units of the approach
+_FURTHER = 1.1  # margin beyond the plane that was found, so that the next one lies within
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,10 +59,11 @@ class ScaledModel:
         border: A name in `BORDERS`. The radii of border asperities are always fitted.
         solver: Solver of the models with interaction.
         body: What a finite body adds to the half-space, as for `AsperityModel`.
-        within: Patches and the flat index of the one whose summits alone there are; all when not
-            given.
-        most_cached: Number of cells of the surface up to which its watersheds are found once and
-            kept. Those of a larger surface are found anew for every plane, as deep as it needs.
+        within: Patches, and the flat index of the one whose summits the model consists of; all
+            summits when not given.
+        most_cached: Largest number of cells of a surface whose watersheds are found once and
+            cached. Those of a larger surface are found again for every plane, only as deep as
+            needed.
         most_iterations: Number of times that the curvatures may be fitted to the contacts.
 
     Raises:
@@ -181,7 +184,7 @@ class ScaledModel:
             known = start is not None and len(start.solution.indentation) == len(scaled.summits)
             near = start if known else None
             plane = self._model(scaled.summits).first_plane(control, near)
-            # How deep the watersheds of a large surface must reach follows from the plane.
+            # The plane determines how deep the watersheds of a large surface must be.
             before, depth = depth, self._highest_approach(plane)
             if before is None and not self._is_cached:
                 continue

@@ -1,12 +1,12 @@
 """The contact problem of summits that displace each other, and its solution by Newton's method.
 
-A contact with the indentation t_k moves its own summit by t_k and the other summits k by
-U_ki(t_i), the interaction displacements. The total displacement is w_k = t_k + Σ_i U_ki(t_i). A
-plane whose interference with the undisplaced summits is d_k demands
+A contact with the indentation t_k moves its own summit by t_k. Contact i moves every other summit k
+by U_ki(t_i), the interaction displacement. The total displacement is w_k = t_k + Σ_i U_ki(t_i). If
+the plane lies d_k below the undisplaced summit k, its interference, the contact conditions are
 
     w_k ≥ d_k,    t_k ≥ 0,    t_k (w_k − d_k) = 0:
 
-it penetrates no summit, and a summit that it does not touch carries nothing.
+it penetrates no summit, and a summit that is not in contact carries no force.
 
 Newton's method solves the normal map of these conditions. Let z = d − U(z⁺) with z⁺ = max(z, 0).
 A positive z_k is the indentation of a contact; a negative one is an open gap. All the conditions
@@ -48,6 +48,7 @@ With 2,500 asperities, 1,800 of them in contact, 27 B were measured on a half-sp
 finite body; the truncated Newton method took 86 B.
 """
 
+# The limits below stop searches that do not converge; ordinary problems take 4 to 7 Newton steps.
 _MOST_ITERATIONS = 40
 _SMALLEST_LOAD_STEP = 1.0 / 256.0
 _SHORTEST_STEP = 2.0**-10
@@ -102,8 +103,8 @@ class ContactProblem:
 
     Args:
         interaction: How the n contacts displace each other's summits.
-        interference: How far the plane reaches below each undisplaced summit, d_k, shape (n,)
-            [mm]; some are positive.
+        interference: Depth d_k of the plane below each undisplaced summit, shape (n,) [mm]; some
+            are positive.
     """
 
     interaction: Interaction

@@ -40,9 +40,12 @@ TOLERANCE = 1e-6
 """Largest change of a displacement in an iteration, relative to the largest interference."""
 
 _MERGING_ITERATIONS = 10
+"""Iterations in which regions may still grow together."""
+
 _MOST_ITERATIONS = 200
 _FIRST_SHARE = 0.6
 _SHARES = (0.2, 1.0)
+"""Bounds of the share of a change that a damped iteration goes."""
 
 
 class Relaxation:
@@ -103,8 +106,8 @@ class PointForces:
         """Return the indentations under a plane, shape (m,) [mm].
 
         Args:
-            interference: How far the plane reaches below each undisplaced peak, negative for
-                peaks below the plane, shape (m,) [mm].
+            interference: Depth of the plane below each undisplaced peak, negative for peaks below
+                the plane, shape (m,) [mm].
             start: First guess of the indentations, shape (m,) [mm].
 
         Raises:
@@ -247,7 +250,7 @@ class IslandContact:
             )
 
         goal, depth = peaks.equilibrium(respond, control, motion)
-        # A plane that moves far would stand on other peaks than these islands have.
+        # A plane that moves by more than the islands are deep would meet other islands.
         most = float(found.depth.max())
         share = min(1.0, most / max(float(np.abs(lever @ (goal - motion)).max()), most))
         motion = goal if share == 1.0 else motion + share * (goal - motion)

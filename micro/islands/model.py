@@ -7,7 +7,7 @@ displacement u_k of peak k by the forces of the other islands lowers the surface
 the region is what rises above z_M − δ + u_k. Regions and displacements are found in turn until
 they agree (`micro.islands.equilibrium`).
 
-Volume and moments see the surface on the scale of the contact. Against half-space solutions on
+Volume and moments describe the surface on the scale of the contact. Against half-space solutions on
 20 surfaces of the paper's Sets 1 and 2 with 256 × 256 cells the force is within 3 % (root mean
 square; 9 % at most) and the area within 5 % (14 %) from 0.1 to 5 % of contact area. Beyond 8 %
 regions grow together across the surface and stand for no ellipse. Every result says whether it
@@ -45,7 +45,7 @@ _LEVEL = (0.0, 0.0)
 _FIRST = 0.1  # of the range of heights: the approach to start from where none is known
 _TURN = 1e-4  # largest turn of the plane, of the deepest contact
 _MOST_CUTS = 8
-_MARGIN = 1.2  # watersheds are kept so much below a plane, in units of the approach
+_MARGIN = 1.2  # depth of the watersheds that are found, in units of the approach
 
 
 class _Found(NamedTuple):
@@ -69,8 +69,9 @@ class IslandModel:
         highest: Height z_M that the approach counts from [mm]; the surface's own when not given.
         body: What a finite body with its sides adds to the half-space, between the centres of the
             islands and the peaks; a half-space when not given.
-        most_cached: Number of cells of the surface up to which its watersheds are found once and
-            kept. Those of a larger surface are found anew for every plane, as deep as it needs.
+        most_cached: Largest number of cells of a surface whose watersheds are found once and
+            cached. Those of a larger surface are found again for every plane, only as deep as
+            needed.
 
     Raises:
         InputError: When the modulus is not positive.
@@ -158,9 +159,9 @@ class IslandModel:
     ) -> Pressed:
         """Solve one load step; see `MicroModel.press`.
 
-        Islands are found anew at every load step: the start is a plane alone. The watersheds of a
-        surface under a plane that turns are those under the slopes before, until it turns by no
-        more than 1e-4 of the deepest contact.
+        Islands are found again at every load step, so the start is a plane only. A plane that turns
+        is solved for on the watersheds of its slopes before, until a turn moves no point by more
+        than 1e-4 of the deepest contact.
         """
         sums = PatchSums(self, *checked_patches(self.surface, patches, mean_heights))
         found = self._pressed(control, start)
@@ -177,7 +178,7 @@ class IslandModel:
         turned = control.tilt or (_LEVEL if near is None else near.tilt)
         plane = RigidPlane.above(self.surface, approach, turned)
         if not self._is_cached and (control.force or control.tilt is None):
-            # Every peak is known, but not the samples below a floor, which follows from the plane.
+            # Watersheds above a floor have all peaks, which suffice to estimate the plane.
             peaks = self._peaks(self._watersheds(plane), plane)
             plane = self._deeper(RigidPlane.moved(self.surface, peaks.first_plane(control, near)))
         for _ in range(_MOST_CUTS):

@@ -25,7 +25,7 @@ from micro.islands.division import Saddles, divided, saddles_between, sampled
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-_FEW = 32
+_FEW = 32  # samples of the smallest cap that has a shape of its own
 _POWERS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
 _ORDER = np.array([2.0, 2.5, 2.5, 3.0, 3.0, 3.0])[:, None]
 
@@ -219,13 +219,13 @@ class Watersheds:
 
 
 def _needed(heights: Array, owner: Indices, z: Array, floor: float) -> NDArray[np.bool_]:
-    """Mark the samples above a floor and the highest ones of each peak that reaches it."""
-    kept = heights > floor
-    count = np.bincount(owner[kept], minlength=len(z))
+    """Mark the samples above a floor, and the highest 33 of every peak above it."""
+    needed = heights > floor
+    count = np.bincount(owner[needed], minlength=len(z))
     wanting = (z >= floor) & (count <= _FEW)
-    rest = np.flatnonzero(wanting[owner] & ~kept)
+    rest = np.flatnonzero(wanting[owner] & ~needed)
     rest = rest[np.lexsort((-heights[rest], owner[rest]))]
     of = owner[rest]
     rank = np.arange(len(rest)) - np.searchsorted(of, of)
-    kept[rest[rank + count[of] <= _FEW]] = True
-    return kept
+    needed[rest[rank + count[of] <= _FEW]] = True
+    return needed
