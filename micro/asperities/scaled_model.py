@@ -3,8 +3,8 @@
 The paper's models are 6 to 11 % low in force and 10 to 23 % low in area between 1 and 10 % of
 contact area. The two options remove most of that. Against half-space solutions on 20 surfaces of
 Sets 1 and 2 the elliptic, interacting model with both is within 1 to 2.5 % in force (root mean
-square; 6 % at most) from 0.3 to 10 % of contact area, and within 7 % in area. With the fitted
-curvature but without border asperities it is 3 to 7 % low in force, the other way round 4 to 8 %.
+square; 6 % at most) from 0.3 to 10 % of contact area, and within 7 % in area. Its force is
+3 to 7 % low without border asperities and 4 to 8 % low without fitted curvature.
 
 Theory: section 8 of ``demos/theory.md``.
 """
