@@ -33,7 +33,7 @@ PATCHES = PatchGrid(grid=(3, 2), lengths=(1.0, 1.0))
 @pytest.fixture(scope="module")
 def surface():
     spectrum = Spectrum(hurst=0.8, waves=(2, 8), rms_slope=0.2, seed=4)
-    return synthesise(spectrum, grid=(64, 64), lengths=(1.0, 1.0))
+    return synthesise(spectrum, grid=(40, 40), lengths=(1.0, 1.0))
 
 
 def scaled(surface, kind="elliptic", **options):

@@ -27,7 +27,7 @@ PATCHES = PatchGrid(grid=(2, 3), lengths=(1.0, 1.0))
 @pytest.fixture(scope="module")
 def surface():
     spectrum = Spectrum(hurst=0.8, waves=(2, 9), rms_slope=0.2, seed=5)
-    return synthesise(spectrum, grid=(64, 64), lengths=(1.0, 1.0))
+    return synthesise(spectrum, grid=(40, 40), lengths=(1.0, 1.0))
 
 
 @pytest.fixture(scope="module")
