@@ -125,7 +125,7 @@ class ScaledAsperities:
             return self.summits
         sheds, cap = self.watersheds, self.watershed[which]
         depth = np.maximum(indentation[which], _SMALLEST * sheds.depth.max(initial=0.0))
-        depth = np.maximum(depth, np.where(sheds.small, sheds.shaped, 0.0)[cap])
+        depth = np.maximum(depth, sheds.whole_caps[cap])
         height = np.zeros(len(sheds))
         height[cap] = depth
         moments = from_origin(sheds.caps(height)[:, cap], sheds.x[cap], sheds.y[cap])

@@ -130,14 +130,6 @@ class PointForces:
         return contact_stiffness(lever[on], rate, self.matrix[np.ix_(on, on)] * rate)
 
 
-class _Effect(NamedTuple):
-    """Effect of islands: displacements of the n peaks, plane (3,), and the islands under it."""
-
-    displacement: Array
-    motion: Array
-    islands: Islands
-
-
 class IslandEquilibrium(NamedTuple):
     """Islands that agree with the displacements that they cause.
 
@@ -221,15 +213,20 @@ class IslandContact:
             remedy='lower load.approach, or choose micro.model = "half-space"',
         )
 
-    def _effect(self, found: Islands, motion: Array) -> _Effect:
-        """Return the displacements by islands that were found under a plane, and its motion."""
+    def _effect(self, found: Islands, motion: Array) -> tuple[Array, Array, Islands]:
+        """Return displacements of the n peaks, the plane (3,), and the islands under it.
+
+        Args:
+            found: The islands under a plane.
+            motion: Approach and slopes of that plane, shape (3,).
+        """
         sheds, peaks, control = self.watersheds, self.peaks, self.control
         checked_pairs(len(sheds), len(found), "islands")
         kernel = found.kernel(sheds.x, sheds.y)
         without_force = control.force == 0.0 or not len(found)
         prescribed = control.force is None and control.tilt is not None
         if without_force or (prescribed and self.body is None):
-            return _Effect(kernel @ found.force, self.motion, found)
+            return kernel @ found.force, self.motion, found
         if self.body is not None:
             centres = BodyPoints.at(self.body.body, found.x, found.y, self.contact_modulus)
             kernel = kernel + self.body.by(centres) / np.pi
@@ -257,4 +254,4 @@ class IslandContact:
         if share < 1.0:
             depth = respond(motion).state
         displacement = kernel @ (forces.law * depth**1.5) - lever @ (motion - self.motion)
-        return _Effect(displacement, motion, found.under(depth))
+        return displacement, motion, found.under(depth)

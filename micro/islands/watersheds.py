@@ -182,22 +182,18 @@ class Watersheds:
         return self.owner + self.depth / self._deepest
 
     @cached_property
-    def small(self) -> NDArray[np.bool_]:
-        """Which watersheds have no more than 32 samples, shape (n,)."""
-        return np.diff(self._start) <= _FEW
+    def whole_caps(self) -> Array:
+        """Heights of the caps of all samples of watersheds with at most 32, else 0, (n,) [mm].
 
-    @cached_property
-    def shaped(self) -> Array:
-        """Heights of the caps with 32 samples, or all of a smaller watershed, shape (n,) [mm].
-
-        Twice as high where all samples are as deep, for such a cap to have a volume; 0 where they
-        are as high as the peak, or below the floor.
+        Where all samples of such a watershed are equally deep the height is twice their depth,
+        for the cap to have a volume. It is 0 where they are as high as the peak.
         """
-        depth, start = np.append(self.depth, 0.0), self._start[:-1]
-        last = np.minimum(start + _FEW, self._start[1:] - 1)
-        some = last >= start
-        first, last = (np.where(some, index, -1) for index in (start, last))
-        return np.where(depth[last] > depth[first], 1.0, 2.0) * depth[last]
+        start, end = self._start[:-1], self._start[1:]
+        small = np.flatnonzero((end > start) & (end - start <= _FEW))
+        highest, lowest = self.depth[start[small]], self.depth[end[small] - 1]
+        heights: Array = np.zeros(len(self))
+        heights[small] = np.where(lowest > highest, lowest, 2.0 * lowest)
+        return heights
 
     @cached_property
     def least_height(self) -> Array:
