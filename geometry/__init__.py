@@ -8,7 +8,7 @@ from geometry.asperities import Asperities, find_asperities
 from geometry.errors import InputError, NotConverged, PatchlawError
 from geometry.files import read_surface
 from geometry.materials import Material, MaterialPair
-from geometry.meshes.block import Alignment, BlockShape, alignment, flat_block
+from geometry.meshes.block import Alignment, BlockShape, alignment
 from geometry.meshes.families import characteristic_size, reference_shapes
 from geometry.meshes.refined_block import RefinedShape
 from geometry.meshes.refinement import places_in_reach, suggested_fine
@@ -40,7 +40,6 @@ __all__ = [
     "alignment",
     "characteristic_size",
     "find_asperities",
-    "flat_block",
     "overlaps",
     "patch_means",
     "places_in_reach",

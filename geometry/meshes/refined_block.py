@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from geometry.checks import positive_lengths
 from geometry.errors import InputError
-from geometry.meshes.lattice import gmsh_session
+from geometry.meshes.gmsh_session import gmsh_session
 
 Array = NDArray[np.float64]
 
@@ -99,9 +99,11 @@ class RefinedShape:
 
     @contextmanager
     def meshed(self) -> Iterator[Any]:
-        """Mesh the block in gmsh for as long as the context lasts; faces as in `flat_block`.
+        """Mesh the block in gmsh for as long as the context lasts.
 
-        The geometry has the order of the element, and its lengths are in `unit`.
+        The cells form the physical volume ``block`` (1); the physical surfaces are ``bottom`` (1),
+        ``top`` (2) and ``sides`` (3). The geometry has the order of the element, and its lengths
+        are in `unit`. A gmsh session of the caller goes on afterwards, with its model and options.
         """
         width, depth, height, fine, coarse = (
             float(f"{length / self.unit:.{_DIGITS}g}")

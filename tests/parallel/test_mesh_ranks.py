@@ -1,4 +1,4 @@
-"""gmsh's flat blocks and those that all ranks make are the same meshes on any number of ranks."""
+"""Flat blocks are the same meshes on any number of ranks."""
 
 import json
 from pathlib import Path
@@ -34,7 +34,7 @@ def found(mpirun, root):
 
 @pytest.mark.parametrize("case", CASES)
 def test_meshes_are_the_same(found, case):
-    meshes = [found[ranks][case][builder] for ranks in RANKS for builder in ("gmsh", "lattice")]
+    meshes = [found[ranks][case] for ranks in RANKS]
     assert all(mesh["exact"] == meshes[0]["exact"] for mesh in meshes)
     volume, bottom, sides = CASES[case]
     for mesh in meshes:
@@ -48,11 +48,7 @@ def test_meshes_are_the_same(found, case):
 
 @pytest.mark.parametrize("case", CASES)
 def test_solutions_are_the_same(found, case):
-    work = [
-        found[ranks][case][builder]["measures"]["work"]
-        for ranks in RANKS
-        for builder in ("gmsh", "lattice")
-    ]
+    work = [found[ranks][case]["measures"]["work"] for ranks in RANKS]
     # the same matrix but for the order of sums; the solver leaves 1e-10, the work its square
     np.testing.assert_allclose(work, work[0], rtol=1e-12)
     assert work[0] > 0.0
@@ -60,7 +56,7 @@ def test_solutions_are_the_same(found, case):
 
 def test_supports_hold_nodes_on_every_rank(found):
     # dealt out, a rank can meet a support in a node alone, whose facets all belong to others
-    whole = found[1]["box"]["gmsh"]["measures"]
+    whole = found[1]["box"]["measures"]
     for ranks in RANKS:
         for measures in found[ranks]["dealt"]:
             assert measures["unknowns"] == whole["unknowns"]
@@ -70,11 +66,11 @@ def test_supports_hold_nodes_on_every_rank(found):
 def test_cells_are_spread_without_ghosts(found):
     for ranks in RANKS:
         for case in CASES:
-            lattice = found[ranks][case]["lattice"]
+            lattice = found[ranks][case]
             assert lattice["ghosts"] == 0 and len(lattice["cells_of_ranks"]) == ranks
-    assert found[2]["quadratic hexahedra"]["lattice"]["cells_of_ranks"] == [8, 4]
-    assert sorted(found[4]["rod"]["lattice"]["cells_of_ranks"]) == [0, 0, 1, 1]
-    assert sorted(found[4]["box"]["lattice"]["cells_of_ranks"]) == [0, 0, 0, 6]
+    assert found[2]["quadratic hexahedra"]["cells_of_ranks"] == [8, 4]
+    assert sorted(found[4]["rod"]["cells_of_ranks"]) == [0, 0, 1, 1]
+    assert sorted(found[4]["box"]["cells_of_ranks"]) == [0, 0, 0, 6]
 
 
 def test_regions_of_contact_go_on_across_ranks(found):
