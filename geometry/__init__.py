@@ -9,9 +9,13 @@ from geometry.errors import InputError, NotConverged, PatchlawError
 from geometry.files import read_surface
 from geometry.materials import Material, MaterialPair
 from geometry.meshes.block import Alignment, BlockShape, alignment
-from geometry.meshes.families import characteristic_size, reference_shapes
+from geometry.meshes.families import (
+    characteristic_size,
+    places_in_reach,
+    reference_shapes,
+    suggested_fine,
+)
 from geometry.meshes.refined_block import RefinedShape
-from geometry.meshes.refinement import places_in_reach, suggested_fine
 from geometry.patches import Partition, PatchGrid, UnevenPartition, overlaps, patch_means
 from geometry.rigid_plane import Control, RigidPlane
 from geometry.spectrum import Spectrum, synthesise
