@@ -1,7 +1,8 @@
 """Geometry of rough contact.
 
-A spectrum or a file gives a surface; the surface gives its statistics, its asperities and its
-means over patches; a block shape gives the mesh of the body that carries it.
+A spectrum or a file yields a surface. From the surface follow its statistics, its asperities and
+its means over patches. A rigid plane presses on it, as a load step prescribes. Materials tell the
+contact modulus, and block shapes the mesh of the body under the surface.
 """
 
 from geometry.asperities import Asperities, find_asperities

@@ -32,10 +32,10 @@ Shape: TypeAlias = BlockShape | RefinedShape
 Cells: TypeAlias = Literal["tetrahedra", "hexahedra"]
 
 EDGES = 3.0
-"""Edges along the radius of a typical contact, of the finest tetrahedra unless stated."""
+"""Edges along the radius of a typical contact in the finest tetrahedra, by default."""
 
 _MERGING = 0.05
-"""Share of the surface in reach above which contacts merge instead of growing wider."""
+"""Share of the surface behind the plane above which contacts merge instead of growing wider."""
 
 _SPAN = 2.0
 """Ratio of the coarsest size of a family to the finest."""
@@ -121,9 +121,9 @@ def places_in_reach(
     spacing: float,
     tilt: tuple[float, float] = (0.0, 0.0),
 ) -> Array:
-    """Return places that the plane can touch: where the surface stands out behind it.
+    """Return the places that the plane can touch: where the undeformed surface penetrates it.
 
-    The half-space only moves away under pressure, so that nothing else can come into contact.
+    Under pressure a half-space only moves away from the plane, so that contact occurs nowhere else.
 
     Args:
         surface: The rough surface.
@@ -147,7 +147,7 @@ def places_in_reach(
 def depth_below_plane(
     surface: Surface, points: Array, approach: float, tilt: tuple[float, float] = (0.0, 0.0)
 ) -> Array:
-    """Return how far the undeformed surface stands out behind the rigid plane [mm].
+    """Return the interference of the undeformed surface and the rigid plane [mm].
 
     Args:
         surface: The rough surface.
@@ -156,10 +156,10 @@ def depth_below_plane(
         tilt: Slopes of the approach along x and y.
 
     Returns:
-        Depths, shape (…); negative where there is a gap.
+        Interference, shape (…); negative where there is a gap.
     """
-    lean = (points - 0.5 * np.array(surface.lengths)) @ np.array(tilt)
-    return surface.height_at(points[..., 0], points[..., 1]) - surface.highest + approach + lean
+    offset = (points - 0.5 * np.array(surface.lengths)) @ np.array(tilt)
+    return surface.height_at(points[..., 0], points[..., 1]) - surface.highest + approach + offset
 
 
 def suggested_fine(
@@ -190,10 +190,10 @@ def contact_radius(
 ) -> float:
     """Estimate the radius of a typical contact from the surface alone [mm].
 
-    In a disc of radius r the mean distance from the edge is r / 3, which also serves patches of
-    other forms; the contact of a cap has 1/√2 of its radius (Hertz). Where more than a twentieth
-    of the surface is in reach, contacts merge and neighbours hold the plane off: the highest
-    twentieth counts.
+    The surface behind the undeformed plane consists of caps. In a disc of radius r the mean
+    distance from the edge is r / 3, which is used for caps of any form. The contact of a cap has
+    1/√2 of the cap's radius (Hertz). Where more than a twentieth of the surface lies behind the
+    plane, contacts merge and bear the plane together: only the highest twentieth counts then.
 
     Args:
         surface: The rough surface.
