@@ -12,8 +12,7 @@ from petsc4py import PETSc
 
 from macro import compat
 from macro.contact.law_interface import Interface
-from macro.contact.unilateral_problem import UnilateralContactProblem
-from macro.contact.unilateral_state import UnilateralContactState
+from macro.contact.unilateral_problem import UnilateralContactProblem, UnilateralContactState
 from macro.mesh.contact_face import top_facets
 
 Array = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""A block pressed by a rigid plane through its contact laws: one load step at a time."""
+"""A block with contact laws on its top, under a rigid plane: one load step at a time."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from geometry.errors import InputError
 from geometry.rigid_plane import Control
 from macro import compat
 from macro.block import Block
-from macro.contact.contact_law import Contact
-from macro.contact.energy_start import DisplacementBasis
+from macro.contact.contact_law import LawContact
 from macro.contact.equilibrium import Equilibrium
+from macro.contact.initial_guess import DisplacementBasis
 from macro.contact.law_interface import ContactLaw, Interface, Mode
 from macro.contact.newton import NewtonReport, NewtonSolver
 
@@ -27,7 +27,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LawContactState:
-    """Equilibrium of the block at one load step; the same on every rank but for the displacement.
+    """Equilibrium of the block at one load step.
+
+    All but the displacement is the same on every rank.
 
     Args:
         approach: Approach of the rigid plane at the middle of the patches [mm].
@@ -63,13 +65,12 @@ class LawContactState:
 
 
 class LawContactProblem:
-    """A block under a rigid plane, solved for one load step after the other by Newton's method.
+    """A block with contact laws under a rigid plane, solved by Newton's method.
 
-    The plane's approach or force, and its tilt or no moment, are prescribed: both ways are one
-    Newton's method in the displacements, with as many linear solves.
-    The tangent is the exact derivative; conjugate gradients are preconditioned by the multigrid of
-    the block alone, which is made once. A load step starts from the best combination of all
-    earlier solutions.
+    Each load step prescribes the plane's approach or force, and its tilt or zero moment. All take
+    the same Newton's method in the displacements, and about as many linear solves. The tangent is
+    the exact derivative. Conjugate gradients are preconditioned by the multigrid of the block
+    alone, which is made once. The initial guess is the best combination of earlier solutions.
 
     Args:
         block: The elastic block.
@@ -97,7 +98,7 @@ class LawContactProblem:
                 "every patch needs a law", value=len(laws), allowed=f"{interface.patches.count}"
             )
         self._interface, self._sampling = interface, interface.sampling(mode)
-        contact = Contact(interface, self._sampling, laws)
+        contact = LawContact(interface, self._sampling, laws)
         self.equilibrium = Equilibrium(block, self._sampling, contact)
         self.newton = NewtonSolver(self.equilibrium, block.solver)
         self._basis = DisplacementBasis(self.equilibrium, self._sampling)
@@ -108,7 +109,7 @@ class LawContactProblem:
         """Find the equilibrium of one load step.
 
         A force and a moment of zero are met to `geometry.plane_equilibrium.TOLERANCE`. Without
-        any force the plane just touches the highest patch, as it is tilted or was last.
+        any force the plane touches the highest patch, with the prescribed tilt or the last one.
 
         Args:
             control: What is prescribed of the plane.
@@ -121,7 +122,7 @@ class LawContactProblem:
         equilibrium = self.equilibrium
         equilibrium.contact.prescribe(control, self._plane)
         solution = equilibrium.block.stiffness.createVecRight()
-        self._basis.start(solution)
+        self._basis.write_guess(solution)
         report = self.newton.solve(
             solution, what=f"the block at {control}", remedy="take more load steps (load.steps)"
         )
@@ -133,7 +134,7 @@ class LawContactProblem:
         return state
 
     def start_from(self, pressure: Array) -> None:
-        """Let the next load step start from the displacements by mean pressures of the patches.
+        """Add the displacements by mean pressures of the patches to the initial guesses.
 
         Args:
             pressure: Pressures, shape (N,) [MPa].
