@@ -93,11 +93,6 @@ class Block:
         matrix.setNearNullSpace(rigid_body_modes(self.space))
         return matrix
 
-    @property
-    def unsupported_stiffness(self) -> PETSc.Mat:
-        """Stiffness matrix without any support [N/mm], assembled anew."""
-        return compat.assemble_matrix(compat.compile_form(self._form), [])
-
     @cached_property
     def solver(self) -> PETSc.KSP:
         """Linear solver of the block alone; its preconditioner also serves the contact solves."""

@@ -47,7 +47,7 @@ def write_fields(
         compat.write_vtx(str(Path(path).with_suffix(".bp")), shown)
     if block.degree > 1:
         shown = _interpolated(compat.vector_space(mesh, 1), shown, shown.name)
-    pressures = fem.Function(compat.cellwise_space(mesh), name="pressure")
+    pressures = fem.Function(compat.scalar_space(mesh, 0, "DG"), name="pressure")
     points, facets = interface.quadrature, top_facets(block.mesh)
     cells = compat.cell_nodes(pressures.function_space)[:, 0]
     force = points.weight * pressure[points.patch]

@@ -45,7 +45,9 @@ class LawContact:
     def __init__(
         self, interface: Interface, sampling: Sampling, laws: Sequence[ContactLaw]
     ) -> None:
-        self._comm, self._sampling, self._laws = interface.block.mesh.comm, sampling, laws
+        self._comm, self._sampling = interface.block.mesh.comm, sampling
+        self._pressures = [law.pressure for law in laws]
+        self._stiffnesses = [law.stiffness for law in laws]
         patches = interface.patches
         self.levers = PlaneLevers.at(
             sampling.x, sampling.y, patches.lengths, centre=patches.middle, comm=self._comm
@@ -99,11 +101,11 @@ class LawContact:
 
         What a law raises on one rank is raised on all.
         """
-        return together(self._comm, lambda: self._sampling.pressure(self._laws, closure))
+        return together(self._comm, lambda: self._sampling.by_patch(self._pressures, closure))
 
     def stiffness(self, closure: Array) -> Array:
         """Return the laws' stiffnesses dp/dc likewise, shape (n,) [MPa/mm]."""
-        return together(self._comm, lambda: self._sampling.stiffness(self._laws, closure))
+        return together(self._comm, lambda: self._sampling.by_patch(self._stiffnesses, closure))
 
     def loads(self, pressure: Array) -> Array:
         """Return force and first moments about the middle of pressures, shape (3,) [N, N mm].

@@ -45,9 +45,10 @@ class Equilibrium:
         stiffness = block.stiffness
         self._load = stiffness.createVecLeft()
         self._samples = sampling.operator.createVecRight()
-        self._action = _TangentAction(stiffness, sampling)
+        self._slope: Array = np.zeros(len(sampling.weight))  # p'/w
+        self._border: Array = np.zeros((len(sampling.weight), 0))  # E
         self.tangent = PETSc.Mat().createPython(
-            stiffness.getSizes(), WeakContext(self._action), comm=stiffness.comm
+            stiffness.getSizes(), WeakContext(self), comm=stiffness.comm
         )
         self.tangent.setUp()
 
@@ -72,32 +73,20 @@ class Equilibrium:
     def update_tangent(self, displacement: PETSc.Vec) -> None:
         """Move the tangent to a displacement."""
         stiffness = self.contact.stiffness(self.closure(displacement))
-        self._action.slope = stiffness / self._sampling.weight
-        self._action.border = self.contact.border(stiffness)
-
-
-class _TangentAction:
-    """The Python context of the tangent.
-
-    It is no part of `Equilibrium`, so that the matrix does not refer to its owner.
-    """
-
-    def __init__(self, stiffness: PETSc.Mat, sampling: Sampling) -> None:
-        self._stiffness, self._operator = stiffness, sampling.operator
-        self._comm = stiffness.comm.tompi4py()
-        self._stretch = sampling.operator.createVecRight()
-        self.slope: Array = np.zeros(len(sampling.weight))  # p'/w
-        self.border: Array = np.zeros((len(sampling.weight), 0))  # E
+        self._slope = stiffness / self._sampling.weight
+        self._border = self.contact.border(stiffness)
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Write K x + B (diag(p'/w) − E Eᵀ) Bᵀ x."""
-        self._stiffness.mult(x, y)
-        self._operator.multTranspose(x, self._stretch)
-        stretch = self._stretch.array_r
-        pressure = self.slope * stretch
-        if self.border.shape[1]:
-            pressure -= self.border @ self._comm.allreduce(self.border.T @ stretch, op=MPI.SUM)
-        self._stretch.array[:] = pressure
-        self._operator.multAdd(self._stretch, y, y)
+        """Write the tangent's product K x + B (diag(p'/w) − E Eᵀ) Bᵀ x; PETSc calls this."""
+        operator, samples = self._sampling.operator, self._samples
+        self.block.stiffness.mult(x, y)
+        operator.multTranspose(x, samples)
+        stretch = samples.array_r
+        pressure = self._slope * stretch
+        if self._border.shape[1]:
+            comm = self.block.mesh.comm
+            pressure -= self._border @ comm.allreduce(self._border.T @ stretch, op=MPI.SUM)
+        samples.array[:] = pressure
+        operator.multAdd(samples, y, y)
 
     multTranspose = mult

@@ -63,24 +63,6 @@ class Sampling:
     patch: NDArray[np.intp]
     count: int
 
-    def pressure(self, laws: Sequence[ContactLaw], closure: Array) -> Array:
-        """Return the laws' pressures at this rank's samples, shape (n,) [MPa].
-
-        Args:
-            laws: One law per patch.
-            closure: Closures of the samples, shape (n,) [mm].
-        """
-        return self.by_patch([law.pressure for law in laws], closure)
-
-    def stiffness(self, laws: Sequence[ContactLaw], closure: Array) -> Array:
-        """Return the laws' stiffnesses dp/dc at this rank's samples, shape (n,) [MPa/mm].
-
-        Args:
-            laws: One law per patch.
-            closure: Closures of the samples, shape (n,) [mm].
-        """
-        return self.by_patch([law.stiffness for law in laws], closure)
-
     def patch_sums(self, values: Array) -> Array:
         """Return the integrals of sampled values over every patch, shape (N,); collective."""
         local = np.bincount(self.patch, weights=self.weight * values, minlength=self.count)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
@@ -46,7 +44,6 @@ class LawContactState:
         residuals: Norm of the residual before each Newton step and at the end, relative to the
             norm of the interface's load there.
         reason: Name of PETSc's reason to stop.
-        wall_s: Wall time of the slowest rank [s].
     """
 
     approach: float
@@ -61,7 +58,6 @@ class LawContactState:
     linear_iterations: int
     residuals: Array
     reason: str
-    wall_s: float
 
 
 class LawContactProblem:
@@ -118,7 +114,6 @@ class LawContactProblem:
             NotConverged: When Newton's method fails, or nothing can hold the plane; the earlier
                 solutions stay what they were, so that a smaller step can be tried.
         """
-        began = time.perf_counter()
         equilibrium = self.equilibrium
         equilibrium.contact.prescribe(control, self._plane)
         solution = equilibrium.block.stiffness.createVecRight()
@@ -127,9 +122,7 @@ class LawContactProblem:
             solution, what=f"the block at {control}", remedy="take more load steps (load.steps)"
         )
         self._basis.add(solution)
-        comm = equilibrium.block.mesh.comm
-        seconds = comm.allreduce(time.perf_counter() - began, op=MPI.MAX)
-        state = self._state(solution, report, seconds)
+        state = self._state(solution, report)
         compat.collect_garbage(solution.comm)
         return state
 
@@ -169,7 +162,7 @@ class LawContactProblem:
         values = together(comm, lambda: sampling.by_patch(functions, self._closure))
         return sampling.patch_sums(values) / self._interface.areas
 
-    def _state(self, solution: PETSc.Vec, report: NewtonReport, wall_s: float) -> LawContactState:
+    def _state(self, solution: PETSc.Vec, report: NewtonReport) -> LawContactState:
         contact, sampling = self.equilibrium.contact, self._sampling
         self._closure = closure = self.equilibrium.closure(solution)
         self._plane = plane = contact.plane.copy()
@@ -189,5 +182,4 @@ class LawContactProblem:
             linear_iterations=report.linear_iterations,
             residuals=report.residuals,
             reason=report.reason,
-            wall_s=wall_s,
         )

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.errors import NotConverged
+from macro.contact.equilibrium import Equilibrium
 from macro.linear_solvers.options import (
     KRYLOV_DEFAULTS,
     PREFIX,
@@ -33,21 +33,6 @@ _LOOSEST = 0.1
 
 _SPARE = 0.3
 """Share of the tolerance that the last linear solve aims at."""
-
-
-class NonlinearProblem(Protocol):
-    """Equations r(u) = 0 with a tangent, and a scale that residuals are relative to."""
-
-    tangent: PETSc.Mat
-    scale: float
-
-    def residual(self, displacement: PETSc.Vec, residual: PETSc.Vec, /) -> None:
-        """Write r(u), and set the scale."""
-        ...
-
-    def update_tangent(self, displacement: PETSc.Vec, /) -> None:
-        """Move the tangent to u."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,7 +68,7 @@ class NewtonSolver:
         Collective.
     """
 
-    def __init__(self, problem: NonlinearProblem, preconditioner: PETSc.KSP) -> None:
+    def __init__(self, problem: Equilibrium, preconditioner: PETSc.KSP) -> None:
         self._problem = problem
         self._residuals: list[float] = []
         base = preconditioner.getOperators()[1]
