@@ -76,7 +76,7 @@ class NewtonSolver:
         self._forcing = not (user.hasName("ksp_rtol") or user.hasName("snes_ksp_ew"))
         self.snes = PETSc.SNES().create(base.comm)
         self.snes.setOptionsPrefix(PREFIX)
-        self.snes.setFunction(self._residual, base.createVecLeft())
+        self.snes.setFunction(lambda _, *vectors: problem.residual(*vectors), base.createVecLeft())
         self.snes.setJacobian(self._tangent, problem.tangent, base)
         self.snes.setConvergenceTest(self._converged)
         with default_options(PREFIX, {**KRYLOV_DEFAULTS, **NONLINEAR_DEFAULTS}):
@@ -107,9 +107,6 @@ class NewtonSolver:
             residuals=np.array(self._residuals),
             reason=reason,
         )
-
-    def _residual(self, _snes: PETSc.SNES, displacement: PETSc.Vec, residual: PETSc.Vec) -> None:
-        self._problem.residual(displacement, residual)
 
     def _tangent(
         self, snes: PETSc.SNES, displacement: PETSc.Vec, _tangent: PETSc.Mat, _base: PETSc.Mat

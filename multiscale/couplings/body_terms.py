@@ -101,9 +101,9 @@ class Body:
         """
         from mpi4py import MPI
 
-        from macro import cached_face_compliance
+        from macro import face_compliance
 
-        return cached_face_compliance(
+        return face_compliance(
             self.lengths,
             self.shape.height,
             self.material,
@@ -111,6 +111,7 @@ class Body:
             modes or self.modes,
             comm or MPI.COMM_SELF,
             coarse=coarse,
+            use_cache=True,
         )
 
     def term(self, face: FaceCompliance, *, higher: float = 0.0) -> BodyModes:
