@@ -122,7 +122,7 @@ class ElasticGrid:
             found += term.displacement(pressure)
         return found
 
-    def comply(self, cells: Cells, pressure: Array) -> Array:
+    def apply_compliance(self, cells: Cells, pressure: Array) -> Array:
         """Return roughly the displacements of some cells by pressures on them, shape (n,) [mm]."""
         self.products += 1
         found = _among(cells, pressure, self._half_space.rough_compliance)
@@ -130,7 +130,7 @@ class ElasticGrid:
             found += term.of_cells(cells, pressure)
         return found
 
-    def resist(self, cells: Cells, displacement: Array) -> Array:
+    def apply_inverse(self, cells: Cells, displacement: Array) -> Array:
         """Return very roughly the pressures on some cells that displace them so, shape (n,)."""
         return _among(cells, displacement, self._half_space.stiffness)
 

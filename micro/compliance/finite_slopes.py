@@ -66,9 +66,9 @@ class FiniteSlopes:
         order: Highest power of the heights, 1 or 2.
         periodic: Whether surface and pressures continue periodically; displacements then count
             from their mean, as those of the periodic half-space do.
-        plane: Height of the surface of the flat body that has the stresses ``beside`` [mm]; that
+        plane: Height of the surface of the flat body whose edge stresses are given [mm]; that
             of the mean plane when not given. On the half-space alone it hardly matters.
-        beside: Stresses in the surface beyond those of the half-space, on the cells of
+        edge_stresses: Stresses in the surface beyond those of the half-space, on the cells of
             `coarse_grid`.
 
     Attributes:
@@ -87,16 +87,16 @@ class FiniteSlopes:
         order: int = 2,
         periodic: bool = False,
         plane: float | None = None,
-        beside: Sequence[SurfaceStress] = (),
+        edge_stresses: Sequence[SurfaceStress] = (),
     ) -> None:
         if order not in (1, 2):
             raise InputError("this order of slopes is unknown", value=order, allowed="1 or 2")
         if periodic and not surface.periodic:
             raise InputError("periodic slopes need a periodic surface", value=surface.source)
-        self.half_space, self.order, self.beside = half_space, order, tuple(beside)
+        self.half_space, self.order, self.edge_stresses = half_space, order, tuple(edge_stresses)
         self._periodic = periodic
         self.grid = coarse_grid(surface)
-        around: Around = "copies" if periodic else "nothing" if beside else "mirrored"
+        around: Around = "copies" if periodic else "nothing" if edge_stresses else "mirrored"
         self._waves = Waves(surface.grid, surface.spacing, coarse=self.grid, around=around)
         self.spacing = self._waves.spacing
         top = float(surface.heights.max())
@@ -157,17 +157,19 @@ class FiniteSlopes:
         own = np.stack(
             [-2.0 * nu * pressure - side * along, side * along - pressure, -side * across]
         )
-        return np.asarray(sum((term.stresses(pressure) for term in self.beside), own), np.float64)
+        return np.asarray(
+            sum((term.stresses(pressure) for term in self.edge_stresses), own), np.float64
+        )
 
     def _adjoint(self, pulls: Array) -> Spectrum:
         """Return the waves of the displacement that does the work of the stresses on a tensor."""
         nu = self.half_space.poisson_ratio
         waves = self._waves.of(pulls)
         found = -2.0 * nu * (waves[0] + waves[1]) - (1.0 - 2.0 * nu) * self._lengthwise(waves)
-        if not self.beside:
+        if not self.edge_stresses:
             return np.asarray(found)
         both = pulls.astype(np.float64) * np.array([1.0, 1.0, 2.0])[:, None, None]  # xy and yx
-        added = np.sum([term.adjoint(both) for term in self.beside], axis=0)
+        added = np.sum([term.adjoint(both) for term in self.edge_stresses], axis=0)
         return np.asarray(found + self._waves.of(added.astype(np.float64)))
 
     def _strains(self, stresses: Array) -> Array:

@@ -41,7 +41,7 @@ class FreeSides:
     Args:
         lengths: Sides (Lx, Ly) of the rectangle [mm].
         poisson_ratio: ν.
-        reach: λ [mm].
+        decay_length: λ [mm].
 
     Raises:
         InputError: When a length is not positive, or ν out of its range.
@@ -49,13 +49,13 @@ class FreeSides:
 
     lengths: tuple[float, float]
     poisson_ratio: float
-    reach: float
+    decay_length: float
 
     def __post_init__(self) -> None:
-        given = (*self.lengths, self.reach)
+        given = (*self.lengths, self.decay_length)
         if not (np.all(np.isfinite(given)) and min(given) > 0.0):
             raise InputError(
-                "lengths and reach must be positive and finite", value=given, allowed="> 0 mm"
+                "lengths and decay length must be positive", value=given, allowed="> 0 mm"
             )
         if not -1.0 < self.poisson_ratio < 0.5:
             raise InputError(
@@ -74,7 +74,7 @@ class FreeSides:
             Shape (w, n, n); symmetric.
         """
         space = quarter_space(self.poisson_ratio)
-        numbers = self._wave_numbers(axis, waves, self.reach)
+        numbers = self._wave_numbers(axis, waves, self.decay_length)
         return np.stack([space.compliance(distances, number) for number in numbers])
 
     def stresses(self, axis: int, distances: Array, waves: NDArray[np.intp]) -> Array:
@@ -92,7 +92,7 @@ class FreeSides:
             Normal to the side, along it, and in shear, shape (3, w, n, n), the loads last [1/mm].
         """
         space = quarter_space_stresses(self.poisson_ratio)
-        numbers = self._wave_numbers(axis, waves, _STRESS_REACH * self.reach)
+        numbers = self._wave_numbers(axis, waves, _STRESS_REACH * self.decay_length)
         found = np.stack([space.stresses(distances, number) for number in numbers], axis=1)
         apart = np.add.outer(distances, distances)
         taken, due = (
@@ -104,10 +104,13 @@ class FreeSides:
         found[2] -= rest
         return found
 
-    def _wave_numbers(self, axis: int, waves: NDArray[np.intp], reach: float) -> Array:
+    def _wave_numbers(self, axis: int, waves: NDArray[np.intp], decay_length: float) -> Array:
         """Return the wave numbers along a side, those of waves beyond the reach raised to 1/λ."""
         numbers = np.pi * waves / self.lengths[1 - axis]
-        larger, smaller = np.maximum(numbers, 1.0 / reach), np.minimum(numbers, 1.0 / reach)
+        larger, smaller = (
+            np.maximum(numbers, 1.0 / decay_length),
+            np.minimum(numbers, 1.0 / decay_length),
+        )
         return np.asarray(larger * (1.0 + (smaller / larger) ** 4) ** 0.25)
 
     def top(self, x: Array, y: Array, loads: Partition) -> Array:

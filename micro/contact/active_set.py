@@ -42,7 +42,7 @@ class ContactSearch:
 
     Args:
         grid: The elastic body.
-        required: Displacement that the body asks for, up to its free motions, (nx, ny) [mm].
+        interference: Displacement that the body asks for, up to its free motions, (nx, ny) [mm].
         limits: Bounds and loads of the pressures.
         pressure: Pressures / E* to begin with, within these limits, shape (nx, ny).
         motion: Free motions while nothing touches, shape (k,) [mm].
@@ -57,13 +57,13 @@ class ContactSearch:
     """
 
     def __init__(
-        self, grid: ElasticGrid, required: Array, limits: Limits, pressure: Array, motion: Array
+        self, grid: ElasticGrid, interference: Array, limits: Limits, pressure: Array, motion: Array
     ) -> None:
-        self.grid, self.required, self.limits = grid, required, limits
+        self.grid, self.interference, self.limits = grid, interference, limits
         self.motion = motion
         self._singly = False  # from where a step of all cells at once gained nothing
         self._held: Indices = np.zeros(0, np.intp)  # at a bound without a gap
-        self._mask: Flags = np.zeros(required.shape, bool)
+        self._mask: Flags = np.zeros(interference.shape, bool)
         self._yielding: Flags | None = None
         self._accept(pressure)
 
@@ -72,16 +72,16 @@ class ContactSearch:
         self.pressure = pressure
         gap = self.grid.displacement(pressure)
         work = float(np.vdot(pressure, gap))
-        asked = float(np.vdot(pressure, self.required))
+        asked = float(np.vdot(pressure, self.interference))
         self._energy = work - 2.0 * asked  # twice the elastic less the external one
-        gap -= self.required
-        highest = self.required
+        gap -= self.interference
+        highest = self.interference
         if self.limits.motions is not None:
             if pressure.any():
                 self.motion = self.limits.motions.best(self._closing(pressure), gap)
             nearer = self.limits.motions.nearer(self.motion)
             gap -= nearer
-            highest = self.required + nearer
+            highest = self.interference + nearer
         self.gap = gap  # within the memory of the displacement
         self.scale = float(highest.max())
         elastic = gap if self.limits.upper == np.inf else gap[pressure < self.limits.upper]
@@ -165,7 +165,7 @@ class ContactSearch:
             first, part = _first_bounds(pressure, change, self.limits.upper)
             if part > 0.0:
                 pressure = np.clip(pressure + part * change, 0.0, self.limits.upper)
-                gap = gap + part * self.grid.comply(contact.cells, change)
+                gap = gap + part * self.grid.apply_compliance(contact.cells, change)
             if part == 1.0:
                 break
             new.ravel()[cells[first]] = np.where(change[first] > 0.0, self.limits.upper, 0.0)
@@ -202,7 +202,7 @@ class ContactSearch:
 
     def _among(self, flat: Indices) -> ContactCells:
         """Return the linear problem of some cells by their flat indices."""
-        cells = Cells.of(flat, self.required.shape)
+        cells = Cells.of(flat, self.interference.shape)
         levers = np.empty((0, flat.size))
         if self.limits.motions is not None:
             levers = self.limits.motions.among(flat)

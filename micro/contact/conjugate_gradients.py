@@ -44,7 +44,7 @@ class ContactCells:
             cells: The n cells in contact.
             levers: How much nearer each of k ≥ 0 free motions brings them, shape (k, n).
         """
-        found = [grid.resist(cells, lever) for lever in levers]
+        found = [grid.apply_inverse(cells, lever) for lever in levers]
         resistance = np.array(found).reshape(levers.shape)
         stiffness = levers @ resistance.T
         inverse = np.linalg.pinv(stiffness, rcond=1e-10)
@@ -59,7 +59,7 @@ class ContactCells:
 
     def preconditioned(self, gap: Array) -> Array:
         """Return roughly the pressures that make these gaps, without loads on free motions."""
-        found = self.grid.resist(self.cells, gap)
+        found = self.grid.apply_inverse(self.cells, gap)
         if not len(self.levers):
             return found
         return found - (self.inverse @ (self.levers @ found)) @ self.resistance
@@ -88,7 +88,7 @@ class ContactCells:
             if size <= 0.0:
                 break
             direction = step + (size / before) * direction
-            answer = self.grid.comply(self.cells, direction)
+            answer = self.grid.apply_compliance(self.cells, direction)
             curvature = float(direction @ answer)
             if curvature <= 0.0:
                 break

@@ -17,13 +17,13 @@ _LEAST_EVEN, _MOST_EVEN = 1e-3, 1e6
 
 
 def first_pressure(
-    grid: ElasticGrid, required: Array, start: Array, limits: Limits
+    grid: ElasticGrid, interference: Array, start: Array, limits: Limits
 ) -> tuple[Array, Array]:
     """Return admissible pressures near given ones, and the free motions where nothing touches.
 
     Args:
         grid: The elastic body.
-        required: Displacement that the body asks for, shape (nx, ny) [mm].
+        interference: Displacement that the body asks for, shape (nx, ny) [mm].
         start: Pressures / E* ≥ 0, shape (nx, ny).
         limits: Their bounds and loads.
 
@@ -32,7 +32,7 @@ def first_pressure(
     """
     still = np.zeros(0 if limits.motions is None else len(limits.motions.loads))
     if limits.unloaded:
-        return _unloaded(grid, required, start, limits)
+        return _unloaded(grid, interference, start, limits)
     share = 0.0
     while share <= _MOST_EVEN:
         even = share * (float(start.max()) or 1.0)
@@ -49,7 +49,7 @@ def first_pressure(
 
 
 def _unloaded(
-    grid: ElasticGrid, required: Array, start: Array, limits: Limits
+    grid: ElasticGrid, interference: Array, start: Array, limits: Limits
 ) -> tuple[Array, Array]:
     """Start a body that turns without load where pressures already lower the energy.
 
@@ -59,13 +59,13 @@ def _unloaded(
     assert limits.motions is not None
     still = np.zeros(len(limits.motions.loads))
     pressure = limits.met(start)
-    if pressure is None or float(np.vdot(pressure, required)) <= 0.0:
-        found = clearance(required, limits.motions)
+    if pressure is None or float(np.vdot(pressure, interference)) <= 0.0:
+        found = clearance(interference, limits.motions)
         if found.overlap <= 0.0:
             return np.zeros(start.shape), found.motion
         pressure = found.support
     work = float(np.vdot(pressure, grid.displacement(pressure)))
-    lowest = float(np.vdot(pressure, required)) / work  # factor on them of the least energy
+    lowest = float(np.vdot(pressure, interference)) / work  # factor on them of the least energy
     pressure = pressure * min(lowest, limits.upper / float(pressure.max()))
     balanced = limits.met(pressure)
     return pressure if balanced is None else balanced, still

@@ -26,7 +26,7 @@ _ROUGH = 2e-2
 
 def nested_pressure(
     grids: ElasticGrids,
-    required: Array,
+    interference: Array,
     spacing: tuple[float, float],
     *,
     motions: Motions | None = None,
@@ -38,7 +38,7 @@ def nested_pressure(
 
     Args:
         grids: Elastic bodies.
-        required: Displacement that the body asks for, shape (nx, ny) [mm].
+        interference: Displacement that the body asks for, shape (nx, ny) [mm].
         spacing: Sides of a cell [mm].
         motions: Free motions of the body and their loads; none when not given.
         upper: Upper bound of the pressures / E*.
@@ -51,16 +51,16 @@ def nested_pressure(
     Raises:
         NotConverged: When the residual stays above the tolerance on one of the grids.
     """
-    start = coarse_start(grids, required, spacing, motions, upper, _corner(box, spacing))
-    grid = grids.at(required.shape, spacing, box)
+    start = coarse_start(grids, interference, spacing, motions, upper, _corner(box, spacing))
+    grid = grids.at(interference.shape, spacing, box)
     return contact_pressure(
-        grid, required, start, motions=motions, upper=upper, tolerance=tolerance
+        grid, interference, start, motions=motions, upper=upper, tolerance=tolerance
     )
 
 
 def coarse_pressure(
     grids: ElasticGrids,
-    required: Array,
+    interference: Array,
     spacing: tuple[float, float],
     *,
     motions: Motions | None = None,
@@ -72,31 +72,31 @@ def coarse_pressure(
 
     See `nested_pressure`.
     """
-    start = coarse_start(grids, required, spacing, motions, upper, corner)
-    grid: ElasticGrid = grids.coarse(required.shape, spacing, corner)
+    start = coarse_start(grids, interference, spacing, motions, upper, corner)
+    grid: ElasticGrid = grids.coarse(interference.shape, spacing, corner)
     return contact_pressure(
-        grid, required, start, motions=motions, upper=upper, tolerance=tolerance
+        grid, interference, start, motions=motions, upper=upper, tolerance=tolerance
     )
 
 
 def coarse_start(
     grids: ElasticGrids,
-    required: Array,
+    interference: Array,
     spacing: tuple[float, float],
     motions: Motions | None,
     upper: float,
     corner: tuple[float, float],
 ) -> Array:
     """Return pressures to start from, by a grid half as fine; even ones on a small grid."""
-    halved = [n > _FEW_CELLS for n in required.shape]
+    halved = [n > _FEW_CELLS for n in interference.shape]
     total = 0.0 if motions is None else float(np.abs(motions.loads).max())
     if not any(halved):
-        return np.full(required.shape, total / required.size)
+        return np.full(interference.shape, total / interference.size)
     factors = [1 + h for h in halved]
     try:
         rough = coarse_pressure(
             grids,
-            coarsened(required, factors),
+            coarsened(interference, factors),
             (spacing[0] * factors[0], spacing[1] * factors[1]),
             motions=None if motions is None else motions.coarsened(factors),
             upper=upper,
@@ -104,8 +104,8 @@ def coarse_start(
             corner=corner,
         )
     except NotConverged:  # a start is a matter of time alone
-        return np.full(required.shape, total / required.size)
-    return refined(rough.pressure, factors)[: required.shape[0], : required.shape[1]]
+        return np.full(interference.shape, total / interference.size)
+    return refined(rough.pressure, factors)[: interference.shape[0], : interference.shape[1]]
 
 
 def _corner(box: Box, spacing: tuple[float, float]) -> tuple[float, float]:

@@ -42,61 +42,63 @@ class Pressing:
     tolerance: float
     upper: float = np.inf
 
-    def by_approach(self, required: Array, start: Pressures | None) -> Pressures:
+    def by_approach(self, interference: Array, start: Pressures | None) -> Pressures:
         """Solve with given displacements d, as `contact_pressure`; pressures on all cells."""
-        return self._agreed(self._by_approach, required, None, start)
+        return self._agreed(self._by_approach, interference, None, start)
 
-    def by_force(self, required: Array, total: float, start: Pressures | None) -> Pressures:
-        """Solve with a given sum of pressures / E*; ``required`` holds up to a constant.
+    def by_force(self, interference: Array, total: float, start: Pressures | None) -> Pressures:
+        """Solve with a given sum of pressures / E*; ``interference`` holds up to a constant.
 
         Args:
-            required: Displacement that the body asks for, shape (nx, ny) [mm].
+            interference: Displacement that the body asks for, shape (nx, ny) [mm].
             total: Sum of pressures / E* over the cells.
             start: A solution nearby, its motion the approach.
         """
-        motions = Motions.approach(required.shape, total)
-        return self._agreed(self._by_force, required, motions, start)
+        motions = Motions.approach(interference.shape, total)
+        return self._agreed(self._by_force, interference, motions, start)
 
-    def by_turning(self, required: Array, motions: Motions, start: Pressures | None) -> Pressures:
-        """Solve with free slopes; ``required`` holds up to the free motions."""
-        return self._agreed(self._by_turning, required, motions, start)
+    def by_turning(
+        self, interference: Array, motions: Motions, start: Pressures | None
+    ) -> Pressures:
+        """Solve with free slopes; ``interference`` holds up to the free motions."""
+        return self._agreed(self._by_turning, interference, motions, start)
 
     def _agreed(
-        self, solve: Solve, required: Array, motions: Motions | None, start: Pressures | None
+        self, solve: Solve, interference: Array, motions: Motions | None, start: Pressures | None
     ) -> Pressures:
-        return with_slopes(solve, self.grids, required, motions, start, self.tolerance)
+        return with_slopes(solve, self.grids, interference, motions, start, self.tolerance)
 
     def _by_approach(
         self,
-        required: Array,
+        interference: Array,
         _motions: Motions | None,
         start: Pressures | None,
         tolerance: float,
     ) -> Pressures:
-        if required.max() <= 0.0:
-            return Pressures(np.zeros(required.shape), np.zeros(0), 0.0, 0, 0)
-        return self._grown(self._box(required), required, _pressure(start), None, tolerance)
+        if interference.max() <= 0.0:
+            return Pressures(np.zeros(interference.shape), np.zeros(0), 0.0, 0, 0)
+        return self._grown(self._box(interference), interference, _pressure(start), None, tolerance)
 
     def _by_turning(
         self,
-        required: Array,
+        interference: Array,
         motions: Motions | None,
         start: Pressures | None,
         tolerance: float,
     ) -> Pressures:
-        whole = Box.whole(required.shape)
-        return self._on(whole, required, _pressure(start), motions, tolerance)
+        whole = Box.whole(interference.shape)
+        return self._on(whole, interference, _pressure(start), motions, tolerance)
 
     def _by_force(
         self,
-        required: Array,
+        interference: Array,
         motions: Motions | None,
         start: Pressures | None,
         tolerance: float,
     ) -> Pressures:
         assert motions is not None
-        top = float(required.max())
-        level = required - top  # from here on the approach counts from first touch of a cell
+        top = float(interference.max())
+        level = interference - top  # from here on the approach counts from first touch of a cell
         first, reach = None, np.inf
         if start is not None and start.pressure.any():
             first, reach = start.pressure, _MARGIN * (float(start.motion[0]) + top)
@@ -106,19 +108,20 @@ class Pressing:
             box = self._box(level + max(reach, float(np.finfo(float).tiny)))
             found = self._grown(box, level, first, motions, tolerance)
             approach = float(found.motion[0])
-            if approach <= reach or box.shape == required.shape:
+            if approach <= reach or box.shape == interference.shape:
                 return found._replace(motion=found.motion - top)
             first, reach = found.pressure, _MARGIN * approach
 
-    def _estimate(self, required: Array, motions: Motions) -> float:
+    def _estimate(self, interference: Array, motions: Motions) -> float:
         """Estimate the approach on a coarse grid: its summits are lower, it errs upwards."""
         factors = [
-            1 << max(0, (n - 1).bit_length() - _FEW_CELLS.bit_length() + 1) for n in required.shape
+            1 << max(0, (n - 1).bit_length() - _FEW_CELLS.bit_length() + 1)
+            for n in interference.shape
         ]
         spacing = (self.spacing[0] * factors[0], self.spacing[1] * factors[1])
         coarse = coarse_pressure(
             self.grids,
-            coarsened(required, factors),
+            coarsened(interference, factors),
             spacing,
             motions=motions.coarsened(factors),
             upper=self.upper,
@@ -127,27 +130,29 @@ class Pressing:
         )
         return float(coarse.motion[0])
 
-    def _box(self, required: Array) -> Box:
-        whole = self.grids.periodic or not np.isfinite(required).all()
-        return Box.around(np.ones(required.shape, bool) if whole else required > 0.0)
+    def _box(self, interference: Array) -> Box:
+        whole = self.grids.periodic or not np.isfinite(interference).all()
+        return Box.around(np.ones(interference.shape, bool) if whole else interference > 0.0)
 
     def _grown(
         self,
         box: Box,
-        required: Array,
+        interference: Array,
         start: Array | None,
         motions: Motions | None,
         tolerance: float,
     ) -> Pressures:
         """Solve on a box, and on a larger one while the body lifts cells outside into contact."""
-        found = self._on(box, required, start, motions, tolerance)
-        while self.grids.body is not None and box.shape != required.shape:
-            nearer = required if motions is None else required + motions.nearer(found.motion)
+        found = self._on(box, interference, start, motions, tolerance)
+        while self.grids.body is not None and box.shape != interference.shape:
+            nearer = (
+                interference if motions is None else interference + motions.nearer(found.motion)
+            )
             lifted = self._lifted(box, nearer, found)
             if lifted is None:
                 break
             box = lifted
-            again = self._on(box, required, found.pressure, motions, tolerance)
+            again = self._on(box, interference, found.pressure, motions, tolerance)
             found = again._replace(iterations=found.iterations + again.iterations)
         return found
 
@@ -172,12 +177,12 @@ class Pressing:
     def _on(
         self,
         box: Box,
-        required: Array,
+        interference: Array,
         start: Array | None,
         motions: Motions | None,
         tolerance: float,
     ) -> Pressures:
-        part = np.ascontiguousarray(required[box])
+        part = np.ascontiguousarray(interference[box])
         free = None if motions is None else motions.on(box)
         first = None if start is None else start[box]
         if first is None or not first.any():
@@ -195,7 +200,7 @@ class Pressing:
             found = contact_pressure(
                 grid, part, first, motions=free, upper=self.upper, tolerance=tolerance
             )
-        pressure = np.zeros(required.shape)
+        pressure = np.zeros(interference.shape)
         pressure[box] = found.pressure
         return found._replace(pressure=pressure)
 

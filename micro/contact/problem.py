@@ -31,7 +31,7 @@ class Pressures(NamedTuple):
 
     Attributes:
         pressure: Pressures / E*, shape (nx, ny).
-        motion: Free motions of the body counted from where ``required`` was, shape (k,) [mm].
+        motion: Free motions of the body counted from where ``interference`` was, shape (k,) [mm].
         residual: Largest violation of the contact conditions over the largest displacement that
             the body asks for.
         iterations: Products of the compliance with pressures.
@@ -47,7 +47,7 @@ class Pressures(NamedTuple):
 
 def contact_pressure(
     grid: ElasticGrid,
-    required: Array,
+    interference: Array,
     start: Array,
     *,
     motions: Motions | None = None,
@@ -62,7 +62,7 @@ def contact_pressure(
 
     Args:
         grid: The elastic body.
-        required: Displacement d that the body asks for, shape (nx, ny) [mm]; negative where it
+        interference: Displacement d that the body asks for, shape (nx, ny) [mm]; negative where it
             is above the surface. Up to free motions of the body.
         start: Pressures / E* to start from, shape (nx, ny), not negative.
         motions: Motions of the body that are free, with their loads; none when not given.
@@ -79,7 +79,9 @@ def contact_pressure(
     """
     used = grid.products
     limits = Limits(motions=motions, upper=upper)
-    search = ContactSearch(grid, required, limits, *first_pressure(grid, required, start, limits))
+    search = ContactSearch(
+        grid, interference, limits, *first_pressure(grid, interference, start, limits)
+    )
     for passes in range(_MOST_PASSES):
         if search.residual <= max(tolerance, search.rounding):
             return Pressures(

@@ -33,7 +33,7 @@ _LAG = 3e-9
 def with_slopes(
     solve: Solve,
     grids: ElasticGrids,
-    required: Array,
+    interference: Array,
     motions: Motions | None,
     start: Pressures | None,
     tolerance: float,
@@ -43,7 +43,7 @@ def with_slopes(
     Args:
         solve: Solves it without them.
         grids: The elastic body; without finite slopes one solution is all.
-        required: Displacement that the body asks for, shape (nx, ny) [mm].
+        interference: Displacement that the body asks for, shape (nx, ny) [mm].
         motions: Free motions of the body.
         start: A solution nearby.
         tolerance: Largest residual.
@@ -52,20 +52,20 @@ def with_slopes(
         NotConverged: When a solution does not converge, or displacements do not agree.
     """
     if grids.slopes is None:
-        return solve(required, motions, start, tolerance)
-    known, lag = Anderson(), np.zeros(required.shape)
+        return solve(interference, motions, start, tolerance)
+    known, lag = Anderson(), np.zeros(interference.shape)
     if start is not None and start.pressure.any():
         lag = grids.by_slopes(start.pressure)
     rough, iterations, passes = max(tolerance, _FIRST), 0, 0
     last = max(_LAG, 10.0 * tolerance)
     for _ in range(_MOST_LAGS):
-        found = start = solve(required - lag, motions, start, rough)
+        found = start = solve(interference - lag, motions, start, rough)
         iterations, passes = iterations + found.iterations, passes + found.passes
         touching = found.pressure > 0.0
         if not touching.any():
             return found
         change = grids.by_slopes(found.pressure) - lag
-        nearer = required if motions is None else required + motions.nearer(found.motion)
+        nearer = interference if motions is None else interference + motions.nearer(found.motion)
         left = float(np.abs(change[touching]).max()) / float(nearer[touching].max())
         if left <= last and rough <= tolerance:
             residual = max(found.residual, left)

@@ -230,10 +230,10 @@ class HalfSpaceModel:
                 (self.surface.x, self.surface.y), self.surface.lengths, strict=True
             )
         )
-        required = self._required(self._plane(control.approach or 0.0, _LEVEL))
+        interference = self._required(self._plane(control.approach or 0.0, _LEVEL))
         total = None if control.force is None else self._total(control)
         known = None if start is None else Pressures(start, np.zeros(3), 0.0, 0, 0)
-        found = self._pressing.by_turning(required, Motions.turning(x, y, total), known)
+        found = self._pressing.by_turning(interference, Motions.turning(x, y, total), known)
         approach = control.approach if control.force is None else float(found.motion[0])
         return self._state(
             self._plane(float(approach or 0.0), _slopes(found.motion[-2:], half)), found
@@ -312,15 +312,16 @@ class HalfSpaceModel:
         return np.asarray(np.divide(pressure, self.contact_modulus))
 
     def _pressed(self, plane: RigidPlane, start: Array | None) -> HalfSpaceState:
-        required = self._required(plane)
-        if self.periodic and required.mean() >= 0.0:
+        interference = self._required(plane)
+        most = plane.approach - interference.mean()
+        if self.periodic and interference.mean() >= 0.0:
             raise InputError(
                 "a periodic surface has no gap left at this approach",
                 value=plane.approach,
-                allowed=f"< {plane.approach - required.mean():.6g} mm; beyond it give the force",
+                allowed=f"< {most:.6g} mm; beyond it give the force",
             )
         known = None if start is None else Pressures(start, np.zeros(0), 0.0, 0, 0)
-        return self._state(plane, self._pressing.by_approach(required, known))
+        return self._state(plane, self._pressing.by_approach(interference, known))
 
     def _plane(self, approach: float, tilt: tuple[float, float]) -> RigidPlane:
         self._check_tilt(tilt)
@@ -340,7 +341,7 @@ class HalfSpaceModel:
     def _state(self, plane: RigidPlane, found: Pressures) -> HalfSpaceState:
         return HalfSpaceState(
             plane=plane,
-            required=self._required(plane),
+            interference=self._required(plane),
             pressure=found.pressure * self.contact_modulus,
             contact_modulus=self.contact_modulus,
             spacing=self.surface.spacing,

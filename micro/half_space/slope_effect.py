@@ -51,12 +51,12 @@ def finite_slope_effect(
 def _slopes(model: HalfSpaceModel, poisson_ratio: float) -> FiniteSlopes:
     surface, sides = model.surface, model.sides
     modulus = model.contact_modulus * (1.0 - poisson_ratio**2)
-    beside = []
+    edge_stresses = []
     if sides is not None:
         cx, cy = coarse_grid(surface)
-        beside = [side_stresses(sides, (surface.lengths[0] / cx, surface.lengths[1] / cy))]
+        edge_stresses = [side_stresses(sides, (surface.lengths[0] / cx, surface.lengths[1] / cy))]
     half_space = HalfSpace(modulus, poisson_ratio)
-    return FiniteSlopes(surface, half_space, periodic=model.periodic, beside=beside)
+    return FiniteSlopes(surface, half_space, periodic=model.periodic, edge_stresses=edge_stresses)
 
 
 def _lowered(model: HalfSpaceModel, slopes: FiniteSlopes, state: HalfSpaceState) -> HalfSpaceModel:

@@ -22,7 +22,7 @@ class HalfSpaceState:
 
     Args:
         plane: The rigid plane: approach at the centre from first touch, and slopes.
-        required: Displacement that the plane asks of each cell, δ(x, y) − (z_M − z), negative
+        interference: Displacement that the plane asks of each cell, δ(x, y) − (z_M − z), negative
             where they are apart, shape (nx, ny) [mm].
         pressure: Contact pressure, shape (nx, ny) [MPa].
         contact_modulus: E* [MPa].
@@ -36,7 +36,7 @@ class HalfSpaceState:
     """
 
     plane: RigidPlane
-    required: Array
+    interference: Array
     pressure: Array
     contact_modulus: float
     spacing: tuple[float, float]
@@ -90,4 +90,4 @@ class HalfSpaceState:
     @property
     def gap(self) -> Array:
         """Distance of the displaced surface from the plane, shape (nx, ny) [mm]."""
-        return self.displacement - self.required
+        return self.displacement - self.interference

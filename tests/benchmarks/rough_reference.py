@@ -56,7 +56,7 @@ def report(surface, name, shape, scale):
 
 def concurrent(surface):
     nu, side = MATERIAL.poisson_ratio, surface.lengths[0]
-    sides = FreeSides(lengths=surface.lengths, poisson_ratio=nu, reach=0.25 * side)
+    sides = FreeSides(lengths=surface.lengths, poisson_ratio=nu, decay_length=0.25 * side)
     shape = BlockShape(interface=surface.lengths, height=1.0, cells=(1, 1, 1))
     body = Body(shape=shape, material=MATERIAL, sides="free", known=sides)
     model = HalfSpaceModel(

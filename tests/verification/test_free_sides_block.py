@@ -22,7 +22,7 @@ from micro import FreeSides, HalfSpace
 from multiscale.results.extrapolation import extrapolated
 
 SQUARE = (1.0, 1.0)
-SIDES = FreeSides(lengths=SQUARE, poisson_ratio=MATERIAL.poisson_ratio, reach=0.25)
+SIDES = FreeSides(lengths=SQUARE, poisson_ratio=MATERIAL.poisson_ratio, decay_length=0.25)
 HALF_SPACE = HalfSpace(MATERIAL.young_modulus, MATERIAL.poisson_ratio)
 APPROACH, FLAT = 3e-3, 0.01
 

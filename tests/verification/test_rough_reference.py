@@ -116,7 +116,7 @@ def test_finite_slopes_soften_the_rough_block_as_estimated():
         forces.append(block.press(Control(approach=approach * scale)).force / scale)
     measured = forces[1] / forces[0] - 1.0
     nu = MATERIAL.poisson_ratio
-    sides = FreeSides(lengths=rough.lengths, poisson_ratio=nu, reach=0.5)
+    sides = FreeSides(lengths=rough.lengths, poisson_ratio=nu, decay_length=0.5)
     modulus = MATERIAL.contact_modulus
     model = HalfSpaceModel(surface=rough, contact_modulus=modulus, sides=sides)
     estimate = finite_slope_effect(model, approach, poisson_ratio=nu)

@@ -87,7 +87,7 @@ def test_stresses_beside_a_side_are_those_of_a_meshed_block(nu):
     spacing = (1.0 / CELLS,) * 2
     pressure = np.exp(hill(TICKS[:, None], TICKS)[0])
     half_space = love_stresses(HalfSpace(1.0, nu), pressure, spacing)
-    sides = FreeSides(lengths=(1.0, 1.0), poisson_ratio=nu, reach=0.25)
+    sides = FreeSides(lengths=(1.0, 1.0), poisson_ratio=nu, decay_length=0.25)
     both = half_space + SideStresses(sides, spacing).stresses(pressure)
     places = np.clip(centres, TICKS[0], TICKS[-1]).T
 

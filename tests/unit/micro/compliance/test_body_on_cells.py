@@ -58,7 +58,7 @@ def test_some_cells_and_a_box_are_a_part_of_all():
     inside = part.displacement(p[box]) - alone.at(box.shape, SPACING, box).displacement(p[box])
     assert inside == pytest.approx(body[box], abs=1e-12 * np.abs(body).max())
     cells = Cells.of(np.flatnonzero(p[box]), box.shape)
-    rough = part.comply(cells, p[box].ravel()[cells.flat])
+    rough = part.apply_compliance(cells, p[box].ravel()[cells.flat])
     fine = part.displacement(p[box]).ravel()[cells.flat]
     assert rough == pytest.approx(fine, abs=1e-5 * np.abs(fine).max())  # single precision
     assert grids.risen(p, SPACING) == pytest.approx(body, abs=1e-11 * np.abs(body).max())
@@ -80,22 +80,22 @@ def test_cells_lifted_into_contact_are_found(control, lower):
         surface=surface, contact_modulus=E_STAR, body=seesaw(3e-3), tolerance=1e-9
     )
     state = model.equilibrium(control)
-    overlap = state.required > 0.0
+    overlap = state.interference > 0.0
     left = surface.x < 0.5
     assert not overlap[left].any()
     assert state.in_contact[left].any() and state.in_contact[~left].any()
-    slack = 1.1e-9 * state.required.max()
+    slack = 1.1e-9 * state.interference.max()
     assert state.gap.min() >= -slack
     assert np.abs(state.gap[state.in_contact]).max() <= slack
     # the same on all cells at once, where no box can hide any
-    required = state.required
+    interference = state.interference
     whole = Box.whole(GRID)
     pressing = Pressing(
         grids=ElasticGrids(periodic=False, modulus=E_STAR, body=seesaw(3e-3)),
         spacing=SPACING,
         tolerance=1e-10,
     )
-    every = pressing._on(whole, required, None, None, 1e-10)
+    every = pressing._on(whole, interference, None, None, 1e-10)
     assert state.pressure / E_STAR == pytest.approx(every.pressure, abs=1e-6 * every.pressure.max())
 
 
@@ -115,6 +115,6 @@ def test_a_body_under_a_free_plane():
     area = np.prod(SPACING)
     for arm in (surface.x[:, None] - 0.5, surface.y - 0.375):
         assert abs(np.sum(state.pressure * arm) * area) < 1e-10 * 2.0
-    assert state.gap.min() >= -1.1e-10 * state.required.max()
+    assert state.gap.min() >= -1.1e-10 * state.interference.max()
     fixed = model.solve(state.approach, tilt=state.plane.tilt)
     assert fixed.force == pytest.approx(2.0, rel=1e-8)

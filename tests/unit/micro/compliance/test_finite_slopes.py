@@ -23,7 +23,7 @@ def rough(grid=(48, 40), lengths=(1.0, 0.9)):
 
 
 def beside_of(surface):
-    sides = FreeSides(lengths=surface.lengths, poisson_ratio=0.3, reach=0.5)
+    sides = FreeSides(lengths=surface.lengths, poisson_ratio=0.3, decay_length=0.5)
     spacing = tuple(
         length / count for length, count in zip(surface.lengths, coarse_grid(surface), strict=True)
     )
@@ -32,7 +32,7 @@ def beside_of(surface):
 
 def term(surface, around="nothing", **options):
     if around == "block":
-        options["beside"] = beside_of(surface)
+        options["edge_stresses"] = beside_of(surface)
     return FiniteSlopes(surface, HALF_SPACE, periodic=around == "periodic", **options)
 
 

@@ -57,7 +57,7 @@ def test_half_space_is_the_limit_of_patches(lengths):
 
 @pytest.mark.parametrize("lengths", [(1.0, 1.0), (1.0, 2.0)])
 def test_sides_in_modes_are_those_of_cells(lengths):
-    sides = FreeSides(lengths=lengths, poisson_ratio=0.3, reach=0.2)
+    sides = FreeSides(lengths=lengths, poisson_ratio=0.3, decay_length=0.2)
     grid = (96, 96 * round(lengths[1] / lengths[0]))
     every = SideCells(sides, (lengths[0] / 96, lengths[0] / 96)).among(*map(np.arange, grid))
     means = [
@@ -77,7 +77,7 @@ def test_sides_in_modes_are_those_of_cells(lengths):
 
 def test_sides_on_patches_are_those_of_points():
     lengths = (1.0, 1.5)
-    sides = FreeSides(lengths=lengths, poisson_ratio=0.15, reach=0.25)
+    sides = FreeSides(lengths=lengths, poisson_ratio=0.15, decay_length=0.25)
     patches = UnevenPartition(ticks_x=(0.0, 0.1, 0.5, 1.0), ticks_y=(0.0, 0.6, 1.5))
     found = side_patches(sides, patches)
     nodes, weights = np.polynomial.legendre.leggauss(12)

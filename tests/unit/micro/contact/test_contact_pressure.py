@@ -30,16 +30,16 @@ def case(request):
     return grid, spacing, heights - heights.max()
 
 
-def oracle(grid, spacing, required, *, periodic):
+def oracle(grid, spacing, interference, *, periodic):
     """Minimise ½ pᵀG p − pᵀd over p ≥ 0 as |Lᵀp − L⁻¹d| with G = L Lᵀ."""
     elastic = half_space(grid, spacing, periodic=periodic)
-    count = required.size
+    count = interference.size
     matrix = np.array([elastic.displacement(row.reshape(grid)).ravel() for row in np.eye(count)])
     if periodic:
         # The mean is free of stiffness, and stays so while some cell is open.
         matrix = matrix + 1e-11 * np.trace(matrix) / count
     factor = np.linalg.cholesky(0.5 * (matrix + matrix.T))
-    pressure, _ = nnls(factor.T, np.linalg.solve(factor, required.ravel()), maxiter=100 * count)
+    pressure, _ = nnls(factor.T, np.linalg.solve(factor, interference.ravel()), maxiter=100 * count)
     return pressure.reshape(grid)
 
 
@@ -48,10 +48,10 @@ def oracle(grid, spacing, required, *, periodic):
 def test_least_squares_finds_the_same(case, share, periodic):
     grid, spacing, below = case
     # a part of the height range, or of the way to full contact
-    required = below + share * (-below.mean() if periodic else 2.0 * np.ptp(below))
+    interference = below + share * (-below.mean() if periodic else 2.0 * np.ptp(below))
     pressing = Pressing(grids=ElasticGrids(periodic=periodic), spacing=spacing, tolerance=1e-11)
-    found = pressing.by_approach(required, None).pressure
-    expected = oracle(grid, spacing, required, periodic=periodic)
+    found = pressing.by_approach(interference, None).pressure
+    expected = oracle(grid, spacing, interference, periodic=periodic)
     # round-off of a factor whose condition number is at most 1e6, squared in the periodic case
     assert found == pytest.approx(expected, abs=1e-7 * expected.max())
     assert np.array_equal(found > 0.0, expected > 1e-9 * expected.max())
@@ -85,12 +85,12 @@ def test_full_contact_of_a_period(case, share):
 
 def test_full_contact_without_periodicity():
     below = 1e-3 * np.random.default_rng(0).standard_normal((12, 10))
-    required = below - below.max() + 1.0  # a thousandth of the approach
+    interference = below - below.max() + 1.0  # a thousandth of the approach
     pressing = Pressing(grids=ElasticGrids(periodic=False), spacing=(1.0, 1.0), tolerance=1e-11)
-    found = pressing.by_approach(required, None)
+    found = pressing.by_approach(interference, None)
     assert np.all(found.pressure > 0.0)
     elastic = half_space((12, 10), (1.0, 1.0), periodic=False)
-    assert elastic.displacement(found.pressure) == pytest.approx(required, abs=1e-10)
+    assert elastic.displacement(found.pressure) == pytest.approx(interference, abs=1e-10)
 
 
 @pytest.mark.parametrize("periodic", [False, True])
@@ -131,12 +131,14 @@ def test_hostile_bodies(seed):
 def test_coarse_start_saves_products_on_the_fine_grid():
     n = 128
     x = (np.arange(n) + 0.5) / n - 0.5
-    required = 0.02 - 0.5 * (x[:, None] ** 2 + x**2)
+    interference = 0.02 - 0.5 * (x[:, None] ** 2 + x**2)
     grids = ElasticGrids(periodic=False)
     cold = contact_pressure.contact_pressure(
-        grids.at((n, n), (1 / n, 1 / n)), required, np.zeros((n, n)), tolerance=1e-8
+        grids.at((n, n), (1 / n, 1 / n)), interference, np.zeros((n, n)), tolerance=1e-8
     )
-    nested = nested_pressure(grids, required, (1 / n, 1 / n), tolerance=1e-8, box=Box.whole((n, n)))
+    nested = nested_pressure(
+        grids, interference, (1 / n, 1 / n), tolerance=1e-8, box=Box.whole((n, n))
+    )
     assert nested.iterations < 0.8 * cold.iterations
     assert nested.pressure.sum() == pytest.approx(cold.pressure.sum(), rel=1e-7)  # 2 ε dlnF/dlnδ
 
@@ -154,6 +156,6 @@ def test_coarse_grids():
 def test_gives_up_with_a_reason(monkeypatch):
     monkeypatch.setattr(contact_pressure, "_MOST_PASSES", 2)
     elastic = half_space((8, 8), (1.0, 1.0), periodic=False)
-    required = np.random.default_rng(0).random((8, 8))
+    interference = np.random.default_rng(0).random((8, 8))
     with pytest.raises(NotConverged, match=r"contact pressure \(residual .*, asked 1.0e-09\)"):
-        contact_pressure.contact_pressure(elastic, required, 0 * required, tolerance=1e-9)
+        contact_pressure.contact_pressure(elastic, interference, 0 * interference, tolerance=1e-9)

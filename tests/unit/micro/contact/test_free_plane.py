@@ -40,21 +40,21 @@ def test_dense_programme_finds_the_same(name, given, bounded, seed):
     approach = {"light": 0.3, "heavy": 4.0, "approach": 0.8}[given]
     total = None if given == "approach" else dense_contact(matrix, below + approach).pressure.sum()
     motions = Motions.turning(x, y, total)
-    required = below + approach if total is None else below
+    interference = below + approach if total is None else below
     held = {"levers": motions.among(np.arange(below.size)), "loads": motions.loads}
-    expected = dense_contact(matrix, required, **held)
+    expected = dense_contact(matrix, interference, **held)
     upper = np.inf
     if bounded:
         upper = 0.6 * expected.pressure.max()
-        expected = dense_contact(matrix, required, **held, upper=upper)
+        expected = dense_contact(matrix, interference, **held, upper=upper)
         assert np.count_nonzero(expected.pressure == upper) > 0
     pressing = Pressing(
         grids=ElasticGrids(periodic=False), spacing=CASES[name][1], tolerance=1e-11, upper=upper
     )
-    found = pressing.by_turning(required, motions, None)
+    found = pressing.by_turning(interference, motions, None)
     peak = expected.pressure.max()
     assert found.pressure.ravel() == pytest.approx(expected.pressure, abs=1e-8 * peak)
-    assert found.motion == pytest.approx(expected.motion, abs=1e-8 * np.abs(required).max())
+    assert found.motion == pytest.approx(expected.motion, abs=1e-8 * np.abs(interference).max())
     assert found.pressure.max() <= upper
 
 

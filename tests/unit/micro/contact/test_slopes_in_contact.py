@@ -40,8 +40,8 @@ def test_solves_the_fixed_point(control):
     state = MODEL.equilibrium(control)
     grid = ElasticGrids(periodic=False).at(SURFACE.grid, SURFACE.spacing, Box.whole(SURFACE.grid))
     moved = grid.displacement(state.pressure / E_STAR) + SLOPES.displacement(state.pressure)
-    gap = moved - state.required
-    slack = 4e-9 * state.required.max()  # slopes are lagged until they change by 3e-9
+    gap = moved - state.interference
+    slack = 4e-9 * state.interference.max()  # slopes are lagged until they change by 3e-9
     assert np.abs(gap[state.in_contact]).max() <= slack
     assert gap.min() >= -slack
     assert state.gap == pytest.approx(gap, abs=1e-15)

@@ -212,7 +212,7 @@ def test_patches_whose_borders_halve_cells_stand_alone(grid, length):
 
 
 def test_a_patch_alone_has_no_free_sides(surface):
-    sides = FreeSides(lengths=surface.lengths, poisson_ratio=0.3, reach=0.5)
+    sides = FreeSides(lengths=surface.lengths, poisson_ratio=0.3, decay_length=0.5)
     model = HalfSpaceModel(surface=surface, contact_modulus=E_STAR)
     alone, expected = (replace(model, sides=each).of_patch(PATCHES, 1)[0] for each in (sides, None))
     assert alone.sides is None

@@ -36,7 +36,7 @@ def test_heights_count_from_anywhere():
 
 
 def test_free_sides_yield_more():
-    sides = FreeSides(lengths=SURFACE.lengths, poisson_ratio=NU, reach=0.5)
+    sides = FreeSides(lengths=SURFACE.lengths, poisson_ratio=NU, decay_length=0.5)
     assert effect(SURFACE, 8e-3, sides=sides) < 1.1 * effect(SURFACE, 8e-3)
 
 
