@@ -24,19 +24,15 @@ from micro.closed_forms.ellipse import (
 from micro.closed_forms.hertz import HertzContact, contact_modulus
 from micro.closed_forms.influence import influence_matrix, mutual_influence
 from micro.closed_forms.love import love_centre, love_integral, love_mean, love_mutual
-from micro.compliance.body_modes import BodyModes
-from micro.compliance.body_stresses import BodyStresses
-from micro.compliance.finite_slopes import FiniteSlopes, coarse_grid
+from micro.compliance.body_modes import BodyModes, BodyStresses
+from micro.compliance.finite_slopes import FiniteSlopes, SurfaceStress, coarse_grid
 from micro.compliance.free_sides import FreeSides
 from micro.compliance.half_space_modes import half_space_modes, half_space_stress_modes
+from micro.compliance.side_cells import SideStresses, side_stresses
 from micro.compliance.side_modes import side_modes, side_stress_modes
-from micro.compliance.side_patches import side_patches
-from micro.compliance.side_stresses import SideStresses, side_stresses
-from micro.compliance.surface_stress import SurfaceStress
 from micro.factory import MODEL_NAMES, START_KINDS, micro_model
 from micro.half_space.contact_spots import Contacts, find_contacts
 from micro.half_space.model import HalfSpaceModel
-from micro.half_space.slope_effect import finite_slope_effect
 from micro.half_space.state import HalfSpaceState
 from micro.islands.model import IslandModel
 from micro.islands.state import IslandState
@@ -85,7 +81,6 @@ __all__ = [
     "eccentricity",
     "eccentricity_approximate",
     "find_contacts",
-    "finite_slope_effect",
     "force_factor",
     "half_space_modes",
     "half_space_stress_modes",
@@ -98,7 +93,6 @@ __all__ = [
     "mutual_influence",
     "resampled",
     "side_modes",
-    "side_patches",
     "side_stress_modes",
     "side_stresses",
 ]

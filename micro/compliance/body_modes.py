@@ -1,8 +1,8 @@
-"""What a finite body adds to the half-space: a smooth compliance in few modes of its top.
+"""What a finite body adds to the half-space: smooth displacements and stresses, in modes.
 
-Pressures p have the moments b_n = ∫ p φ_n dA with the modes φ_n, and displace by Σ φ_m D_mn b_n.
-Modes are products of Legendre modes along x and y (`geometry.legendre_modes`): all evaluations are
-thin products along the axes.
+Pressures p have the moments b_n = ∫ p φ_n dA with the modes φ_n. They displace by Σ φ_m D_mn b_n,
+and add the stresses Σ φ_m S_mn b_n in the surface. Modes are products of Legendre modes along x and
+y (`geometry.legendre_modes`), so that all evaluations are thin products along the axes.
 """
 
 from __future__ import annotations
@@ -61,19 +61,22 @@ class BodyModes:
         """Modes K along a side."""
         return int(np.sqrt(len(self.matrix)) + 0.5)
 
-    def on(self, borders_x: ArrayLike, borders_y: ArrayLike) -> ModesOnCells:
+    def on(
+        self, borders_x: ArrayLike, borders_y: ArrayLike, *, modulus: float = 1.0
+    ) -> ModesOnCells:
         """Return the compliance of cells of pressure, by means over the cells.
 
         Args:
             borders_x: Borders of the cells along x, ascending within the top, (nx + 1,) [mm].
             borders_y: Borders along y, shape (ny + 1,) [mm].
+            modulus: Unit of the pressures [MPa].
         """
         x, y = self._placed(borders_x, borders_y)
         return ModesOnCells(
             self.matrix,
             mode_means(x, self.lengths[0], self.count),
             mode_means(y, self.lengths[1], self.count),
-            np.diff(x),
+            modulus * np.diff(x),
             np.diff(y),
         )
 
@@ -129,7 +132,7 @@ class ModesOnCells:
         matrix: D [mm/N].
         means_x: Means of the modes along x over the cells, shape (K, nx).
         means_y: Means along y, shape (K, ny).
-        widths_x: Widths of the cells along x, shape (nx,) [mm].
+        widths_x: Widths of the cells along x, times the unit of the pressures, shape (nx,) [N/mm].
         widths_y: Widths along y, shape (ny,) [mm].
     """
 
@@ -143,7 +146,7 @@ class ModesOnCells:
         """Return the displacements of all cells by pressures on them.
 
         Args:
-            pressure: Shape (nx, ny) [MPa].
+            pressure: In the unit chosen, shape (nx, ny).
 
         Returns:
             Shape (nx, ny) [mm].
@@ -166,3 +169,67 @@ class ModesOnCells:
             self.widths_x[rows],
             self.widths_y[columns],
         )
+
+
+class BodyStresses:
+    """Stresses in its top that a finite body adds to those of the half-space, as means over cells.
+
+    Args:
+        lengths: Sides (Lx, Ly) of the top [mm].
+        grid: Cells (nx, ny), which fill the top but a margin all around.
+        matrix: S of σ_xx, σ_yy and σ_xy; mode k K + l varies as mode k along x and l along y, shape
+            (3, K², K²) [1/mm²].
+        margin: Width of the margin [mm].
+
+    Raises:
+        InputError: When the matrix is not one of K² modes, or not finite.
+    """
+
+    def __init__(
+        self,
+        lengths: tuple[float, float],
+        grid: tuple[int, int],
+        matrix: ArrayLike,
+        margin: float = 0.0,
+    ) -> None:
+        self._matrix = np.asarray(matrix, float)
+        count = int(np.sqrt(self._matrix.shape[-1]) + 0.5)
+        if not count or self._matrix.shape != (3, count**2, count**2):
+            raise InputError(
+                "the stresses are not those of K × K modes",
+                value=self._matrix.shape,
+                allowed="(3, K², K²), K ≥ 1",
+            )
+        if not np.all(np.isfinite(self._matrix)):
+            raise InputError("the stresses are not finite", value="nan or inf", allowed="numbers")
+        borders = [
+            np.linspace(margin, length - margin, cells + 1)
+            for length, cells in zip(lengths, grid, strict=True)
+        ]
+        self._x, self._y = (
+            mode_means(ticks, length, count) for ticks, length in zip(borders, lengths, strict=True)
+        )
+        self._cell = float(np.prod([ticks[1] - ticks[0] for ticks in borders]))
+
+    def stresses(self, pressure: Array) -> Array:
+        """Return σ_xx, σ_yy and σ_xy on the cells, shape (3, nx, ny) [MPa].
+
+        Args:
+            pressure: On all cells, shape (nx, ny) [MPa].
+        """
+        moments = self._x @ pressure @ self._y.T * self._cell
+        amplitudes = (self._matrix @ moments.ravel()).reshape(3, *moments.shape)
+        return np.asarray(self._x.T @ amplitudes @ self._y)
+
+    def adjoint(self, fields: Array) -> Array:
+        """Apply the transpose of `stresses`.
+
+        Args:
+            fields: Weights of σ_xx, σ_yy and σ_xy on the cells, shape (3, nx, ny).
+
+        Returns:
+            Weights of the pressures, shape (nx, ny).
+        """
+        amplitudes = self._x @ fields @ self._y.T
+        moments = np.tensordot(amplitudes.reshape(3, -1), self._matrix, axes=2)
+        return np.asarray(self._x.T @ moments.reshape(amplitudes.shape[1:]) @ self._y * self._cell)

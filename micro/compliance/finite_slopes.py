@@ -32,6 +32,7 @@ Sources: Johnson 1985, ch. 3; Eshelby 1975, doi 10.1007/BF00126994.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +41,6 @@ from scipy import fft
 from geometry import Surface
 from geometry.errors import InputError
 from micro.closed_forms.boussinesq import HalfSpace
-from micro.compliance.surface_stress import SurfaceStress
 from micro.compliance.waves import Around, Spectrum, Waves
 
 Array = NDArray[np.float64]
@@ -51,6 +51,30 @@ _GRADIENT = 0.9
 """Cells per coarse cell along an axis: the first ratio that leaves 64 coarse cells a side and 0.9
 of the mean square gradient. Against ratio 1, forces of rough surfaces of 128² … 1024² cells change
 by up to 0.1 %, in a tenth of the time."""
+
+
+class SurfaceStress(Protocol):
+    """Stresses in a flat surface, or a part of them, under pressures on a grid of cells."""
+
+    def stresses(self, pressure: Array) -> Array:
+        """Return the stresses in the surface, positive in tension.
+
+        Args:
+            pressure: Pressures on the cells, shape (nx, ny) [MPa].
+
+        Returns:
+            σ_xx, σ_yy and σ_xy at the centres of the cells, shape (3, nx, ny) [MPa].
+        """
+
+    def adjoint(self, fields: Array) -> Array:
+        """Apply the transpose of `stresses`.
+
+        Args:
+            fields: What σ_xx, σ_yy and σ_xy are multiplied by, shape (3, nx, ny).
+
+        Returns:
+            What the pressures are multiplied by, with the same sum, shape (nx, ny).
+        """
 
 
 class FiniteSlopes:

@@ -10,7 +10,7 @@ from geometry import InputError, Spectrum, Surface, synthesise
 from micro import FreeSides, HalfSpace, HalfSpaceModel
 from micro.compliance import finite_slopes
 from micro.compliance.finite_slopes import FiniteSlopes, coarse_grid
-from micro.compliance.side_stresses import SideStresses
+from micro.compliance.side_cells import SideStresses
 
 HALF_SPACE = HalfSpace(4000.0, 0.3)
 DICE = np.random.default_rng(7)

@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from free_side_points import side_displacements
 
 from geometry import Surface, UnevenPartition
 from geometry.errors import InputError
 from micro import FreeSides, HalfSpaceModel
-from micro.compliance.bounding_box import Box
-from micro.compliance.elastic_grid import Cells, ElasticGrids
+from micro.compliance.cells import Box, Cells
+from micro.compliance.grid_compliance import Compliance
 from micro.compliance.side_cells import SideCells
 
 SIDES = FreeSides(lengths=(1.0, 1.5), poisson_ratio=0.2, decay_length=0.25)
@@ -59,26 +60,26 @@ def test_cells_and_rectangles_tell_the_same(cells):
     x, y = (np.arange(n) * 0.05 + 0.025 for n in GRID)
     ticks = (0.0, 0.2, 1.0), (0.0, 0.6, 0.8, 1.5)
     loads = UnevenPartition(ticks_x=ticks[0], ticks_y=ticks[1])
-    found, points = whole(cells, p), SIDES.top(x, y, loads)[:, :, 1]
+    found, points = whole(cells, p), side_displacements(SIDES, x, y, loads)[:, :, 1]
     # means over cells against their middles: 2.2 % of the largest next to the side, then 0.3 %
     assert np.abs(found - points).max() < 0.03 * points.max()
     assert np.abs(found - points)[2:].max() < 4e-3 * points.max()
 
 
 def test_grids_know_their_sides_where_they_lie():
-    grids, alone = (ElasticGrids(periodic=False, sides=sides) for sides in (SIDES, None))
+    grids, alone = (Compliance(periodic=False, sides=sides) for sides in (SIDES, None))
     box = Box(slice(0, 8), slice(20, 30))
     p = np.abs(random(5, box.shape))
-    beside = grids.at(p.shape, SPACING, box).displacement(p)
-    inside = alone.at(p.shape, SPACING, box).displacement(p)
+    beside = grids.on_grid(p.shape, SPACING, box).displacement(p)
+    inside = alone.on_grid(p.shape, SPACING, box).displacement(p)
     every = np.zeros(GRID)
     every[box] = p
     added = whole(SideCells(SIDES, SPACING), every)[box]
     np.testing.assert_allclose(beside, inside + added, rtol=1e-12)
     where = Cells.of(np.flatnonzero(p > 1.0), p.shape)
     few = np.where(p > 1.0, p, 0.0)
-    rough = grids.at(p.shape, SPACING, box).apply_compliance(where, few.ravel()[where.flat])
-    fine = grids.at(p.shape, SPACING, box).displacement(few).ravel()[where.flat]
+    rough = grids.on_grid(p.shape, SPACING, box).apply_compliance(where, few.ravel()[where.flat])
+    fine = grids.on_grid(p.shape, SPACING, box).displacement(few).ravel()[where.flat]
     np.testing.assert_allclose(rough, fine, rtol=1e-5)  # products in single precision
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from free_side_points import side_displacements
 
 from geometry import PatchGrid, UnevenPartition
 from geometry.legendre_modes import mode_means
@@ -10,7 +11,6 @@ from micro.compliance import half_space_modes as module
 from micro.compliance.half_space_modes import half_space_modes
 from micro.compliance.side_cells import SideCells
 from micro.compliance.side_modes import side_modes
-from micro.compliance.side_patches import side_patches
 
 SHAPES = [(1.0, 1.0), (1.0, 2.5), (3.0, 0.2)]
 
@@ -79,13 +79,13 @@ def test_sides_on_patches_are_those_of_points():
     lengths = (1.0, 1.5)
     sides = FreeSides(lengths=lengths, poisson_ratio=0.15, decay_length=0.25)
     patches = UnevenPartition(ticks_x=(0.0, 0.1, 0.5, 1.0), ticks_y=(0.0, 0.6, 1.5))
-    found = side_patches(sides, patches)
+    found = sides.patch_compliance(patches)
     nodes, weights = np.polynomial.legendre.leggauss(12)
     places = [
         (0.5 * (b[1:] + b[:-1])[:, None] + 0.5 * np.diff(b)[:, None] * nodes).ravel()
         for b in (patches.borders_x, patches.borders_y)
     ]
-    top = sides.top(*places, patches).reshape(3, 12, 2, 12, 6)
+    top = side_displacements(sides, *places, patches).reshape(3, 12, 2, 12, 6)
     means = np.einsum("a,b,iajbn->ijn", weights / 2, weights / 2, top).reshape(6, 6)
     # Gauss' rule against the logarithm at the side
     np.testing.assert_allclose(found, means, atol=3e-3 * means.max())

@@ -5,7 +5,7 @@ import pytest
 from love_stresses import love_stresses
 
 from micro import FreeSides, HalfSpace
-from micro.compliance.side_stresses import SideStresses
+from micro.compliance.side_cells import SideStresses
 
 SIDES = FreeSides(lengths=(1.0, 1.5), poisson_ratio=0.2, decay_length=0.25)
 GRID, SPACING = (20, 30), (0.05, 0.05)
