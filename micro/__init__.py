@@ -22,8 +22,14 @@ from micro.closed_forms.ellipse import (
     force_factor,
 )
 from micro.closed_forms.hertz import HertzContact, contact_modulus
-from micro.closed_forms.influence import influence_matrix, mutual_influence
-from micro.closed_forms.love import love_centre, love_integral, love_mean, love_mutual
+from micro.closed_forms.love import (
+    influence_matrix,
+    love_centre,
+    love_integral,
+    love_mean,
+    love_mutual,
+    mutual_influence,
+)
 from micro.compliance.body_modes import BodyModes, BodyStresses
 from micro.compliance.finite_slopes import FiniteSlopes, SurfaceStress, coarse_grid
 from micro.compliance.free_sides import FreeSides
