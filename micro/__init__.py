@@ -1,9 +1,15 @@
 """Contact of a rough surface with a rigid plane on the scale of its asperities.
 
-Asperities and a contact modulus make an `AsperityModel`; a surface and a contact modulus make a
-`ScaledModel`, whose asperities follow the load, an `IslandModel` or a `HalfSpaceModel`. Solved
-along approaches each gives a `Response` of the surface and its patches; `love` tells how patches
-of pressure move the half-space.
+Every micro model presses a plane on a surface and returns a `Response` of the surface and its
+patches. `HalfSpaceModel` solves the contact problem on the surface's cells. `AsperityModel` sees
+given asperities, `ScaledModel` asperities whose curvature follows the load, and `IslandModel` the
+regions above the plane. `micro_model` makes any of them by name, and `choose` the cheapest one that
+keeps a tolerance.
+
+    closed_forms                                      Hertz, Love, Boussinesq
+    compliance → contact → half_space                 the contact problem on cells
+    pairs → complementarity → islands, asperities     contacts that interact pair by pair
+    factory → choice                                  models by name and by accuracy
 """
 
 from micro.asperities.many_summits import PAIR_SUMS
@@ -13,23 +19,8 @@ from micro.asperities.state import AsperityState
 from micro.choice.candidates import Candidate, resampled
 from micro.choice.selection import Choice, choose
 from micro.closed_forms.boussinesq import HalfSpace
-from micro.closed_forms.ellipse import (
-    area_factor,
-    axis_factor,
-    axis_ratio,
-    eccentricity,
-    eccentricity_approximate,
-    force_factor,
-)
 from micro.closed_forms.hertz import HertzContact, contact_modulus
-from micro.closed_forms.love import (
-    influence_matrix,
-    love_centre,
-    love_integral,
-    love_mean,
-    love_mutual,
-    mutual_influence,
-)
+from micro.closed_forms.love import influence_matrix
 from micro.compliance.body_modes import BodyModes, BodyStresses
 from micro.compliance.finite_slopes import FiniteSlopes, SurfaceStress, coarse_grid
 from micro.compliance.free_sides import FreeSides
@@ -77,26 +68,15 @@ __all__ = [
     "ScaledModel",
     "SideStresses",
     "SurfaceStress",
-    "area_factor",
     "asperity_model",
-    "axis_factor",
-    "axis_ratio",
     "choose",
     "coarse_grid",
     "contact_modulus",
-    "eccentricity",
-    "eccentricity_approximate",
     "find_contacts",
-    "force_factor",
     "half_space_modes",
     "half_space_stress_modes",
     "influence_matrix",
-    "love_centre",
-    "love_integral",
-    "love_mean",
-    "love_mutual",
     "micro_model",
-    "mutual_influence",
     "resampled",
     "side_modes",
     "side_stress_modes",

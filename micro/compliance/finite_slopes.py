@@ -93,10 +93,11 @@ class FiniteSlopes:
         plane: Height of the surface of the flat body whose edge stresses are given [mm]; that
             of the mean plane when not given. On the half-space alone it hardly matters.
         edge_stresses: Stresses in the surface beyond those of the half-space, on the cells of
-            `coarse_grid`.
+            ``grid``.
+        grid: Cells that the term works on, the surface's or coarser; `coarse_grid` when not given.
 
     Attributes:
-        grid: Cells that the term works on, the surface's or coarser: `coarse_grid`.
+        grid: Cells that the term works on.
         spacing: Sides of these cells [mm].
 
     Raises:
@@ -112,6 +113,7 @@ class FiniteSlopes:
         periodic: bool = False,
         plane: float | None = None,
         edge_stresses: Sequence[SurfaceStress] = (),
+        grid: tuple[int, int] | None = None,
     ) -> None:
         if order not in (1, 2):
             raise InputError("this order of slopes is unknown", value=order, allowed="1 or 2")
@@ -119,7 +121,7 @@ class FiniteSlopes:
             raise InputError("periodic slopes need a periodic surface", value=surface.source)
         self.half_space, self.order, self.edge_stresses = half_space, order, tuple(edge_stresses)
         self._periodic = periodic
-        self.grid = coarse_grid(surface)
+        self.grid = grid or coarse_grid(surface)
         around: Around = "copies" if periodic else "nothing" if edge_stresses else "mirrored"
         self._waves = Waves(surface.grid, surface.spacing, coarse=self.grid, around=around)
         self.spacing = self._waves.spacing

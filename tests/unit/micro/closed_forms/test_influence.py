@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from geometry import PatchGrid, UnevenPartition
-from micro import influence_matrix, love_mean, mutual_influence
+from micro import influence_matrix
+from micro.closed_forms.love import love_mean, mutual_influence
 from micro.compliance.grid_compliance import Compliance
 
 
