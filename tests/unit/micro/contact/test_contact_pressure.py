@@ -8,7 +8,7 @@ from geometry import NotConverged
 from micro.compliance.grid_compliance import Compliance, GridCompliance
 from micro.compliance.half_space_grid import HalfSpaceGrid
 from micro.contact.active_set import solve
-from micro.contact.nested_grids import coarsened, nested_start, refined
+from micro.contact.nested_grids import SurfaceProblem, coarsened, refined
 from micro.contact.problem import ContactProblem
 from micro.contact.rigid_motions import Motions
 from micro.contact.solver import ContactSolver
@@ -144,10 +144,16 @@ def test_coarse_start_saves_products_on_the_fine_grid():
     n = 128
     x = (np.arange(n) + 0.5) / n - 0.5
     interference = 0.02 - 0.5 * (x[:, None] ** 2 + x**2)
-    grids, spacing = Compliance(periodic=False), (1 / n, 1 / n)
-    problem = ContactProblem(compliance=grids.on_grid((n, n), spacing), interference=interference)
-    cold = solve(problem, np.zeros((n, n)), 1e-8)
-    nested = solve(problem, nested_start(grids, interference, spacing, (0.0, 0.0)), 1e-8)
+    problem = SurfaceProblem(
+        compliance=Compliance(periodic=False),
+        interference=interference,
+        motions=None,
+        upper=np.inf,
+        spacing=(1 / n, 1 / n),
+    )
+    grid = problem.compliance.on_grid((n, n), problem.spacing)
+    cold = solve(problem.with_compliance(grid), np.zeros((n, n)), 1e-8)
+    nested = solve(problem.with_compliance(grid), problem.nested_start(), 1e-8)
     assert nested.iterations < 0.8 * cold.iterations
     assert nested.pressure.sum() == pytest.approx(cold.pressure.sum(), rel=1e-7)  # 2 ε dlnF/dlnδ
 
