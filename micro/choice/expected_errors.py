@@ -18,6 +18,8 @@ which does not. The coefficients are quantile regressions (`tests/benchmarks/aut
 of the errors at two loads of 160 surfaces: Hurst exponents 0.3 to 1, bands from 1 to 4 up to 6 to
 64 waves a side, a part of them anisotropic, 48² to 512² heights, rms gradients 0.05 to 0.2, contact
 on 0.02 to 30 % of the area. 97.5 % of the errors keep their bound.
+
+Theory: demos/theory.md, section 13.
 """
 
 from __future__ import annotations

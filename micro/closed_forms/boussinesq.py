@@ -7,6 +7,8 @@ With V the integral of p/r and χ that of p ln(r + z) over the loaded area, z th
 and the stresses follow from second derivatives of both (Love 1929). For rectangles every term is
 a second difference over the four corners of a function in closed form. Loads that form a grid
 share their corners: each is evaluated once for all loads around it.
+
+Theory: demos/theory.md, section 4.
 """
 
 from __future__ import annotations

@@ -21,6 +21,8 @@ to rounding from τ = 30 on, some 5.5 major semi-axes away, at less than a tenth
 Source:
     Waddad et al. 2016, eqs. 10, 17, 18, doi 10.1016/j.triboint.2015.12.023; Carlson's integrals
     (DLMF 19.16) in place of the paper's eqs. 20–22.
+
+Theory: demos/theory.md, section 8.
 """
 
 from __future__ import annotations

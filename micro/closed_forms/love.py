@@ -5,6 +5,8 @@ L(x, y) is the integral of 1/distance over the rectangle [mm]. Pressure on recta
 rectangle i by Λ_ij p/(π E*) in the mean, where Λ_ij is the mean of L over rectangle i. Near by it
 is a closed form, second differences of the fourfold antiderivative of 1/ρ. These cancel far away,
 where Gauss' rule takes their place.
+
+Theory: demos/theory.md, section 4.
 """
 
 from __future__ import annotations

@@ -27,6 +27,8 @@ the forms at the pressures. On caps and rough surfaces (rms gradient 0.215) that
 the compliance from the series to sixth order; two orders alone are within 0.5 %.
 
 Sources: Johnson 1985, ch. 3; Eshelby 1975, doi 10.1007/BF00126994.
+
+Theory: demos/theory.md, section 7.
 """
 
 from __future__ import annotations

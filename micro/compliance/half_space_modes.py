@@ -7,6 +7,8 @@ s and smooth functions of v, to which Gauss' rules converge at once.
 
 The stresses in the surface are σ_αβ = −2ν p δ_αβ − (1 − 2ν) ∂_α ∂_β φ, with φ the convolution of p
 with ln ρ/2π. Integrated by parts once, the moments of ∂_α ∂_β φ are −∫∫ A' B ∂_β ln ρ/2π.
+
+Theory: demos/theory.md, section 4.
 """
 
 from __future__ import annotations

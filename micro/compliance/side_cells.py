@@ -3,6 +3,8 @@
 Pressures are uniform on the cells, and displacements and stresses are their means over them. Along
 a side, Fourier's transform takes cells to waves, which do not mix. Across it, sparse matrices take
 cells to values at nodes of the distance from the side (`micro.compliance.distance_nodes`).
+
+Theory: demos/theory.md, section 5.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Compliance and stresses that free sides add to the half-space, in modes of the rectangle."""
+"""Compliance and stresses that free sides add to the half-space, in modes of the rectangle.
+
+Theory: demos/theory.md, section 5.
+"""
 
 from __future__ import annotations
 

@@ -4,6 +4,8 @@ Heights times stresses make waves shorter than either. Cells hold waves of two c
 products that fall below come back as others, which makes the powers of heights in an expansion
 unstable. Waves shorter than about three of the coarse cells are therefore left out on the way in,
 and on the way out, so that the map as a whole stays symmetric.
+
+Theory: demos/theory.md, section 7.
 """
 
 from __future__ import annotations

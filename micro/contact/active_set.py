@@ -4,6 +4,8 @@ A step takes the cells with a pressure or a negative gap as the contact, solves 
 roughly by conjugate gradients and drops tensile pressures (primal-dual active set). Where a plane
 that may turn rests on few cells, each of them is needed to hold it. There, cells are dropped one at
 a time (primal active set), so that no step leaves the plane without support.
+
+Theory: demos/theory.md, section 3.
 """
 
 from __future__ import annotations

@@ -4,6 +4,8 @@ Pressures to start from come from the solution on a grid half as fine, and so on
 one. The set of cells in contact is then found on the coarse grids, where that costs little, and
 only its edge is left to the fine one (full multigrid: Zhao, Vollebregt & Oosterlee 2014,
 doi 10.3846/13926292.2014.909899).
+
+Theory: demos/theory.md, section 3.
 """
 
 from __future__ import annotations

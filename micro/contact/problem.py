@@ -14,6 +14,8 @@ These are the conditions of the minimum of the convex energy ½ p·C p − p·d 
 between 0 and H that meet the loads f_i. Pressures and H are over E*, so that C is a length.
 
 Source: Almqvist, Sahlin, Larsson & Glavatskih 2007, Tribol. Int. 40, 574-579, for the bound H.
+
+Theory: demos/theory.md, section 3.
 """
 
 from __future__ import annotations

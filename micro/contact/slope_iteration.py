@@ -4,6 +4,8 @@ The displacements that finite slopes add depend on the pressures and are evaluat
 surface. Each solution takes them from the solution before it. They are a few per cent of all
 displacements, and change by a hundredth of that in the second solution. Solutions need not be more
 accurate than the next change, so the first ones stop early.
+
+Theory: demos/theory.md, section 7.
 """
 
 from __future__ import annotations

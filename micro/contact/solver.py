@@ -3,6 +3,8 @@
 The half-space's displacements by pressures are never negative. Without periodicity a rigid body
 therefore touches only cells with a positive interference, and a box around these is all that enters
 the solution. A finite body may lift other cells into contact: they are searched for at the end.
+
+Theory: demos/theory.md, section 3.
 """
 
 from __future__ import annotations

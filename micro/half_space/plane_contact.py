@@ -1,4 +1,7 @@
-"""A rigid plane on the cells of a surface: what is prescribed of it as a contact problem."""
+"""A rigid plane on the cells of a surface: what is prescribed of it as a contact problem.
+
+Theory: demos/theory.md, section 3.
+"""
 
 from __future__ import annotations
 
