@@ -204,14 +204,12 @@ class BodyStresses:
             )
         if not np.all(np.isfinite(self._matrix)):
             raise InputError("the stresses are not finite", value="nan or inf", allowed="numbers")
-        borders = [
-            np.linspace(margin, length - margin, cells + 1)
-            for length, cells in zip(lengths, grid, strict=True)
-        ]
+        sizes = [length - 2.0 * margin for length in lengths]
         self._x, self._y = (
-            mode_means(ticks, length, count) for ticks, length in zip(borders, lengths, strict=True)
+            mode_means(np.linspace(margin, margin + size, cells + 1), length, count)
+            for size, length, cells in zip(sizes, lengths, grid, strict=True)
         )
-        self._cell = float(np.prod([ticks[1] - ticks[0] for ticks in borders]))
+        self._cell = float(np.prod(sizes) / np.prod(grid))
 
     def stresses(self, pressure: Array) -> Array:
         """Return σ_xx, σ_yy and σ_xy on the cells, shape (3, nx, ny) [MPa].

@@ -97,49 +97,27 @@ def _pairs(
 
 
 class SideCells:
-    """Compliance that free sides add to cells, symmetric, for E* = 1.
+    """Compliance that free sides add to the cells where rows and columns cross, for E* = 1.
 
     Args:
-        sides: The free sides.
-        spacing: Sides (dx, dy) of a cell [mm]; the cells fill the rectangle between the sides.
-    """
-
-    def __init__(self, sides: FreeSides, spacing: tuple[float, float]) -> None:
-        self.pairs = _pairs(sides, spacing, stress=False)
-
-    def among(self, rows: Indices, columns: Indices) -> SomeSideCells:
-        """Return the cells where some rows and columns of the grid cross.
-
-        Args:
-            rows: Indices of the rows, ascending, shape (r,).
-            columns: Indices of the columns, ascending, shape (c,).
-        """
-        return SomeSideCells(self, rows, columns)
-
-
-class SomeSideCells:
-    """Cells under pressure where rows and columns cross, between free sides: a compliance term.
-
-    Args:
-        whole: The cells of the whole rectangle.
+        pairs: The sides across x and those across y.
         rows: Indices of the rows, ascending, shape (r,).
         columns: Indices of the columns, ascending, shape (c,).
     """
 
-    def __init__(self, whole: SideCells, rows: Indices, columns: Indices) -> None:
-        self._whole, self._rows, self._columns = whole, rows, columns
-        across_x, across_y = whole.pairs
-        self._lines = _Lines.of(across_x, rows, columns), _Lines.of(across_y, columns, rows)
+    def __init__(self, pairs: tuple[_SidePair, _SidePair], rows: Indices, columns: Indices) -> None:
+        self._pairs, self._rows, self._columns = pairs, rows, columns
+        self._across_x = _Lines.of(pairs[0], rows, columns)
+        self._across_y = _Lines.of(pairs[1], columns, rows)
 
     def displacement(self, pressure: Array) -> Array:
         """Return the displacements of these cells by pressures on them, shape (r, c) [mm]."""
-        across_x, across_y = self._lines
-        found = across_x.displacement(pressure)
-        return np.asarray(found + across_y.displacement(pressure.T).T)
+        found = self._across_x.displacement(pressure)
+        return np.asarray(found + self._across_y.displacement(pressure.T).T)
 
-    def among(self, rows: Indices, columns: Indices) -> SomeSideCells:
+    def among(self, rows: Indices, columns: Indices) -> SideCells:
         """Return some of these rows and columns, by ascending indices among them."""
-        return SomeSideCells(self._whole, self._rows[rows], self._columns[columns])
+        return SideCells(self._pairs, self._rows[rows], self._columns[columns])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -224,5 +202,16 @@ def _adjoint(pair: _SidePair, fields: Array) -> Array:
     return np.asarray(pair.means @ pair.lines(found))
 
 
-side_cells = lru_cache(maxsize=8)(SideCells)
+@lru_cache(maxsize=8)
+def side_cells(sides: FreeSides, spacing: tuple[float, float]) -> SideCells:
+    """Return all cells between free sides, cached for the next surface between them.
+
+    Args:
+        sides: The free sides.
+        spacing: Sides (dx, dy) of a cell [mm]; the cells fill the rectangle between the sides.
+    """
+    pairs = _pairs(sides, spacing, stress=False)
+    return SideCells(pairs, *(np.arange(pair.means.shape[0]) for pair in pairs))
+
+
 side_stresses = lru_cache(maxsize=8)(SideStresses)

@@ -82,19 +82,15 @@ class HalfSpaceModel:
             raise InputError(
                 "the upper bound of the pressures must be positive", value=self.upper, allowed="> 0"
             )
+        source, lengths, sides = self.surface.source, self.surface.lengths, self.sides
         if self.periodic and not self.surface.periodic:
-            raise InputError(
-                "a periodic half-space needs a periodic surface", value=self.surface.source
-            )
-        if self.periodic and self.sides is not None:
-            raise InputError("a periodic half-space has no free sides", value=self.sides)
-        lengths = self.surface.lengths
-        if self.sides is not None and not np.allclose(
-            self.sides.lengths, lengths, rtol=1e-9, atol=0.0
-        ):
+            raise InputError("a periodic half-space needs a periodic surface", value=source)
+        if self.periodic and sides is not None:
+            raise InputError("a periodic half-space has no free sides", value=sides)
+        if sides is not None and not np.allclose(sides.lengths, lengths, rtol=1e-9, atol=0.0):
             raise InputError(
                 "the free sides are not those of the surface",
-                value=self.sides.lengths,
+                value=sides.lengths,
                 allowed=f"{lengths} mm",
             )
 

@@ -11,7 +11,7 @@ from geometry.errors import InputError
 from micro import FreeSides, HalfSpaceModel
 from micro.compliance.cells import Box, Cells
 from micro.compliance.grid_compliance import Compliance
-from micro.compliance.side_cells import SideCells
+from micro.compliance.side_cells import side_cells
 
 SIDES = FreeSides(lengths=(1.0, 1.5), poisson_ratio=0.2, decay_length=0.25)
 GRID = (20, 30)
@@ -20,7 +20,7 @@ SPACING = (0.05, 0.05)
 
 @pytest.fixture(scope="module")
 def cells():
-    return SideCells(SIDES, SPACING)
+    return side_cells(SIDES, SPACING)
 
 
 def whole(cells, pressure):
@@ -74,7 +74,7 @@ def test_grids_know_their_sides_where_they_lie():
     inside = alone.on_grid(p.shape, SPACING, box).displacement(p)
     every = np.zeros(GRID)
     every[box] = p
-    added = whole(SideCells(SIDES, SPACING), every)[box]
+    added = whole(side_cells(SIDES, SPACING), every)[box]
     np.testing.assert_allclose(beside, inside + added, rtol=1e-12)
     where = Cells.of(np.flatnonzero(p > 1.0), p.shape)
     few = np.where(p > 1.0, p, 0.0)

@@ -9,7 +9,7 @@ from geometry.legendre_modes import mode_means
 from micro import FreeSides, influence_matrix
 from micro.closed_forms.love import love_mean
 from micro.compliance.half_space_modes import half_space_modes
-from micro.compliance.side_cells import SideCells
+from micro.compliance.side_cells import side_cells
 from micro.compliance.side_modes import side_modes
 
 SHAPES = [(1.0, 1.0), (1.0, 2.5), (3.0, 0.2)]
@@ -58,7 +58,7 @@ def test_half_space_is_the_limit_of_patches(lengths):
 def test_sides_in_modes_are_those_of_cells(lengths):
     sides = FreeSides(lengths=lengths, poisson_ratio=0.3, decay_length=0.2)
     grid = (96, 96 * round(lengths[1] / lengths[0]))
-    every = SideCells(sides, (lengths[0] / 96, lengths[0] / 96)).among(*map(np.arange, grid))
+    every = side_cells(sides, (lengths[0] / 96, lengths[0] / 96)).among(*map(np.arange, grid))
     means = [
         mode_means(np.linspace(0.0, side, n + 1), side, 3)
         for side, n in zip(lengths, grid, strict=True)
