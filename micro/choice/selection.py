@@ -133,30 +133,30 @@ def _first_good(found: list[Option], tolerance: float, check: _Check) -> Choice:
         candidates[k] = replace(candidates[k], checked_error=error)
         return model, against
 
-    def chosen(k: int, model: MicroModel, against: str, why: str) -> Choice:
-        reasons = [_sentence(candidates[k], check, against, why, tolerance), *failed]
-        return Choice(
-            model=model,
-            taken=candidates[k],
-            candidates=tuple(candidates),
-            sentence="; ".join(reasons),
-        )
-
+    why = "the cheapest that promises"
     for k, candidate in enumerate(candidates):
         if candidate.expected_error > tolerance:
             continue
         model, against = made(k)
         error = candidates[k].checked_error
         if error is None or error <= tolerance:
-            return chosen(k, model, against, "the cheapest that promises")
+            break
         said = "has no solution" if np.isinf(error) else f"differs by {100 * error:.2g} %"
         failed.append(f"{candidate.label} {said} when checked")
         left.remove(k)
-    best = min(left or range(len(found)), key=lambda k: candidates[k].expected_error)
-    why = "the least expected error, for none promises"
-    if failed:
-        why = "the least expected error of the rest, for none that was checked keeps"
-    return chosen(best, *made(best), why)
+    else:
+        k = min(left or range(len(found)), key=lambda k: candidates[k].expected_error)
+        model, against = made(k)
+        why = "the least expected error, for none promises"
+        if failed:
+            why = "the least expected error of the rest, for none that was checked keeps"
+    reasons = [_sentence(candidates[k], check, against, why, tolerance), *failed]
+    return Choice(
+        model=model,
+        taken=candidates[k],
+        candidates=tuple(candidates),
+        sentence="; ".join(reasons),
+    )
 
 
 def _sentence(taken: Candidate, check: _Check, against: str, why: str, tolerance: float) -> str:

@@ -44,18 +44,16 @@ class BodyModes:
     def __post_init__(self) -> None:
         matrix = np.asarray(self.matrix, float)
         object.__setattr__(self, "matrix", matrix)
+        shape, largest = matrix.shape, np.abs(matrix).max(initial=0.0)
         if not (np.all(np.isfinite(self.lengths)) and min(self.lengths) > 0.0):
             raise InputError("lengths must be positive", value=self.lengths, allowed="> 0 mm")
-        if matrix.ndim != 2 or not len(matrix) or matrix.shape != 2 * (self.count**2,):
-            raise InputError(
-                "the compliance is not one of K × K modes",
-                value=matrix.shape,
-                allowed="(K², K²), K ≥ 1",
-            )
-        if not np.all(np.isfinite(matrix)):
+        if matrix.ndim != 2 or not len(matrix) or shape != 2 * (self.count**2,):
+            problem = "the compliance is not one of K × K modes"
+            raise InputError(problem, value=shape, allowed="(K², K²), K ≥ 1")
+        if not np.isfinite(largest):
             raise InputError("the compliance is not finite", value=matrix[0, 0], allowed="numbers")
         apart = float(np.abs(matrix - matrix.T).max())
-        if apart > 1e-9 * np.abs(matrix).max():
+        if apart > 1e-9 * largest:
             raise InputError("the compliance is not symmetric", value=apart, allowed="D = Dᵀ")
 
     @property
@@ -74,13 +72,11 @@ class BodyModes:
             modulus: Unit of the pressures [MPa].
         """
         x, y = self._placed(borders_x, borders_y)
-        return ModesOnCells(
-            self.matrix,
-            mode_means(x, self.lengths[0], self.count),
-            mode_means(y, self.lengths[1], self.count),
-            modulus * np.diff(x),
-            np.diff(y),
+        means_x, means_y = (
+            mode_means(at, length, self.count)
+            for at, length in zip((x, y), self.lengths, strict=True)
         )
+        return ModesOnCells(self.matrix, means_x, means_y, modulus * np.diff(x), np.diff(y))
 
     def between(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Return displacements of points by unit forces at points, shape (n, n) [mm/N].
@@ -107,15 +103,14 @@ class BodyModes:
         return np.asarray(modes.T @ self.matrix @ modes * patches.areas)
 
     def fewer(self, count: int) -> BodyModes:
-        """Return the first modes alone; what they lack tells how well K modes resolve the face.
+        """Return the compliance of the first modes alone, which shows how well K modes resolve it.
 
         Args:
             count: Modes along a side, at most K.
         """
         if not 1 <= count <= self.count:
-            raise InputError(
-                "so many modes are not there", value=count, allowed=f"1 … {self.count}"
-            )
+            allowed = f"1 … {self.count}"
+            raise InputError("so many modes are not there", value=count, allowed=allowed)
         some = self.matrix.reshape(4 * (self.count,))[:count, :count, :count, :count]
         return BodyModes(self.lengths, some.reshape(count**2, count**2), self.origin)
 
@@ -164,13 +159,8 @@ class ModesOnCells:
             rows: Indices of the rows, shape (r,).
             columns: Indices of the columns, shape (c,).
         """
-        return ModesOnCells(
-            self.matrix,
-            self.means_x[:, rows],
-            self.means_y[:, columns],
-            self.widths_x[rows],
-            self.widths_y[columns],
-        )
+        x, y = self.means_x[:, rows], self.means_y[:, columns]
+        return ModesOnCells(self.matrix, x, y, self.widths_x[rows], self.widths_y[columns])
 
 
 class BodyStresses:
@@ -197,11 +187,8 @@ class BodyStresses:
         self._matrix = np.asarray(matrix, float)
         count = int(np.sqrt(self._matrix.shape[-1]) + 0.5)
         if not count or self._matrix.shape != (3, count**2, count**2):
-            raise InputError(
-                "the stresses are not those of K × K modes",
-                value=self._matrix.shape,
-                allowed="(3, K², K²), K ≥ 1",
-            )
+            problem = "the stresses are not those of K × K modes"
+            raise InputError(problem, value=self._matrix.shape, allowed="(3, K², K²), K ≥ 1")
         if not np.all(np.isfinite(self._matrix)):
             raise InputError("the stresses are not finite", value="nan or inf", allowed="numbers")
         sizes = [length - 2.0 * margin for length in lengths]

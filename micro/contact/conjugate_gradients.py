@@ -20,7 +20,7 @@ from micro.compliance.grid_compliance import GridCompliance
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class ContactCells:
     """Cells in contact, loaded by a rigid body of which k motions are free.
 
@@ -50,13 +50,7 @@ class ContactCells:
         found = [compliance.apply_inverse(cells, lever) for lever in levers]
         resistance = np.array(found).reshape(levers.shape)
         inverse = np.linalg.pinv(levers @ resistance.T, rcond=1e-10)
-        return cls(
-            compliance=compliance,
-            cells=cells,
-            levers=levers,
-            resistance=resistance,
-            inverse=inverse,
-        )
+        return cls(compliance, cells, levers, resistance, inverse)
 
     def balanced(self, gap: Array) -> Array:
         """Subtract from gaps the part that free motions of the body take up."""
