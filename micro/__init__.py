@@ -12,6 +12,7 @@ keeps a tolerance.
     factory → choice                                  models by name and by accuracy
 """
 
+from geometry.rigid_plane import RigidPlane
 from micro.asperities.many_summits import PAIR_SUMS
 from micro.asperities.model import MODELS, SOLVERS, AsperityModel, ModelKind, asperity_model
 from micro.asperities.scaled_model import BORDERS, CURVATURES, ScaledModel
@@ -19,7 +20,7 @@ from micro.asperities.state import AsperityState
 from micro.choice.candidates import Candidate, resampled
 from micro.choice.selection import Choice, choose
 from micro.closed_forms.boussinesq import HalfSpace
-from micro.closed_forms.hertz import HertzContact, contact_modulus
+from micro.closed_forms.hertz import HertzContact
 from micro.closed_forms.love import influence_matrix
 from micro.compliance.body_modes import BodyModes, BodyStresses
 from micro.compliance.finite_slopes import FiniteSlopes, SurfaceStress, coarse_grid
@@ -34,7 +35,6 @@ from micro.half_space.state import HalfSpaceState
 from micro.islands.model import IslandModel
 from micro.islands.state import IslandState
 from micro.model import MicroModel
-from micro.plane import RigidPlane
 from micro.response import Pressed, Response
 
 __all__ = [
@@ -71,7 +71,6 @@ __all__ = [
     "asperity_model",
     "choose",
     "coarse_grid",
-    "contact_modulus",
     "find_contacts",
     "half_space_modes",
     "half_space_stress_modes",

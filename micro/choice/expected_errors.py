@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import label
 
 from geometry import Surface, roughness
-from geometry.maxima import grid_maxima
+from geometry.summits import grid_maxima
 
 CONTACT_TERMS = ("floor", "crowding", "eccentricity", "wave", "eccentric_wave", "border")
 GRID_TERMS = ("radius_few", "radius", "wave")

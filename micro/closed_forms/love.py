@@ -19,8 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import toeplitz
 
 from geometry.errors import InputError
-from geometry.partition import Partition
-from geometry.patches import PatchGrid
+from geometry.patches import Partition, PatchGrid
 
 Array = NDArray[np.float64]
 

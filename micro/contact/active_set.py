@@ -82,8 +82,8 @@ class ActiveSet:
         interference = problem.interference
         if problem.motions is not None:
             if pressure.any():
-                self.motion = problem.motions.best(self._weights(pressure), gap)
-            nearer = problem.motions.nearer(self.motion)
+                self.motion = problem.motions.closing(self._weights(pressure), gap)
+            nearer = problem.motions.displacement(self.motion)
             gap -= nearer
             interference = interference + nearer
         self.gap = gap  # in the memory of the displacement
@@ -205,7 +205,7 @@ class ActiveSet:
     def _among(self, flat: Indices) -> ContactCells:
         """Return the linear problem of some cells by their flat indices."""
         cells, motions = Cells.of(flat, self.gap.shape), self.problem.motions
-        levers = np.empty((0, flat.size)) if motions is None else motions.among(flat)
+        levers = np.empty((0, flat.size)) if motions is None else motions.levers_of(flat)
         return ContactCells.among(self.problem.compliance, cells, levers)
 
 

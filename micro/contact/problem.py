@@ -95,8 +95,8 @@ class ContactProblem:
             return pressure if self.upper == np.inf else np.minimum(pressure, self.upper)
         found = None
         if fixed is not None:
-            found = self.motions.balanced(pressure, self.upper, fixed)
-        return self.motions.balanced(pressure, self.upper) if found is None else found
+            found = self.motions.scaled_to_loads(pressure, self.upper, fixed)
+        return self.motions.scaled_to_loads(pressure, self.upper) if found is None else found
 
     def started(self, pressure: Array) -> tuple[Array, Array]:
         """Return admissible pressures near given ones, and the free motions if nothing touches.
@@ -134,7 +134,7 @@ class ContactProblem:
         found = self.admissible(pressure)
         if found is None or float(np.vdot(found, self.interference)) <= 0.0:
             clear = clearance(self.interference, self.motions)
-            if clear.overlap <= 0.0:
+            if clear.interference <= 0.0:
                 return np.zeros(pressure.shape), clear.motion
             found = clear.support
         twice_elastic = float(np.vdot(found, self.compliance.displacement(found)))

@@ -109,7 +109,9 @@ def solve_with_slopes(
         if not touching.any():
             return found
         change = compliance.slope_displacement(found.pressure) - displaced
-        nearer = interference if motions is None else interference + motions.nearer(found.motion)
+        nearer = (
+            interference if motions is None else interference + motions.displacement(found.motion)
+        )
         left = float(np.abs(change[touching]).max()) / float(nearer[touching].max())
         if left <= last and accuracy <= tolerance:
             return found._replace(residual=max(found.residual, left), iterations=iterations)

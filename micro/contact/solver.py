@@ -130,7 +130,7 @@ def _solve_growing(
     while problem.compliance.body is not None and box.shape != problem.interference.shape:
         nearer = problem.interference
         if problem.motions is not None:
-            nearer = nearer + problem.motions.nearer(found.motion)
+            nearer = nearer + problem.motions.displacement(found.motion)
         lifted = _lifted(problem, box, nearer, found.pressure)
         if not lifted.any():
             break

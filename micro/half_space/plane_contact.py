@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from geometry import Control, Surface
 from geometry.errors import InputError
+from geometry.rigid_plane import RigidPlane
 from micro.contact.problem import ContactPressures
 from micro.contact.rigid_motions import Motions
 from micro.contact.solver import ContactSolver
 from micro.half_space.state import HalfSpaceState
-from micro.plane import RigidPlane
 
 Array = NDArray[np.float64]
 
