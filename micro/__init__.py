@@ -8,15 +8,14 @@ keeps a tolerance.
 
     closed_forms                                      Hertz, Love, Boussinesq
     compliance → contact → half_space                 the contact problem on cells
-    pairs → complementarity → islands, asperities     contacts that interact pair by pair
+    interaction → islands, asperities                 contacts that interact pair by pair
     factory → choice                                  models by name and by accuracy
 """
 
 from geometry.rigid_plane import RigidPlane
-from micro.asperities.many_summits import PAIR_SUMS
-from micro.asperities.model import MODELS, SOLVERS, AsperityModel, ModelKind, asperity_model
+from micro.asperities.contacts import SOLVERS, AsperityState
+from micro.asperities.model import MODELS, AsperityModel, ModelKind, asperity_model
 from micro.asperities.scaled_model import BORDERS, CURVATURES, ScaledModel
-from micro.asperities.state import AsperityState
 from micro.choice.candidates import Candidate, resampled
 from micro.choice.selection import Choice, choose
 from micro.closed_forms.boussinesq import HalfSpace
@@ -33,7 +32,7 @@ from micro.half_space.contact_spots import Contacts, find_contacts
 from micro.half_space.model import HalfSpaceModel
 from micro.half_space.state import HalfSpaceState
 from micro.islands.model import IslandModel
-from micro.islands.state import IslandState
+from micro.islands.shapes import IslandState
 from micro.model import MicroModel
 from micro.response import Pressed, Response
 
@@ -42,7 +41,6 @@ __all__ = [
     "CURVATURES",
     "MODELS",
     "MODEL_NAMES",
-    "PAIR_SUMS",
     "SOLVERS",
     "START_KINDS",
     "AsperityModel",

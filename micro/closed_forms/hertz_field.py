@@ -9,8 +9,8 @@ underlying integral vanishes at its lower limit, so dU/ds = κ RF(1+v, β+v, v) 
 Both functions below return U/κ and (dU/ds)/κ.
 
 Held at a fixed v, U is linear in s; a lower bound on v therefore continues U linearly, with
-continuous slope, from the size at which the root falls below the bound. `micro.pairs.interaction`
-uses this for merging contacts.
+continuous slope, from the size at which the root falls below the bound.
+`micro.interaction.hertz_pairs` uses this for merging contacts.
 
 Far from the ellipse a series takes the place of Carlson's integrals. With τ = t + (1+β)/3 the
 product under the root of the underlying integrals becomes (1+t)(β+t)t = τ³ (1 + e2/τ² + e3/τ³).

@@ -12,9 +12,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry import Control, Partition, PatchGrid, Surface, patch_means
+from geometry import Control, Partition, PatchGrid, Surface
 from geometry.errors import InputError
-from micro.checks import checked_approaches, checked_means, whole_patch
 from micro.compliance.body_modes import BodyModes
 from micro.compliance.free_sides import FreeSides
 from micro.compliance.grid_compliance import Compliance, SlopeTerm
@@ -22,6 +21,7 @@ from micro.contact.solver import ContactSolver
 from micro.half_space.patch_sums import response_row
 from micro.half_space.plane_contact import LEVEL, PlaneContact
 from micro.half_space.state import HalfSpaceState
+from micro.model import checked_approaches, checked_patches, whole_patch
 from micro.response import Pressed, Response
 
 Array = NDArray[np.float64]
@@ -198,7 +198,7 @@ class HalfSpaceModel:
         Each solution starts from the two before it, extrapolated in the approach. A cell that
         straddles a border of patches is shared by area.
         """
-        patches, means = self._patches(patches, mean_heights)
+        patches, means = checked_patches(self.surface, patches, mean_heights)
         given = checked_approaches(approaches)
         rows: dict[int, dict[str, Any]] = {}
         before = last = None
@@ -222,20 +222,11 @@ class HalfSpaceModel:
         start: Any = None,
     ) -> Pressed:
         """Solve one load step; see `MicroModel.press`."""
-        patches, means = self._patches(patches, mean_heights)
+        patches, means = checked_patches(self.surface, patches, mean_heights)
         state = self._contact.equilibrium(control, *(start or (None, None)))
         rows = [self._row(state, patches, means)]
         response = Response.of(rows, self.name, self.contact_modulus, patches)
         return Pressed(response, state.plane, (state.pressure, state.plane))
-
-    def _patches(
-        self, patches: Partition | None, mean_heights: ArrayLike | None
-    ) -> tuple[Partition, Array]:
-        """Return the patches, the whole surface when not given, and their mean heights."""
-        patches = whole_patch(self.surface) if patches is None else patches
-        if mean_heights is None:
-            return patches, patch_means(self.surface, patches)
-        return patches, checked_means(mean_heights, patches)
 
     def _row(self, state: HalfSpaceState, patches: Partition, means: Array) -> dict[str, Any]:
         return response_row(self.surface, state, patches, means, self.reference_height)

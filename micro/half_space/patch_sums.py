@@ -56,7 +56,7 @@ def response_row(
         "mean_separation": np.average(separation, weights=patches.areas),
         "iterations": state.iterations,
         "residual": state.residual,
-        "engulfed": 0,
+        "overlapping_contacts": 0,
         "patch_force": (x @ state.pressure @ y.T).ravel(),
         "patch_contact_area": (x @ area @ y.T).ravel(),
         "patch_contacts": np.bincount(owner, minlength=patches.count),

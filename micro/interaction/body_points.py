@@ -1,7 +1,7 @@
 """What a finite body adds to the displacements of summits by the forces on them.
 
-Contacts are small against the waves of the body's modes: forces and displacements count at their
-centres, that of the contact itself included.
+Contacts are small against the waves of the body's modes. So forces act and displacements are taken
+at the centres of the contacts, and a contact's own force counts as well.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Indices = NDArray[np.intp]
 class BodyPoints:
     """Compliance of a body between n points of its contact face.
 
-    Moments of force are P/(π E*), as in `micro.pairs.multipoles`.
+    Forces are given as P/(π E*) [mm²].
 
     Args:
         body: The compliance in modes.
@@ -57,45 +57,36 @@ class BodyPoints:
         """Return the compliance between some of the points."""
         return replace(self, values=self.values[:, index])
 
-    def elsewhere(self, x: Array, y: Array) -> Self:
-        """Return the compliance between other points of the same body.
+    def displacement(self, force: Array) -> Array:
+        """Return the displacements of the points by forces on them, (n,) [mm].
 
         Args:
-            x: Abscissae, shape (m,) [mm].
-            y: Ordinates, shape (m,) [mm].
+            force: P/(π E*), shape (n,) [mm²].
         """
-        return self.at(self.body, x, y, self.contact_modulus)
-
-    def displacement(self, moment: Array) -> Array:
-        """Return the displacements of the points by moments of force on them, (n,) [mm].
-
-        Args:
-            moment: P/(π E*), shape (n,) [mm²].
-        """
-        return np.asarray(self.values.T @ self._amplitudes(moment))
+        return np.asarray(self.values.T @ self._amplitudes(force))
 
     def by(self, loaded: BodyPoints) -> Array:
-        """Return the displacements of the points by unit moments on m others, (n, m) [1/mm].
+        """Return the displacements of the points by unit forces on m others, (n, m) [1/mm].
 
         Args:
-            loaded: The points with a force, on the same body.
+            loaded: The points that the forces act on, on the same body.
         """
         return np.asarray(self.values.T @ (self._modulus * self.body.matrix @ loaded.values))
 
-    def patch_means(self, patches: Partition, moment: Array) -> Array:
+    def patch_means(self, patches: Partition, force: Array) -> Array:
         """Return the mean displacements of patches, shape (N,) [mm].
 
         Args:
             patches: N patches within the face.
-            moment: P/(π E*), shape (n,) [mm²].
+            force: P/(π E*), shape (n,) [mm²].
         """
         cells = self.body.on(patches.borders_x, patches.borders_y)
-        amplitudes = self._amplitudes(moment).reshape(self.body.count, -1)
+        amplitudes = self._amplitudes(force).reshape(self.body.count, -1)
         return np.asarray((cells.means_x.T @ amplitudes @ cells.means_y).ravel())
 
     @property
     def _modulus(self) -> float:
         return float(np.pi * self.contact_modulus)
 
-    def _amplitudes(self, moment: Array) -> Array:
-        return np.asarray(self._modulus * (self.body.matrix @ (self.values @ moment)))
+    def _amplitudes(self, force: Array) -> Array:
+        return np.asarray(self._modulus * (self.body.matrix @ (self.values @ force)))

@@ -1,20 +1,26 @@
-"""Residual, continuation and refusal of the complementarity problem."""
+"""Residual, continuation, refusals and memory of the contact problem."""
 
 import numpy as np
 import pytest
 
-from geometry import NotConverged
+from geometry import InputError, NotConverged
 from micro.closed_forms.ellipse import shape_factors
-from micro.complementarity.active_set import active_set
-from micro.complementarity.contact_problem import TOLERANCE, ContactProblem, solve
-from micro.pairs.interaction import Interaction, Lift
+from micro.interaction.contact_problem import (
+    BYTES_PER_PAIR,
+    TOLERANCE,
+    ContactProblem,
+    active_set,
+    checked_pairs,
+    solve,
+)
+from micro.interaction.hertz_pairs import HertzPairs
 
 
 @pytest.fixture
 def problem(cluster):
     shape = shape_factors(cluster.radius_major, cluster.radius_minor)
-    kernel = Interaction.among(cluster, shape, circular=False)
-    return ContactProblem(interaction=kernel, required=5e-3 + cluster.z)
+    kernel = HertzPairs.among(cluster, shape, circular=False)
+    return ContactProblem(interaction=kernel, interference=5e-3 + cluster.z)
 
 
 def refusing(limit):
@@ -22,22 +28,22 @@ def refusing(limit):
     calls = []
 
     def method(problem, start):
-        grown = problem.required.max() - calls[-1] if calls else problem.required.max()
+        grown = problem.interference.max() - calls[-1] if calls else problem.interference.max()
         if grown > limit:
             raise NotConverged("test", reason="TOO_FAR", iterations=3, remedy="none")
-        calls.append(problem.required.max())
+        calls.append(problem.interference.max())
         return active_set(problem, start)
 
     return method, calls
 
 
 def test_residual_measures_every_condition(problem):
-    none = Lift(np.array([], int), np.zeros(7), np.zeros((7, 0)))
+    none = np.zeros(7)
     one = problem.scale
-    met = problem.required.copy()
+    met = problem.interference.copy()
     assert problem.residual(met, none) == 0.0
     assert problem.residual(np.zeros(7), none) == 1.0  # penetration
-    pulled = none._replace(displacement=problem.required + 0.5 * one)
+    pulled = problem.interference + 0.5 * one
     assert problem.residual(np.full(7, 0.25 * one), pulled) == pytest.approx(0.25)  # force at a gap
     assert problem.residual(np.full(7, -one), pulled) == 0.0  # pushed off by the others
 
@@ -57,3 +63,16 @@ def test_gives_up_loudly(problem):
     message = r"7 interacting asperities .*reached 0.0% of it\) did not converge: TOO_FAR after"
     with pytest.raises(NotConverged, match=message):
         solve(problem, method, np.zeros(7))
+
+
+def test_pairs_that_do_not_fit_into_the_memory_are_refused():
+    most = BYTES_PER_PAIR * 3000.0**2
+    checked_pairs(3000, 3000, "asperities", available=most)
+    message = (
+        r"^micro\.model: the interaction of 3001 asperities needs 0\.432 GB of memory and 0\.432 GB"
+        r" are there \(allowed: half-space, "
+    )
+    with pytest.raises(InputError, match=message):
+        checked_pairs(3001, 3001, "asperities", available=most)
+    with pytest.raises(InputError, match="of 10000000 islands needs 480 GB"):
+        checked_pairs(10**7, 1000, "islands", available=most)

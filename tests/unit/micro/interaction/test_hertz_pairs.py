@@ -6,21 +6,21 @@ from scipy.special import elliprf
 
 from micro.closed_forms.ellipse import shape_factors
 from micro.closed_forms.hertz import HertzContact
-from micro.pairs.interaction import MERGING_SLOPE, Interaction, merging_parameter
+from micro.interaction.hertz_pairs import MERGING_SLOPE, HertzPairs, merging_parameter
 
 
 def interaction(asperities, circular):
     major = asperities.radius if circular else asperities.radius_major
     minor = asperities.radius if circular else asperities.radius_minor
-    return Interaction.among(asperities, shape_factors(major, minor), circular=circular)
+    return HertzPairs.among(asperities, shape_factors(major, minor), circular=circular)
 
 
 both_shapes = pytest.mark.parametrize("circular", [True, False], ids=["circular", "elliptic"])
 
 
-def test_lift_is_hertz_displacement(cluster):
+def test_displacement_is_hertz_s_displacement(cluster):
     own = np.full(7, 2e-5)  # contacts small against the distances: nothing is continued
-    lift = interaction(cluster, circular=False).lift(own)
+    caused = interaction(cluster, circular=False).evaluate(own)
     expected = np.zeros(7)
     for k in range(7):
         for i in set(range(7)) - {k}:
@@ -33,8 +33,8 @@ def test_lift_is_hertz_displacement(cluster):
             apart = (cluster.x[k] - cluster.x[i]) + 1j * (cluster.y[k] - cluster.y[i])
             local = apart * np.exp(-1j * cluster.angle[i])
             expected[k] += contact.displacement(local.real, local.imag)
-    assert lift.displacement == pytest.approx(expected, rel=1e-13)  # same formula, pair by pair
-    assert lift.engulfed == 0
+    assert caused.displacement == pytest.approx(expected, rel=1e-13)  # same formula, pair by pair
+    assert caused.overlapping_contacts == 0
 
 
 @both_shapes
@@ -43,15 +43,15 @@ def test_slopes_by_differences(cluster, circular, depth):
     rng = np.random.default_rng(0)
     own, kernel = depth * (0.5 + rng.random(7)), interaction(cluster, circular)
     own[3] = -depth  # out of contact: acts on nobody, has no column
-    lift, step = kernel.lift(own), 1e-6 * depth
-    assert lift.active.tolist() == [0, 1, 2, 4, 5, 6]
-    for column, i in enumerate(lift.active):
+    caused, step = kernel.evaluate(own), 1e-6 * depth
+    assert caused.active.tolist() == [0, 1, 2, 4, 5, 6]
+    for column, i in enumerate(caused.active):
         shift = np.where(np.arange(7) == i, step, 0.0)
-        up, down = kernel.lift(own + shift), kernel.lift(own - shift)
+        up, down = kernel.evaluate(own + shift), kernel.evaluate(own - shift)
         difference = (up.displacement - down.displacement) / (2 * step)
         # Truncation ~ step²; rounding of U over the step 1e-16/1e-6.
-        assert lift.slope[:, column] == pytest.approx(difference, abs=1e-8)
-    assert np.all(lift.slope <= MERGING_SLOPE + 1e-14)
+        assert caused.derivative[:, column] == pytest.approx(difference, abs=1e-8)
+    assert np.all(caused.derivative <= MERGING_SLOPE + 1e-14)
 
 
 @both_shapes
@@ -59,10 +59,10 @@ def test_continuation_is_smooth(summits, circular):
     pair = summits([0.5, 0.53], 0.5, major=[0.3, 0.1], minor=0.1, angle=0.4)
     kernel = interaction(pair, circular)
     depth = np.geomspace(1e-5, 1e-1, 4001)
-    lifts = [kernel.lift(np.array([t, 0.0])) for t in depth]
-    value = np.array([lift.displacement[1] for lift in lifts])
-    slope = np.array([lift.slope[1, 0] for lift in lifts])
-    merged = np.array([lift.engulfed for lift in lifts]) > 0
+    found = [kernel.evaluate(np.array([t, 0.0])) for t in depth]
+    value = np.array([each.displacement[1] for each in found])
+    slope = np.array([each.derivative[1, 0] for each in found])
+    merged = np.array([each.overlapping_contacts for each in found]) > 0
     first = np.flatnonzero(merged)[0]
     assert 0 < first < 4000 and np.all(merged[first:])
     assert np.all(np.diff(slope) >= -1e-15) and np.all(np.abs(slope[merged] - slope[-1]) < 1e-15)
@@ -76,9 +76,9 @@ def test_continuation_is_smooth(summits, circular):
 @both_shapes
 def test_coincident_summits(summits, circular):
     twins = summits([0.5, 0.5], 0.5, major=0.2, minor=0.1)
-    lift = interaction(twins, circular).lift(np.array([1e-3, 1e-3]))
-    assert lift.displacement == pytest.approx(MERGING_SLOPE * np.full(2, 1e-3), rel=1e-14)
-    assert lift.engulfed == 2
+    caused = interaction(twins, circular).evaluate(np.array([1e-3, 1e-3]))
+    assert caused.displacement == pytest.approx(MERGING_SLOPE * np.full(2, 1e-3), rel=1e-14)
+    assert caused.overlapping_contacts == 2
 
 
 def test_merging_slope_gives_twins_the_force_of_one():
@@ -100,6 +100,6 @@ def test_round_ellipses_are_circles(summits):
     rng = np.random.default_rng(3)
     balls = summits(*rng.random((2, 30)), major=0.02 + 0.1 * rng.random(30))
     own = 1e-3 * rng.random(30)
-    circle, ellipse = (interaction(balls, circular).lift(own) for circular in (True, False))
+    circle, ellipse = (interaction(balls, circular).evaluate(own) for circular in (True, False))
     assert ellipse.displacement == pytest.approx(circle.displacement, rel=1e-12)
-    assert ellipse.slope == pytest.approx(circle.slope, rel=1e-12, abs=0.0)
+    assert ellipse.derivative == pytest.approx(circle.derivative, rel=1e-12, abs=0.0)

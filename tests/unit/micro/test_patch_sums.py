@@ -7,16 +7,27 @@ from scipy.special import roots_jacobi
 from geometry import PatchGrid
 from micro import HertzContact
 from micro.closed_forms.love import love_integral
-from micro.patch_displacement import patch_displacements
+from micro.patch_sums import EllipticContacts, patch_displacements
 
 PATCHES = PatchGrid(grid=(4, 2), lengths=(1.0, 0.6))
 
 
+def displacements(patches, position, semi_axes, angle, force, contact_modulus):
+    contacts = EllipticContacts(
+        position=position,
+        angle=angle,
+        semi_axes=semi_axes,
+        area=np.pi * semi_axes.prod(axis=1),
+        force=force,
+    )
+    return patch_displacements(patches, contacts, contact_modulus)
+
+
 def means(position, semi_axes, angle=0.0):
-    return patch_displacements(
+    return displacements(
         PATCHES,
-        np.atleast_2d(position),
-        np.atleast_2d(semi_axes),
+        np.atleast_2d(np.asarray(position, float)),
+        np.atleast_2d(np.asarray(semi_axes, float)),
         np.array([angle]),
         np.array([2.0]),
         3.0,
@@ -65,7 +76,7 @@ def test_contact_at_the_outer_border(offset, bound):
     whole, a = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)), 0.1
     position = np.array([offset * a, 0.4])
     none, one = np.zeros(1), np.ones(1)
-    got = patch_displacements(whole, position[None], np.full((1, 2), a), none, one, 1.0)
+    got = displacements(whole, position[None], np.full((1, 2), a), none, one, 1.0)
     nodes, shares = roots_jacobi(60, 0.5, 0.0)
     around = 2.0 * np.pi * np.arange(1001) / 1001
     place = position + a * np.sqrt(0.5 * (1.0 + nodes))[:, None, None] * np.stack(
@@ -79,11 +90,11 @@ def test_patches_add_up():
     whole = PatchGrid(grid=(1, 1), lengths=PATCHES.lengths)
     position, axes = np.array([[0.5, 0.3], [0.77, 0.01]]), np.array([[0.02, 0.01], [0.05, 0.04]])
     angle, force = np.array([0.3, 0.0]), np.array([1.0, 4.0])
-    fine = patch_displacements(PATCHES, position, axes, angle, force, 1.0)
-    coarse = patch_displacements(whole, position, axes, angle, force, 1.0)
+    fine = displacements(PATCHES, position, axes, angle, force, 1.0)
+    coarse = displacements(whole, position, axes, angle, force, 1.0)
     assert fine.mean() == pytest.approx(coarse[0], rel=1e-13)  # the corner terms telescope
 
 
 def test_no_contact():
     none = np.empty((0, 2))
-    assert not patch_displacements(PATCHES, none, none, np.empty(0), np.empty(0), 1.0).any()
+    assert not displacements(PATCHES, none, none, np.empty(0), np.empty(0), 1.0).any()
