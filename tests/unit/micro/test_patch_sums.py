@@ -5,7 +5,8 @@ import pytest
 from scipy.special import roots_jacobi
 
 from geometry import PatchGrid
-from micro import HertzContact, love_integral
+from micro import HertzContact
+from micro.closed_forms.love import love_integral
 from micro.patch_sums import EllipticContacts, patch_displacements
 
 PATCHES = PatchGrid(grid=(4, 2), lengths=(1.0, 0.6))

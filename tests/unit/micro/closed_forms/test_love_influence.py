@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from geometry import PatchGrid, UnevenPartition
-from micro import influence_matrix, love_mean, mutual_influence
-from micro.compliance.elastic_grid import ElasticGrids
+from micro import influence_matrix
+from micro.closed_forms.love import love_mean, mutual_influence
+from micro.compliance.grid_compliance import Compliance
 
 
 def _exact(dx, dy, a, b):
@@ -65,7 +66,7 @@ def test_means_over_patches_agree_with_the_cell_kernel():
     for cells in (32, 64):
         pressure = np.zeros((cells, cells))
         pressure[: cells // 2, : cells // 2] = 1.0
-        shift = ElasticGrids(periodic=False).at(pressure.shape, (1 / cells, 1 / cells))
+        shift = Compliance(periodic=False).on_grid(pressure.shape, (1 / cells, 1 / cells))
         parts = shift.displacement(pressure).reshape(2, cells // 2, 2, cells // 2)
         displaced.append(parts.mean(axis=(1, 3)).ravel())
     expected = influence_matrix(patches)[0] / np.pi

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from geometry import Surface
-from micro.choice.expected_errors import grid_error
-from micro.choice.measures import contact_measures
+from micro.choice.expected_errors import contact_measures, grid_error
 
 
 def paraboloid(centre=(0.5, 0.5), ratio=1.0, cells=160):

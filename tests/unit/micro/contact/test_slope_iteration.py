@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from micro.contact.anderson import Anderson
+from micro.contact.slope_iteration import AndersonMixing
 
 
 def errors(contraction, target, steps):
     """Return the distances from the fixed point of x → A (x − x*) + x*."""
-    known, point, found = Anderson(), np.zeros_like(target), []
+    known, point, found = AndersonMixing(), np.zeros_like(target), []
     for _ in range(steps):
         residual = (contraction @ (point - target).ravel()).reshape(target.shape) + target - point
         point = known.next(point, residual)
@@ -42,7 +42,7 @@ def test_many_unknowns_converge_faster_than_plain_steps():
 
 
 def test_stays_at_the_fixed_point():
-    known, point = Anderson(), np.ones(3)
+    known, point = AndersonMixing(), np.ones(3)
     for _ in range(3):
         point = known.next(point, np.zeros(3))
     assert point.tolist() == [1.0, 1.0, 1.0]

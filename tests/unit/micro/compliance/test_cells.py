@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from micro.compliance.bounding_box import Box
+from micro.compliance.cells import Box
 
 
 @pytest.mark.parametrize(
