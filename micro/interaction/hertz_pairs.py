@@ -140,10 +140,10 @@ class HertzPairs:
                 merged = slope[rows] >= MERGING_SLOPE * (1.0 - 1e-12)
                 overlapping += int(np.count_nonzero(merged))
         if self.body is not None:
-            moment = self.scaled_force(np.maximum(indentation, 0.0))[active]
+            force = self.scaled_force(np.maximum(indentation, 0.0))[active]
             between = self.body.by(self.body.among(active))
-            displacement += between @ moment
-            between *= 1.5 * moment / indentation[active]
+            displacement += between @ force
+            between *= 1.5 * force / indentation[active]
             slope += between
         return InteractionDisplacement(active, displacement, slope, overlapping)
 
