@@ -1,0 +1,1 @@
+"""What a run found: load steps, values at mesh size zero with error bars, ranges of validity."""
