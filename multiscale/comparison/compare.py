@@ -7,7 +7,7 @@ import math
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
@@ -23,13 +23,7 @@ from multiscale.resolution.problem_setup import make_setup
 from multiscale.scene.scene import Scene
 from multiscale.storage.whole_files import write_json
 
-Against = Literal["reference", "concurrent", "half-space"]
-
-AGAINST: dict[Against, str] = {
-    "reference": "reference",
-    "concurrent": "concurrent",
-    "half-space": "analytic",
-}
+AGAINST = {"reference": "reference", "concurrent": "concurrent", "half-space": "analytic"}
 """Coupling of each kind of measure; the best kind is the first."""
 
 AUTO_VALUES = "auto_values.json"
@@ -38,14 +32,12 @@ AUTO_VALUES = "auto_values.json"
 BUSY = 0.7
 """A machine is called busy when the processes worked less than this share of their wall time."""
 
-_PHASES = {"laws": "seconds_laws", "load steps": "seconds_steps"}
-
 
 def compare(
     scene: Scene,
     comm: Any = None,
     *,
-    against: Against | None = None,
+    against: str | None = None,
     budget_s: float | None = None,
     folder: Path | None = None,
     ranks: int = 1,
@@ -77,31 +69,19 @@ def compare(
     Raises:
         InputError: When the scene, an argument or the MPI job does not allow it.
     """
-    if comm is not None and comm.size > 1:
-        raise InputError(
-            "configurations are launched as processes of their own, which is not possible inside "
-            "an MPI job",
-            key="comm",
-            value=comm.size,
-            allowed="compare(scene, ranks=N) from a process on its own",
-        )
     if against is not None and against not in AGAINST:
         allowed = ", ".join(AGAINST)
         raise InputError("is nothing to compare against", value=against, allowed=allowed)
     if budget_s is not None and not budget_s > 0.0:
         raise InputError("is no budget", value=budget_s, allowed="more than 0 s")
-    if launch is None:
-        check_launchable(ranks)
+    if launch is None or comm is not None:
+        check_launchable(ranks, comm)
     results = []
     with tempfile.TemporaryDirectory(prefix="patchlaw-compare-") as temporary:
         place = Path(temporary) if folder is None else folder
         scene = resolved_scene(scene, place)
         found = run_all(
-            configurations(scene, ranks),
-            folder=place,
-            budget_s=budget_s,
-            launch=launch,
-            begin=begin,
+            configurations(scene, ranks), place, budget_s=budget_s, launch=launch, begin=begin
         )
         for result, stored in found:
             if observe is not None:
@@ -135,9 +115,7 @@ def resolved_scene(scene: Scene, folder: Path) -> Scene:
     return provisional(with_resolved(scene, values), auto & {"micro.model"})
 
 
-def compared(
-    scene: Scene, results: Sequence[RunResult], against: Against | None = None
-) -> Comparison:
+def compared(scene: Scene, results: Sequence[RunResult], against: str | None = None) -> Comparison:
     """Compare results with the best of them.
 
     Args:
@@ -187,7 +165,7 @@ def compared(
     )
 
 
-def ranked(results: Sequence[RunResult], against: Against) -> list[RunResult]:
+def ranked(results: Sequence[RunResult], against: str) -> list[RunResult]:
     """Return the finished results that could be the measure, the best first.
 
     One mesh alone has no error bar, and is no measure.
@@ -196,14 +174,12 @@ def ranked(results: Sequence[RunResult], against: Against) -> list[RunResult]:
         results: All results.
         against: Kind of the measure.
     """
-    fitting = [
-        one
-        for one in results
-        if one.done
-        and one.configuration.kind == AGAINST[against]
-        and one.configuration.model in ("", "half-space")
-        and one.configuration.scale == 1.0
-    ]
+
+    def fits(one: Configuration) -> bool:
+        models = ("", "half-space")
+        return one.kind == AGAINST[against] and one.model in models and one.scale == 1.0
+
+    fitting = [one for one in results if one.done and fits(one.configuration)]
     found = sorted(fitting, key=_fineness, reverse=True)
     return [] if against == "reference" and found and _fineness(found[0])[0] < 2 else found
 
@@ -245,7 +221,7 @@ def refinements(best_first: Sequence[RunResult]) -> Iterator[tuple[str, str]]:
 
 
 def _warnings(
-    results: Sequence[RunResult], against: Against | None, chosen: Against | None
+    results: Sequence[RunResult], against: str | None, chosen: str | None
 ) -> Iterator[str]:
     if against is not None and chosen != against:
         instead = f"compared against the {chosen} instead" if chosen else "nothing to compare with"
@@ -271,27 +247,21 @@ def _row(result: RunResult, **columns: Any) -> Row:
             "contact_area_fraction": float(curves.area[-1]),
             "mean_separation_mm": float(curves.separation[-1]),
         }
-    if result.seconds:
-        columns |= {"seconds": sum(result.seconds.values()), "seconds_setup": 0.0}
-        for phase, spent in result.seconds.items():
-            name = _PHASES.get(phase, "seconds_setup")
-            columns[name] = columns.get(name, 0.0) + spent
-    cells: Sequence[int] = ()
-    if one.kind == "reference":
-        cells = one.content["reference"].get("cells", ())
-    elif one.scene.coupling.on_mesh:
-        cells = one.content["block"].get("cells", ())
-    heights, patches, elements = (
-        "x".join(map(str, counts))
-        for counts in (one.heights, one.content["patches"]["grid"], cells)
-    )
+    if seconds := dict(result.seconds):
+        columns["seconds"] = sum(seconds.values())
+        columns["seconds_laws"] = seconds.pop("laws", math.nan)
+        columns["seconds_steps"] = seconds.pop("load steps", math.nan)
+        columns["seconds_setup"] = sum(seconds.values())
+    meshed = "reference" if one.kind == "reference" else "block"
+    has_cells = one.kind == "reference" or one.scene.coupling.on_mesh
+    cells = one.content[meshed].get("cells", ()) if has_cells else ()
     return Row(
         name=one.name,
         kind=one.kind,
         model=one.model,
-        heights=heights,
-        patches=patches,
-        cells=elements,
+        heights=_text(one.heights),
+        patches=_text(one.content["patches"]["grid"]),
+        cells=_text(cells),
         finite_slopes=one.kind == "reference" or result.finite_slopes,
         status=result.status,
         unknowns=result.unknowns,
@@ -303,3 +273,7 @@ def _row(result: RunResult, **columns: Any) -> Row:
         message=result.message,
         **columns,
     )
+
+
+def _text(counts: Sequence[int]) -> str:
+    return "x".join(map(str, counts))

@@ -42,6 +42,10 @@ OFFSETS = np.vstack([_NEAR, 2.2 * _NEAR, 3.4 * _NEAR]) * (10.0, 9.0)
 """Where a number may stand relative to its point, the best first [pt]."""
 
 
+_NUMBER: dict[str, Any] = {"fontsize": 9, "fontweight": "bold", "color": "0.1", "zorder": 6}
+_NUMBER |= {"ha": "center", "va": "center"}
+
+
 class Point(NamedTuple):
     """A configuration in a panel of error over time.
 
@@ -76,10 +80,9 @@ def pareto_figure(comparison: Comparison) -> Figure:
     }
     figure = new_figure(13.2, 6.4)
     panels, below = panels_above_legend(figure, 3, 0.16)
-    points = [
-        _draw_errors(axes, comparison, error) for axes, error in zip(panels, titles, strict=True)
-    ]
-    for axes, title in zip(panels, titles.values(), strict=True):
+    points = []
+    for axes, (error, title) in zip(panels, titles.items(), strict=True):
+        points.append(_draw_errors(axes, comparison, error))
         axes.set_title(title, fontsize=10.5)
     panels[0].set_ylabel("relative to the measure")
     _draw_legend(below, comparison)
@@ -175,19 +178,8 @@ def _draw_numbers(axes: Any, points: Sequence[Point], frontier: Sequence[Row]) -
         best = int(np.argmin(covered + 1000 * outside))
         placed = np.vstack([placed, spots[best]])
         leader = {"arrowstyle": "-", "lw": 0.6, "color": "0.3"} if best >= len(_NEAR) else None
-        axes.annotate(
-            str(point.number),
-            point[:2],
-            xytext=tuple(OFFSETS[best]),
-            textcoords="offset points",
-            ha="center",
-            va="center",
-            fontsize=9,
-            fontweight="bold",
-            color="0.1",
-            zorder=6,
-            arrowprops=leader,
-        )
+        place = {"xytext": tuple(OFFSETS[best]), "textcoords": "offset points"}
+        axes.annotate(str(point.number), point[:2], arrowprops=leader, **place, **_NUMBER)
 
 
 def _covered(spots: Array, others: Array, share: float) -> NDArray[np.intp]:

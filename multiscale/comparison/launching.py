@@ -33,24 +33,23 @@ MPI_JOB = ("OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_SIZE", "PMI_RANK", "SLURM_S
 _NO_CACHE = {"PATCHLAW_CACHE": "off"}
 
 
-def check_launchable(ranks: int) -> None:
+def check_launchable(ranks: int, comm: Any = None) -> None:
     """Check that processes can be launched.
 
     Args:
         ranks: Number of processes of one configuration.
+        comm: MPI communicator of this process, or None.
 
     Raises:
         InputError: Inside an MPI job, or when more than one rank is wanted and there is no
             ``mpirun``.
     """
-    inside = next((name for name in MPI_JOB if name in os.environ), None)
-    if inside is not None:
+    if (comm is not None and comm.size > 1) or any(name in os.environ for name in MPI_JOB):
         raise InputError(
-            f"configurations are launched as processes of their own, which is not possible inside "
-            f"an MPI job ({inside} is set)",
+            "configurations run in processes of their own, which cannot be launched in an MPI job",
             key="--ranks",
             value=ranks,
-            allowed="patchlaw compare SCENE --ranks N, without mpirun",
+            allowed="patchlaw compare SCENE --ranks N, or compare(scene, ranks=N), without mpirun",
         )
     if ranks < 1:
         raise InputError("is no number of processes", key="--ranks", value=ranks, allowed="≥ 1")
@@ -60,8 +59,8 @@ def check_launchable(ranks: int) -> None:
 
 def run_all(
     configurations: Sequence[Configuration],
-    *,
     folder: Path,
+    *,
     budget_s: float | None = None,
     launch: Launch | None = None,
     begin: Callable[[Configuration], None] | None = None,

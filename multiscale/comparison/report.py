@@ -68,30 +68,29 @@ def comparison_html(comparison: Comparison, figures: Mapping[str, bytes]) -> str
     Returns:
         A complete HTML document.
     """
-    captions = list(figures)
     failed = [
-        {
-            "configuration": row.name,
-            "status": row.status,
-            "exit code": "" if row.exit_code is None else str(row.exit_code),
-            "message": row.message,
-        }
+        (row.name, row.status, _number(row.exit_code, "d"), row.message)
         for row in comparison.rows
         if row.status != "done"
     ]
+    without_result = Section(
+        heading="Configurations without a result",
+        table=(("configuration", "status", "exit code", "message"), failed),
+        text_columns=(1, 3),
+    )
     sections = [
         Section(
             paragraphs=list(headline(comparison)),
             items=list(frontier_lines(comparison)),
             warnings=comparison.warnings,
         ),
-        Section(figures={caption: figures[caption] for caption in captions[:1]}),
+        Section(figures=dict(list(figures.items())[:1])),
         Section(
             heading="Configurations",
             table=_table(_configuration_cells(comparison)),
             text_columns=(1, 2),
             wide=True,
-            figures={caption: figures[caption] for caption in captions[1:]},
+            figures=dict(list(figures.items())[1:]),
         ),
         Section(
             heading="Errors by cause",
@@ -103,6 +102,7 @@ def comparison_html(comparison: Comparison, figures: Mapping[str, bytes]) -> str
             text_columns=(1,),
             wide=True,
         ),
+        *([without_result] if failed else []),
         Section(
             heading="How errors are measured",
             preformatted=(measures_text or "").strip(),
@@ -112,12 +112,6 @@ def comparison_html(comparison: Comparison, figures: Mapping[str, bytes]) -> str
             ],
         ),
     ]
-    if failed:
-        table = _table(failed)
-        sections.insert(
-            -1,
-            Section(heading="Configurations without a result", table=table, text_columns=(1, 3)),
-        )
     return page_html(f"patchlaw compare: {comparison.scene}", sections)
 
 

@@ -180,7 +180,7 @@ def test_slopes_are_measured_by_a_reference_with_small_ones():
     [
         ({"against": "experiment"}, r"'experiment': is nothing to compare against \(allowed: ref"),
         ({"budget_s": 0.0}, "is no budget"),
-        ({"comm": type("Comm", (), {"size": 2})()}, "not possible inside an MPI job"),
+        ({"comm": type("Comm", (), {"size": 2})()}, "cannot be launched in an MPI job"),
     ],
 )
 def test_wrong_arguments(arguments, text):
