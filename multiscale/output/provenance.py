@@ -9,16 +9,19 @@ import sys
 from collections.abc import Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from typing import Any
-
-import numpy
-import scipy
 
 from multiscale.costs.prediction import peak_memory
 from multiscale.couplings.reference import ReferenceCoupling
 from multiscale.run import Run
 from multiscale.setup.problem import ProblemSetup
+
+LIBRARIES = (
+    "numpy", "scipy", "dolfinx", "petsc4py", "mpi4py", "gmsh", "h5py", "pydantic", "pint",
+    "matplotlib",
+)  # fmt: skip
+"""Libraries whose versions are recorded."""
 
 
 def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
@@ -105,18 +108,7 @@ def _micro_model(setup: ProblemSetup) -> dict[str, Any] | None:
 
 
 def _versions() -> dict[str, str]:
-    """Return the versions of what took part; of compiled parts, only where they were loaded."""
-    found = {
-        "python": platform.python_version(),
-        "numpy": numpy.__version__,
-        "scipy": scipy.__version__,
-    }
-    for name in ("dolfinx", "petsc4py", "mpi4py", "gmsh"):
-        if name in sys.modules:
-            found[name] = str(getattr(sys.modules[name], "__version__", "unknown"))
-    for name in ("h5py", "pydantic", "pint", "matplotlib"):
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "unknown"
-    return found
+    """Return the versions of Python and of the libraries that took part."""
+    loaded = {name: sys.modules[name] for name in LIBRARIES if name in sys.modules}
+    found = {name: getattr(module, "__version__", "unknown") for name, module in loaded.items()}
+    return {"python": platform.python_version(), **found}

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from io import BytesIO
+from itertools import islice, zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -69,14 +70,14 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
     Note:
         Collective: all ranks draw, rank 0 writes.
     """
-    drawings: list[Drawing] = []
+    drawings: Sequence[Drawing] = ()
     if run.scene.output.figures and run.steps:
         with run.phase("output"):
             drawings = _drawings(run)
     return on_root(run.comm, lambda: _write(folder, run, drawings, options))
 
 
-def _write(folder: Path, run: Run, drawings: list[Drawing], options: list[str]) -> list[Path]:
+def _write(folder: Path, run: Run, drawings: Sequence[Drawing], options: list[str]) -> list[Path]:
     for name in FILES:  # Files of an earlier run must not stand beside those of this one.
         with written(folder / name):
             remove(folder / name)
@@ -138,15 +139,14 @@ def _drawings(run: Run) -> list[Drawing]:
     comm = run.comm
     rank, size = (0, 1) if comm is None else (comm.rank, comm.size)
 
-    def draw() -> dict[int, Drawing]:
-        if rank >= MOST_FIGURES:
-            return {}
-        mine = list(enumerate(_figures(run)))[rank::size]
-        return {at: Drawing(name, caption, png(make())) for at, (name, caption, make) in mine}
+    def draw() -> list[Drawing]:
+        mine = islice(_figures(run), rank, None, size) if rank < MOST_FIGURES else ()
+        return [Drawing(name, caption, png(make())) for name, caption, make in mine]
 
-    parts = [together(comm, draw)] if comm is None else comm.gather(together(comm, draw))
-    drawn = {at: one for part in parts or () for at, one in part.items()}
-    return [drawn[at] for at in sorted(drawn)]
+    mine = together(comm, draw)
+    parts = [mine] if comm is None else comm.gather(mine) or []
+    # Rank k has the figures k, k + size, ….
+    return [one for figures in zip_longest(*parts) for one in figures if one is not None]
 
 
 def _figures(run: Run) -> Iterator[tuple[str, str, Callable[[], Figure]]]:

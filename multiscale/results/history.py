@@ -164,12 +164,9 @@ class History:
     def patch_rows(self) -> Iterator[tuple]:
         """Yield the rows of ``patches.csv``."""
         for step in self.steps:
-            state = step.patches
-            values = zip(
-                state.closure_mm, state.pressure_MPa, state.contact_area_fraction, strict=True
-            )
-            for index, (closure, pressure, area) in enumerate(values):
-                yield (step.step, *self.patches.unravel(index), closure, pressure, area)
+            for index in range(self.patches.count):
+                values = (getattr(step.patches, name)[index] for name in PATCH_COLUMNS[3:])
+                yield (step.step, *self.patches.unravel(index), *values)
 
     def to_dataframe(self) -> Any:
         """Return the rows of ``history.csv`` as a pandas data frame.
@@ -192,13 +189,10 @@ class History:
         A reference has one more column, with its values at mesh size zero.
         """
         columns = [column for column in COLUMNS if column.heading]
-        header = [column.heading for column in columns]
-        rows = [[column.text(step) for column in columns] for step in self.steps]
+        texts = {column.heading: [column.text(step) for step in self.steps] for column in columns}
         if self.reference is not None:
-            heading, cells = self.reference.cells
-            header.append(heading)
-            rows = [[*row, cell] for row, cell in zip(rows, cells, strict=True)]
-        return header, rows
+            heading, texts[heading] = self.reference.cells
+        return list(texts), list(zip(*texts.values(), strict=True))
 
     def _repr_html_(self) -> str:
         """Return the table as HTML, which notebooks show for a history."""
