@@ -147,7 +147,8 @@ def launch_process(
         result = read_result(answer, configuration)
         if result is not None:
             return replace(result, start_s=result.start_s + spent)
-        lines = errors.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+        text = errors.read_text(encoding="utf-8", errors="replace")
+        lines = [line for line in text.splitlines() if line.strip(" -")]  # mpirun ends by a rule
         why = lines[-1] if lines else f"its process ended with exit code {code}"
         return RunResult(configuration=configuration, status="failed", exit_code=code, message=why)
 

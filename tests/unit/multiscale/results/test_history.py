@@ -50,7 +50,7 @@ def test_every_column_is_an_attribute_with_documentation(history):
 def test_table_shows_values_with_their_errors(history):
     header, rows = history.table()
     assert header[:3] == ["step", "approach [µm]", "force [N]"]
-    assert rows[0][:3] == ["1", "4", "0.5"]
+    assert rows[0][:3] == ("1", "4", "0.5")
     assert rows[1][2] == "1.000 ± 0.030"
 
 
