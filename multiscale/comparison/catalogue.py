@@ -9,7 +9,7 @@ their results over the patches that pressures are compared on (`pressure_grid`).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TypeAlias
+from typing import NamedTuple
 
 from geometry.errors import InputError, NotConverged
 from geometry.typical_contact import suggested_fine
@@ -32,9 +32,6 @@ from multiscale.scene.scene import Scene
 from multiscale.setup.checks import EMBEDDED_CELLS, patch_grid
 from multiscale.setup.surface import make_surface
 
-Proposal: TypeAlias = tuple[str, Content, Grid]
-"""Name of a configuration, the sections of the scene that it changes, and its surface's grid."""
-
 SMALL_SLOPES = ", small slopes"
 """End of the name of a configuration that differs from another by neglecting finite slopes."""
 
@@ -55,6 +52,22 @@ REFERENCE_MESHES = ((1, 2.0), (1, 1.0), (2, 1.0), (3, 1.0), (3, 0.5**0.5))
 
 _HALF_SPACE: Content = {"model": "half-space"}
 _FITTED: Content = {"model": "elliptic", "curvature": "contact", "border": "include"}
+
+
+class Proposal(NamedTuple):
+    """A configuration that the scene need not allow.
+
+    Attributes:
+        name: Its name.
+        changes: The sections of the scene that it changes.
+        heights: Grid of its surface.
+        repeat_low: Whether to repeat it with low heights under a low load.
+    """
+
+    name: str
+    changes: Content
+    heights: Grid
+    repeat_low: bool = False
 
 
 def configurations(scene: Scene, ranks: int = 1) -> tuple[Configuration, ...]:
@@ -98,21 +111,21 @@ def configurations(scene: Scene, ranks: int = 1) -> tuple[Configuration, ...]:
         return made.content
 
     # The scene itself comes first: an equal configuration does not replace its name.
-    for name, changes, heights in catalogue.proposals():
-        content = add(name, catalogue.base | changes, heights)
-        low = content and name == catalogue.name_for_low_heights and scaled(content)
-        if low:
-            add(name + LOW_HEIGHTS, low, heights, LOW_HEIGHTS_SCALE)
+    for one in catalogue.proposals():
+        content = add(one.name, catalogue.base | one.changes, one.heights)
+        if one.repeat_low and content is not None:
+            low = scaled(content)
+            if low is not None:
+                add(one.name + LOW_HEIGHTS, low, one.heights, LOW_HEIGHTS_SCALE)
     return tuple(sorted(found.values(), key=lambda one: one.cost))
 
 
 class _Catalogue:
-    """The configurations of one scene, as proposals that the scene need not allow.
+    """Proposes the configurations of one scene.
 
     Attributes:
         base: What all configurations have in common.
         heights: Grid of the surface.
-        name_for_low_heights: Name of the reference that is repeated with low heights.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -127,7 +140,6 @@ class _Catalogue:
         block = {key: value for key, value in content["block"].items() if key != "cells"}
         patches = {"grid": list(pressure_grid(scene))}
         self.base: Content = content | {"patches": patches, "block": block}
-        self.name_for_low_heights = ""
 
     def proposals(self) -> Iterator[Proposal]:
         """Yield all proposals, the scene itself first."""
@@ -136,7 +148,7 @@ class _Catalogue:
         del micros["half-space"]
         for name, micro in (micros | {"elliptic, fitted": _FITTED}).items():
             changes = {"coupling": {"kind": "analytic"}, "micro": micro}
-            yield f"analytic, {name}", changes, self.heights
+            yield Proposal(f"analytic, {name}", changes, self.heights)
         for kind in ("analytic", "concurrent"):
             yield from self._half_spaces(kind, {"coupling": {"kind": kind}})
         yield from self._isolated()
@@ -152,16 +164,16 @@ class _Catalogue:
             parts.append(self._scene.micro.model)
         changes = {name: value for name, value in self._given.items() if value is not None}
         changes["patches"] = {"grid": list(self._patches)}
-        return f"{OWN}: {', '.join(parts)}", changes, self.heights
+        return Proposal(f"{OWN}: {', '.join(parts)}", changes, self.heights)
 
     def _half_spaces(self, name: str, changes: Content) -> Iterator[Proposal]:
         """Yield half-spaces on every grid, and one of them without finite slopes."""
         for grid in self._grids:
             full = f"{name}, half-space {_times(grid)}"
-            yield full, changes | {"micro": _HALF_SPACE}, grid
+            yield Proposal(full, changes | {"micro": _HALF_SPACE}, grid)
             if grid == self._law_grid:
                 small = changes | {"micro": _HALF_SPACE | {"finite_slopes": False}}
-                yield full + SMALL_SLOPES, small, grid
+                yield Proposal(full + SMALL_SLOPES, small, grid)
 
     def _isolated(self) -> Iterator[Proposal]:
         micro = self.base["micro"]
@@ -203,7 +215,7 @@ class _Catalogue:
         if cells:
             name += f", {_times(cells)} elements"
             changes["block"] = self.base["block"] | {"cells": list(cells)}
-        return name, changes, heights
+        return Proposal(name, changes, heights)
 
     def _references(self) -> Iterator[Proposal]:
         """Yield references; edges are those that fit the contacts, where these are known."""
@@ -219,9 +231,9 @@ class _Catalogue:
             if fine:
                 section["fine"] = float(f"{factor * fine:.4g}")
                 name += f", {1e3 * section['fine']:.3g} µm"
-                if (meshes, factor) == (1, 1.0):
-                    self.name_for_low_heights = name
-            yield name, {"coupling": {"kind": "reference"}, "reference": section}, self.heights
+            changes = {"coupling": {"kind": "reference"}, "reference": section}
+            repeat_low = bool(fine) and (meshes, factor) == (1, 1.0)
+            yield Proposal(name, changes, self.heights, repeat_low)
 
     @property
     def _cells(self) -> tuple[int, int, int]:

@@ -28,6 +28,11 @@ def made(*overrides, ranks=1):
     return configurations(Scene.load(PAPER, overrides), ranks)
 
 
+def small(*overrides, ranks=1):
+    """Return the configurations of a surface with few heights, which takes less time."""
+    return made("surface.grid=[64, 64]", *overrides, ranks=ranks)
+
+
 def test_paper_has_every_kind_and_the_scene_itself():
     found = made()
     kinds = {one.kind for one in found}
@@ -79,22 +84,21 @@ def test_heights_from_a_file_are_taken_as_they_are(tmp_path):
     assert not before & {one.key for one in configurations(scene)}  # other heights, other results
 
 
-def test_same_scene_same_keys_and_other_scene_other_keys():
-    keys = {one.key for one in made()}
-    assert keys == {one.key for one in made()}
-    assert not keys & {one.key for one in made("surface.spectrum.seed=2")}
-    assert keys & {one.key for one in made("patches.grid=[2, 2]")}  # what does not see patches
+def test_other_scenes_have_other_keys():
+    keys = {one.key for one in small()}
+    assert not keys & {one.key for one in small("surface.spectrum.seed=2")}
+    assert keys & {one.key for one in small("patches.grid=[2, 2]")}  # what does not see patches
 
 
 def test_only_couplings_use_ranks():
-    ranks = {(one.kind == "analytic", one.ranks) for one in made(ranks=3)}
+    ranks = {(one.kind == "analytic", one.ranks) for one in small(ranks=3)}
     assert ranks == {(True, 1), (False, 3)}
-    several = {one.key for one in made(ranks=3) if one.ranks == 3}
-    assert several.isdisjoint(one.key for one in made())
+    several = {one.key for one in small(ranks=3) if one.ranks == 3}
+    assert several.isdisjoint(one.key for one in small())
 
 
 def test_all_configurations_take_the_same_steps():
-    for one in made("load.force_change=0.2", "load.steps=3"):
+    for one in small("load.force_change=0.2", "load.steps=3"):
         assert one.scene.loading.force_change is None
         targets = np.divide(one.scene.loading.load_history.targets, one.scale)
         assert targets == pytest.approx([8e-3 / 3, 16e-3 / 3, 8e-3])
@@ -109,24 +113,26 @@ def test_pressures_are_compared_on_multiples_of_the_patches(grid, common):
 
 def test_load_by_force_or_free_tilt_has_configurations_too():
     for overrides in (["load.tilt=free"], ["load.force=3 N"]):
-        scene = Scene.load(PAPER).model_dump(by_alias=True, mode="json", exclude_none=True)
+        scene = Scene.load(PAPER, ["surface.grid=[64, 64]"]).model_dump(
+            by_alias=True, mode="json", exclude_none=True
+        )
         if overrides == ["load.force=3 N"]:
             scene["load"] = {"force": 3.0, "steps": 2}
             found = configurations(Scene.from_dict(scene))
         else:
-            found = made(*overrides)
+            found = small(*overrides)
         assert {"analytic", "concurrent", "reference"} <= {one.kind for one in found}
 
 
 def test_small_slopes_scale_heights_and_load_together():
-    found = made("load.tilt=[0.01, 0]")
-    (small,) = [one for one in found if one.scale != 1.0]
-    (steep,) = [one for one in found if f"{one.name}, heights × 0.1" == small.name]
-    assert (steep.scale, small.scale) == (1.0, 0.1)
-    assert small.scene.surface.spectrum.rms_slope == pytest.approx(0.0215, rel=1e-12)  # rounding
-    assert small.scene.loading.approach == pytest.approx((0.8e-3,), rel=1e-12)
-    assert small.scene.loading.tilt == pytest.approx((1e-3, 0.0), rel=1e-12)
-    assert small.scene.reference == steep.scene.reference
+    found = small("load.tilt=[0.01, 0]")
+    (low,) = [one for one in found if one.scale != 1.0]
+    (steep,) = [one for one in found if f"{one.name}, heights × 0.1" == low.name]
+    assert (steep.scale, low.scale) == (1.0, 0.1)
+    assert low.scene.surface.spectrum.rms_slope == pytest.approx(0.0215, rel=1e-12)  # rounding
+    assert low.scene.loading.approach == pytest.approx((0.8e-3,), rel=1e-12)
+    assert low.scene.loading.tilt == pytest.approx((1e-3, 0.0), rel=1e-12)
+    assert low.scene.reference == steep.scene.reference
 
 
 def test_scene_that_leaves_all_open_has_configurations_that_stand(tmp_path):
