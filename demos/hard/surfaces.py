@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from hard.bench import CELLS, case, lawless, of_heights, off, solved
 
-from geometry import Asperities
-from micro import asperity_model, contact_modulus
+from geometry import Asperities, Material
+from micro import asperity_model
 
 x = (np.arange(CELLS) + 0.5) / CELLS - 0.5
 DOME = -(x[:, None] ** 2 + x**2) / 0.8
@@ -26,7 +26,13 @@ def first_touch() -> tuple[Any, ...]:
     grid = (np.arange(33) + 0.5) / 33 - 0.5
     ball, way = of_heights(-(grid[:, None] ** 2 + grid**2)), [1e-10, 1e-8, 1e-6]
     found = solved("consistent", micro__model="circular", load__approach=[*way, 0.0], **ball)
-    hertz = 4 / 3 * contact_modulus(4000.0, 0.15) * np.sqrt(0.5) * np.array(way) ** 1.5
+    hertz = (
+        4
+        / 3
+        * Material(young_modulus=4000.0, poisson_ratio=0.15).contact_modulus
+        * np.sqrt(0.5)
+        * np.array(way) ** 1.5
+    )
     return off(found.force_N[:3], hertz) + found.force_N[3], found
 
 
@@ -85,8 +91,8 @@ def merging() -> tuple[Any, ...]:
     return state.residual, state
 
 
-@case(4, "a summit 1e-9 mm off and 1e-9 mm lower, engulfed", "both carry what one does", 1e-6)
-def engulfed() -> tuple[Any, ...]:
+@case(4, "a summit 1e-9 mm off and 1e-9 mm lower, overlapping", "both carry what one does", 1e-6)
+def twin_beside_a_summit() -> tuple[Any, ...]:
     pair, one = pressed(0.02, 1.0, [0.5, 0.5 + 1e-9], 1e-9), pressed(0.02, 1.0, [0.5])
     return off(pair.force.sum(), one.force[0]), pair
 

@@ -18,6 +18,9 @@ from typing import Any, NoReturn
 
 from multiscale.output.streams import sturdy_streams
 
+AGAINST = ("reference", "concurrent", "half-space")
+"""What a comparison can be against; the keys of `multiscale.comparison.compare.AGAINST`."""
+
 COMPARE_ENDING = "-compare"
 """What the results folder of a comparison is called after the scene's name."""
 
@@ -151,25 +154,38 @@ def parser() -> argparse.ArgumentParser:
         "--resume", action="store_true", help="go on after the last load step of an interrupted run"
     )
     run.add_argument(
-        "--max-time", metavar="TIME", help="stop cleanly before so much wall time is over, as 55m"
+        "--max-time",
+        metavar="TIME",
+        type=wall_time,
+        help="stop cleanly before so much wall time is over, as 55m",
     )
     _add_scene(run)
     _add_scene(
         command("plan", "Say what a run would do, and why; run nothing expensive."),
         folder="accepted so that the words of a run can be reused: a plan writes nothing",
     )
-    compare = command("compare", "Run a scene in every sensible way; draw error against time.")
+    compare = command(
+        "compare", "Run a scene in every sensible configuration; draw error against time."
+    )
     _add_scene(compare, ending=COMPARE_ENDING)
     compare.add_argument(
         "--against",
-        metavar="LEVEL",
-        help="compare with reference, concurrent, half-space; by default the best that is reached",
+        metavar="KIND",
+        choices=AGAINST,
+        help=f"compare with {', '.join(AGAINST)}; by default the best that is reached",
     )
     compare.add_argument(
-        "--budget", metavar="TIME", help="wall time for all levels, such as 5min; by default any"
+        "--budget",
+        metavar="TIME",
+        type=wall_time,
+        help="wall time for all configurations, such as 5min; by default any",
     )
     compare.add_argument(
-        "--ranks", type=int, default=1, metavar="N", help="processes of each level, under mpirun"
+        "--ranks",
+        type=int,
+        default=1,
+        metavar="N",
+        help="processes of each configuration, under mpirun",
     )
     _add_scene(command("laws", "Tabulate the patch laws of a scene; write and draw them."))
     _add_scene(command("surface", "Describe and draw the surface of a scene."))
@@ -185,6 +201,23 @@ def parser() -> argparse.ArgumentParser:
         "--element", nargs="+", default=[], metavar="NAME", help="Q1, Q2, P1, P2; all by default"
     )
     return top
+
+
+def wall_time(text: str) -> float:
+    """Return a wall time in seconds.
+
+    Args:
+        text: A quantity such as ``"55m"`` or ``"2 h"``.
+
+    Raises:
+        argparse.ArgumentTypeError: When the text is no time, or not greater than zero.
+    """
+    from multiscale.scene.quantities import parse_duration
+
+    try:
+        return parse_duration(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r}: {error}") from None
 
 
 def _add_scene(command: argparse.ArgumentParser, *, folder: str = "", ending: str = "") -> None:

@@ -1,4 +1,4 @@
-"""What the commands on a scene have in common: the scene, its results folder, wall times."""
+"""What the commands on a scene have in common: the scene and its results folder."""
 
 from __future__ import annotations
 
@@ -7,9 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from geometry.collective import on_root
-from geometry.errors import InputError
 from multiscale.machine.mpi_job import refuse_detached_processes
-from multiscale.scene.quantities import parse_duration
 from multiscale.scene.scene import Scene
 
 
@@ -40,19 +38,3 @@ def scene_and_folder(
         return scene, choice.out or Path("results") / f"{scene.name}{ending}"
 
     return on_root(comm, read)
-
-
-def wall_time(text: str | None, key: str) -> float | None:
-    """Return a wall time in seconds; None for none.
-
-    Args:
-        text: What the user typed, such as ``"55m"``.
-        key: The option, for the message.
-
-    Raises:
-        InputError: When the text is no time, or not positive.
-    """
-    try:
-        return None if text is None else parse_duration(text)
-    except ValueError as error:
-        raise InputError(str(error), key=key, value=text) from None

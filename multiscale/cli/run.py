@@ -7,7 +7,7 @@ from typing import Any
 
 from geometry.collective import on_root
 from geometry.errors import InputError, NotConverged, PatchlawError
-from multiscale.cli.inputs import scene_and_folder, wall_time
+from multiscale.cli.inputs import scene_and_folder
 from multiscale.output import terminal
 from multiscale.output.field_files import write_fields
 from multiscale.output.results import write_results
@@ -26,7 +26,7 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    with Interruption(comm, wall_time(choice.max_time, "--max-time")) as interruption:
+    with Interruption(comm, choice.max_time) as interruption:
         scene, folder = scene_and_folder(choice, comm)
         with locked(folder, comm) as lock:
             found = None

@@ -100,14 +100,16 @@ def on_body(
         # heights count from the highest point, which is near the loads: slopes add least there;
         # the flat body then reaches up to it, while the block's height is that of the mean plane
         higher = surface.highest - surface.mean_height if order else 0.0
-        beside: list[SurfaceStress] = []
+        edge_stresses: list[SurfaceStress] = []
         if body is not None and face is not None:
             model = replace(model, sides=body.known, body=body.term(face, higher=higher))
-            beside = _stresses(body, face, surface) if order else []
+            edge_stresses = _stresses(body, face, surface) if order else []
         if not order:
             return model
-        plane = surface.highest if beside else None
-        slopes = FiniteSlopes(surface, material, order=order, plane=plane, beside=beside)
+        plane = surface.highest if edge_stresses else None
+        slopes = FiniteSlopes(
+            surface, material, order=order, plane=plane, edge_stresses=edge_stresses
+        )
         return replace(model, slopes=slopes)
 
     return put
@@ -155,7 +157,7 @@ def _block_sides(setup: ProblemSetup) -> FreeSides | None:
     return FreeSides(
         lengths=setup.surface.lengths,
         poisson_ratio=setup.scene.block.poisson_ratio,
-        reach=_REACH * min(*setup.surface.lengths, setup.shape.height),
+        decay_length=_REACH * min(*setup.surface.lengths, setup.shape.height),
     )
 
 
@@ -199,12 +201,12 @@ def patch_compliance(setup: ProblemSetup, comm: Any) -> Array:
         return body.patch_compliance(setup.patches, comm)
     from mpi4py import MPI
 
-    from macro import plain_compliance
+    from macro import patch_compliance_matrix
     from macro.compliance.cache import cached
     from macro.linear_solvers.options import users_options
 
     def compute() -> dict[str, Array]:
-        return {"compliance": plain_compliance(embedding(setup, comm))}
+        return {"compliance": patch_compliance_matrix(embedding(setup, comm))}
 
     sides = setup.scene.block.sides
     key = (setup.shape, block_material(setup), sides, setup.patches, users_options())

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.checks import process_memory
 from geometry.errors import InputError
-from geometry.memory import process_memory
 from micro import (
     BodyModes,
     BodyStresses,
@@ -23,7 +23,6 @@ from micro import (
     half_space_stress_modes,
     influence_matrix,
     side_modes,
-    side_patches,
     side_stress_modes,
 )
 
@@ -125,11 +124,11 @@ class Body:
         """
         from mpi4py import MPI
 
-        from macro import cached_face_compliance
+        from macro import face_compliance
 
         count = modes or self.modes
         self._check_memory(count)
-        return cached_face_compliance(
+        return face_compliance(
             self.lengths,
             self.shape.height,
             self.material,
@@ -137,6 +136,7 @@ class Body:
             count,
             comm or MPI.COMM_SELF,
             coarse=coarse,
+            use_cache=True,
         )
 
     def term(self, face: FaceCompliance, *, higher: float = 0.0) -> BodyModes:
@@ -183,7 +183,7 @@ class Body:
         modulus, count = self.material.contact_modulus, self.modes
         known = influence_matrix(patches) / (np.pi * modulus)
         if self.known is not None:
-            known += side_patches(self.known, patches) / modulus
+            known += self.known.patch_compliance(patches) / modulus
             count = max(count, min(max(patches.shape), _CORNERS))
         else:
             count = max(count, min(_PER_PATCH * max(patches.shape), _MOST))

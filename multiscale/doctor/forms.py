@@ -67,7 +67,7 @@ def cache(comm: Any, folder: Path | None = None) -> list[CheckResult]:
     slowest = max(gathered(comm, _small_file_seconds(folder) if writable else 0.0))
     fewest = min(gathered(comm, compiled))
     text, problem, remedy = f"{folder}, {compiled} compiled", "", ""
-    if left := jit.left_locks(folder):
+    if left := jit.stale_locks(folder):
         text = f"{text}; {len(left)} compilation(s) cut short, such as {left[0].name}"
         return [CheckResult("form cache", "fail", text, "clear them with: patchlaw warm")]
     if not writable:
@@ -129,9 +129,9 @@ def known_solve(comm: Any) -> list[CheckResult]:
     """
     from mpi4py import MPI
 
-    from geometry.control import Control
     from geometry.meshes.block import BlockShape
     from geometry.patches import PatchGrid
+    from geometry.rigid_plane import Control
     from macro import Block, Interface, LawContactProblem, Material, block_mesh
 
     began = time.perf_counter()
@@ -140,7 +140,7 @@ def known_solve(comm: Any) -> list[CheckResult]:
     block = Block(block_mesh(shape, comm or MPI.COMM_SELF), material, sides="roller")
     patches = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
     pressed = LawContactProblem(block, Interface(block, patches), [_Spring()] * patches.count)
-    state = pressed.press(Control(approach=_APPROACH))
+    state = pressed.solve(Control(approach=_APPROACH))
     seconds = time.perf_counter() - began
     expected = _APPROACH / (1.0 / _SPRING + 1.0 / material.confined_modulus)
     error = abs(state.force / expected - 1.0)
@@ -190,7 +190,7 @@ def warm(elements: Sequence[str], comm: Any = None) -> tuple[Path, int]:
 
         folder = form_cache()
         if jit.writable(folder):
-            for source in jit.left_locks(folder):
+            for source in jit.stale_locks(folder):
                 source.unlink(missing_ok=True)
         for element in elements or ELEMENTS:
             _use_all_forms(element)
