@@ -99,16 +99,16 @@ def press_work(setup: ProblemSetup, *, alone: bool = False) -> Work:
     kind = "scaled" if isinstance(model, ScaledModel) else model.name
     if isinstance(model, HalfSpaceModel):
         cells = int(np.prod(model.surface.grid))
-    at = reach(setup.surface, setup.plane_at_largest_load, int(setup.reached.sum()))
+    at = reach(setup.surface, setup.plane_at_largest_load, int(setup.interfering_summits.sum()))
     if alone:  # on the piece of the surface that is the patch
         cells //= setup.patches.count
         heights = at.heights // setup.patches.count
-        at = replace(at, heights=heights, summits=at.summits // max(setup.reached_patches, 1))
+        at = replace(at, heights=heights, summits=at.summits // max(setup.interfering_patches, 1))
     work = kind_work(kind, cells, at)
     if alone:
         return work
     work = _SLOPES * work if setup.finite_slopes else work
-    return _BODY * work if setup.embedded and cells else work
+    return _BODY * work if setup.has_block and cells else work
 
 
 def check_work(setup: ProblemSetup) -> Work:
@@ -117,7 +117,7 @@ def check_work(setup: ProblemSetup) -> Work:
     Args:
         setup: The scene's ingredients.
     """
-    solved = _CHECK + (1.0 if setup.by_laws else 0.0)
+    solved = _CHECK + (1.0 if setup.uses_laws else 0.0)
     return solved * press_work(setup)
 
 
@@ -127,9 +127,9 @@ def law_work(setup: ProblemSetup) -> Work:
     Args:
         setup: The scene's ingredients.
     """
-    rows = ROWS["summits" if setup.by_summits else "cells"]
+    rows = ROWS["summits" if setup.uses_summits else "cells"]
     if setup.scene.coupling.kind == "isolated":
-        return rows * setup.reached_patches * press_work(setup, alone=True)
+        return rows * setup.interfering_patches * press_work(setup, alone=True)
     return rows * (press_work(setup) + Work(call=15 * setup.patches.count))
 
 

@@ -73,7 +73,7 @@ def run_work(setup: ProblemSetup) -> dict[str, Work]:
     works = {"surface": _surface(setup.surface.heights.size)}
     if setup.choice is not None:
         works["micro choice"] = _micro_choice(setup)
-    if setup.by_laws:
+    if setup.uses_laws:
         works["laws"] = law_work(setup)
     if setup.meshes is not None:
         load_history = setup.scene.loading.load_history
@@ -86,10 +86,10 @@ def run_work(setup: ProblemSetup) -> dict[str, Work]:
     if isinstance(setup.micro, HalfSpaceModel) and output.check != "none":
         checks = step_count(setup.scene.loading.load_history) if output.check == "all" else 1
         works["check"] = checks * check_work(setup)
-    if output.fields and setup.embedded and not (setup.meshes or _on_mesh(setup)):
+    if output.fields and setup.has_block and not (setup.meshes or _on_mesh(setup)):
         works["field"] = mesh_work(setup.shape) + cycle_work(setup.shape, CYCLES_PER_PATCH)
     if output.figures:
-        works["output"] = (4 if setup.by_laws else 3) * _FIGURE
+        works["output"] = (4 if setup.uses_laws else 3) * _FIGURE
         works["output"] += Work() if "matplotlib" in sys.modules else _DRAWING
     return works
 
@@ -105,11 +105,11 @@ def _micro_choice(setup: ProblemSetup) -> Work:
 
 
 def _on_mesh(setup: ProblemSetup) -> bool:
-    return setup.by_laws and not newton_choice(setup).condensed
+    return setup.uses_laws and not newton_choice(setup).condensed
 
 
 def _block(setup: ProblemSetup) -> Work:
-    if not setup.embedded:
+    if not setup.has_block:
         return Work(call=1_000)
     coupling = setup.scene.coupling
     if coupling.decomposed:
@@ -122,7 +122,7 @@ def _block(setup: ProblemSetup) -> Work:
 
 def _load_steps(setup: ProblemSetup) -> Work:
     steps = step_count(setup.scene.loading.load_history)
-    if not setup.by_laws:
+    if not setup.uses_laws:
         return steps * press_work(setup)
     if _on_mesh(setup):
         return cycle_work(setup.shape, full_cycles(setup, steps))
@@ -139,7 +139,7 @@ def _memory(setup: ProblemSetup) -> float:
     patches, steps = setup.patches.count, step_count(setup.scene.loading.load_history)
     kept = 8.0 * (10.0 * patches**2 + 3.0 * steps * patches)
     block = 0.0
-    if setup.embedded:
+    if setup.has_block:
         block = 0.0 if "dolfinx" in sys.modules else _FINITE_ELEMENTS
         if setup.meshes is not None:
             block += setup.meshes.bytes

@@ -27,7 +27,7 @@ def error_probe(setup: ProblemSetup, body: OnBody) -> ErrorProbe:
         model=setup.model,
         on_body=body,
         order=SLOPES if setup.finite_slopes else 0,
-        by_laws=setup.by_laws,
+        by_laws=setup.uses_laws,
     )
 
 

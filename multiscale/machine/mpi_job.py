@@ -21,7 +21,7 @@ _LEAST_DATA = 0.5e9
 _SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS")
 
 
-def petsc_leaves_signals() -> None:
+def keep_petsc_from_signals() -> None:
     """Keep PETSc from taking SIGHUP, and without Open MPI SIGTERM, from who watches for them.
 
     Its handlers end the process with exit code 59. It must be told before it starts.
@@ -72,7 +72,7 @@ def world() -> Any:
     return MPI.COMM_WORLD if MPI.COMM_WORLD.size > 1 else None
 
 
-def for_large(comm: Any) -> Any:
+def large_object_comm(comm: Any) -> Any:
     """Return a communicator for what may be larger than MPI can count, 2 GB in one message.
 
     Large arrays travel beside the pickle, so that neither end holds them twice; small messages

@@ -20,24 +20,24 @@ class MemoryRequest:
 
     Attributes:
         shared: Divided over all ranks [B].
-        held: Held by every rank [B].
-        once: Taken on rank 0 alone, beyond what it holds as every rank does [B].
+        per_rank: Held by every rank [B].
+        root_only: Taken on rank 0 alone, beyond what it holds as every rank does [B].
     """
 
     shared: float = 0.0
-    held: float = 0.0
-    once: float = 0.0
+    per_rank: float = 0.0
+    root_only: float = 0.0
 
     @property
-    def alone(self) -> float:
+    def total(self) -> float:
         """Memory that a process on its own takes [B]."""
-        return self.shared + self.held + self.once
+        return self.shared + self.per_rank + self.root_only
 
 
-def node_memory() -> float:
+def memory_of_this_node() -> float:
     """Return the memory of this node, or of a control group of this process if that is less [B]."""
     physical = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    return min([float(physical), *(limit for limit, _ in group_memory())])
+    return min([float(physical), *(limit for limit, _ in control_group_memory())])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,27 +48,27 @@ class ClusterNodes:
         ranks: Ranks on each node.
         memory: Memory of a node, the least of all [B].
         process: Address space that a process may fill with data, rank 0's for all [B].
-        more: Whether a run could have more nodes like these, which a plan supposes.
+        extensible: Whether a run could have more nodes like these, which a plan supposes.
     """
 
     ranks: tuple[int, ...] = (1,)
-    memory: float = field(default_factory=node_memory)
+    memory: float = field(default_factory=memory_of_this_node)
     process: float = field(default_factory=address_space)
-    more: bool = False
+    extensible: bool = False
 
-    def fit(self, need: MemoryRequest) -> bool:
+    def fits(self, need: MemoryRequest) -> bool:
         """Tell whether there is room for something, on the fullest node and on that of rank 0.
 
         Args:
             need: What it takes.
         """
         most = max(self.ranks)
-        taken = most * (need.shared / sum(self.ranks) + need.held) + need.once
-        of_one = need.shared / sum(self.ranks) + need.held + need.once
+        taken = most * (need.shared / sum(self.ranks) + need.per_rank) + need.root_only
+        of_one = need.shared / sum(self.ranks) + need.per_rank + need.root_only
         fits = taken <= self.memory and of_one <= self.process
-        return fits or (self.more and self.enough(need) is not None)
+        return fits or (self.extensible and self.nodes_needed(need) is not None)
 
-    def enough(self, need: MemoryRequest) -> int | None:
+    def nodes_needed(self, need: MemoryRequest) -> int | None:
         """Return the least number of nodes like the fullest that there is room on; None if on none.
 
         Args:
@@ -76,12 +76,12 @@ class ClusterNodes:
         """
         most = max(self.ranks)
         left = min(
-            self.memory - most * need.held - need.once,
-            most * (self.process - need.held - need.once),
+            self.memory - most * need.per_rank - need.root_only,
+            most * (self.process - need.per_rank - need.root_only),
         )
         return max(math.ceil(need.shared / left), 1) if left > 0.0 else None
 
-    def room(self, need: MemoryRequest) -> str:
+    def remedy(self, need: MemoryRequest) -> str:
         """Say what room there is, and what would make enough of it.
 
         Args:
@@ -93,20 +93,20 @@ class ClusterNodes:
         text += f" with {most} ranks" if most > 1 else ""
         if self.process < self.memory:
             text += f", {max(self.process, 0.0) / 1e9:.3g} GB for a process (ulimit -v)"
-        enough = self.enough(need)
+        enough = self.nodes_needed(need)
         if enough is not None:
             return (
                 f"{text}; {enough} such nodes would do, filled evenly by mpirun over several hosts"
             )
-        if need.once + need.held > self.process:
+        if need.root_only + need.per_rank > self.process:
             return text
-        left = self.memory - need.once - need.shared / len(self.ranks)
-        fewer = int(left / need.held) if need.held else 0
+        left = self.memory - need.root_only - need.shared / len(self.ranks)
+        fewer = int(left / need.per_rank) if need.per_rank else 0
         ranks = "1 rank" if fewer == 1 else f"{fewer} ranks"
         return f"{text}; {ranks} on a node would do, for each holds it all" if fewer > 0 else text
 
 
-def nodes_of(comm: Any) -> ClusterNodes:
+def cluster_nodes(comm: Any) -> ClusterNodes:
     """Return the nodes of a run.
 
     Args:
@@ -122,13 +122,13 @@ def nodes_of(comm: Any) -> ClusterNodes:
     node = comm.Split_type(MPI.COMM_TYPE_SHARED)
     ranks = node.size if node.rank == 0 else 0
     node.Free()
-    told = comm.allgather((ranks, node_memory()))
+    told = comm.allgather((ranks, memory_of_this_node()))
     return ClusterNodes(
         ranks=tuple(ranks for ranks, _ in told if ranks), memory=min(memory for _, memory in told)
     )
 
 
-def group_memory() -> Iterator[tuple[float, float]]:
+def control_group_memory() -> Iterator[tuple[float, float]]:
     """Yield limit and use of memory of the control groups that this process is in [B].
 
     A batch system limits its jobs by them, of either generation; groups without a limit are left

@@ -44,6 +44,6 @@ def error_statement(setup: ProblemSetup) -> str:
         return "not measured (output.check = 'none')"
     which = "every load step" if check == "all" else "the last load step"
     causes = "grid, slopes"
-    causes += ", body" if setup.embedded else "; a block is not thought of"
-    causes += " and laws" if setup.by_laws else ""
+    causes += ", body" if setup.has_block else "; a block is not thought of"
+    causes += " and laws" if setup.uses_laws else ""
     return f"measured at {which}, by cause: {causes}"

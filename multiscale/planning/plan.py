@@ -35,9 +35,9 @@ def statements(setup: ProblemSetup, made: Cost | None = None) -> Iterator[tuple[
     yield "coupling", _coupling(setup)
     if setup.meshes is not None:
         yield "block", reference_statement(setup.scene, setup.meshes)
-    elif setup.embedded:
+    elif setup.has_block:
         yield "block", block_statement(setup)
-    if setup.by_laws:
+    if setup.uses_laws:
         yield "newton", _newton(setup)
     yield "load", _load(setup)
     if setup.decision is not None:
@@ -54,13 +54,13 @@ def warnings(setup: ProblemSetup) -> Iterator[str]:
         setup: The scene's ingredients.
     """
     yield from _surface_warnings(setup)
-    if setup.scene.output.fields and not setup.embedded:
+    if setup.scene.output.fields and not setup.has_block:
         yield "output.fields: there is no block, and no fields are written"
-    if setup.by_laws:
+    if setup.uses_laws:
         yield from _patch_warnings(setup)
     if setup.meshes is not None:
         yield from reference_warnings(setup.scene, setup.meshes)
-    elif setup.embedded:
+    elif setup.has_block:
         yield from block_warnings(setup)
     if setup.decision is not None and setup.decision.warning:
         yield setup.decision.warning
@@ -75,12 +75,12 @@ def _surface_warnings(setup: ProblemSetup) -> Iterator[str]:
             f"above the highest of the given heights, at x = {x:.4g} mm, y = {y:.4g} mm: the "
             "heights are too coarse or too noisy there"
         )
-    if not setup.reached_patches:
+    if not setup.interfering_patches:
         yield "nothing lies within the largest approach: no force will act"
-    if setup.ignores_border and setup.reached_at_border:
+    if setup.ignores_border and setup.interfering_border_maxima:
         yield (
             "maxima on the surface's border within the largest approach: "
-            f"{setup.reached_at_border}; an 8-neighbour search cannot confirm them, and they carry "
+            f"{setup.interfering_border_maxima}; an 8-neighbour search cannot confirm them, and they carry "
             "no load here"
         )
     if isinstance(setup.micro, AsperityModel) and setup.asperities.flat:
@@ -130,12 +130,12 @@ def _along_waves(setup: ProblemSetup) -> str:
 
 
 def _contact(setup: ProblemSetup) -> str:
-    if setup.by_summits:
+    if setup.uses_summits:
         return (
-            f"{len(setup.asperities)} summits, {int(setup.reached.sum())} within the largest "
+            f"{len(setup.asperities)} summits, {int(setup.interfering_summits.sum())} within the largest "
             "approach; the others cost nothing"
         )
-    reached = setup.reached_cells
+    reached = setup.interfering_cells
     return f"{reached.size} cells, {int(reached.sum())} within the largest approach"
 
 
@@ -167,15 +167,15 @@ def _coupling(setup: ProblemSetup) -> str:
     coupling, patches = setup.scene.coupling, setup.patches
     if setup.meshes is not None:
         return reference_coupling(setup.scene)
-    if not setup.embedded:
+    if not setup.has_block:
         return "analytic: the micro model alone on a half-space, no finite elements"
     grid = f"{patches.grid[0]} × {patches.grid[1]} patches"
-    if not setup.by_laws:
+    if not setup.uses_laws:
         return (
             "concurrent: the whole surface on the block at every load step, no laws; "
             f"{grid} gather the results"
         )
-    reached = setup.reached_patches
+    reached = setup.interfering_patches
     made = {
         "isolated": f"every patch alone, Love's {coupling.love} displacement",
         "consistent": "all from one solution of the whole surface" + _under_tilt(setup),

@@ -128,7 +128,7 @@ class _Search:
         model = setup.micro
         assert isinstance(model, HalfSpaceModel)
         resample = not by_surface and "micro.model" in auto_keys(self.given)
-        body = on_body(setup, None, half_space=not setup.embedded)
+        body = on_body(setup, None, half_space=not setup.has_block)
         cells = setup.surface.grid
         if resample:
             cells = _scaled(cells, 1.0 / _FIRST_CELLS)

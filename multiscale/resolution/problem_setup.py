@@ -30,7 +30,7 @@ from multiscale.resolution.micro_model import (
     stated_model,
 )
 from multiscale.scene.scene import Scene
-from multiscale.setup.checks import check_load, check_patches, check_size, patch_grid
+from multiscale.setup.checks import check_load, check_memory, check_patches, patch_grid
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import reference_meshes
 from multiscale.setup.surface import make_shape, make_surface
@@ -75,7 +75,7 @@ def _stage(scene: Scene, nodes: ClusterNodes, known: Any = None) -> ProblemSetup
         InputError: When something cannot be made or does not fit; names file, key and value.
     """
     began = time.perf_counter()
-    check_size(scene, nodes)
+    check_memory(scene, nodes)
     surface = make_surface(scene)
     check_patches(scene, surface)
     check_load(scene, surface)

@@ -29,7 +29,7 @@ BYTES_PER_NEW_LAW = 11_400
 BYTES_PER_STATE = 24
 """Memory of what a patch carries at one load step [B]."""
 
-EMBEDDED_CELLS = (40, 40, 25)
+LAW_BLOCK_CELLS = (40, 40, 25)
 """Cells of a block that carries the laws itself: those of Waddad et al. 2016."""
 
 FIELD_CELLS = (20, 20, 12)
@@ -46,7 +46,7 @@ def block_cells(scene: Scene) -> tuple[int, int, int]:
     """
     cells = scene.block.cells
     if cells is None or cells == "auto":
-        return EMBEDDED_CELLS if scene.coupling.on_mesh else FIELD_CELLS
+        return LAW_BLOCK_CELLS if scene.coupling.on_mesh else FIELD_CELLS
     return cells
 
 
@@ -63,7 +63,7 @@ def patch_grid(scene: Scene) -> tuple[int, int]:
     return PROVISIONAL_PATCHES if grid == "auto" else grid
 
 
-def check_size(scene: Scene, nodes: ClusterNodes) -> None:
+def check_memory(scene: Scene, nodes: ClusterNodes) -> None:
     """Refuse what could never fit into the memory of the nodes, before anything is allocated.
 
     Keys that are left to the plan are passed over: it takes nothing that would be refused.
@@ -75,18 +75,18 @@ def check_size(scene: Scene, nodes: ClusterNodes) -> None:
     Raises:
         InputError: Names the key, its value and what is allowed.
     """
-    for key, value, what, need in needs(scene):
-        if not nodes.fit(need):
+    for key, value, what, need in memory_requests(scene):
+        if not nodes.fits(need):
             raise InputError(
-                f"{what}needs about {need.alone / 1e9:.3g} GB of memory",
+                f"{what}needs about {need.total / 1e9:.3g} GB of memory",
                 key=key,
                 value=list(value) if isinstance(value, tuple) else value,
-                allowed=f"what fits into {nodes.room(need)}",
+                allowed=f"what fits into {nodes.remedy(need)}",
                 file=scene.file,
             )
 
 
-def needs(scene: Scene) -> Iterator[tuple[str, object, str, MemoryRequest]]:
+def memory_requests(scene: Scene) -> Iterator[tuple[str, object, str, MemoryRequest]]:
     """Yield keys, their values, what of them takes memory, and how much.
 
     Args:
@@ -96,7 +96,7 @@ def needs(scene: Scene) -> Iterator[tuple[str, object, str, MemoryRequest]]:
     if isinstance(grid, tuple):
         kept = math.prod(grid) * BYTES_PER_SENT_HEIGHT
         made = math.prod(grid) * BYTES_PER_HEIGHT - kept
-        yield "surface.grid", grid, "", MemoryRequest(held=kept, once=made)
+        yield "surface.grid", grid, "", MemoryRequest(per_rank=kept, root_only=made)
     if meshes_block(scene):  # a reference checks its meshes itself
         nx, ny, nz = block_cells(scene)
         yield "block.cells", (nx, ny, nz), "", MemoryRequest(shared=nx * ny * nz * BYTES_PER_CELL)
@@ -107,17 +107,21 @@ def needs(scene: Scene) -> Iterator[tuple[str, object, str, MemoryRequest]]:
     if not isinstance(patches, tuple):
         return
     count, steps = math.prod(patches), scene.loading.steps * len(scene.loading.load_history.points)
-    yield "patches.grid", patches, "", MemoryRequest(held=count * BYTES_PER_HEIGHT)
+    yield "patches.grid", patches, "", MemoryRequest(per_rank=count * BYTES_PER_HEIGHT)
     if scene.coupling.kind not in ("analytic", "reference"):
         what = "the interaction of all patches with each other "
-        yield "patches.grid", patches, what, MemoryRequest(held=count**2 * BYTES_PER_PAIR)
+        yield "patches.grid", patches, what, MemoryRequest(per_rank=count**2 * BYTES_PER_PAIR)
     if scene.coupling.kind in ("isolated", "consistent"):
         law, new = count * BYTES_PER_LAW, count * BYTES_PER_NEW_LAW
         dealt = scene.coupling.kind == "isolated"  # to the ranks; else all are made by rank 0
-        need = MemoryRequest(held=law, shared=new) if dealt else MemoryRequest(held=law, once=new)
+        need = (
+            MemoryRequest(per_rank=law, shared=new)
+            if dealt
+            else MemoryRequest(per_rank=law, root_only=new)
+        )
         yield "patches.grid", patches, "a law for every patch ", need
     what = f"the history of {count} patches "
-    need = MemoryRequest(held=steps * (count * BYTES_PER_STATE + 1000))
+    need = MemoryRequest(per_rank=steps * (count * BYTES_PER_STATE + 1000))
     yield "load.steps", scene.loading.steps, what, need
 
 

@@ -72,12 +72,12 @@ class ProblemSetup:
         return self.micro
 
     @property
-    def embedded(self) -> bool:
+    def has_block(self) -> bool:
         """Whether a block takes part."""
         return self.scene.coupling.kind != "analytic"
 
     @property
-    def by_laws(self) -> bool:
+    def uses_laws(self) -> bool:
         """Whether the patches get laws."""
         return self.scene.coupling.kind in ("isolated", "consistent")
 
@@ -89,7 +89,7 @@ class ProblemSetup:
         return able if stated is None else stated and able
 
     @property
-    def by_summits(self) -> bool:
+    def uses_summits(self) -> bool:
         """Whether the micro model sees summits rather than the whole surface."""
         return isinstance(self.micro, AsperityModel | ScaledModel)
 
@@ -97,7 +97,7 @@ class ProblemSetup:
     def ignores_border(self) -> bool:
         """Whether maxima on the surface's border carry no load in the micro model."""
         model = self.micro
-        return self.by_summits and not (
+        return self.uses_summits and not (
             isinstance(model, ScaledModel) and model.border == "include"
         )
 
@@ -107,12 +107,12 @@ class ProblemSetup:
 
         By default 1e-4, and 5e-4 for models that see cells, whose steps finer tables would trace.
         """
-        return self.scene.coupling.table_tolerance or (1e-4 if self.by_summits else 5e-4)
+        return self.scene.coupling.table_tolerance or (1e-4 if self.uses_summits else 5e-4)
 
     @property
     def table_rows(self) -> int:
         """Rows that laws may take to get there; models that see cells pay for each."""
-        return 400 if self.by_summits else MOST_ROWS
+        return 400 if self.uses_summits else MOST_ROWS
 
     @property
     def largest_local_approach(self) -> float:
@@ -130,7 +130,7 @@ class ProblemSetup:
         return max(self.plane_at_largest_load[0], float(overlap.max()))
 
     @property
-    def closure_ends(self) -> Array:
+    def largest_closures(self) -> Array:
         """Largest closure that each patch's law is made for, shape (N,) [mm].
 
         It is the largest approach there, and a reserve: the surface of a bent block may rise
@@ -149,28 +149,28 @@ class ProblemSetup:
         return ends + CLOSURE_RESERVE * self.largest_interference
 
     @property
-    def reached(self) -> NDArray[np.bool_]:
+    def interfering_summits(self) -> NDArray[np.bool_]:
         """Which summits lie within the largest approach, shape (n,)."""
         return self._overlap(self.asperities.x, self.asperities.y, self.asperities.z) > 0.0
 
     @property
-    def reached_at_border(self) -> int:
+    def interfering_border_maxima(self) -> int:
         """Number of the border's maxima within the largest approach."""
         cut = self.asperities
         return int(np.sum(self._overlap(cut.border_x, cut.border_y, cut.border_z) > 0.0))
 
     @property
-    def reached_cells(self) -> NDArray[np.bool_]:
+    def interfering_cells(self) -> NDArray[np.bool_]:
         """Which cells of the surface lie within the largest approach, shape (nx ny,)."""
         return self._overlap(*self._cells) > 0.0
 
     @property
-    def reached_patches(self) -> int:
+    def interfering_patches(self) -> int:
         """Number of patches with anything that the largest closure of their laws can touch."""
         summits = self.asperities.x, self.asperities.y, self.asperities.z
         x, y, z = summits if self.ignores_border else self._cells
         owner = self.patches.index_of(x, y)
-        return int(np.unique(owner[self.closure_ends[owner] > self.surface.highest - z]).size)
+        return int(np.unique(owner[self.largest_closures[owner] > self.surface.highest - z]).size)
 
     @property
     def _cells(self) -> tuple[Array, Array, Array]:

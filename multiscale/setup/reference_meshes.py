@@ -180,19 +180,19 @@ def reference_needs(shared: float, gathered: float = 0.0) -> Iterator[tuple[str,
         gathered: See `ReferenceMeshes.gathered`.
     """
     yield "the reference", MemoryRequest(shared=shared)
-    yield "gmsh on rank 0, which meshes the reference,", MemoryRequest(once=gathered)
+    yield "gmsh on rank 0, which meshes the reference,", MemoryRequest(root_only=gathered)
 
 
 def _check_memory(
     scene: Scene, key: str, nodes: ClusterNodes, shared: float, gathered: float = 0.0
 ) -> None:
     for what, need in reference_needs(shared, gathered):
-        if not nodes.fit(need):
+        if not nodes.fits(need):
             raise InputError(
-                f"{what} needs about {need.alone / 1e9:.3g} GB of memory",
+                f"{what} needs about {need.total / 1e9:.3g} GB of memory",
                 key=key,
                 value=scene.reference.cells or scene.reference.fine,
-                allowed=f"what fits into {nodes.room(need)}; or fewer reference.meshes",
+                allowed=f"what fits into {nodes.remedy(need)}; or fewer reference.meshes",
                 file=scene.file,
             )
 

@@ -116,7 +116,7 @@ def test_a_plan_solves_nothing_of_the_scene(monkeypatch, presses, kind):
 def test_patches_out_of_reach_build_no_law(monkeypatch):
     given = data("isolated", patches={"grid": [4, 4]}, load={"approach": 0.003, "steps": 1})
     run = Run(Scene.from_dict(given))
-    reached = run.setup.reached_patches
+    reached = run.setup.interfering_patches
     assert 0 < reached < 16
     solved = set()
     state = HalfSpaceModel._state

@@ -85,7 +85,7 @@ def test_rows_of_laws_are_as_many_as_predicted(solved, kind):
     run = Run(scene(kind))
     solved.clear()
     run.make_laws()
-    tables = run.setup.reached_patches if kind == "isolated" else 1
+    tables = run.setup.interfering_patches if kind == "isolated" else 1
     # a patch alone is pressed on the cells under it
     cells = 64**2 if kind == "consistent" else 64**2 // run.setup.patches.count
     # refinement takes 33 to 65 rows of the 56 that are predicted, and some to find its ends

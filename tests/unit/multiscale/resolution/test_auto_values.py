@@ -70,7 +70,7 @@ def test_under_a_force_a_half_space_tells_how_near_that_is(monkeypatch, tilt):
 def test_a_chosen_asperity_model_counts_and_warns_as_a_stated_one(monkeypatch):
     monkeypatch.setattr("micro.choice.candidates.contact_error", lambda kind, at: 1e-5)
     setup = make_setup(scene({"approach": 0.02}, model="auto", tolerance=0.45))
-    assert setup.by_summits
+    assert setup.uses_summits
     assert setup.ignores_border
     stated = make_setup(scene({"approach": 0.02}, model=setup.choice.taken.label))
     assert dict(statements(setup))["contact"] == dict(statements(stated))["contact"]
@@ -80,7 +80,7 @@ def test_a_chosen_asperity_model_counts_and_warns_as_a_stated_one(monkeypatch):
 
 def test_asperities_with_those_of_the_border_ignore_nothing():
     setup = make_setup(scene(model="elliptic", curvature="contact", border="include"))
-    assert setup.by_summits
+    assert setup.uses_summits
     assert not setup.ignores_border
 
 
