@@ -10,6 +10,7 @@ import numpy as np
 
 from geometry import PatchGrid, Surface
 from micro.asperities.model import MODELS
+from micro.choice.cost import contact_box_share, solution_seconds
 from micro.choice.expected_errors import contact_error, grid_error
 from micro.choice.measures import ContactMeasures
 from micro.factory import micro_model
@@ -27,21 +28,6 @@ _MOST_CELLS = 2**22
 
 _SCALED = {"curvature": "contact", "border": "include"}
 _SCALED_LABEL = "elliptic with curvature at the contact's scale and border summits"
-
-_COSTS = {
-    "elliptic": (2e-3, 1.8e-7, 1e-3, 0.0),
-    "circular": (2e-3, 1.8e-7, 1e-3, 0.0),
-    "elliptic-independent": (2e-3, 1.8e-7, 3e-4, 0.0),
-    "circular-independent": (2e-3, 1.8e-7, 3e-4, 0.0),
-    "scaled": (0.15, 1e-7, 4e-3, 6e-7),
-    "islands": (0.15, 1e-7, 3e-3, 1e-8),
-    "half-space": (0.0, 2e-7, 3e-3, 4e-7),
-}
-"""Seconds to set up, and per cell; seconds per approach, and per cell: minima on one core."""
-
-
-Cost = Callable[[str, int], float]
-"""Time of all solutions of a kind of model on so many cells [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,7 +72,6 @@ def options(
     solutions: int,
     patches: PatchGrid | None,
     periodic: bool,
-    cost: Cost | None = None,
 ) -> Iterator[Option]:
     """Yield the models that a surface and its patches allow.
 
@@ -97,10 +82,14 @@ def options(
         solutions: Approaches to be solved for.
         patches: Patches that must hold at least 8 cells of a grid along each side.
         periodic: Whether only periodic models are wanted.
-        cost: Predicted time of all solutions of a kind on so many cells [s]; by default what one
-            core took when it was measured.
     """
-    seconds = cost or partial(_cost, solutions=solutions)
+    largest = measures[-1]
+    box = contact_box_share(surface.heights - (surface.highest - largest.approach))
+
+    def seconds(kind: str, cells: int) -> float:
+        once = solution_seconds(kind, cells, box=box, summits=largest.summits)
+        return solutions * once
+
     parts = patches.grid if patches else (1, 1)
     if not periodic:
         for kind, label, made in _by_contacts(surface, contact_modulus, parts):
@@ -170,11 +159,6 @@ def _grids(surface: Surface, parts: tuple[int, int]) -> Iterator[tuple[float, tu
         fits = factor >= 1.0 or _fits(cells, parts)
         if factor == 1.0 or (fits and cells[0] * cells[1] <= _MOST_CELLS):
             yield factor, cells
-
-
-def _cost(kind: str, cells: int, solutions: int) -> float:
-    set_up, per_cell, each, each_per_cell = _COSTS[kind]
-    return set_up + per_cell * cells + solutions * (each + each_per_cell * cells)
 
 
 def _fits(cells: tuple[int, int], parts: tuple[int, int]) -> bool:

@@ -19,7 +19,7 @@ import numpy as np
 
 from geometry import PatchGrid, Surface
 from geometry.errors import InputError
-from micro.choice.candidates import Candidate, Cost, Option, options
+from micro.choice.candidates import Candidate, Option, options
 from micro.choice.check import Check
 from micro.choice.measures import contact_measures
 from micro.model import MicroModel
@@ -56,7 +56,6 @@ def choose(
     solutions: int = 40,
     patches: PatchGrid | None = None,
     periodic: bool = False,
-    cost: Cost | None = None,
     label: str | None = None,
 ) -> Choice:
     """Choose a micro model of a surface.
@@ -72,11 +71,9 @@ def choose(
         contact_modulus: E* [MPa].
         approach: Largest approach of the plane [mm].
         tolerance: Largest relative error of the force.
-        solutions: Approaches that the model will be solved for; set-up is shared among them.
+        solutions: Approaches that the model will be solved for.
         patches: Patches that must hold at least 8 cells of a grid along each side.
         periodic: Whether surface and pressures continue periodically; else the border is free.
-        cost: Predicted time of all solutions, of a kind of model (its name, or ``scaled``) on so
-            many cells [s]; by default what one core took when it was measured.
         label: Label of the only candidate that may be taken, such as an earlier choice.
 
     Raises:
@@ -99,7 +96,6 @@ def choose(
             solutions=solutions,
             patches=patches,
             periodic=periodic,
-            cost=cost,
         )
     )
     if label is not None:

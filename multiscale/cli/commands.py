@@ -12,7 +12,7 @@ from typing import Any
 from geometry.collective import on_root
 from geometry.errors import InputError, NotConverged, PatchlawError
 from geometry.statistics import roughness
-from multiscale.costs.prediction import Cost
+from multiscale.costs.prediction import Cost, predicted_cost
 from multiscale.couplings.blocks import load_together
 from multiscale.laws.files import write_laws
 from multiscale.machine.mpi_job import large_object_comm, refuse_detached_processes
@@ -21,8 +21,6 @@ from multiscale.output import terminal
 from multiscale.output.field_files import write_fields
 from multiscale.output.results import write_figure, write_results
 from multiscale.planning import plan
-from multiscale.planning.forecast import forecast
-from multiscale.planning.memory import memory_warnings
 from multiscale.resolution.problem_setup import make_setup
 from multiscale.restart.folder_lock import locked
 from multiscale.restart.interruption import Interruption, Stopped
@@ -131,13 +129,13 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
     load_together(scene, comm)
     nodes = cluster_nodes(comm)
     setup, made = on_root(large_object_comm(comm), lambda: _planned(scene, nodes))
-    terminal.show_plan(comm, setup, made, list(memory_warnings(setup, nodes)))
+    terminal.show_plan(comm, setup, made, list(plan.memory_warnings(setup, nodes)))
 
 
 def _planned(scene: Scene, nodes: ClusterNodes) -> tuple[ProblemSetup, Cost]:
     """Plan a run, on more nodes like those here if it takes them."""
     setup = make_setup(scene, nodes=replace(nodes, extensible=True))
-    return setup, forecast(setup)
+    return setup, predicted_cost(setup)
 
 
 def tabulate_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:

@@ -25,7 +25,7 @@ from multiscale.comparison.level import (
     pressure_grid,
 )
 from multiscale.costs.prediction import predicted_cost
-from multiscale.machine.rates import Machine
+from multiscale.costs.work import Machine
 from multiscale.resolution.problem_setup import make_setup
 from multiscale.scene.scene import Scene
 from multiscale.setup.checks import LAW_BLOCK_CELLS, patch_grid

@@ -15,8 +15,8 @@ from typing import Any
 import numpy
 import scipy
 
-from multiscale.costs.prediction import peak_memory
 from multiscale.couplings.reference import ReferenceCoupling
+from multiscale.machine.nodes import peak_memory
 from multiscale.run import Run
 from multiscale.setup.problem import ProblemSetup
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +16,9 @@ from geometry import Asperities, PatchGrid
 from micro import HalfSpaceModel, asperity_model
 from multiscale import Run, Scene, make_setup
 from multiscale.cli.command_line import main
+from multiscale.costs.prediction import predicted_cost
+from multiscale.costs.work import Machine, Work, this_machine
 from multiscale.output.results import write_results
-from multiscale.planning.forecast import forecast
 
 FINITE_ELEMENTS = ("dolfinx", "petsc4py", "macro", "gmsh")
 PICTURES = ("matplotlib",)
@@ -108,8 +108,7 @@ def test_a_plan_solves_nothing_of_the_scene(monkeypatch, presses, kind):
     monkeypatch.setattr("multiscale.couplings.assembly.make_table", never)
     given = data(kind, grid=128)
     setup = make_setup(Scene.from_dict(given))
-    made = forecast(setup)
-    assert made.total > 0.0
+    assert predicted_cost(setup).total > 0.0
     assert presses == []
 
 
@@ -166,15 +165,15 @@ def test_summits_out_of_reach_cost_nothing(monkeypatch):
     assert evaluations(monkeypatch, 40) == alone
 
 
-def test_a_scene_without_open_keys_weighs_no_alternatives(monkeypatch):
-    monkeypatch.setattr("multiscale.resolution.accuracy.predicted_cost", never)
-    monkeypatch.setattr("multiscale.resolution.problem_setup.accurate_stage", never)
+def test_a_scene_without_auto_values_predicts_no_cost():
+    this_machine.cache_clear()
     setup = make_setup(Scene.from_dict(data("consistent")))
     assert setup.decision is None
+    assert vars(this_machine()) == {}  # whose speed no prediction has asked for
 
 
-def test_a_run_predicts_nothing_and_writes_what_it_took(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr("multiscale.costs.prediction.run_work", never)
+def test_a_run_predicts_nothing_and_writes_what_it_took(tmp_path, capsys):
+    this_machine.cache_clear()
     path = tmp_path / "scene.json.toml"
     path.write_text(
         "[surface]\nspectrum = {hurst = 0.9, waves = [2, 4], rms_slope = 0.1}\n"
@@ -183,16 +182,15 @@ def test_a_run_predicts_nothing_and_writes_what_it_took(monkeypatch, tmp_path, c
         "[load]\napproach = 0.004\nsteps = 2\n[output]\nfigures = false\n"
     )
     assert main(["run", str(path), "--out", str(tmp_path / "results")]) == 0
+    assert vars(this_machine()) == {}
     told = capsys.readouterr().out
     assert "took: surface" in told
     assert "memory" in told
 
 
-def test_rates_are_measured_only_where_they_are_needed():
-    from multiscale.costs.work import Work
-    from multiscale.machine.rates import Machine
-
+def test_ratios_of_a_machine_are_measured_only_where_they_are_needed():
     machine = Machine()
-    assert Work(call=10.0, passes=5.0).seconds(machine) > 0.0
-    assert set(vars(machine)) == {"call", "passes"}
-    assert replace(Work(call=1.0), call=0.0).seconds(Machine()) == 0.0
+    assert machine.seconds(Work()) == 0.0
+    assert vars(machine) == {}
+    assert machine.seconds(Work(arrays=10.0)) > 0.0
+    assert set(vars(machine)) == {"arrays"}

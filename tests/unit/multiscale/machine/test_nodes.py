@@ -13,7 +13,6 @@ from mpi4py import MPI
 from geometry.errors import InputError
 from multiscale import Scene, make_setup
 from multiscale.cli.command_line import main
-from multiscale.machine import nodes
 from multiscale.machine.nodes import (
     ClusterNodes,
     MemoryRequest,
@@ -21,7 +20,7 @@ from multiscale.machine.nodes import (
     control_group_memory,
     memory_of_this_node,
 )
-from multiscale.planning.memory import memory_warnings
+from multiscale.planning.plan import memory_warnings
 from multiscale.setup.checks import check_memory, memory_requests
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
@@ -124,9 +123,9 @@ def test_isolated_laws_are_dealt_to_the_ranks():
     words = ("patches.grid=[200, 200]", "surface.grid=[800, 800]")
     laws = {
         kind: next(
-            need
-            for _, _, what, need in memory_requests(scene(*words, f"coupling.kind={kind}"))
-            if what == "a law for every patch "
+            request
+            for request in memory_requests(scene(*words, f"coupling.kind={kind}"))
+            if request.purpose == "a law for every patch"
         )
         for kind in ("isolated", "consistent")
     }
@@ -189,19 +188,18 @@ def test_cells_of_a_block_take_memory_only_where_it_is_meshed(kind):
         ("1:cpu:/job", "job", ("memory.max", "memory.current"), ("3000", "1000"), []),
     ],
 )  # fmt: skip
-def test_control_groups_limit_a_node(monkeypatch, tmp_path, group, folder, names, told, found):
+def test_control_groups_limit_a_node(tmp_path, group, folder, names, told, found):
     place = tmp_path / "groups" / folder
     place.mkdir(parents=True)
     for name, text in zip(names, told, strict=True):
         (place / name).write_text(f"{text}\n", encoding="utf-8")
     (tmp_path / "mine").write_text(f"{group}\n", encoding="utf-8")
-    monkeypatch.setattr(nodes, "_GROUPS", tmp_path / "groups")
-    monkeypatch.setattr(nodes, "_OWN", tmp_path / "mine")
-    assert list(control_group_memory()) == found
-    assert memory_of_this_node() == (found[0][0] if found else ClusterNodes().memory)
-    monkeypatch.setattr(nodes, "_OWN", tmp_path / "nowhere")
-    assert list(control_group_memory()) == []
-    assert memory_of_this_node() > 1e8
+    limits = list(control_group_memory(tmp_path / "mine", tmp_path / "groups"))
+    assert limits == found
+    if found:
+        assert memory_of_this_node(limits) == found[0][0]
+    assert list(control_group_memory(tmp_path / "nowhere", tmp_path / "groups")) == []
+    assert memory_of_this_node([]) > 1e8
 
 
 def test_limit_of_a_process_counts():
