@@ -28,7 +28,6 @@ from multiscale.couplings.blocks import (
 from multiscale.couplings.load_steps import EmbeddedCoupling
 from multiscale.couplings.newton_choice import newton_choice
 from multiscale.couplings.reference import ReferenceCoupling, recorded, reference_notes
-from multiscale.errors.load_steps import checked, error_notes, error_probe
 from multiscale.laws.files import LawTable, read_laws, write_laws
 from multiscale.laws.refinement import missed_notes
 from multiscale.laws.repair import repair_notes
@@ -36,6 +35,7 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling, LoadPosition, LoadStepper, Restorable
 from multiscale.machine.mpi_job import large_object_comm
 from multiscale.machine.nodes import cluster_nodes
+from multiscale.measured_errors import checked, error_notes, error_probe
 from multiscale.resolution.auto_keys import resolved_keys
 from multiscale.resolution.problem_setup import make_setup
 from multiscale.results.history import History

@@ -21,6 +21,7 @@ from multiscale.output import terminal
 from multiscale.output.field_files import write_fields
 from multiscale.output.results import write_figure, write_results
 from multiscale.planning import plan
+from multiscale.planning.block_plan import memory_warnings
 from multiscale.resolution.problem_setup import make_setup
 from multiscale.restart.folder_lock import locked
 from multiscale.restart.interruption import Interruption, Stopped
@@ -129,7 +130,7 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
     load_together(scene, comm)
     nodes = cluster_nodes(comm)
     setup, made = on_root(large_object_comm(comm), lambda: _planned(scene, nodes))
-    terminal.show_plan(comm, setup, made, list(plan.memory_warnings(setup, nodes)))
+    terminal.show_plan(comm, setup, made, list(memory_warnings(setup, nodes)))
 
 
 def _planned(scene: Scene, nodes: ClusterNodes) -> tuple[ProblemSetup, Cost]:

@@ -1,12 +1,14 @@
-"""Says what the block of a run is made of, or the meshes of a reference, and what is doubtful."""
+"""Says what the block or the meshes of a run are, whether they fit its patches and the memory."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
 from geometry.meshes.block import BlockShape, alignment
+from multiscale.machine.nodes import ClusterNodes
+from multiscale.setup.checks import memory_requests
 from multiscale.setup.problem import ProblemSetup
-from multiscale.setup.reference_meshes import ReferenceMeshes
+from multiscale.setup.reference_meshes import ReferenceMeshes, reference_requests
 
 LOCKING_FROM = 0.45
 """Poisson's ratio above which linear elements lock. Two by two patches on 8 × 8 × 6 trilinear
@@ -52,6 +54,7 @@ def block_warnings(setup: ProblemSetup) -> Iterator[str]:
     Args:
         setup: The problem, with a block.
     """
+    yield from _patch_warnings(setup)
     if setup.meshes is not None:
         yield from _mesh_warnings(setup.meshes)
     elif setup.scene.coupling.decomposed:
@@ -76,6 +79,39 @@ def block_warnings(setup: ProblemSetup) -> Iterator[str]:
         fit = alignment(setup.shape, setup.patches)
         if not fit:
             yield fit.sentence
+
+
+def memory_warnings(setup: ProblemSetup, nodes: ClusterNodes) -> Iterator[str]:
+    """Yield what a run needs more memory for than the nodes have.
+
+    Args:
+        setup: The problem.
+        nodes: The nodes there are.
+    """
+    requests = [*memory_requests(setup.scene)]
+    if setup.meshes is not None:
+        requests += reference_requests(setup.scene, setup.meshes)
+    for request in requests:
+        if not nodes.fits(request):
+            key = "" if request.value is None else f"{request.key} = {request.value}: "
+            yield f"{key}{request.sentence}; there is {nodes.remedy(request)}"
+
+
+def _patch_warnings(setup: ProblemSetup) -> Iterator[str]:
+    if setup.scene.coupling.kind != "isolated":
+        return
+    grids = zip(setup.surface.grid, setup.patches.grid, strict=True)
+    if setup.model.name == "islands" and any(cells % patches for cells, patches in grids):
+        yield (
+            "patch borders cut cells of the surface: every patch is taken alone along whole cells; "
+            "a grid that is a multiple of the patches would fit"
+        )
+    widths = [length + 2.0 * setup.shape.margin for length in setup.surface.lengths]
+    if max(setup.patches.size) > 0.5 * min(setup.shape.height, *widths):
+        yield (
+            "the patches are not small against the block: the half-space correction (Love) inside "
+            "their laws is an approximation there"
+        )
 
 
 def _meshes(meshes: ReferenceMeshes) -> str:

@@ -8,12 +8,9 @@ from geometry.statistics import roughness
 from micro import MODELS, AsperityModel, HalfSpaceModel
 from multiscale.costs.prediction import Cost
 from multiscale.couplings.newton_choice import newton_choice
-from multiscale.machine.nodes import ClusterNodes
 from multiscale.planning.block_plan import block_statement, block_warnings
 from multiscale.resolution.auto_keys import heights_per_wave
-from multiscale.setup.checks import memory_requests
 from multiscale.setup.problem import ProblemSetup
-from multiscale.setup.reference_meshes import reference_requests
 
 _INTERACTING = ("elliptic", "circular")
 
@@ -74,43 +71,10 @@ def warnings(setup: ProblemSetup) -> Iterator[str]:
         )
     if setup.scene.output.fields and not setup.has_block:
         yield "output.fields: there is no block, and no fields are written"
-    if setup.scene.coupling.kind == "isolated":
-        yield from _isolated_warnings(setup)
     if setup.has_block:
         yield from block_warnings(setup)
     if setup.decision is not None and setup.decision.warning:
         yield setup.decision.warning
-
-
-def _isolated_warnings(setup: ProblemSetup) -> Iterator[str]:
-    grids = zip(setup.surface.grid, setup.patches.grid, strict=True)
-    if setup.model.name == "islands" and any(cells % patches for cells, patches in grids):
-        yield (
-            "patch borders cut cells of the surface: every patch is taken alone along whole cells; "
-            "a grid that is a multiple of the patches would fit"
-        )
-    widths = [length + 2.0 * setup.shape.margin for length in setup.surface.lengths]
-    if max(setup.patches.size) > 0.5 * min(setup.shape.height, *widths):
-        yield (
-            "the patches are not small against the block: the half-space correction (Love) inside "
-            "their laws is an approximation there"
-        )
-
-
-def memory_warnings(setup: ProblemSetup, nodes: ClusterNodes) -> Iterator[str]:
-    """Yield what a run needs more memory for than the nodes have.
-
-    Args:
-        setup: The problem.
-        nodes: The nodes there are.
-    """
-    requests = [*memory_requests(setup.scene)]
-    if setup.meshes is not None:
-        requests += reference_requests(setup.scene, setup.meshes)
-    for request in requests:
-        if not nodes.fits(request):
-            key = "" if request.value is None else f"{request.key} = {request.value}: "
-            yield f"{key}{request.sentence}; there is {nodes.remedy(request)}"
 
 
 def surface_statement(setup: ProblemSetup) -> str:

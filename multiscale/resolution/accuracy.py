@@ -1,50 +1,49 @@
 """Resolves auto values by errors that are measured at the largest load.
 
 The contact problem on the scene's body is solved on coarse cells, its errors are measured
-(`multiscale.errors`), and the cells are refined until the sum of the errors keeps the accuracy.
-Where causes other than the cells exceed it, or where meshing the roughness is predicted to take
-less time, the meshes of a reference are refined in the same way.
+(`multiscale.measured_errors`), and the cells are refined until the sum of the errors keeps the
+accuracy. Where causes other than the cells exceed it, or where meshing the roughness is predicted
+to take less time, the meshes of a reference are refined in the same way.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from geometry.errors import InputError, NotConverged
 from micro import HalfSpaceModel, resampled
 from multiscale.costs.prediction import predicted_cost
 from multiscale.couplings.blocks import SLOPES, OnBody, on_body
-from multiscale.couplings.reference import make_reference, recorded
-from multiscale.errors.load_steps import error_probe
+from multiscale.measured_errors import error_probe
 from multiscale.resolution.auto_keys import (
     MOST_HEIGHTS,
-    accuracy_of,
     auto_keys,
     couplings,
     map_grid,
     on_waves,
     with_value,
 )
+from multiscale.resolution.mesh_accuracy import (
+    TRIALS,
+    Build,
+    Errors,
+    MeshError,
+    MeshSearch,
+    refinement,
+)
 from multiscale.scene.scene import Scene
 from multiscale.setup.decision import Alternative, Decision
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.surface import make_surface
 
-Build = Callable[[Scene], ProblemSetup]
-MeshError = Callable[[ProblemSetup], float]
 Cells = tuple[int, int]
-Errors = Mapping[str, float]
 
 _SPARE = 0.8
 """Share of the accuracy that errors at the largest load may take; errors at other loads differ."""
 _ORDER = 1.5
 """Order of the force in the size of the cells, for the next grid to try."""
-_LEAST_STEP, _LARGEST_STEP = 1.3, 2.0
-"""Limits of the refinement from one trial to the next."""
-_TRIALS = 6
-"""Most trials."""
 _COARSE, _FINE = 8, 16
 """Heights along the shortest wave that are tried first, and that are enough for summits and for
 meshes."""
@@ -52,10 +51,6 @@ _FIRST_CELLS = 4
 """Coarsening of a given grid for the first trial, along a side."""
 _LEAST_CELLS = 48
 """Cells along a side at least."""
-_DEFAULT_MESHES = 0.005
-"""Error, roughly, of the meshes that a reference has by default."""
-_COARSEST_MESH = 1.8
-"""Largest edge length of the first meshes, relative to the default."""
 _CHEAPER = 0.7
 """Time of a reference, relative to that of another coupling, below which it is taken."""
 _NOTHING_TO_SAVE = 4.0
@@ -85,44 +80,14 @@ def setup_by_accuracy(
     if "patches.grid" in auto:
         setup = build(with_value(start, "patches.grid", map_grid(setup.surface)))
     if setup.meshes is not None:
-        return search.decided(*search.refined_meshes(setup))
+        return search.decided(*search.with_refined_meshes(setup))
     if isinstance(setup.micro, HalfSpaceModel):
         return search.cheapest(*search.refined_cells(setup, setup.micro))
     return search.decided(setup, {})
 
 
-def measured_mesh_error(setup: ProblemSetup) -> float:
-    """Return the relative error of the force by the meshes of a reference at the largest load.
-
-    Args:
-        setup: The problem, of a reference with several meshes.
-
-    Raises:
-        NotConverged: When the contact problem cannot be solved.
-    """
-    coupling, load_history = make_reference(setup, None), setup.scene.loading.load_history
-    step = coupling.press(load_history.control(load_history.largest))
-    (found,) = recorded(setup, coupling, [step]).with_errors([step])
-    if not step.force_N > 0.0:
-        return 0.0
-    if found.force_error_N is None or found.approach_error_mm is None:
-        return 1.0
-    if load_history.quantity == "force":
-        return 1.5 * found.approach_error_mm / abs(found.approach_mm)  # F grows as δ^1.5
-    return found.force_error_N / found.force_N
-
-
-@dataclass(frozen=True)
-class _Search:
+class _Search(MeshSearch):
     """The search for auto values of one scene; see `setup_by_accuracy`."""
-
-    given: Scene
-    build: Build
-    mesh_error: MeshError
-
-    @property
-    def accuracy(self) -> float:
-        return accuracy_of(self.given)
 
     def refined_cells(
         self, setup: ProblemSetup, model: HalfSpaceModel
@@ -134,7 +99,7 @@ class _Search:
         if may_refine and not new_surface:
             cells = _scaled(cells, 1.0 / _FIRST_CELLS)
         body = on_body(setup, None, half_space=not setup.has_block)
-        for trial in range(_TRIALS):
+        for trial in range(TRIALS):
             if new_surface:
                 surface = make_surface(with_value(setup.scene, "surface.grid", cells))
                 highest = surface.highest
@@ -144,10 +109,10 @@ class _Search:
             errors = self._measured(setup, model, body)
             others = sum(errors.values()) - errors["grid"]
             allowed = max(_SPARE * self.accuracy - others, 0.5 * others)
-            last = trial == _TRIALS - 1 or max(cells) >= MOST_HEIGHTS
+            last = trial == TRIALS - 1 or max(cells) >= MOST_HEIGHTS
             if not may_refine or last or errors["grid"] <= allowed:
                 break
-            cells = _scaled(cells, _refinement(errors["grid"] / allowed, _ORDER))
+            cells = _scaled(cells, refinement(errors["grid"] / allowed, _ORDER))
         if new_surface:
             setup = self.build(with_value(setup.scene, "surface.grid", model.surface.grid))
         return replace(setup, micro=model), errors
@@ -178,10 +143,10 @@ class _Search:
         if not self._may_be_meshed or (keeps and _seconds(setup) < _NOTHING_TO_SAVE):
             return self.decided(setup, errors, others)
         try:
-            meshed = self._first_meshes(self.build(_meshed(setup.scene)))
+            meshed = self.with_first_meshes(self.build(_meshed(setup.scene)))
             if keeps and _seconds(meshed) > _CHEAPER * _seconds(setup):
                 return self.decided(setup, errors, [*others, _alternative(meshed)])
-            meshed, mesh_errors = self.refined_meshes(meshed)
+            meshed, mesh_errors = self.with_refined_meshes(meshed)
         except (InputError, NotConverged):  # the block or the memory does not allow meshes
             return self.decided(setup, errors, others)
         if not keeps and sum(mesh_errors.values()) > sum(errors.values()):
@@ -189,12 +154,10 @@ class _Search:
         others = [_alternative(setup), *others]
         return self.decided(meshed, mesh_errors, others, missed={} if keeps else errors)
 
-    def _coupled(self, setup: ProblemSetup) -> Iterable[ProblemSetup]:
+    def _coupled(self, setup: ProblemSetup) -> Iterator[ProblemSetup]:
         """Yield the problem with every coupling that may be chosen."""
-        sections: Iterable = [setup.scene.coupling]
-        if "coupling.kind" in auto_keys(self.given):
-            sections = couplings(self.given)
-        for section in sections:
+        chosen = "coupling.kind" in auto_keys(self.given)
+        for section in couplings(self.given) if chosen else iter([setup.scene.coupling]):
             if section.kind == "consistent" and section.table_tolerance is None:
                 tolerance = {"table_tolerance": 0.1 * self.accuracy}
                 section = section.model_copy(update=tolerance)
@@ -206,42 +169,11 @@ class _Search:
         stated = self.given.coupling.model_fields_set - {"kind"}
         return {"coupling.kind", "micro.model"} <= auto_keys(self.given) and not stated
 
-    def refined_meshes(self, setup: ProblemSetup) -> tuple[ProblemSetup, Errors]:
-        """Refine the meshes of a reference until their error keeps the accuracy."""
-        setup = self._first_meshes(setup)
-        assert setup.meshes is not None
-        if len(setup.meshes.shapes) == 1:  # one mesh does not show its error
-            return setup, {}
-        for _ in range(_TRIALS):
-            error, fine = self.mesh_error(setup), setup.scene.reference.fine
-            if error <= self.accuracy or not self._may_refine(setup) or fine is None:
-                break
-            finer = _refinement(error / self.accuracy, setup.meshes.force_order)
-            try:
-                setup = self.build(with_value(setup.scene, "reference.fine", fine / finer))
-            except InputError:  # more memory than there is
-                break
-        return setup, {"mesh": error}
-
-    def _may_refine(self, setup: ProblemSetup) -> bool:
-        """Tell whether the scene leaves the size of tetrahedra open."""
-        assert setup.meshes is not None
-        return self.given.reference.fine is None and not setup.meshes.hexahedral
-
-    def _first_meshes(self, setup: ProblemSetup) -> ProblemSetup:
-        """Return a reference with the meshes to try first, coarser for a lower accuracy."""
-        if not self._may_refine(setup) or setup.scene.reference.fine is not None:
-            return setup
-        assert setup.meshes is not None
-        coarser = min(max((self.accuracy / _DEFAULT_MESHES) ** 0.5, 1.0), _COARSEST_MESH)
-        fine = coarser * float(setup.meshes.sizes[-1])
-        return self.build(with_value(setup.scene, "reference.fine", fine))
-
     def decided(
         self,
         setup: ProblemSetup,
         errors: Errors,
-        others: Iterable[Alternative] = (),
+        others: Sequence[Alternative] = (),
         missed: Errors | None = None,
     ) -> ProblemSetup:
         """Return the problem with what was decided for it."""
@@ -253,11 +185,6 @@ class _Search:
             missed=missed or {},
         )
         return replace(setup, decision=decision)
-
-
-def _refinement(excess: float, order: float) -> float:
-    """Return the refinement for the next trial from error over allowed error."""
-    return min(max(excess ** (1.0 / order), _LEAST_STEP), _LARGEST_STEP)
 
 
 def _scaled(cells: Cells, factor: float) -> Cells:

@@ -27,7 +27,7 @@ from micro import (
 from multiscale.couplings.load_steps import ContactCoupling
 from multiscale.loading.stepper import Coupling, LoadHistory, load_steps
 from multiscale.machine.nodes import ClusterNodes
-from multiscale.resolution.accuracy import MeshError, measured_mesh_error, setup_by_accuracy
+from multiscale.resolution.accuracy import setup_by_accuracy
 from multiscale.resolution.auto_keys import (
     accuracy_of,
     auto_keys,
@@ -37,6 +37,7 @@ from multiscale.resolution.auto_keys import (
     with_resolved,
     with_value,
 )
+from multiscale.resolution.mesh_accuracy import MeshError, measured_mesh_error
 from multiscale.scene.scene import Scene
 from multiscale.setup.checks import check_load, check_memory, check_patches, patch_grid
 from multiscale.setup.problem import ProblemSetup

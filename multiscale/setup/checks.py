@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
 from geometry.errors import InputError
 from geometry.files import BYTES_PER_HEIGHT
@@ -88,46 +89,36 @@ def memory_requests(scene: Scene) -> Iterator[MemoryRequest]:
     Args:
         scene: The scene.
     """
+
+    def request(key: str, value: Any, purpose: str = "", **sizes: Any) -> MemoryRequest:
+        return MemoryRequest(key=key, value=value, purpose=purpose, **sizes)
+
     grid, patches, kind = scene.surface.grid, scene.patches.grid, scene.coupling.kind
     if isinstance(grid, tuple):
         sent = math.prod(grid) * BYTES_PER_SENT_HEIGHT
         made = math.prod(grid) * BYTES_PER_HEIGHT - sent
-        yield MemoryRequest(key="surface.grid", value=grid, per_rank=sent, root_only=made)
+        yield request("surface.grid", grid, per_rank=sent, root_only=made)
     if meshes_block(scene):
         nx, ny, nz = block_cells(scene)
-        shared = nx * ny * nz * BYTES_PER_CELL
-        yield MemoryRequest(key="block.cells", value=(nx, ny, nz), shared=shared)
+        yield request("block.cells", (nx, ny, nz), shared=nx * ny * nz * BYTES_PER_CELL)
         if scene.block.margin:
             margin = scene.block.margin_cells
-            shared = (nx + 2 * margin) * (ny + 2 * margin) * nz * BYTES_PER_CELL
-            yield MemoryRequest(key="block.margin_cells", value=margin, shared=shared)
+            cells = (nx + 2 * margin) * (ny + 2 * margin) * nz
+            yield request("block.margin_cells", margin, shared=cells * BYTES_PER_CELL)
     if not isinstance(patches, tuple):
         return
-    count, steps = math.prod(patches), scene.loading.load_history.count
-    yield MemoryRequest(key="patches.grid", value=patches, per_rank=count * BYTES_PER_HEIGHT)
+    key, count = "patches.grid", math.prod(patches)
+    yield request(key, patches, per_rank=count * BYTES_PER_HEIGHT)
     if kind not in ("analytic", "reference"):
-        yield MemoryRequest(
-            key="patches.grid",
-            value=patches,
-            purpose="the interaction of all patches with each other",
-            per_rank=count**2 * BYTES_PER_PAIR,
-        )
-    if kind in ("isolated", "consistent"):
-        new = count * BYTES_PER_NEW_LAW  # isolated laws are divided over the ranks
-        yield MemoryRequest(
-            key="patches.grid",
-            value=patches,
-            purpose="a law for every patch",
-            per_rank=count * BYTES_PER_LAW,
-            shared=new if kind == "isolated" else 0.0,
-            root_only=0.0 if kind == "isolated" else new,
-        )
-    yield MemoryRequest(
-        key="load.steps",
-        value=scene.loading.steps,
-        purpose=f"the history of {count} patches",
-        per_rank=steps * (count * BYTES_PER_STATE + BYTES_PER_STEP),
-    )
+        purpose = "the interaction of all patches with each other"
+        yield request(key, patches, purpose, per_rank=count**2 * BYTES_PER_PAIR)
+    if kind in ("isolated", "consistent"):  # isolated laws are divided over the ranks
+        where = "shared" if kind == "isolated" else "root_only"
+        sizes = {"per_rank": count * BYTES_PER_LAW, where: count * BYTES_PER_NEW_LAW}
+        yield request(key, patches, "a law for every patch", **sizes)
+    steps, purpose = scene.loading.load_history.count, f"the history of {count} patches"
+    size = steps * (count * BYTES_PER_STATE + BYTES_PER_STEP)
+    yield request("load.steps", scene.loading.steps, purpose, per_rank=size)
 
 
 def check_patches(scene: Scene, surface: Surface) -> None:

@@ -50,7 +50,7 @@ FLOORS = {
         "results scene",
         "setup",
         "couplings",
-        "costs errors",
+        "costs measured_errors",
         "resolution",
         "planning run",
         "output restart",

@@ -9,8 +9,7 @@ import pytest
 from geometry import BlockShape
 from micro import HalfSpaceModel
 from multiscale import Run, Scene, make_setup
-from multiscale.costs.contacts import step_count
-from multiscale.costs.prediction import predicted_cost, reference_work
+from multiscale.costs.prediction import predicted_cost, reference_work, step_count
 from multiscale.costs.work import Machine, Work, this_machine
 from multiscale.loading.stepper import LoadHistory
 from multiscale.setup.reference_meshes import mesh_unknowns

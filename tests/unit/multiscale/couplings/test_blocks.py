@@ -7,7 +7,7 @@ import pytest
 
 from micro import BodyModes, FiniteSlopes, FreeSides
 from multiscale import Scene, make_setup
-from multiscale.costs.contacts import solution_work
+from multiscale.costs.prediction import solution_work
 from multiscale.couplings.blocks import contact_model, free_sides, patch_displacements
 
 

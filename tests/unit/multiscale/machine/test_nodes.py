@@ -20,7 +20,7 @@ from multiscale.machine.nodes import (
     control_group_memory,
     memory_of_this_node,
 )
-from multiscale.planning.plan import memory_warnings
+from multiscale.planning.block_plan import memory_warnings
 from multiscale.setup.checks import check_memory, memory_requests
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"

@@ -13,7 +13,7 @@ from geometry.control import Control
 from geometry.errors import NotConverged
 from multiscale import Run, Scene, run
 from multiscale.couplings.blocks import on_body
-from multiscale.errors.measured import ErrorProbe, MeasuredErrors
+from multiscale.measured_errors import ErrorProbe, MeasuredErrors
 from multiscale.output.report import curve_cells, with_error
 from multiscale.output.results import write_results
 from multiscale.output.tables import write_tables
