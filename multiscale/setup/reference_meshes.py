@@ -51,19 +51,22 @@ class ReferenceMeshes:
         sizes: Edge lengths where contact can occur, falling, shape (meshes,) [mm].
         across: Edges of the finest mesh across a typical contact at the largest load, estimated.
         unknowns: Degrees of freedom, estimated for tetrahedra.
-        key: Key of the scene that decides how fine they are.
     """
 
     shapes: tuple[Shape, ...]
     sizes: Array
     across: float
     unknowns: tuple[int, ...]
-    key: str
 
     @property
     def hexahedral(self) -> bool:
         """Whether the cells are hexahedra."""
         return self.shapes[-1].hexahedral
+
+    @property
+    def key(self) -> str:
+        """Key of the scene that decides how fine the meshes are."""
+        return _key(self.hexahedral)
 
     @property
     def degree(self) -> int:
@@ -107,7 +110,6 @@ def reference_meshes(
     """
     _check_block(scene)
     hexahedral, fine = scene.reference.hexahedral, scene.reference.fine
-    key = "reference.cells" if hexahedral else "reference.fine"
     approach, tilt = plane_at_largest_load.approach, plane_at_largest_load.tilt
     prescribed = scene.loading.force is None and scene.loading.tilt != "free"
     largest = approach if prescribed else (1.0 + _RESERVE) * approach
@@ -121,14 +123,13 @@ def reference_meshes(
         )
         radius = contact_radius(surface, approach, tilt=tilt)
     except InputError as error:
-        raise error.located(key=key, file=scene.file) from None
+        raise error.located(key=_key(hexahedral), file=scene.file) from None
     sizes = np.array([characteristic_size(shape) for shape in shapes])
     meshes = ReferenceMeshes(
         shapes=shapes,
         sizes=sizes,
         across=2.0 * radius / float(sizes[-1]),
         unknowns=tuple(mesh_unknowns(shape) for shape in shapes),
-        key=key,
     )
     check_memory(scene, nodes, reference_requests(scene, meshes))
     return meshes
@@ -151,12 +152,16 @@ def _requests(scene: Scene, shared: float, gathered: float = 0.0) -> Iterator[Me
         ("gmsh on rank 0, which meshes the reference,", {"root_only": gathered}),
     ):
         yield MemoryRequest(
-            key="reference.cells" if reference.hexahedral else "reference.fine",
+            key=_key(reference.hexahedral),
             value=reference.cells or reference.fine,
             purpose=purpose,
             alternative="fewer reference.meshes",
             **sizes,
         )
+
+
+def _key(hexahedral: bool) -> str:
+    return "reference.cells" if hexahedral else "reference.fine"
 
 
 def _mesh_keys(scene: Scene) -> dict[str, Any]:
