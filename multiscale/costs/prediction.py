@@ -20,16 +20,19 @@ from multiscale.machine.nodes import peak_memory
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import ReferenceMeshes, mesh_unknowns
 
-# contact problems, measured on 64² to 512² heights of Set 1 of Waddad et al. 2016 and of bands of
-# 1 to 6 and 2 to 32 waves
+# contact problems
 ROWS = {"cells": 56, "summits": 70}
 """Rows of a table of laws. Models of cells took 45 to 65, models of summits 60 to 150."""
-_ERROR_CHECK = 1.5
-"""Solutions that measuring the errors of a load step is worth; 0.5 to 2.5 were measured."""
-_FINITE_SLOPES = 2.5
-"""Factor of the work where finite slopes are taken into account."""
-_BLOCK = 1.3
-"""Factor of the work where the half-space has free sides and the correction of a body."""
+_ROW = 1.5
+"""Solutions that a row of consistent laws is worth, with its derivative; measured on 64² cells."""
+_BLOCK, _BLOCK_EACH = 1.9, 5e-3
+"""Factor of the work of a solution, and time besides [s], where the half-space has free sides and
+the correction of a body; measured on 64² to 256² cells, like the next two."""
+_SLOPES, _SLOPES_EACH = 1.8, 20e-3
+"""Factor of the work of a solution, and time besides [s], with finite slopes."""
+_ERROR_CHECK = 5.0
+"""Solutions that measuring the errors of a load step is worth; 2 to 7 were measured with finite
+slopes."""
 _PATCH_SUMS = 4e-6
 """Time of a patch's sums in a row of consistent laws [s]."""
 
@@ -157,8 +160,9 @@ def solution_work(setup: ProblemSetup, *, one_patch: bool = False) -> Work:
     work = Work(arrays=solution_seconds(kind, cells, box=box, summits=summits))
     if one_patch or not isinstance(model, HalfSpaceModel):
         return work
-    slopes = _FINITE_SLOPES if setup.finite_slopes else 1.0
-    return slopes * (_BLOCK if setup.has_block else 1.0) * work
+    if setup.has_block:
+        work = _BLOCK * work + Work(arrays=_BLOCK_EACH)
+    return _SLOPES * work + Work(arrays=_SLOPES_EACH) if setup.finite_slopes else work
 
 
 def law_work(setup: ProblemSetup) -> Work:
@@ -170,7 +174,7 @@ def law_work(setup: ProblemSetup) -> Work:
     rows = ROWS["summits" if setup.uses_summits else "cells"]
     if setup.scene.coupling.kind == "isolated":
         return rows * setup.interfering_patches * solution_work(setup, one_patch=True)
-    return rows * (solution_work(setup) + Work(arrays=_PATCH_SUMS * setup.patches.count))
+    return rows * (_ROW * solution_work(setup) + Work(arrays=_PATCH_SUMS * setup.patches.count))
 
 
 def error_check_work(setup: ProblemSetup) -> Work:
