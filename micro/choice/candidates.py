@@ -68,6 +68,7 @@ def options(
     surface: Surface,
     measures: Sequence[ContactMeasures],
     *,
+    approach: float,
     contact_modulus: float,
     solutions: int,
     patches: PatchGrid | None,
@@ -77,18 +78,20 @@ def options(
 
     Args:
         surface: The surface.
-        measures: Its contacts at every load that errors are promised for.
+        measures: Its contacts at every load that errors are promised for, the largest last.
+        approach: Largest approach of the plane [mm].
         contact_modulus: E* [MPa].
         solutions: Approaches to be solved for.
         patches: Patches that must hold at least 8 cells of a grid along each side.
         periodic: Whether only periodic models are wanted.
     """
-    largest = measures[-1]
-    box = contact_box_share(surface.heights - (surface.highest - largest.approach))
+    box = contact_box_share(surface.heights - (surface.highest - approach))
+    # the density of the summits above the plane is the square of crowding over contact radius
+    radius = measures[-1].cells_per_radius * max(surface.spacing)
+    summits = round(surface.area * (measures[-1].crowding / radius) ** 2)
 
     def seconds(kind: str, cells: int) -> float:
-        once = solution_seconds(kind, cells, box=box, summits=largest.summits)
-        return solutions * once
+        return solutions * solution_seconds(kind, cells, box=box, summits=summits)
 
     parts = patches.grid if patches else (1, 1)
     if not periodic:

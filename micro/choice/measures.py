@@ -24,9 +24,7 @@ class ContactMeasures:
     """Measures of the contacts of a surface under a plane.
 
     Attributes:
-        approach: Approach of the undeformed plane [mm].
         regions: Connected regions above the undeformed plane.
-        summits: Maxima of the heights above the plane, at least 1.
         contact_fraction: Half of the bearing area fraction: an estimate of the contact area.
         cells_per_radius: Contact radius, of the mean contact, over the longer side of a cell.
         cells_per_wave: Shortest wavelength over the longer side of a cell: that of a single wave
@@ -36,9 +34,7 @@ class ContactMeasures:
         border_share: Share of the bearing area in regions that the border cuts.
     """
 
-    approach: float
     regions: int
-    summits: int
     contact_fraction: float
     cells_per_radius: float
     cells_per_wave: float
@@ -62,15 +58,13 @@ def contact_measures(surface: Surface, approach: float, *, periodic: bool) -> Co
     dx, dy = surface.spacing
     radius = np.sqrt(0.5 * cells * dx * dy / (np.pi * max(regions, 1)))
     summits = grid_maxima(surface.heights, periodic=periodic)
-    above = max(int(np.count_nonzero(summits.height > level)), 1)
+    above = int(np.count_nonzero(summits.height > level))
     return ContactMeasures(
-        approach=approach,
         regions=regions,
-        summits=above,
         contact_fraction=0.5 * cells / surface.heights.size,
         cells_per_radius=float(radius / max(dx, dy)),
         cells_per_wave=_cells_per_wave(surface),
-        crowding=float(radius * np.sqrt(above / surface.area)),
+        crowding=float(radius * np.sqrt(max(above, 1) / surface.area)),
         eccentricity=float(np.sqrt(_mean_square_eccentricity(names, area, dx / dy))),
         border_share=0.0 if periodic else _border_share(names, area),
     )

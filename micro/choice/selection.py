@@ -92,6 +92,7 @@ def choose(
         options(
             surface,
             [check.measures, contact_measures(surface, approach, periodic=periodic)],
+            approach=approach,
             contact_modulus=contact_modulus,
             solutions=solutions,
             patches=patches,
