@@ -38,8 +38,6 @@ from multiscale.setup.decision import Alternative, Decision
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.surface import make_surface
 
-Cells = tuple[int, int]
-
 _SPARE = 0.8
 """Share of the accuracy that errors at the largest load may take; errors at other loads differ."""
 _ORDER = 1.5
@@ -187,7 +185,7 @@ class _Search(MeshSearch):
         return replace(setup, decision=decision)
 
 
-def _scaled(cells: Cells, factor: float) -> Cells:
+def _scaled(cells: tuple[int, int], factor: float) -> tuple[int, int]:
     """Return cells along the sides times a factor, as multiples of 8 within the limits."""
     x, y = (
         min(max(8 * math.ceil(factor * count / 8 - 1e-9), _LEAST_CELLS), MOST_HEIGHTS)

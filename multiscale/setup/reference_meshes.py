@@ -116,7 +116,8 @@ def reference_meshes(
     try:
         if fine is not None and not hexahedral:
             plane = RigidPlane.above(surface, largest, tilt)
-            check_memory(scene, nodes, _requests(scene, _least_bytes(surface, plane, fine)))
+            least = _least_bytes(surface, plane, fine)
+            check_memory(scene, nodes, [_request(scene, "the reference", shared=least)])
         height = scene.block.height_under(surface.lengths)
         shapes = reference_shapes(
             surface, largest, height, count=scene.reference.meshes, tilt=tilt, **_mesh_keys(scene)
@@ -142,22 +143,19 @@ def reference_requests(scene: Scene, meshes: ReferenceMeshes) -> Iterator[Memory
         scene: The scene.
         meshes: Its meshes.
     """
-    return _requests(scene, meshes.bytes, meshes.gathered)
+    yield _request(scene, "the reference", shared=meshes.bytes)
+    yield _request(scene, "gmsh on rank 0, which meshes the reference,", root_only=meshes.gathered)
 
 
-def _requests(scene: Scene, shared: float, gathered: float = 0.0) -> Iterator[MemoryRequest]:
+def _request(scene: Scene, purpose: str, **sizes: Any) -> MemoryRequest:
     reference = scene.reference
-    for purpose, sizes in (
-        ("the reference", {"shared": shared}),
-        ("gmsh on rank 0, which meshes the reference,", {"root_only": gathered}),
-    ):
-        yield MemoryRequest(
-            key=_key(reference.hexahedral),
-            value=reference.cells or reference.fine,
-            purpose=purpose,
-            alternative="fewer reference.meshes",
-            **sizes,
-        )
+    return MemoryRequest(
+        key=_key(reference.hexahedral),
+        value=reference.cells or reference.fine,
+        purpose=purpose,
+        alternative="fewer reference.meshes",
+        **sizes,
+    )
 
 
 def _key(hexahedral: bool) -> str:
