@@ -1,8 +1,10 @@
-"""Checks that several records of this package share."""
+"""Checks of input that several records share, and the memory that input has to fit into."""
 
 from __future__ import annotations
 
 import math
+import os
+import resource
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,7 +14,10 @@ from numpy.typing import NDArray
 from geometry.errors import InputError
 
 SMALLEST, LARGEST = 1e-15, 1e15
-"""Lengths that double precision leaves sense to when they are squared and multiplied [mm]."""
+"""Range of lengths whose squares and products stay within double precision [mm]."""
+
+PROGRAM = 1.0e9
+"""Address space of the program with all its libraries; 0.88 GB were measured on two cores [B]."""
 
 
 def positive_lengths(value: Any, what: str) -> tuple[float, float]:
@@ -23,7 +28,7 @@ def positive_lengths(value: Any, what: str) -> tuple[float, float]:
         what: What the lengths belong to, such as ``"the surface"``.
 
     Raises:
-        InputError: When there are not two of them, or one is not positive, or of no sensible scale.
+        InputError: When there are not two of them, or one is not positive or out of range.
     """
     problem, allowed = f"the lengths of {what} do not fit", "two positive numbers (Lx, Ly) in mm"
     pair = finite_pair(value, problem, allowed=allowed)
@@ -33,7 +38,7 @@ def positive_lengths(value: Any, what: str) -> tuple[float, float]:
 
 
 def is_level(heights: NDArray[np.float64], among: NDArray[np.float64] | None = None) -> bool:
-    """Tell whether heights differ by no more than what rounding makes of equal ones.
+    """Tell whether heights differ by rounding alone.
 
     Args:
         heights: Heights [mm]; those that are not finite do not count.
@@ -43,7 +48,7 @@ def is_level(heights: NDArray[np.float64], among: NDArray[np.float64] | None = N
     if not finite.size:
         return False
     size = float(np.abs(finite if among is None else among).max())
-    # halves: the range of heights near the largest number would overflow
+    # halves, as the range of heights near the largest number would overflow
     return float(np.ptp(0.5 * finite)) <= 32.0 * float(np.finfo(float).eps) * size
 
 
@@ -51,7 +56,7 @@ def check_scale(heights: NDArray[np.float64]) -> None:
     """Refuse roughness so fine that squares of its curvatures leave double precision.
 
     Args:
-        heights: Heights [mm]; those that are not finite are none of this function's business.
+        heights: Heights [mm]; those that are not finite are ignored.
 
     Raises:
         InputError: When they are not level, but differ by less than `SMALLEST`.
@@ -116,3 +121,18 @@ def finite_pair(value: Any, problem: str, *, allowed: str) -> tuple[float, float
     if not (math.isfinite(first) and math.isfinite(second)):
         raise InputError(problem, value=value, allowed=allowed)
     return first, second
+
+
+def address_space() -> float:
+    """Return the address space that this process may fill with data [B].
+
+    That is its limit (``ulimit -v``), less what the program takes itself; infinite without one.
+    """
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    return math.inf if limit == resource.RLIM_INFINITY else limit - PROGRAM
+
+
+def process_memory() -> float:
+    """Return the memory that this process may fill with data: the machine's, or less [B]."""
+    physical = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    return min(float(physical), address_space())

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.errors import InputError
+from geometry.materials import Material
 from macro import compat
-from macro.elasticity import Material, rigid_body_modes, stiffness_form
+from macro.elasticity import rigid_body_modes, stiffness_form
 from macro.linear_solvers.multigrid import Lattice, lattice_of
 from macro.linear_solvers.options import solve_linear
 from macro.linear_solvers.selection import block_solver
@@ -76,7 +77,7 @@ class Block:
     @cached_property
     def conditions(self) -> list[Any]:
         """Dirichlet conditions: the clamped bottom and, on request, the rollers."""
-        clamped = self._nodes(self._facets(BOTTOM))
+        clamped = self._nodes(self.mesh.facet_tags.find(BOTTOM))
         conditions = [fem.dirichletbc(np.zeros(3, PETSc.ScalarType), clamped, self.space)]
         if self.sides == "roller":
             conditions += [self._roller(axis) for axis in (0, 1)]
@@ -89,13 +90,9 @@ class Block:
         matrix = compat.assemble_matrix(compat.compile_form(self._form), self.conditions, kind)
         if kind == "aij":
             matrix.setOption(PETSc.Mat.Option.SPD, True)  # for the user's direct solvers
-        matrix.setNearNullSpace(rigid_body_modes(self.space))
+        points = self.space.tabulate_dof_coordinates()[: self.owned_dofs // 3]
+        matrix.setNearNullSpace(rigid_body_modes(points, self.mesh.comm))
         return matrix
-
-    @property
-    def unsupported_stiffness(self) -> PETSc.Mat:
-        """Stiffness matrix without any support [N/mm], assembled anew."""
-        return compat.assemble_matrix(compat.compile_form(self._form), [])
 
     @cached_property
     def solver(self) -> PETSc.KSP:
@@ -133,7 +130,7 @@ class Block:
         return function
 
     def reaction(self, displacement: PETSc.Vec) -> float:
-        """Return the force that the clamped bottom bears, from nodal residuals [N].
+        """Return the reaction force of the clamped bottom, from nodal residuals [N].
 
         Args:
             displacement: Owned degrees of freedom [mm].
@@ -146,13 +143,13 @@ class Block:
 
     @cached_property
     def _form(self) -> Any:
-        # exact on boxes and affine tetrahedra, full integration on distorted hexahedra
+        # exact on boxes and straight tetrahedra, full integration on distorted hexahedra
         degree = 2 * self.degree if self.mesh.shape.hexahedral else 2 * (self.degree - 1)
         return stiffness_form(self.space, self.material, degree)
 
     @property
     def free(self) -> PETSc.Vec:
-        """1 for degrees of freedom that no condition holds, 0 for the others."""
+        """1 for free degrees of freedom, 0 for those that the supports constrain."""
         free = self.stiffness.createVecRight()
         free.set(1.0)
         for condition in self.conditions:
@@ -164,17 +161,15 @@ class Block:
     def _bottom_row(self) -> PETSc.Vec:
         """Sum of the unconstrained stiffness' rows of the bottom's vertical displacements."""
         lift = fem.Function(self.space)
-        lift.x.array[3 * self._nodes(self._facets(BOTTOM)) + 2] = 1.0
+        lift.x.array[3 * self._nodes(self.mesh.facet_tags.find(BOTTOM)) + 2] = 1.0
         return compat.assemble_vector(compat.compile_form(ufl.action(self._form, lift)))
 
-    def _facets(self, marker: int) -> NDArray[np.int32]:
-        return self.mesh.facet_tags.find(marker)
-
     def _nodes(self, facets: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Return the nodes of all ranks' facets that this rank sees, ghosts too, ascending.
+        """Return this rank's nodes and ghosts on some facets of any rank, ascending.
 
-        dolfinx asks the ranks that a rank exchanges nodes with. Two ranks that both see a node of
-        a third need not be such, but the third, who has the node, is asked by both.
+        `locate_dofs_topological` finds the nodes of this rank's facets, and those that neighbouring
+        ranks report. Two ranks may both have a node of a third rank without being neighbours; the
+        owner of the node knows of it, so that its ghosts are updated from the owner.
         """
         marks = fem.Function(self.space)
         marks.x.array[3 * fem.locate_dofs_topological(self.space, 2, facets)] = 1.0
@@ -183,7 +178,7 @@ class Block:
 
     def _roller(self, axis: int) -> Any:
         """Fix the normal displacement on the two side planes across an axis."""
-        facets = self._facets(SIDES)
+        facets = self.mesh.facet_tags.find(SIDES)
         shape = self.mesh.shape
         low, high = -shape.margin, shape.interface[axis] + shape.margin
         place = dmesh.compute_midpoints(self.mesh.mesh, 2, facets)[:, axis]

@@ -6,7 +6,6 @@ all releases share, and petsc4py.
 
 from __future__ import annotations
 
-import ctypes
 import inspect
 import logging
 from collections.abc import Iterator, Sequence
@@ -24,12 +23,15 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.errors import InputError
-from geometry.meshes.lattice import sigint_kept
+from geometry.meshes.gmsh_session import sigint_untouched
 from macro.form_cache import TIMEOUT, explained
 
 _JIT = {"timeout": TIMEOUT}  # another process may be compiling the same form on a slow machine
 HAS_VTX = hasattr(io, "VTXWriter")
 """Whether this dolfinx was built with ADIOS2."""
+
+_FILES_NOT_CLOSED: list[Any] = []
+"""XDMF files that could not be closed, kept from their destructor until the process ends."""
 
 _CELLS = {"hexahedron": basix.CellType.hexahedron, "tetrahedron": basix.CellType.tetrahedron}
 
@@ -82,7 +84,7 @@ def mesh_from_gmsh(model: Any, comm: Any) -> tuple[Any, Any]:
     Note:
         Collective. Facet tags may include ghost facets (dolfinx 0.5).
     """
-    with sigint_kept():  # here, for it brings gmsh, which lattices do without
+    with sigint_untouched():  # the import loads gmsh, which lattices do not need
         try:
             from dolfinx.io import gmsh as reader
         except ImportError:
@@ -150,24 +152,17 @@ def vector_space(mesh: Any, degree: int) -> Any:
 
 
 @_compiling()
-def scalar_space(mesh: Any, degree: int) -> Any:
-    """Return the continuous Lagrange space of scalars.
+def scalar_space(mesh: Any, degree: int, family: str = "Lagrange") -> Any:
+    """Return a space of scalars.
 
     Args:
         mesh: dolfinx mesh.
         degree: Polynomial degree.
+        family: ``"Lagrange"``, continuous, or ``"DG"``, discontinuous between cells.
     """
     if hasattr(fem, "functionspace"):
-        return fem.functionspace(mesh, ("Lagrange", degree))
-    return fem.FunctionSpace(mesh, ("Lagrange", degree))
-
-
-@_compiling()
-def cellwise_space(mesh: Any) -> Any:
-    """Return the space of scalars that are constant on every cell."""
-    if hasattr(fem, "functionspace"):
-        return fem.functionspace(mesh, ("DG", 0))
-    return fem.FunctionSpace(mesh, ("DG", 0))
+        return fem.functionspace(mesh, (family, degree))
+    return fem.FunctionSpace(mesh, (family, degree))
 
 
 def cell_nodes(space: Any) -> NDArray[np.int32]:
@@ -199,6 +194,18 @@ def lagrange_values(cell_name: str, degree: int, points: NDArray[np.float64]) ->
     if not len(points):  # basix 0.5 aborts the process on no points
         return np.empty((0, element.dim))
     return element.tabulate(0, points)[0].reshape(len(points), -1)
+
+
+def lagrange_gradients(cell_name: str, degree: int) -> NDArray[np.float64]:
+    """Return the gradients of the scalar Lagrange basis at its nodes, shape (nodes, basis, 3).
+
+    Args:
+        cell_name: Name of the cell, such as ``hexahedron``.
+        degree: Polynomial degree.
+    """
+    element = _lagrange(cell_name, degree)
+    slopes = np.asarray(element.tabulate(1, element.points)[1:])
+    return np.moveaxis(slopes.reshape(3, element.dim, element.dim), 0, 2)
 
 
 def lagrange_points(cell_name: str, degree: int) -> NDArray[np.float64]:
@@ -264,7 +271,7 @@ def assemble_vector(form: Any) -> PETSc.Vec:
     return vector
 
 
-def free_dropped(comm: PETSc.Comm) -> None:
+def collect_garbage(comm: PETSc.Comm) -> None:
     """Free the matrices and vectors that Python has dropped on all ranks, and every rank's own.
 
     PETSc from 3.18 on keeps them until it is asked, because ranks drop them at different times;
@@ -313,6 +320,6 @@ def write_xdmf(path: str, mesh: Any, functions: Sequence[Any]) -> None:
             file.write_function(function)
         file.close()
     except RuntimeError:
-        # on a full disk it cannot be closed, and dropping it would try again and end the process
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(file))
+        # on a full disk it cannot be closed, and its destructor would try again and end the process
+        _FILES_NOT_CLOSED.append(file)
         raise

@@ -292,14 +292,14 @@ class Run:
             blocks = self.coupling.blocks
         if not blocks:
             return
-        from macro.compat import free_dropped
+        from macro.compat import collect_garbage
 
         comms = [block.stiffness.comm.duplicate() for block in blocks]  # outlive their blocks
         self.interface = self.coupling = None
         blocks.clear()
         gc.collect()  # blocks and what presses them know each other
         for comm in comms:
-            free_dropped(comm)
+            collect_garbage(comm)
             comm.destroy()
 
     @contextmanager

@@ -14,14 +14,16 @@ from scipy.spatial import cKDTree
 
 from geometry.checks import positive_lengths
 from geometry.errors import InputError
-from geometry.meshes.lattice import gmsh_session
-from geometry.surface import Surface
+from geometry.meshes.gmsh_session import gmsh_session
 
 Array = NDArray[np.float64]
 
-_DELAUNAY = 5  # gmsh's number of the algorithm
-_DIGITS = 12  # of lengths that gmsh is given
-_PLACE = 3  # decimals of places that gmsh is given, beyond those of the fine edge
+_DELAUNAY = 5
+"""gmsh's number of the algorithm."""
+_DIGITS = 12
+"""Significant digits of lengths passed to gmsh."""
+_PLACE = 3
+"""Decimals of places passed to gmsh, beyond those of the fine edge length."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -78,9 +80,9 @@ class RefinedShape:
     def unit(self) -> float:
         """Length that gmsh meshes the block in, its largest side [mm].
 
-        Its CAD kernel takes what is shorter than 1e-7 for nothing. Blocks of one shape have one
-        mesh, whatever their size: what sizes leave in the last digits is rounded away, as it would
-        decide where triangles are flipped.
+        gmsh's CAD kernel treats lengths below 1e-7 as zero. Blocks of one shape have the same mesh
+        whatever their size: coordinates are rounded, because differences in the last digit would
+        change which edges are flipped.
         """
         return max(*self.interface, self.height)
 
@@ -89,7 +91,7 @@ class RefinedShape:
         object.__setattr__(self, "places", places)
         if places.ndim != 2 or places.shape[1] != 2 or not len(places):
             raise InputError("places have two coordinates", value=places.shape, allowed="(n, 2)")
-        # gmsh ends the process when it gets what is no number
+        # gmsh ends the process when a coordinate is not a number
         away = ~((places >= 0.0) & (places <= self.interface)).all(axis=1)
         if away.any():
             raise InputError(
@@ -100,9 +102,11 @@ class RefinedShape:
 
     @contextmanager
     def meshed(self) -> Iterator[Any]:
-        """Mesh the block in gmsh for as long as the context lasts; faces as in `flat_block`.
+        """Mesh the block in gmsh for as long as the context lasts.
 
-        The geometry has the order of the element, and its lengths are in `unit`.
+        The cells form the physical volume ``block`` (1); the physical surfaces are ``bottom`` (1),
+        ``top`` (2) and ``sides`` (3). The geometry has the order of the element, and its lengths
+        are in `unit`. A gmsh session of the caller goes on afterwards, with its model and options.
         """
         width, depth, height, fine, coarse = (
             float(f"{length / self.unit:.{_DIGITS}g}")
@@ -123,54 +127,6 @@ class RefinedShape:
             yield gmsh.model
 
 
-def places_in_reach(
-    surface: Surface,
-    approach: float,
-    *,
-    spacing: float,
-    tilt: tuple[float, float] = (0.0, 0.0),
-) -> Array:
-    """Return places that the plane can touch: where the surface stands out behind it.
-
-    The half-space only moves away under pressure, so that nothing else can come into contact.
-
-    Args:
-        surface: The rough surface.
-        approach: Largest approach at the middle of the surface [mm].
-        spacing: Distance between places [mm].
-        tilt: Slopes of the approach along x and y.
-
-    Returns:
-        Points of a square lattice, shape (n, 2) [mm]; at least that of the largest depth.
-    """
-    x, y = (
-        np.linspace(0.0, length, max(2, math.ceil(length / spacing) + 1))
-        for length in surface.lengths
-    )
-    lattice = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-    grid = np.vstack([lattice, surface.highest_point])
-    depth = depth_below_plane(surface, grid, approach, tilt)
-    return grid[depth >= min(0.0, float(depth.max()))]
-
-
-def depth_below_plane(
-    surface: Surface, points: Array, approach: float, tilt: tuple[float, float] = (0.0, 0.0)
-) -> Array:
-    """Return how far the undeformed surface stands out behind the rigid plane [mm].
-
-    Args:
-        surface: The rough surface.
-        points: Places on it, shape (…, 2) [mm].
-        approach: Approach at the middle of the surface, from first touch of a level plane [mm].
-        tilt: Slopes of the approach along x and y.
-
-    Returns:
-        Depths, shape (…); negative where there is a gap.
-    """
-    lean = (points - 0.5 * np.array(surface.lengths)) @ np.array(tilt)
-    return surface.height_at(points[..., 0], points[..., 1]) - surface.highest + approach + lean
-
-
 def _name_faces(gmsh: Any, box: int, height: float) -> None:
     faces = [tag for _, tag in gmsh.model.getBoundary([(3, box)], oriented=False)]
     level = {tag: gmsh.model.occ.getCenterOfMass(2, tag)[2] / height for tag in faces}
@@ -187,9 +143,10 @@ def _name_faces(gmsh: Any, box: int, height: float) -> None:
 
 
 def _generate(gmsh: Any, shape: RefinedShape) -> None:
-    """Mesh; again if the frontal algorithm, whose triangles are better, has missed a place.
+    """Mesh by the frontal algorithm, and again by Delaunay's if it has missed a place.
 
-    It looks at sizes where it puts nodes alone, and can step over small ones between large ones.
+    The frontal algorithm makes better triangles, but evaluates sizes only at its own nodes and can
+    step over a small region between large edges.
     """
     gmsh.model.mesh.generate(2)
     _, nodes, _ = gmsh.model.mesh.getNodes(2, -1, includeBoundary=True)
@@ -210,10 +167,10 @@ def _set_sizes(gmsh: Any, shape: RefinedShape) -> None:
     near = fields.add("Distance")
     fields.setNumbers(near, "PointsList", points)
     size = fields.add("Threshold")
-    reach = 2.0 * shape.fine
+    inner = 2.0 * shape.fine
     values = {
-        "DistMin": reach,
-        "DistMax": reach + (shape.coarse - shape.fine) / shape.growth,
+        "DistMin": inner,
+        "DistMax": inner + (shape.coarse - shape.fine) / shape.growth,
         "SizeMin": shape.fine,
         "SizeMax": shape.coarse,
         "InField": near,

@@ -19,17 +19,16 @@ from macro.mesh.block import BlockMesh, block_mesh
 Array = NDArray[np.float64]
 
 _DECAY = 3.0
-"""Power of the distance from the bottom with which the roughness fades into the depth."""
+"""Power of the height above the bottom with which the roughness decays into the depth."""
 
 _LEAST_VOLUME = 0.05
-"""Volume relative to that of the flat block, below which cells are refused."""
+"""Smallest volume of a cell relative to that in the flat block; smaller cells are refused."""
 
 _STEEPEST = 2.0
-"""Slope between neighbouring nodes above which a top is refused: edges at 27° to each other."""
-
+"""Largest slope between neighbouring nodes; steeper tops are refused (edges 27° apart)."""
 
 _LEAST_BENT = 0.3
-"""The same, below which the edges of a quadratic tetrahedron are made straight."""
+"""Relative volume below which the edges of a quadratic tetrahedron are made straight."""
 
 _EDGES = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])
 """Ends of a quadratic tetrahedron's edges, in dolfinx's order of the nodes 4 … 9 between them."""
@@ -54,15 +53,15 @@ def rough_block_mesh(
 ) -> tuple[BlockMesh, MeshQuality]:
     """Mesh a flat block and move its nodes onto the roughness.
 
-    The top becomes z = h(x, y) − <h>, from the surface's interpolant at the nodes; below, the
-    movement fades as (1 + z/height)³. Every rank moves the nodes that it has.
+    The top becomes z = h(x, y) − <h>, with the surface's interpolant h at the nodes. Below the top
+    the movement decays as (1 + z/height)³. Every rank moves its own nodes.
 
-    The edges of quadratic tetrahedra bend with the roughness, but for the few cells, long against
-    its waves and far from contact, that this would turn inside out: they stay straight.
+    The edges of quadratic tetrahedra bend with the roughness. They stay straight in the few cells
+    that bending would turn inside out: cells far from contact that are long beside its waves.
 
-    Along every vertical line the movement keeps the order of points as long as the deepest valley
-    lies less than height/3 below the mean. Hexahedra, whose sides are vertical, then stay
-    hexahedra; tetrahedra are looked at one by one.
+    Along a vertical line the movement keeps the order of points if the deepest valley lies less
+    than height/3 below the mean. Hexahedra have vertical sides and then stay valid; tetrahedra are
+    checked one by one.
 
     Args:
         shape: The flat block, without margin; its interface is the surface's rectangle.
@@ -134,7 +133,7 @@ def _check_depth(shape: BlockShape | RefinedShape, surface: Surface) -> None:
 
 
 def _straighten(flat: BlockMesh, moved: Array) -> None:
-    """Put the middles of edges onto the chord in cells that bend too much, on all ranks alike."""
+    """Move the middle nodes of edges onto the chord in cells that bend too much, on all ranks."""
     cells, names = compat.cell_vertices(flat.mesh), flat.mesh.geometry.input_global_indices
     done: Array = np.empty(0, dtype=np.int64)
     while True:
@@ -157,41 +156,12 @@ def _volumes(flat: BlockMesh, moved: Array) -> Array:
     cells, points = compat.cell_vertices(flat.mesh), flat.mesh.geometry.x
     x, y, before, after = (row[cells] for row in (*points.T, moved[:, 2]))
     smallest = np.full(len(cells), np.inf)
-    for slopes in _slopes(cells.shape[1]) if len(cells) else ():
+    degree = 2 if cells.shape[1] == 10 else 1
+    for slopes in compat.lagrange_gradients(flat.mesh.topology.cell_name(), degree):
         normal = np.cross(x @ slopes, y @ slopes)
         volumes = (np.einsum("ci,ci->c", normal, z @ slopes) for z in (after, before))
         np.minimum(smallest, np.divide(*volumes), out=smallest)
     return smallest
-
-
-def _slopes(nodes: int) -> Array:
-    """Return the shape functions' gradients at the nodes of a cell, shape (points, nodes, 3).
-
-    Nodes of hexahedra (8) and tetrahedra (4 or 10) in the order of dolfinx; of a linear
-    tetrahedron's gradients, which are the same everywhere, one.
-    """
-    if nodes == 8:
-        return _trilinear_slopes()
-    linear = np.vstack([np.full(3, -1.0), np.eye(3)])
-    if nodes == 4:
-        return linear[None]
-    i, j = _EDGES.T
-    at = np.vstack([np.eye(4), 0.5 * (np.eye(4)[i] + np.eye(4)[j])])[:, :, None]
-    # of L (2 L - 1) at vertices, of 4 L L' in the middle of edges
-    vertices = (4.0 * at - 1.0) * linear
-    middles = 4.0 * (at[:, i] * linear[j] + at[:, j] * linear[i])
-    return np.concatenate([vertices, middles], axis=1)
-
-
-def _trilinear_slopes() -> Array:
-    corners = np.array(list(np.ndindex(2, 2, 2)))[:, ::-1]  # x runs first
-    slopes = np.zeros((8, 8, 3))
-    for point, node in np.ndindex(8, 8):
-        apart = corners[point] != corners[node]
-        for axis in range(3):
-            if not np.delete(apart, axis).any():
-                slopes[point, node, axis] = 2 * corners[node, axis] - 1
-    return slopes
 
 
 def _steepest(flat: BlockMesh, rise: Array) -> float:

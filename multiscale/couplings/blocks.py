@@ -199,12 +199,12 @@ def patch_compliance(setup: ProblemSetup, comm: Any) -> Array:
         return body.patch_compliance(setup.patches, comm)
     from mpi4py import MPI
 
-    from macro import plain_compliance
+    from macro import patch_compliance_matrix
     from macro.compliance.cache import cached
     from macro.linear_solvers.options import users_options
 
     def compute() -> dict[str, Array]:
-        return {"compliance": plain_compliance(embedding(setup, comm))}
+        return {"compliance": patch_compliance_matrix(embedding(setup, comm))}
 
     sides = setup.scene.block.sides
     key = (setup.shape, block_material(setup), sides, setup.patches, users_options())

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.checks import process_memory
 from geometry.errors import InputError
-from geometry.memory import process_memory
 from micro import (
     BodyModes,
     BodyStresses,
@@ -125,11 +125,11 @@ class Body:
         """
         from mpi4py import MPI
 
-        from macro import cached_face_compliance
+        from macro import face_compliance
 
         count = modes or self.modes
         self._check_memory(count)
-        return cached_face_compliance(
+        return face_compliance(
             self.lengths,
             self.shape.height,
             self.material,
@@ -137,6 +137,7 @@ class Body:
             count,
             comm or MPI.COMM_SELF,
             coarse=coarse,
+            use_cache=True,
         )
 
     def term(self, face: FaceCompliance, *, higher: float = 0.0) -> BodyModes:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.control import Control
+from geometry.rigid_plane import Control
 from multiscale.couplings.dense_newton import DenseNewton, DenseState
 from multiscale.couplings.load_steps import beyond_law, embedded_step
 from multiscale.laws.files import LawTable

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
 from multiscale.laws.tangent import Tangent
-from multiscale.loading.stepper import described
 
 if TYPE_CHECKING:
     from multiscale.laws.patch_law import LawPoint
@@ -242,7 +241,7 @@ class LoadCase:
     def failure(self, reason: str, iterations: int) -> NotConverged:
         """Return the error of an iteration that found no equilibrium."""
         return NotConverged(
-            f"the condensed block at {described(self.control)}",
+            f"the condensed block at {self.control}",
             reason=reason,
             iterations=iterations,
             remedy="take more load steps (load.steps)",

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.control import Control
 from geometry.errors import NotConverged
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
 from multiscale.couplings.dense_equations import TOLERANCE, DenseEquations, Iterate, Laws, LoadCase
 
 Array = NDArray[np.float64]

@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.control import Control
 from geometry.errors import NotConverged
+from geometry.rigid_plane import Control, RigidPlane
 from multiscale.couplings.load_steps import beyond_law, embedded_step
 from multiscale.laws.files import LawTable
 from multiscale.laws.packed import PatchLaws
 from multiscale.laws.whole_surface import Displacements
 from multiscale.loading.load_step import LoadStep, PatchState
-from multiscale.loading.stepper import described
 
 Array = NDArray[np.float64]
 
@@ -74,14 +73,14 @@ class TurningCoupling:
     def _step(self, control: Control, approach: float, steps: int) -> LoadStep:
         along, tilt = self._along(approach), self._path.tilt_at(approach)
         point = self._laws.along(along)
-        local = self._patches.mean_approaches(approach, tilt)
+        local = RigidPlane.above(self._patches, approach, tilt).means(self._patches)
         closure = local - self._displacements(point.pressure[None])[0]
         touched = point.pressure > 0.0
         missed = np.abs(np.where(touched, closure - point.closure, 0.0)).max()
         missed /= float(np.abs(local).max()) or 1.0
         if missed > _OTHER_BODY:
             raise NotConverged(
-                f"the patches at {described(control)}",
+                f"the patches at {control}",
                 reason="OTHER_BODY",
                 iterations=0,
                 remedy=f"their closures miss {missed:.1%} of the approach: make the laws for this "

@@ -9,17 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.collective import on_root
-from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
 from micro import START_KINDS, MicroModel, Response, RigidPlane
 from multiscale.laws.files import LawTable
 from multiscale.loading.load_step import LoadStep, PatchState
-from multiscale.loading.stepper import BeyondLaws, described
+from multiscale.loading.stepper import BeyondLaws
 from multiscale.storage.serialisation import Arrays, packed, unpacked
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import LawContactProblem, PressState
+    from macro import LawContactProblem, LawContactState
 
 Array = NDArray[np.float64]
 
@@ -77,7 +77,7 @@ class EmbeddedCoupling:
 
     def __init__(self, pressed: LawContactProblem, table: LawTable) -> None:
         self._pressed, self._table = pressed, table
-        self._last: PressState | None = None
+        self._last: LawContactState | None = None
 
     @property
     def displacement(self) -> Array:
@@ -93,7 +93,7 @@ class EmbeddedCoupling:
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `Coupling.press`."""
         try:
-            state = self._pressed.press(control)
+            state = self._pressed.solve(control)
         except NotConverged as error:
             if not any(law.is_punch for law in self._table.laws):
                 raise
@@ -117,9 +117,9 @@ class EmbeddedCoupling:
         if state:
             approach, tilt, pressure = unpacked(state, ())
             self._pressed.start_from(pressure)
-            self._last = self._pressed.press(Control(approach=approach, tilt=tilt))
+            self._last = self._pressed.solve(Control(approach=approach, tilt=tilt))
 
-    def _step(self, control: Control, press: PressState) -> LoadStep:
+    def _step(self, control: Control, press: LawContactState) -> LoadStep:
         """Read area, contacts and separation off the laws at the converged closures."""
         laws = self._table.laws
         try:
@@ -243,7 +243,7 @@ def beyond_law(
             "'condensed', which goes on, or coupling.kind = 'concurrent', which needs no law"
         )
     return BeyondLaws(
-        f"the patches at {described(control)}",
+        f"the patches at {control}",
         reason=f"LAW_RANGE: {problem}",
         iterations=0,
         remedy=whole if coupling == "consistent" else alone,

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.control import Control
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
 from multiscale.couplings.blocks import block_material
 from multiscale.couplings.load_steps import embedded_step
 from multiscale.loading.load_step import LoadStep, PatchState
@@ -82,7 +82,7 @@ class ReferenceCoupling:
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step on every mesh; see `Coupling.press`."""
-        self._last = tuple(block.press(control) for block in self._blocks)
+        self._last = tuple(block.solve(control) for block in self._blocks)
         return self._step(self._last)
 
     def state(self) -> Arrays:
@@ -93,7 +93,7 @@ class ReferenceCoupling:
         """Press every mesh by its plane again; see `Restorable`."""
         planes = unpacked(state, ()) if state else ()
         self._last = tuple(
-            block.press(Control(approach=approach, tilt=(tx, ty)))
+            block.solve(Control(approach=approach, tilt=(tx, ty)))
             for block, (approach, tx, ty) in zip(self._blocks, planes, strict=False)
         )
 

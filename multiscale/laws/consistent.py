@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.collective import on_root
-from geometry.control import Control
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
 from micro import MicroModel, influence_matrix
 from multiscale.laws.files import LawTable
 from multiscale.laws.refinement import MOST_ROWS

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.collective import together
-from geometry.control import Control
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
 from micro import MicroModel, Response, RigidPlane
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.plane_path import PlanePath

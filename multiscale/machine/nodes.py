@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from geometry.memory import address_space
+from geometry.checks import address_space
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,15 +12,15 @@ import numpy as np
 
 from geometry.asperities import find_asperities
 from geometry.errors import InputError
+from geometry.materials import Material
 from geometry.patches import PatchGrid, patch_means
+from geometry.rigid_plane import RigidPlane
 from geometry.surface import Surface
 from micro import (
     Choice,
     HalfSpaceModel,
     MicroModel,
-    RigidPlane,
     choose,
-    contact_modulus,
     micro_model,
     resampled,
 )
@@ -201,4 +201,6 @@ def _chosen_model(scene: Scene, surface: Surface, patches: PatchGrid, label: str
 
 
 def _modulus(scene: Scene) -> float:
-    return contact_modulus(scene.block.young_modulus, scene.block.poisson_ratio)
+    block = scene.block
+    material = Material(young_modulus=block.young_modulus, poisson_ratio=block.poisson_ratio)
+    return material.contact_modulus

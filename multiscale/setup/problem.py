@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from geometry.asperities import Asperities
 from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import RigidPlane
 from geometry.surface import Surface
-from micro import AsperityModel, Choice, HalfSpaceModel, MicroModel, RigidPlane, ScaledModel
+from micro import AsperityModel, Choice, HalfSpaceModel, MicroModel, ScaledModel
 from multiscale.laws.refinement import MOST_ROWS
 from multiscale.scene.scene import Scene
 from multiscale.setup.decision import Decision

@@ -14,11 +14,10 @@ from scipy.ndimage import distance_transform_edt
 
 from geometry.errors import InputError
 from geometry.meshes.block import BlockShape
-from geometry.meshes.families import characteristic_size, reference_shapes
+from geometry.meshes.families import characteristic_size, contact_radius, reference_shapes
 from geometry.meshes.refined_block import RefinedShape
+from geometry.rigid_plane import RigidPlane
 from geometry.surface import Surface
-from geometry.typical_contact import contact_radius
-from micro import RigidPlane
 from multiscale.machine.nodes import ClusterNodes, MemoryRequest
 from multiscale.scene.scene import Scene
 from multiscale.setup.checks import check_memory

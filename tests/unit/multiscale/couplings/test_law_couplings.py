@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from geometry.control import Control
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
 from multiscale.couplings.load_steps import EmbeddedCoupling
 from multiscale.laws.files import LawTable
 from multiscale.laws.patch_law import PatchLaw
@@ -33,7 +33,7 @@ def law(end=1.0):
 class EasyBlock:
     """Stands for a block that gives way to nothing: closures are the approach."""
 
-    def press(self, control):
+    def solve(self, control):
         self.approach = approach = control.approach
         return SimpleNamespace(
             approach=approach,
@@ -48,7 +48,6 @@ class EasyBlock:
             linear_iterations=10,
             residuals=np.array([1.0, 1e-11]),
             reason="CONVERGED_FNORM_RELATIVE",
-            wall_s=0.0,
         )
 
     def patch_means(self, functions):
@@ -92,9 +91,3 @@ def test_remedy_beyond_a_consistent_law_fits_what_is_wrong(falls, remedy):
     table = LawTable(patches=PATCHES, laws=(law(), bent), made_by={"coupling": "consistent"})
     with pytest.raises(BeyondLaws, match=f"LAW_RANGE: .*: take coupling.{remedy}"):
         EmbeddedCoupling(EasyBlock(), table).press(Control(approach=0.8))
-
-
-def test_tilt_turns_about_the_middle():
-    approaches = PATCHES.mean_approaches(0.01, (0.004, 0.1))
-    # patch centres lie a quarter of a millimetre beside the middle, along x only
-    np.testing.assert_allclose(approaches, [0.009, 0.011], rtol=1e-12)
