@@ -181,7 +181,7 @@ class _Problems:
         """Return the change of the force with the approach, without finite slopes [N/mm]."""
         grid = self._half if min(self._half) >= _FEWEST_CELLS else self._grid
         state, approach = self._state(grid, 0), self._control.approach or 0.0
-        step = _APPROACH_STEP * float(state.required.max())
+        step = _APPROACH_STEP * float(state.interference.max())
         if not (state.force > 0.0 and step > 0.0):
             return 0.0
         back = replace(self._control, approach=approach - step)

@@ -100,14 +100,16 @@ def on_body(
         # heights count from the highest point, which is near the loads: slopes add least there;
         # the flat body then reaches up to it, while the block's height is that of the mean plane
         higher = surface.highest - surface.mean_height if order else 0.0
-        beside: list[SurfaceStress] = []
+        edge_stresses: list[SurfaceStress] = []
         if body is not None and face is not None:
             model = replace(model, sides=body.known, body=body.term(face, higher=higher))
-            beside = _stresses(body, face, surface) if order else []
+            edge_stresses = _stresses(body, face, surface) if order else []
         if not order:
             return model
-        plane = surface.highest if beside else None
-        slopes = FiniteSlopes(surface, material, order=order, plane=plane, beside=beside)
+        plane = surface.highest if edge_stresses else None
+        slopes = FiniteSlopes(
+            surface, material, order=order, plane=plane, edge_stresses=edge_stresses
+        )
         return replace(model, slopes=slopes)
 
     return put
@@ -155,7 +157,7 @@ def _block_sides(setup: ProblemSetup) -> FreeSides | None:
     return FreeSides(
         lengths=setup.surface.lengths,
         poisson_ratio=setup.scene.block.poisson_ratio,
-        reach=_REACH * min(*setup.surface.lengths, setup.shape.height),
+        decay_length=_REACH * min(*setup.surface.lengths, setup.shape.height),
     )
 
 
