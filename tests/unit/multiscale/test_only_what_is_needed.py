@@ -160,9 +160,9 @@ def test_a_run_predicts_nothing_and_writes_what_it_took(tmp_path, capsys):
     )
     assert main(["run", str(path), "--out", str(tmp_path / "results")]) == 0
     assert vars(this_machine()) == {}
-    told = capsys.readouterr().out
-    assert "took: surface" in told
-    assert "memory" in told
+    printed = capsys.readouterr().out
+    assert "took: surface" in printed
+    assert "memory" in printed
 
 
 def test_ratios_of_a_machine_are_measured_only_where_they_are_needed():

@@ -37,7 +37,7 @@ def of(count, *, ranks=1, memory=64.0):
 
 
 class Job:
-    """A communicator's rank among others, which sit on hosts as told."""
+    """A communicator's rank among others, on the given hosts."""
 
     def __init__(self, hosts, memories=None):
         self.hosts, self.size = hosts, len(hosts)
@@ -136,8 +136,8 @@ def test_isolated_laws_are_dealt_to_the_ranks():
 def test_a_plan_says_what_nodes_a_run_needs():
     one = of(1)
     setup = make_setup(scene(*LARGE), nodes=replace(one, extensible=True))
-    (told,) = memory_warnings(setup, one)
-    assert told == (
+    (warning,) = memory_warnings(setup, one)
+    assert warning == (
         "block.cells = (500, 500, 200): needs about 250 GB of memory; there is one node of 64 GB; "
         "4 such nodes would do, filled evenly by mpirun over several hosts"
     )
@@ -177,7 +177,7 @@ def test_cells_of_a_block_take_memory_only_where_it_is_meshed(kind):
 
 
 @pytest.mark.parametrize(
-    ("group", "folder", "names", "told", "found"),
+    ("group", "folder", "names", "contents", "found"),
     [
         ("0::/job/step", "job", ("memory.max", "memory.current"), ("3000", "1000"), [(3e3, 1e3)]),
         ("0::/job/step", "", ("memory.max", "memory.current"), ("max", "1000"), []),
@@ -188,10 +188,10 @@ def test_cells_of_a_block_take_memory_only_where_it_is_meshed(kind):
         ("1:cpu:/job", "job", ("memory.max", "memory.current"), ("3000", "1000"), []),
     ],
 )  # fmt: skip
-def test_control_groups_limit_a_node(tmp_path, group, folder, names, told, found):
+def test_control_groups_limit_a_node(tmp_path, group, folder, names, contents, found):
     place = tmp_path / "groups" / folder
     place.mkdir(parents=True)
-    for name, text in zip(names, told, strict=True):
+    for name, text in zip(names, contents, strict=True):
         (place / name).write_text(f"{text}\n", encoding="utf-8")
     (tmp_path / "mine").write_text(f"{group}\n", encoding="utf-8")
     limits = list(control_group_memory(tmp_path / "mine", tmp_path / "groups"))

@@ -54,14 +54,14 @@ def test_tighter_accuracies_measure_smaller_errors_on_finer_grids():
         assert not [text for text in warnings(setup) if "accuracy" in text]
 
 
-def test_open_keys_become_values_and_the_plan_says_what_was_measured():
+def test_auto_values_are_resolved_and_the_plan_says_what_was_measured():
     setup = make_setup(scene({"grid": "auto"}, accuracy=0.05, **OPEN))
-    settled = setup.scene
-    assert settled.coupling.kind in ("concurrent", "consistent")
-    assert settled.patches.grid == (8, 8)
-    assert settled.surface.grid == setup.surface.grid == setup.micro.surface.grid
-    assert settled.micro.model == "half-space"
-    assert settled.block.cells == "auto"  # of no mesh
+    resolved = setup.scene
+    assert resolved.coupling.kind in ("concurrent", "consistent")
+    assert resolved.patches.grid == (8, 8)
+    assert resolved.surface.grid == setup.surface.grid == setup.micro.surface.grid
+    assert resolved.micro.model == "half-space"
+    assert resolved.block.cells == "auto"  # of no mesh
     assert set(setup.decision.errors) == {"body", "slopes", "grid"}
     assert setup.decision.error <= setup.decision.accuracy == 0.05
     assert dict(statements(setup))["choice"] == setup.decision.sentence
@@ -122,12 +122,12 @@ def test_cells_are_left_to_the_plan_only_under_laws_on_a_mesh():
     ],
 )
 def test_stated_keys_are_respected(stated):
-    settled = make_setup(scene(accuracy=0.05, **stated)).scene
+    resolved = make_setup(scene(accuracy=0.05, **stated)).scene
     for section, keys in stated.items():
         for key, value in keys.items():
-            found = getattr(getattr(settled, section), key)
+            found = getattr(getattr(resolved, section), key)
             assert list(found) == value if isinstance(value, list) else found == value
-    assert settled.surface.grid == (48, 48)
+    assert resolved.surface.grid == (48, 48)
 
 
 @pytest.mark.parametrize(
@@ -240,7 +240,7 @@ def test_sizes_that_fit_no_memory_are_refused_before_anything_is_made(sections, 
         make_setup(given, nodes=ClusterNodes(memory=16e9))
 
 
-def test_open_keys_survive_a_dump_and_are_in_the_schema():
+def test_auto_values_survive_a_dump_and_are_in_the_schema():
     given = scene({"grid": "auto"}, accuracy=0.03, **OPEN)
     again = Scene.from_dict(given.model_dump(by_alias=True, mode="json"))
     assert auto_keys(again) == auto_keys(given) == {

@@ -1,4 +1,4 @@
-"""The choice of a micro model in a scene: what is asked for, told, refused and recorded."""
+"""The choice of a micro model in a scene: what is requested, stated, refused and recorded."""
 
 from __future__ import annotations
 

@@ -69,10 +69,10 @@ def test_laws_reach_a_contact_at_the_corner_of_the_block():
 
 
 @pytest.mark.parametrize(
-    ("micro", "told"),
+    ("micro", "warns"),
     [({}, True), ({"curvature": "contact"}, False), ({"model": "islands"}, False)],
 )
-def test_the_plan_tells_of_flat_summits_that_carry_nothing(tmp_path, micro, told):
+def test_the_plan_warns_of_flat_summits_that_carry_nothing(tmp_path, micro, warns):
     x = np.linspace(-0.5, 0.5, 33)
     waves = 0.01 * np.cos(4 * np.pi * x[:, None]) * np.cos(4 * np.pi * x)
     steps = np.round(waves / 2e-3) * 2e-3  # heights in steps of 2 µm
@@ -91,7 +91,7 @@ def test_the_plan_tells_of_flat_summits_that_carry_nothing(tmp_path, micro, told
         }
     )
     said = [text for text in warnings(make_setup(stepped)) if "summits are flat" in text]
-    assert len(said) == told
+    assert len(said) == warns
 
 
 class Shy(ContactCoupling):
