@@ -18,7 +18,6 @@ from micro.asperities.model import MODELS, AsperityModel, ModelKind, asperity_mo
 from micro.asperities.scaled_model import BORDERS, CURVATURES, ScaledModel
 from micro.choice.candidates import Candidate
 from micro.choice.selection import Choice, choose
-from micro.closed_forms.boussinesq import HalfSpace
 from micro.closed_forms.hertz import HertzContact
 from micro.closed_forms.love import influence_matrix
 from micro.compliance.body_modes import BodyModes, BodyStresses
@@ -52,7 +51,6 @@ __all__ = [
     "Contacts",
     "FiniteSlopes",
     "FreeSides",
-    "HalfSpace",
     "HalfSpaceModel",
     "HalfSpaceState",
     "HertzContact",

@@ -151,7 +151,7 @@ class _Problems:
         placed, flat = self._model(self._half, 2), self._model(self._half, 0)
         if not isinstance(placed.slopes, FiniteSlopes) or placed.body is None:
             return self.force(self._half, 2)
-        alone = FiniteSlopes(flat.surface, placed.slopes.half_space)
+        alone = FiniteSlopes(flat.surface, placed.slopes.material)
         start = self._state(self._half, 2)
         return replace(flat, slopes=alone).equilibrium(self._control, start=start).force
 
