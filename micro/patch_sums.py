@@ -11,6 +11,8 @@ point force 0.17). The mean over all patches is good to 1e-9 for contacts away f
 border. For one that touches that border from inside it is good to 4e-4 a/s, s now the side of the
 whole; for one that reaches across it to 0.02 a/s. Of more than 2000 contacts those that are small
 and far from any border count as point forces, for which the same bound holds.
+
+Theory: demos/theory.md, section 8.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ exists has its volume and moments, hence a paraboloid. A summit cut in half gets
 solutions on 256 × 256 cells a summit cut in half is 6 % low in force and 10 % in area, one cut to
 a quarter in a corner 10 % and 14 %.
 
-Theory: section 8 of ``demos/theory.md``.
+Theory: demos/theory.md, section 8.
 """
 
 from __future__ import annotations

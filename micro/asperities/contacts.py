@@ -1,6 +1,6 @@
 """Hertz contacts of all asperities of a surface at a given interference, and their stiffness.
 
-Theory: section 8 of ``demos/theory.md``.
+Theory: demos/theory.md, section 8.
 """
 
 from __future__ import annotations

@@ -5,6 +5,8 @@ of one that straddles borders is integrated over every patch: along y in closed 
 of the ellipse that two borders cut; along x by Gauss' rule in the angle, between the angles at
 which the rim crosses borders. The shares are good to 4e-7 and add up to one. What lies outside of
 all patches counts for the nearest.
+
+Theory: demos/theory.md, section 8.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ Sets 1 and 2 the elliptic, interacting model with both is within 1 to 2.5 % in f
 square; 6 % at most) from 0.3 to 10 % of contact area, and within 7 % in area. Its force is
 3 to 7 % low without border asperities and 4 to 8 % low without fitted curvature.
 
-Theory: section 8 of ``demos/theory.md``.
+Theory: demos/theory.md, section 8.
 """
 
 from __future__ import annotations

@@ -53,7 +53,7 @@ def displacements(
     chi_y = dx * log + z * v_y + dy * _angle(dy, dx, z, r)
     v = dx * v_x + dy * v_y + z * v_z
     parts = -side * chi_x - z * v_x, -side * chi_y - z * v_y, 2.0 * (1.0 - nu) * v - z * v_z
-    return _differences(parts, loads, 4.0 * np.pi * material.lame[1])
+    return _differences(parts, loads, 4.0 * np.pi * material.shear_modulus)
 
 
 def stresses(

@@ -169,7 +169,7 @@ class FiniteSlopes:
             the waves of the second part.
         """
         waves, heights = self._waves, self._below
-        nu, shear = self.material.poisson_ratio, self.material.lame[1]
+        nu, shear = self.material.poisson_ratio, self.material.shear_modulus
         bending = (1.0 - nu) / shear * waves.wave_number
         strains = waves.fields(self._strains_by_traction(waves.of(heights * stresses)))
         curvatures = waves.fields(bending * loads * waves.directions)
@@ -207,7 +207,7 @@ class FiniteSlopes:
 
     def _strains_by_traction(self, moments: Spectrum) -> Spectrum:
         """Return the waves of the strains in the plane by tractions ∂_α (h σ_αβ) on it."""
-        nu, shear = self.material.poisson_ratio, self.material.lame[1]
+        nu, shear = self.material.poisson_ratio, self.material.shear_modulus
         along_x, along_y, across = self._waves.directions
         xx, yy, xy = moments
         both = nu * self._lengthwise(moments)

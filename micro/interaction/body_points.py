@@ -1,7 +1,9 @@
-"""What a finite body adds to the displacements of summits by the forces on them.
+"""Displacements of summits that a finite body adds to those of the half-space.
 
 Contacts are small against the waves of the body's modes. So forces act and displacements are taken
 at the centres of the contacts, and a contact's own force counts as well.
+
+Theory: demos/theory.md, section 8, eq. 6.1.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ together are the one equation
 Every U_ki starts with the slope 0 at t_i = 0, so G is continuously differentiable. Its Jacobian
 I + ∂U/∂t has columns for the active set {z_i > 0} alone.
 
-Theory: section 8 of ``demos/theory.md``, eq. 8.1.
+Theory: demos/theory.md, section 8, eq. 8.1.
 
 Source:
     Waddad et al. 2016, eqs. 10–12 and 23, doi 10.1016/j.triboint.2015.12.023;
@@ -157,7 +157,7 @@ def checked_pairs(
     Args:
         rows: Number of displaced summits.
         columns: Number of contacts that displace them.
-        what: Their name in the message, such as ``asperities``.
+        what: Name of the contacts in the message, such as ``asperities``.
         bytes_per_pair: Memory that a pair takes [B].
         available: Memory that may be filled [B]; that of this process when not given.
 
@@ -168,7 +168,7 @@ def checked_pairs(
     needed = bytes_per_pair * rows * columns
     if needed > available:
         raise InputError(
-            f"the interaction of {max(rows, columns)} {what} needs {needed / 1e9:.3g} GB of memory"
+            f"the interaction of {columns} {what} needs {needed / 1e9:.3g} GB of memory"
             f" and {available / 1e9:.3g} GB are there",
             allowed="half-space, circular-independent or elliptic-independent",
             key="micro.model",

@@ -13,7 +13,7 @@ one, as they should: t (1 + c*) = d and 2 t^(3/2) = d^(3/2). More than two at on
 little: n equal ones n (1 + (n − 1) c*)^(−3/2) of one, 0.94 for 3 and 0.82 for 5. Pairs beyond c*
 count as overlapping contacts, so that a result can be judged.
 
-Theory: section 8 of ``demos/theory.md``.
+Theory: demos/theory.md, section 8.
 """
 
 from __future__ import annotations
@@ -140,10 +140,10 @@ class HertzPairs:
                 merged = slope[rows] >= MERGING_SLOPE * (1.0 - 1e-12)
                 overlapping += int(np.count_nonzero(merged))
         if self.body is not None:
-            moment = self.scaled_force(np.maximum(indentation, 0.0))[active]
+            force = self.scaled_force(np.maximum(indentation, 0.0))[active]
             between = self.body.by(self.body.among(active))
-            displacement += between @ moment
-            between *= 1.5 * moment / indentation[active]
+            displacement += between @ force
+            between *= 1.5 * force / indentation[active]
             slope += between
         return InteractionDisplacement(active, displacement, slope, overlapping)
 

@@ -3,6 +3,8 @@
 Every sample climbs to the highest of its 8 neighbours until it reaches a peak. The samples that
 reach the same peak are its watershed. The climb never goes down, so above any level a watershed
 is connected, and two of them are one region when their saddle lies above the level.
+
+Theory: demos/theory.md, section 9.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ On a half-space with a prescribed plane the forces at the depths of the cut give
 at once. A finite body or a free motion of the plane couples the islands; then depths,
 displacements and plane follow from a contact problem (`micro.interaction.contact_problem`).
 
-Theory: section 9 of ``demos/theory.md``.
+Theory: demos/theory.md, section 9.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ square; 9 % at most) and the area within 5 % (14 %) from 0.1 to 5 % of contact a
 regions grow together across the surface and stand for no ellipse. Every result says whether it
 lies within this range (`IslandState.warning`, `Response.warnings`).
 
-Theory: section 9 of ``demos/theory.md``.
+Theory: demos/theory.md, section 9.
 """
 
 from __future__ import annotations

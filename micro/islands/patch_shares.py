@@ -3,6 +3,8 @@
 A sample at a height e above its level weighs as Hertz's pressure does in a paraboloid cap of
 height w, (2 e/w − 1)^½, in force, and as 1 in area where e > w/2. Samples that straddle a border
 are shared by area.
+
+Theory: demos/theory.md, section 9.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ sqrt(2 R' w), sqrt(2 R'' w). Integrated over the cap,
 X and Y from its centroid along the principal directions. Read backwards, the volume of any region
 gives R = V/(π w²), the ratio of the principal moments gives R'/R'', their direction the ellipse's.
 
-Theory: section 9 of ``demos/theory.md``.
+Theory: demos/theory.md, section 9.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ The samples of each watershed are sorted by depth below its peak, and their mome
 in that order. So the sums above a level, which may differ between watersheds, cost one search for
 each peak.
 
-Theory: section 9 of ``demos/theory.md``.
+Theory: demos/theory.md, section 9.
 """
 
 from __future__ import annotations

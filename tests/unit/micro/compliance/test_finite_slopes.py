@@ -155,7 +155,7 @@ def pressure_of(n):
 @pytest.fixture(scope="module")
 def expansion_errors():
     """Errors of the work of the pressures by heights × 1 and × ½, to first and second order."""
-    shear, nu = MATERIAL.lame[1], MATERIAL.poisson_ratio
+    shear, nu = MATERIAL.shear_modulus, MATERIAL.poisson_ratio
     small, large = pressure_of(WAVES), pressure_of(60)
     flat = displaced(np.zeros_like(small), small, shear, nu)
     errors = []
@@ -186,7 +186,7 @@ def test_errors_fall_with_the_order_of_the_heights(expansion_errors, order, leas
 
 
 def test_flat_half_space_of_the_oracle():
-    shear, nu = MATERIAL.lame[1], MATERIAL.poisson_ratio
+    shear, nu = MATERIAL.shear_modulus, MATERIAL.poisson_ratio
     x = 2.0 * np.pi * np.arange(WAVES) / WAVES
     pressure = np.cos(x)[:, None] * np.cos(2.0 * x)
     found = displaced(np.zeros_like(pressure), pressure, shear, nu)
