@@ -146,26 +146,15 @@ def checked_patches(
         InputError: When there is not one finite number for every patch, or only asperities are
             known and the patches have no mean heights.
     """
-    if mean_heights is None:
-        if isinstance(rough, Surface):
-            patches = whole_patch(rough) if patches is None else patches
-            return patches, patch_means(rough, patches)
-        if patches is not None:
-            raise InputError(
-                "asperities do not know the mean heights of patches",
-                allowed="mean_heights, or no patches",
-            )
-        mean_heights = [rough.mean_height]
-    patches = whole_patch(rough) if patches is None else patches
-    return patches, checked_means(mean_heights, patches)
-
-
-def checked_means(mean_heights: ArrayLike, patches: Partition) -> Array:
-    """Return the mean heights of patches as an array.
-
-    Raises:
-        InputError: When there is not one finite number for every patch.
-    """
+    given, patches = patches, whole_patch(rough) if patches is None else patches
+    if mean_heights is None and isinstance(rough, Surface):
+        return patches, patch_means(rough, patches)
+    if mean_heights is None and given is not None:
+        raise InputError(
+            "asperities do not know the mean heights of patches",
+            allowed="mean_heights, or no patches",
+        )
+    mean_heights = [rough.mean_height] if mean_heights is None else mean_heights
     allowed = f"shape ({patches.count},)"
     try:
         means = np.asarray(mean_heights, float)
@@ -177,4 +166,4 @@ def checked_means(mean_heights: ArrayLike, patches: Partition) -> Array:
         raise InputError("every patch needs one mean height", value=means.shape, allowed=allowed)
     if not np.isfinite(means).all():
         raise InputError("a mean height is not finite", value=means.tolist(), allowed="mm")
-    return means
+    return patches, means

@@ -156,13 +156,9 @@ class AsperityContacts:
         own, displacement, spent = np.zeros_like(interference), np.zeros_like(interference), 0
         if above.size == 0:
             return Solution(own, displacement, 0, 0.0, 0)
+        size = BYTES_PER_PAIR * (2.0 if self.solver == "truncated-newton" else 1.0)
         while True:
-            checked_pairs(
-                len(above),
-                len(above),
-                "asperities",
-                bytes_per_pair=BYTES_PER_PAIR * (2.0 if self.solver == "truncated-newton" else 1.0),
-            )
+            checked_pairs(len(above), len(above), "asperities", bytes_per_pair=size)
             pairs = self.pairs.subset(above)
             problem = ContactProblem(interaction=pairs, interference=interference[above])
             found = solve(problem, SOLVERS[self.solver], start[above])
