@@ -25,10 +25,10 @@ from multiscale.comparison.level import (
     pressure_grid,
 )
 from multiscale.costs.prediction import predicted_cost
-from multiscale.machine.rates import Machine
+from multiscale.costs.work import Machine
 from multiscale.resolution.problem_setup import make_setup
 from multiscale.scene.scene import Scene
-from multiscale.setup.checks import EMBEDDED_CELLS, patch_grid
+from multiscale.setup.checks import LAW_BLOCK_CELLS, patch_grid
 from multiscale.setup.surface import make_surface
 
 LAW_HEIGHTS = 128
@@ -242,7 +242,7 @@ class _Family:
     def _cells(self) -> tuple[int, int, int]:
         """Elements of a block that carries laws itself."""
         stated = self._scene.block.cells
-        return stated if isinstance(stated, tuple) else EMBEDDED_CELLS
+        return stated if isinstance(stated, tuple) else LAW_BLOCK_CELLS
 
     @property
     def _patches(self) -> Grid:

@@ -42,7 +42,7 @@ def write_fields(folder: Path, run: Run) -> list[Path]:
     Note:
         Collective: every rank writes its part.
     """
-    if not run.setup.embedded or not run.steps:
+    if not run.setup.has_block or not run.steps:
         return []
 
     # The XDMF file names its HDF5 file, so both are written under their names in a folder aside.

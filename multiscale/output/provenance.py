@@ -15,8 +15,8 @@ from typing import Any
 import numpy
 import scipy
 
-from multiscale.costs.prediction import peak_memory
 from multiscale.couplings.reference import ReferenceCoupling
+from multiscale.machine.nodes import peak_memory
 from multiscale.run import Run
 from multiscale.setup.problem import ProblemSetup
 
@@ -44,8 +44,8 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
             "heights_sha256": run.heights,
             "highest_mm": run.setup.surface.highest,
             "summits": run.setup.asperities.count,
-            "summits_in_reach": int(run.setup.reached.sum()),
-            "border_maxima_in_reach": run.setup.reached_at_border,
+            "summits_in_reach": int(run.setup.interfering_summits.sum()),
+            "border_maxima_in_reach": run.setup.interfering_border_maxima,
         },
         "micro_model": _micro_model(run.setup),
         "ranks": 1 if run.comm is None else run.comm.size,

@@ -15,7 +15,7 @@ from multiscale.comparison.measures import Curves
 from multiscale.comparison.outcomes import Outcome, ranked, refinements
 from multiscale.resolution.auto_keys import auto_keys
 from multiscale.scene.scene import Scene
-from multiscale.setup.checks import EMBEDDED_CELLS
+from multiscale.setup.checks import LAW_BLOCK_CELLS
 
 COLUMNS = (
     "approach", "force", "area", "separation", "approach_error", "force_error", "area_error",
@@ -148,7 +148,7 @@ def test_scene_that_leaves_all_open_has_levels_that_stand(tmp_path):
         assert auto_keys(level.scene) <= {"micro.model"}
         assert not auto_keys(level.scene) or level.is_own or level.kind == "reference"
     meshed = [level.scene.block.cells for level in found if "elements" in level.name]
-    assert EMBEDDED_CELLS in meshed  # laws on a mesh are not left with what a smooth rest needs
+    assert LAW_BLOCK_CELLS in meshed  # laws on a mesh are not left with what a smooth rest needs
 
 
 def ended(level, *, finite_slopes=True):
