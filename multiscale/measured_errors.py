@@ -155,7 +155,7 @@ class _Problems:
         model, flat = self._model(self._half, 2), self._model(self._half, 0)
         if not isinstance(model.slopes, FiniteSlopes) or model.body is None:
             return error
-        slopes = FiniteSlopes(flat.surface, model.slopes.half_space)
+        slopes = FiniteSlopes(flat.surface, model.slopes.material)
         alone = replace(flat, slopes=slopes).equilibrium(self._control, start=known)
         return error + _ON_BODY * abs(known.force - alone.force)
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
-
-import numpy as np
 
 from geometry import PatchGrid, Surface
 from micro.asperities.model import MODELS
@@ -126,31 +124,8 @@ def half_space(
     surface: Surface, cells: tuple[int, int], contact_modulus: float, periodic: bool
 ) -> HalfSpaceModel:
     """Return the half-space model on a grid, its approach counted from the surface's summit."""
-    return HalfSpaceModel(
-        resampled(surface, cells),
-        contact_modulus=contact_modulus,
-        periodic=periodic,
-        highest=surface.highest,
-    )
-
-
-def resampled(surface: Surface, grid: tuple[int, int]) -> Surface:
-    """Return the interpolant of a surface at the centres of other cells.
-
-    Its own highest point differs a little: models that are to be compared get the `highest` of
-    the original.
-
-    Args:
-        surface: The surface.
-        grid: Cells in x and y.
-    """
-    if grid == surface.grid:
-        return surface
-    x, y = (
-        (np.arange(n) + 0.5) * (size / n) for n, size in zip(grid, surface.lengths, strict=True)
-    )
-    points = np.meshgrid(x, y, indexing="ij")
-    return replace(surface, heights=surface.height_at(*points))
+    model = HalfSpaceModel(surface, contact_modulus=contact_modulus, periodic=periodic)
+    return model.resampled(cells)
 
 
 def _fits(cells: tuple[int, int], parts: tuple[int, int]) -> bool:

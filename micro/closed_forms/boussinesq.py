@@ -24,67 +24,75 @@ Array = NDArray[np.float64]
 _TINY = 1e-290
 
 
-class HalfSpace(Material):
-    """An elastic half-space below the plane that carries the pressures.
+def displacements(
+    material: Material, x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: Partition
+) -> Array:
+    """Return displacements of a half-space by unit pressure on each rectangle alone.
+
+    Args:
+        material: Elastic constants.
+        x: Abscissae of n points, shape (n,) [mm].
+        y: Ordinates, shape (n,) [mm].
+        depth: Depths z ≥ 0 below the loaded plane, shape (n,) [mm].
+        loads: M rectangles.
+
+    Returns:
+        Displacements along x, y and into the depth, shape (3, n, M) [mm/MPa].
+
+    Raises:
+        InputError: When a point lies above the plane.
 
     Source:
         Love 1929, doi 10.1098/rsta.1929.0009.
     """
+    dx, dy, z, r = _corners(x, y, depth, loads)
+    nu, side = material.poisson_ratio, 1.0 - 2.0 * material.poisson_ratio
+    v_x, v_y, v_z = _gradient(dx, dy, z, r)
+    log = np.log(np.maximum(r + z, _TINY))
+    chi_x = dy * log + z * v_x + dx * _angle(dx, dy, z, r)
+    chi_y = dx * log + z * v_y + dy * _angle(dy, dx, z, r)
+    v = dx * v_x + dy * v_y + z * v_z
+    parts = -side * chi_x - z * v_x, -side * chi_y - z * v_y, 2.0 * (1.0 - nu) * v - z * v_z
+    return _differences(parts, loads, 4.0 * np.pi * material.shear_modulus)
 
-    __slots__ = ()
 
-    def displacements(
-        self, x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: Partition
-    ) -> Array:
-        """Return displacements by unit pressure on each rectangle alone.
+def stresses(
+    material: Material, x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: Partition
+) -> Array:
+    """Return stresses in a half-space by unit pressure on each rectangle alone, tension positive.
 
-        Args:
-            x: Abscissae of n points, shape (n,) [mm].
-            y: Ordinates, shape (n,) [mm].
-            depth: Depths z ≥ 0 below the loaded plane, shape (n,) [mm].
-            loads: M rectangles.
+    Args:
+        material: Elastic constants.
+        x: Abscissae of n points, shape (n,) [mm].
+        y: Ordinates, shape (n,) [mm].
+        depth: Depths z ≥ 0 below the loaded plane, shape (n,) [mm].
+        loads: M rectangles.
 
-        Returns:
-            Displacements along x, y and into the depth, shape (3, n, M) [mm/MPa].
-        """
-        dx, dy, z, r = _corners(x, y, depth, loads)
-        nu, side = self.poisson_ratio, 1.0 - 2.0 * self.poisson_ratio
-        v_x, v_y, v_z = _gradient(dx, dy, z, r)
-        log = np.log(np.maximum(r + z, _TINY))
-        chi_x = dy * log + z * v_x + dx * _angle(dx, dy, z, r)
-        chi_y = dx * log + z * v_y + dy * _angle(dy, dx, z, r)
-        v = dx * v_x + dy * v_y + z * v_z
-        parts = -side * chi_x - z * v_x, -side * chi_y - z * v_y, 2.0 * (1.0 - nu) * v - z * v_z
-        return _differences(parts, loads, 4.0 * np.pi * self.shear_modulus)
+    Returns:
+        σ_xx, σ_yy, σ_zz, σ_yz, σ_xz, σ_xy with z into the depth, shape (6, n, M) [-].
 
-    def stresses(self, x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: Partition) -> Array:
-        """Return stresses by unit pressure on each rectangle alone, positive in tension.
+    Raises:
+        InputError: When a point lies above the plane.
 
-        Args:
-            x: Abscissae of n points, shape (n,) [mm].
-            y: Ordinates, shape (n,) [mm].
-            depth: Depths z ≥ 0 below the loaded plane, shape (n,) [mm].
-            loads: M rectangles.
-
-        Returns:
-            σ_xx, σ_yy, σ_zz, σ_yz, σ_xz, σ_xy with z into the depth, shape (6, n, M) [-].
-        """
-        dx, dy, z, r = _corners(x, y, depth, loads)
-        nu, side = self.poisson_ratio, 1.0 - 2.0 * self.poisson_ratio
-        _, _, v_z = _gradient(dx, dy, z, r)
-        x_part = _over(r - dy, r * (dx**2 + z**2))
-        y_part = _over(r - dx, r * (dy**2 + z**2))
-        v_xx, v_yy, v_xy = dx * x_part, dy * y_part, _over(1.0, r)
-        chi_xy = np.log(np.maximum(r + z, _TINY))
-        parts = (
-            2.0 * nu * v_z - side * _angle(dx, dy, z, r) - z * v_xx,
-            2.0 * nu * v_z - side * _angle(dy, dx, z, r) - z * v_yy,
-            v_z + z * (v_xx + v_yy),  # V is harmonic
-            -z * z * y_part,
-            -z * z * x_part,
-            -side * chi_xy - z * v_xy,
-        )
-        return _differences(parts, loads, 2.0 * np.pi)
+    Source:
+        Love 1929, doi 10.1098/rsta.1929.0009.
+    """
+    dx, dy, z, r = _corners(x, y, depth, loads)
+    nu, side = material.poisson_ratio, 1.0 - 2.0 * material.poisson_ratio
+    _, _, v_z = _gradient(dx, dy, z, r)
+    x_part = _over(r - dy, r * (dx**2 + z**2))
+    y_part = _over(r - dx, r * (dy**2 + z**2))
+    v_xx, v_yy, v_xy = dx * x_part, dy * y_part, _over(1.0, r)
+    chi_xy = np.log(np.maximum(r + z, _TINY))
+    parts = (
+        2.0 * nu * v_z - side * _angle(dx, dy, z, r) - z * v_xx,
+        2.0 * nu * v_z - side * _angle(dy, dx, z, r) - z * v_yy,
+        v_z + z * (v_xx + v_yy),  # V is harmonic
+        -z * z * y_part,
+        -z * z * x_part,
+        -side * chi_xy - z * v_xy,
+    )
+    return _differences(parts, loads, 2.0 * np.pi)
 
 
 def _corners(

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.surface import Surface
+from geometry import Material, Surface
 from micro import (
     FiniteSlopes,
     FreeSides,
-    HalfSpace,
     HalfSpaceModel,
     MicroModel,
     SurfaceStress,
@@ -25,7 +24,7 @@ from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import FaceCompliance, Interface, Material
+    from macro import FaceCompliance, Interface
 
 Array = NDArray[np.float64]
 
@@ -92,8 +91,7 @@ def on_body(
     body = None if half_space else scene_body(setup)
     if body is not None and face is None:
         face = body.face(comm, modes=modes, coarse=coarse)
-    section = setup.scene.block
-    material = HalfSpace(young_modulus=section.young_modulus, poisson_ratio=section.poisson_ratio)
+    material = block_material(setup)
 
     def put(model: HalfSpaceModel, order: int) -> HalfSpaceModel:
         surface, model = model.surface, replace(model, tolerance=_SHARP)
@@ -250,8 +248,6 @@ def load_together(scene: Scene, comm: Any) -> None:
 
 def block_material(setup: ProblemSetup) -> Material:
     """Return the elastic constants of a scene's block."""
-    from macro import Material
-
     section = setup.scene.block
     return Material(young_modulus=section.young_modulus, poisson_ratio=section.poisson_ratio)
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from geometry.patches import UnevenPartition
-from micro.closed_forms.boussinesq import HalfSpace
+from geometry import Material, UnevenPartition
+from micro.closed_forms.boussinesq import stresses
 from micro.compliance.quarter_space import QuarterSpace, side_pressure_stresses
 
 RATIOS = [-0.5, 0.0, 0.15, 0.45]
@@ -56,7 +56,7 @@ def test_stresses_by_pressure_on_the_side_are_those_of_the_half_space(nu):
     points = np.zeros_like(y), y, np.full_like(y, depth)
     # xx, yy, zz, yz, zx, xy about the side's surface: its z is the top's x
     stress = (
-        HalfSpace(young_modulus=1.0, poisson_ratio=nu).stresses(*points, loads)[:, :, 0]
+        stresses(Material(young_modulus=1.0, poisson_ratio=nu), *points, loads)[:, :, 0]
         / (2.0 * half) ** 2
     )
     cosine, sine = (2.0 * step * wave(y) for wave in (np.cos, np.sin))
