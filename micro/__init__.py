@@ -16,9 +16,8 @@ from geometry.rigid_plane import RigidPlane
 from micro.asperities.contacts import SOLVERS, AsperityState
 from micro.asperities.model import MODELS, AsperityModel, ModelKind, asperity_model
 from micro.asperities.scaled_model import BORDERS, CURVATURES, ScaledModel
-from micro.choice.candidates import Candidate, resampled
+from micro.choice.candidates import Candidate
 from micro.choice.selection import Choice, choose
-from micro.closed_forms.boussinesq import HalfSpace
 from micro.closed_forms.hertz import HertzContact
 from micro.closed_forms.love import influence_matrix
 from micro.compliance.body_modes import BodyModes, BodyStresses
@@ -29,7 +28,7 @@ from micro.compliance.side_cells import SideStresses, side_stresses
 from micro.compliance.side_modes import side_modes, side_stress_modes
 from micro.factory import MODEL_NAMES, START_KINDS, micro_model
 from micro.half_space.contact_spots import Contacts, find_contacts
-from micro.half_space.model import HalfSpaceModel
+from micro.half_space.model import HalfSpaceModel, resampled
 from micro.half_space.state import HalfSpaceState
 from micro.islands.model import IslandModel
 from micro.islands.shapes import IslandState
@@ -52,7 +51,6 @@ __all__ = [
     "Contacts",
     "FiniteSlopes",
     "FreeSides",
-    "HalfSpace",
     "HalfSpaceModel",
     "HalfSpaceState",
     "HertzContact",

@@ -13,12 +13,10 @@ Theory: demos/theory.md, section 4.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry import Partition
+from geometry import Material, Partition
 from geometry.errors import InputError
 
 Array = NDArray[np.float64]
@@ -26,88 +24,75 @@ Array = NDArray[np.float64]
 _TINY = 1e-290
 
 
-@dataclass(frozen=True, slots=True)
-class HalfSpace:
-    """An elastic half-space below the plane that carries the pressures.
+def displacements(
+    material: Material, x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: Partition
+) -> Array:
+    """Return displacements of a half-space by unit pressure on each rectangle alone.
 
     Args:
-        young_modulus: E [MPa].
-        poisson_ratio: ν, −1 < ν < 0.5.
+        material: Elastic constants.
+        x: Abscissae of n points, shape (n,) [mm].
+        y: Ordinates, shape (n,) [mm].
+        depth: Depths z ≥ 0 below the loaded plane, shape (n,) [mm].
+        loads: M rectangles.
+
+    Returns:
+        Displacements along x, y and into the depth, shape (3, n, M) [mm/MPa].
 
     Raises:
-        InputError: When a constant is out of its range.
+        InputError: When a point lies above the plane.
 
     Source:
         Love 1929, doi 10.1098/rsta.1929.0009.
     """
+    dx, dy, z, r = _corners(x, y, depth, loads)
+    nu, side = material.poisson_ratio, 1.0 - 2.0 * material.poisson_ratio
+    v_x, v_y, v_z = _gradient(dx, dy, z, r)
+    log = np.log(np.maximum(r + z, _TINY))
+    chi_x = dy * log + z * v_x + dx * _angle(dx, dy, z, r)
+    chi_y = dx * log + z * v_y + dy * _angle(dy, dx, z, r)
+    v = dx * v_x + dy * v_y + z * v_z
+    parts = -side * chi_x - z * v_x, -side * chi_y - z * v_y, 2.0 * (1.0 - nu) * v - z * v_z
+    return _differences(parts, loads, 4.0 * np.pi * material.shear_modulus)
 
-    young_modulus: float
-    poisson_ratio: float
 
-    def __post_init__(self) -> None:
-        e, nu = self.young_modulus, self.poisson_ratio
-        if not (np.isfinite(e) and e > 0.0 and -1.0 < nu < 0.5):
-            raise InputError(
-                "the elastic constants are out of range", value=(e, nu), allowed="E > 0, -1 < ν < ½"
-            )
+def stresses(
+    material: Material, x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: Partition
+) -> Array:
+    """Return stresses in a half-space by unit pressure on each rectangle alone, tension positive.
 
-    @property
-    def shear_modulus(self) -> float:
-        """G [MPa]."""
-        return self.young_modulus / (2.0 * (1.0 + self.poisson_ratio))
+    Args:
+        material: Elastic constants.
+        x: Abscissae of n points, shape (n,) [mm].
+        y: Ordinates, shape (n,) [mm].
+        depth: Depths z ≥ 0 below the loaded plane, shape (n,) [mm].
+        loads: M rectangles.
 
-    def displacements(
-        self, x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: Partition
-    ) -> Array:
-        """Return displacements by unit pressure on each rectangle alone.
+    Returns:
+        σ_xx, σ_yy, σ_zz, σ_yz, σ_xz, σ_xy with z into the depth, shape (6, n, M) [-].
 
-        Args:
-            x: Abscissae of n points, shape (n,) [mm].
-            y: Ordinates, shape (n,) [mm].
-            depth: Depths z ≥ 0 below the loaded plane, shape (n,) [mm].
-            loads: M rectangles.
+    Raises:
+        InputError: When a point lies above the plane.
 
-        Returns:
-            Displacements along x, y and into the depth, shape (3, n, M) [mm/MPa].
-        """
-        dx, dy, z, r = _corners(x, y, depth, loads)
-        nu, side = self.poisson_ratio, 1.0 - 2.0 * self.poisson_ratio
-        v_x, v_y, v_z = _gradient(dx, dy, z, r)
-        log = np.log(np.maximum(r + z, _TINY))
-        chi_x = dy * log + z * v_x + dx * _angle(dx, dy, z, r)
-        chi_y = dx * log + z * v_y + dy * _angle(dy, dx, z, r)
-        v = dx * v_x + dy * v_y + z * v_z
-        parts = -side * chi_x - z * v_x, -side * chi_y - z * v_y, 2.0 * (1.0 - nu) * v - z * v_z
-        return _differences(parts, loads, 4.0 * np.pi * self.shear_modulus)
-
-    def stresses(self, x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: Partition) -> Array:
-        """Return stresses by unit pressure on each rectangle alone, positive in tension.
-
-        Args:
-            x: Abscissae of n points, shape (n,) [mm].
-            y: Ordinates, shape (n,) [mm].
-            depth: Depths z ≥ 0 below the loaded plane, shape (n,) [mm].
-            loads: M rectangles.
-
-        Returns:
-            σ_xx, σ_yy, σ_zz, σ_yz, σ_xz, σ_xy with z into the depth, shape (6, n, M) [-].
-        """
-        dx, dy, z, r = _corners(x, y, depth, loads)
-        nu, side = self.poisson_ratio, 1.0 - 2.0 * self.poisson_ratio
-        _, _, v_z = _gradient(dx, dy, z, r)
-        x_part = _over(r - dy, r * (dx**2 + z**2))
-        y_part = _over(r - dx, r * (dy**2 + z**2))
-        v_xx, v_yy, v_xy = dx * x_part, dy * y_part, _over(1.0, r)
-        chi_xy = np.log(np.maximum(r + z, _TINY))
-        parts = (
-            2.0 * nu * v_z - side * _angle(dx, dy, z, r) - z * v_xx,
-            2.0 * nu * v_z - side * _angle(dy, dx, z, r) - z * v_yy,
-            v_z + z * (v_xx + v_yy),  # V is harmonic
-            -z * z * y_part,
-            -z * z * x_part,
-            -side * chi_xy - z * v_xy,
-        )
-        return _differences(parts, loads, 2.0 * np.pi)
+    Source:
+        Love 1929, doi 10.1098/rsta.1929.0009.
+    """
+    dx, dy, z, r = _corners(x, y, depth, loads)
+    nu, side = material.poisson_ratio, 1.0 - 2.0 * material.poisson_ratio
+    _, _, v_z = _gradient(dx, dy, z, r)
+    x_part = _over(r - dy, r * (dx**2 + z**2))
+    y_part = _over(r - dx, r * (dy**2 + z**2))
+    v_xx, v_yy, v_xy = dx * x_part, dy * y_part, _over(1.0, r)
+    chi_xy = np.log(np.maximum(r + z, _TINY))
+    parts = (
+        2.0 * nu * v_z - side * _angle(dx, dy, z, r) - z * v_xx,
+        2.0 * nu * v_z - side * _angle(dy, dx, z, r) - z * v_yy,
+        v_z + z * (v_xx + v_yy),  # V is harmonic
+        -z * z * y_part,
+        -z * z * x_part,
+        -side * chi_xy - z * v_xy,
+    )
+    return _differences(parts, loads, 2.0 * np.pi)
 
 
 def _corners(

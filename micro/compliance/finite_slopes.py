@@ -40,9 +40,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from geometry import Surface
+from geometry import Material, Surface
 from geometry.errors import InputError
-from micro.closed_forms.boussinesq import HalfSpace
 from micro.compliance.waves import Around, Spectrum, Waves
 
 Array = NDArray[np.float64]
@@ -86,7 +85,7 @@ class FiniteSlopes:
 
     Args:
         surface: The surface.
-        half_space: The half-space.
+        material: Elastic constants of the body.
         order: Highest power of the heights, 1 or 2.
         periodic: Whether surface and pressures continue periodically; displacements then count
             from their mean, as those of the periodic half-space do.
@@ -107,7 +106,7 @@ class FiniteSlopes:
     def __init__(
         self,
         surface: Surface,
-        half_space: HalfSpace,
+        material: Material,
         *,
         order: int = 2,
         periodic: bool = False,
@@ -119,7 +118,7 @@ class FiniteSlopes:
             raise InputError("this order of slopes is unknown", value=order, allowed="1 or 2")
         if periodic and not surface.periodic:
             raise InputError("periodic slopes need a periodic surface", value=surface.source)
-        self.half_space, self.order, self.edge_stresses = half_space, order, tuple(edge_stresses)
+        self.material, self.order, self.edge_stresses = material, order, tuple(edge_stresses)
         self._periodic = periodic
         self.grid = grid or coarse_grid(surface)
         around: Around = "copies" if periodic else "nothing" if edge_stresses else "mirrored"
@@ -141,7 +140,7 @@ class FiniteSlopes:
             Shape (nx, ny) [mm].
         """
         waves, heights = self._waves, self._heights
-        modulus = self.half_space.young_modulus
+        modulus = self.material.young_modulus
         loaded = waves.alone(waves.coarsened(pressure))
         loads = waves.of(loaded)
         xx, _, xy = waves.directions
@@ -170,7 +169,7 @@ class FiniteSlopes:
             the waves of the second part.
         """
         waves, heights = self._waves, self._below
-        nu, shear = self.half_space.poisson_ratio, self.half_space.shear_modulus
+        nu, shear = self.material.poisson_ratio, self.material.shear_modulus
         bending = (1.0 - nu) / shear * waves.wave_number
         strains = waves.fields(self._strains_by_traction(waves.of(heights * stresses)))
         curvatures = waves.fields(bending * loads * waves.directions)
@@ -180,7 +179,7 @@ class FiniteSlopes:
 
     def _stresses(self, pressure: Array, along: Array, across: Array) -> Array:
         """Return σ_xx, σ_yy, σ_xy by pressures and their k_x²/k² and k_x k_y/k² transforms."""
-        nu = self.half_space.poisson_ratio
+        nu = self.material.poisson_ratio
         side = 1.0 - 2.0 * nu
         found = np.stack(
             [-2.0 * nu * pressure - side * along, side * along - pressure, -side * across]
@@ -191,7 +190,7 @@ class FiniteSlopes:
 
     def _adjoint(self, weights: Array) -> Spectrum:
         """Return the waves of the displacement that does the work of the stresses on a tensor."""
-        nu = self.half_space.poisson_ratio
+        nu = self.material.poisson_ratio
         waves = self._waves.of(weights)
         found = -2.0 * nu * (waves[0] + waves[1]) - (1.0 - 2.0 * nu) * self._lengthwise(waves)
         if self.edge_stresses:
@@ -202,13 +201,13 @@ class FiniteSlopes:
 
     def _strains(self, stresses: Array) -> Array:
         """Return the strains xx, yy, xy by stresses in the plane alone."""
-        nu, modulus = self.half_space.poisson_ratio, self.half_space.young_modulus
+        nu, modulus = self.material.poisson_ratio, self.material.young_modulus
         xx, yy, xy = stresses
         return np.stack([xx - nu * yy, yy - nu * xx, (1.0 + nu) * xy]) / modulus
 
     def _strains_by_traction(self, moments: Spectrum) -> Spectrum:
         """Return the waves of the strains in the plane by tractions ∂_α (h σ_αβ) on it."""
-        nu, shear = self.half_space.poisson_ratio, self.half_space.shear_modulus
+        nu, shear = self.material.poisson_ratio, self.material.shear_modulus
         along_x, along_y, across = self._waves.directions
         xx, yy, xy = moments
         both = nu * self._lengthwise(moments)

@@ -100,14 +100,18 @@ def solve_with_slopes(
     mixing, displaced = AndersonMixing(), np.zeros(interference.shape)
     if start is not None and start.pressure.any():
         displaced = compliance.slope_displacement(start.pressure)
-    accuracy, iterations = max(tolerance, _FIRST), 0
+    accuracy, iterations, left = max(tolerance, _FIRST), 0, np.inf
     last = max(_CONVERGED, 10.0 * tolerance)
     for _ in range(_MOST_SOLUTIONS):
         found = start = solve(interference - displaced, motions, start, accuracy)
         iterations += found.iterations
         touching = found.pressure > 0.0
         if not touching.any():
-            return found
+            if not displaced.any():
+                return found
+            # slopes of a far larger load part the bodies: begin without them
+            mixing, displaced = AndersonMixing(), np.zeros(interference.shape)
+            continue
         change = compliance.slope_displacement(found.pressure) - displaced
         nearer = (
             interference if motions is None else interference + motions.displacement(found.motion)

@@ -120,6 +120,18 @@ class HalfSpaceModel:
         model = replace(self, surface=piece, highest=self.reference_height, **alone)
         return model, whole_patch(piece)
 
+    def resampled(self, grid: tuple[int, int]) -> Self:
+        """Return the model on other cells of the same surface, between its free sides and body.
+
+        The approach counts from the same height. Finite slopes belong to the cells of a surface and
+        are left out.
+
+        Args:
+            grid: Cells in x and y.
+        """
+        surface = resampled(self.surface, grid)
+        return replace(self, surface=surface, highest=self.reference_height, slopes=None)
+
     def solve(
         self,
         approach: float,
@@ -249,3 +261,21 @@ class HalfSpaceModel:
         return PlaneContact(
             surface=self.surface, reference_height=self.reference_height, solver=solver
         )
+
+
+def resampled(surface: Surface, grid: tuple[int, int]) -> Surface:
+    """Return the interpolant of a surface at the centres of other cells.
+
+    Its own highest point differs a little: models that are to be compared count the approach from
+    that of the original, as `HalfSpaceModel.resampled` does.
+
+    Args:
+        surface: The surface.
+        grid: Cells in x and y.
+    """
+    if grid == surface.grid:
+        return surface
+    x, y = (
+        (np.arange(n) + 0.5) * (size / n) for n, size in zip(grid, surface.lengths, strict=True)
+    )
+    return replace(surface, heights=surface.height_at(*np.meshgrid(x, y, indexing="ij")))

@@ -11,16 +11,15 @@ from typing import Any
 from geometry.collective import on_root
 from geometry.statistics import roughness
 from multiscale.cli.inputs import scene_and_folder
-from multiscale.costs.prediction import Cost
+from multiscale.costs.prediction import Cost, predicted_cost
 from multiscale.couplings.blocks import load_together
 from multiscale.laws.files import write_laws
-from multiscale.machine.mpi_job import for_large
-from multiscale.machine.nodes import nodes_of
+from multiscale.machine.mpi_job import large_object_comm
+from multiscale.machine.nodes import cluster_nodes
 from multiscale.output import terminal
 from multiscale.output.results import write_figure
 from multiscale.planning import plan
-from multiscale.planning.forecast import forecast
-from multiscale.planning.memory import shortages
+from multiscale.planning.block_plan import memory_warnings
 from multiscale.resolution.problem_setup import make_setup
 from multiscale.restart.folder_lock import locked
 from multiscale.run import Run
@@ -39,16 +38,16 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
     """
     scene, _ = scene_and_folder(choice, comm)
     load_together(scene, comm)
-    nodes = nodes_of(comm)
+    nodes = cluster_nodes(comm)
 
     def planned() -> tuple[ProblemSetup, Cost]:
         setup = make_setup(
-            scene, nodes=replace(nodes, more=True)
+            scene, nodes=replace(nodes, extensible=True)
         )  # of any number, if it takes them
-        return setup, forecast(setup)
+        return setup, predicted_cost(setup)
 
-    setup, cost = on_root(for_large(comm), planned)
-    terminal.show_plan(comm, setup, cost, list(shortages(setup, nodes)))
+    setup, cost = on_root(large_object_comm(comm), planned)
+    terminal.show_plan(comm, setup, cost, list(memory_warnings(setup, nodes)))
 
 
 def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -86,8 +85,10 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
     """
     scene, folder = scene_and_folder(choice, comm)
     with locked(folder, comm):
-        nodes = replace(nodes_of(comm), more=True)  # a surface needs no memory for its block
-        setup = on_root(for_large(comm), lambda: make_setup(scene, nodes=nodes))
+        nodes = replace(
+            cluster_nodes(comm), extensible=True
+        )  # a surface needs no memory for its block
+        setup = on_root(large_object_comm(comm), lambda: make_setup(scene, nodes=nodes))
         terminal.show_pairs(comm, _surface_facts(setup))
 
         def write() -> list[Path]:

@@ -12,7 +12,7 @@ from importlib import import_module
 from typing import Any
 
 from geometry.errors import InputError, NotWritten, OutOfMemory, PatchlawError
-from multiscale.machine.mpi_job import check_address_space, petsc_leaves_signals, world
+from multiscale.machine.mpi_job import check_address_space, keep_petsc_from_signals, world
 from multiscale.output import terminal
 
 _COMMANDS = {
@@ -42,7 +42,7 @@ def execute(choice: argparse.Namespace | str, options: list[str]) -> int:
     Note:
         Collective over all processes of the MPI job, which starts here.
     """
-    petsc_leaves_signals()
+    keep_petsc_from_signals()
     try:
         check_address_space()
         comm = world()

@@ -85,7 +85,7 @@ def _make_load_steps(
     load_history = run.scene.loading.load_history
     with terminal.progress(run.comm, load_history, len(run.steps)) as advance:
         try:
-            if run.setup.by_laws:
+            if run.setup.uses_laws:
                 run.make_laws()
             checkpoints.write()
             interruption.check("before the block was made")

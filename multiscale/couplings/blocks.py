@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.surface import Surface
+from geometry import Material, Surface
 from micro import (
     FiniteSlopes,
     FreeSides,
-    HalfSpace,
     HalfSpaceModel,
     MicroModel,
     SurfaceStress,
@@ -25,7 +24,7 @@ from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import FaceCompliance, Interface, Material
+    from macro import FaceCompliance, Interface
 
 Array = NDArray[np.float64]
 
@@ -53,7 +52,7 @@ def contact_model(setup: ProblemSetup, comm: Any) -> MicroModel:
         Collective.
     """
     model = setup.model
-    embedded = setup.embedded and setup.scene.coupling.kind != "isolated"
+    embedded = setup.has_block and setup.scene.coupling.kind != "isolated"
     if isinstance(model, HalfSpaceModel):
         order = SLOPES if setup.finite_slopes else 0
         return on_body(setup, comm, half_space=not embedded)(model, order)
@@ -92,8 +91,7 @@ def on_body(
     body = None if half_space else scene_body(setup)
     if body is not None and face is None:
         face = body.face(comm, modes=modes, coarse=coarse)
-    section = setup.scene.block
-    material = HalfSpace(section.young_modulus, section.poisson_ratio)
+    material = block_material(setup)
 
     def put(model: HalfSpaceModel, order: int) -> HalfSpaceModel:
         surface, model = model.surface, replace(model, tolerance=_SHARP)
@@ -152,7 +150,7 @@ def free_sides(setup: ProblemSetup) -> FreeSides | None:
 
 def _block_sides(setup: ProblemSetup) -> FreeSides | None:
     """Return the free sides of a scene's block that end its interface; None without them."""
-    if not setup.embedded or setup.scene.block.sides != "free" or setup.shape.margin:
+    if not setup.has_block or setup.scene.block.sides != "free" or setup.shape.margin:
         return None
     return FreeSides(
         lengths=setup.surface.lengths,
@@ -250,8 +248,6 @@ def load_together(scene: Scene, comm: Any) -> None:
 
 def block_material(setup: ProblemSetup) -> Material:
     """Return the elastic constants of a scene's block."""
-    from macro import Material
-
     section = setup.scene.block
     return Material(young_modulus=section.young_modulus, poisson_ratio=section.poisson_ratio)
 

@@ -17,7 +17,7 @@ import threadpoolctl
 
 from multiscale.doctor.examination import CheckResult, State, gathered
 from multiscale.machine.mpi_job import detached_processes
-from multiscale.machine.nodes import group_memory
+from multiscale.machine.nodes import control_group_memory
 
 _OLDEST = {
     "numpy": (1, 24),
@@ -195,7 +195,7 @@ def memory(comm: Any, free: float | None = None) -> list[CheckResult]:
         comm: MPI communicator, or None.
         free: Free memory of this host [B]; by default it is measured.
     """
-    free = free_memory(group_memory()) if free is None else free
+    free = free_memory(control_group_memory()) if free is None else free
     hosts = gathered(comm, (platform.node(), free))
     sharing = Counter(host for host, _ in hosts)
     least = min(amount / sharing[host] for host, amount in hosts)

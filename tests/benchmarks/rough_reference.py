@@ -25,7 +25,7 @@ from geometry import (
     synthesise,
 )
 from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
-from micro import FiniteSlopes, FreeSides, HalfSpace, HalfSpaceModel
+from micro import FiniteSlopes, FreeSides, HalfSpaceModel
 from multiscale.couplings.body_terms import Body
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
@@ -78,8 +78,7 @@ def main():
     choice = parser.parse_args()
     surface = synthesise(SPECTRUM, grid=(256, 256), lengths=(1.0, 1.0))
     model = HalfSpaceModel(surface=surface, contact_modulus=MATERIAL.contact_modulus)
-    nu = MATERIAL.poisson_ratio
-    slopes = FiniteSlopes(surface, HalfSpace(MATERIAL.young_modulus, nu))
+    slopes = FiniteSlopes(surface, MATERIAL)
     sloped = replace(model, slopes=slopes)
     effects = [sloped.solve(at).force / model.solve(at).force - 1.0 for at in APPROACHES]
     if COMM.rank == 0:

@@ -61,8 +61,8 @@ def test_slopes_soften_a_low_block_as_its_mesh():
     found = replace(steep, tolerance=1e-8).solve(APPROACH).force / small - 1.0
     assert found == pytest.approx(expected, abs=2.5e-3)  # −4.13 %
     # without the body's own stresses, and its height above the mean plane
-    half_space = steep.slopes.half_space
-    slopes = FiniteSlopes(steep.surface, half_space, edge_stresses=steep.slopes.edge_stresses[:-1])
+    material = steep.slopes.material
+    slopes = FiniteSlopes(steep.surface, material, edge_stresses=steep.slopes.edge_stresses[:-1])
     alone = replace(flat, slopes=slopes, tolerance=1e-8).solve(APPROACH).force / small - 1.0
     assert alone - expected > 8e-3  # −3.01 %
 

@@ -19,12 +19,12 @@ from geometry import (
     reference_shapes,
 )
 from macro import Block, Interface, UnilateralContactProblem, block_mesh, rough_block_mesh
-from micro import FreeSides, HalfSpace
+from micro import FreeSides
+from micro.closed_forms.boussinesq import displacements
 from multiscale.results.extrapolation import extrapolated
 
 SQUARE = (1.0, 1.0)
 SIDES = FreeSides(lengths=SQUARE, poisson_ratio=MATERIAL.poisson_ratio, decay_length=0.25)
-HALF_SPACE = HalfSpace(MATERIAL.young_modulus, MATERIAL.poisson_ratio)
 APPROACH, FLAT = 3e-3, 0.01
 
 
@@ -51,7 +51,7 @@ def test_what_is_left_beside_a_side_is_smooth():
     at = (np.abs(nodes[:, 2]) < 1e-9) & (np.abs(nodes[:, 1] - square.centres[0, 1]) < 0.01)
     at &= (nodes[:, 0] > 1e-3) & (nodes[:, 0] < 0.06)
     x, y, _ = nodes[at].T
-    beyond = down[at] - HALF_SPACE.displacements(x, y, np.zeros_like(x), square)[2, :, 0]
+    beyond = down[at] - displacements(MATERIAL, x, y, np.zeros_like(x), square)[2, :, 0]
     grid = np.linspace(1e-3, 0.06, 60), np.linspace(y.min(), y.max(), 5)
     side = (
         RectBivariateSpline(*grid, side_displacements(SIDES, *grid, square)[:, :, 0]).ev(x, y)

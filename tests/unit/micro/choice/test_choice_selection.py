@@ -7,7 +7,7 @@ import pytest
 
 from geometry import PatchGrid, Spectrum, Surface, synthesise
 from geometry.errors import InputError, NotConverged
-from micro import AsperityModel, HalfSpaceModel, choose, resampled
+from micro import AsperityModel, HalfSpaceModel, choose
 
 WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
 
@@ -23,12 +23,7 @@ def force(model, approaches):
 
 
 def fine(surface, cells, **options):
-    return HalfSpaceModel(
-        surface=resampled(surface, (cells, cells)),
-        contact_modulus=1.0,
-        highest=surface.highest,
-        **options,
-    )
+    return HalfSpaceModel(surface, contact_modulus=1.0, **options).resampled((cells, cells))
 
 
 @pytest.mark.parametrize(

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from rough_half_space import displaced
 
-from geometry import InputError, Spectrum, Surface, synthesise
-from micro import FreeSides, HalfSpace, HalfSpaceModel
+from geometry import InputError, Material, Spectrum, Surface, synthesise
+from micro import FreeSides, HalfSpaceModel
 from micro.compliance.finite_slopes import FiniteSlopes, coarse_grid
 from micro.compliance.side_cells import SideStresses
 
-HALF_SPACE = HalfSpace(4000.0, 0.3)
+MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.3)
 DICE = np.random.default_rng(7)
 
 
@@ -32,7 +32,7 @@ def beside_of(surface):
 def term(surface, around="nothing", **options):
     if around == "block":
         options["edge_stresses"] = beside_of(surface)
-    return FiniteSlopes(surface, HALF_SPACE, periodic=around == "periodic", **options)
+    return FiniteSlopes(surface, MATERIAL, periodic=around == "periodic", **options)
 
 
 def pressed(surface, periodic=False, approach=2e-3):
@@ -155,7 +155,7 @@ def pressure_of(n):
 @pytest.fixture(scope="module")
 def expansion_errors():
     """Errors of the work of the pressures by heights × 1 and × ½, to first and second order."""
-    shear, nu = HALF_SPACE.shear_modulus, HALF_SPACE.poisson_ratio
+    shear, nu = MATERIAL.shear_modulus, MATERIAL.poisson_ratio
     small, large = pressure_of(WAVES), pressure_of(60)
     flat = displaced(np.zeros_like(small), small, shear, nu)
     errors = []
@@ -186,7 +186,7 @@ def test_errors_fall_with_the_order_of_the_heights(expansion_errors, order, leas
 
 
 def test_flat_half_space_of_the_oracle():
-    shear, nu = HALF_SPACE.shear_modulus, HALF_SPACE.poisson_ratio
+    shear, nu = MATERIAL.shear_modulus, MATERIAL.poisson_ratio
     x = 2.0 * np.pi * np.arange(WAVES) / WAVES
     pressure = np.cos(x)[:, None] * np.cos(2.0 * x)
     found = displaced(np.zeros_like(pressure), pressure, shear, nu)

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry import Control, NotConverged, Spectrum, synthesise
-from micro import HalfSpace, HalfSpaceModel
+from geometry import Control, Material, NotConverged, Spectrum, synthesise
+from micro import HalfSpaceModel
 from micro.compliance.cells import Box
 from micro.compliance.finite_slopes import FiniteSlopes
 from micro.compliance.grid_compliance import Compliance
@@ -16,7 +16,7 @@ E_STAR = MODULUS / (1.0 - NU**2)
 SURFACE = synthesise(
     Spectrum(hurst=0.9, waves=(2, 6), rms_slope=0.2, seed=3), grid=(64, 48), lengths=(1.0, 0.75)
 )
-SLOPES = FiniteSlopes(SURFACE, HalfSpace(MODULUS, NU))
+SLOPES = FiniteSlopes(SURFACE, Material(young_modulus=MODULUS, poisson_ratio=NU))
 MODEL = HalfSpaceModel(
     surface=SURFACE, contact_modulus=E_STAR, slopes=SLOPES, highest=SURFACE.highest, tolerance=1e-10
 )

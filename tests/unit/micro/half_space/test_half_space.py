@@ -241,3 +241,12 @@ def test_a_patch_alone_has_no_free_sides(surface):
     alone, expected = (replace(model, sides=each).of_patch(PATCHES, 1)[0] for each in (sides, None))
     assert alone.sides is None
     assert alone.solve(0.04).force == expected.solve(0.04).force > 0.0
+
+
+def test_resampled_cells_count_from_the_same_height(surface):
+    model = HalfSpaceModel(surface, contact_modulus=E_STAR, tolerance=1e-9)
+    fine = model.resampled((96, 80))
+    assert fine.surface.grid == (96, 80) and fine.tolerance == 1e-9
+    assert fine.reference_height == model.reference_height == surface.highest
+    # measured 0.9 %
+    assert fine.solve(8e-3).force == pytest.approx(model.solve(8e-3).force, rel=0.03)
