@@ -11,9 +11,9 @@ from multiscale.couplings.condensed import CondensedCoupling
 from multiscale.couplings.load_steps import ContactCoupling, EmbeddedCoupling
 from multiscale.couplings.reference import ReferenceCoupling
 from multiscale.laws.consistent import consistent_laws
-from multiscale.laws.files import LawTable, read_laws, write_laws
+from multiscale.laws.files import read_laws, write_laws
 from multiscale.laws.isolated import isolated_laws
-from multiscale.laws.packed import PatchLaws
+from multiscale.laws.law_table import LawTable, PatchLaws
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.loading.load_step import LoadStep, PatchState
 from multiscale.loading.stepper import LoadHistory, load_steps

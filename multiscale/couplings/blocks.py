@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -25,7 +26,7 @@ from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import FaceCompliance, Interface, Material
+    from macro import Block, FaceCompliance, Interface, Material
 
 Array = NDArray[np.float64]
 
@@ -42,12 +43,14 @@ _SHARP = 1e-10
 of length nor the number of ranks is seen in a result. It costs a tenth more than 1e-8."""
 
 
-def contact_model(setup: ProblemSetup, comm: Any) -> MicroModel:
+def contact_model(setup: ProblemSetup, comm: Any, put_on_body: OnBody | None = None) -> MicroModel:
     """Return a scene's micro model on the body that it is pressed on, finite slopes included.
 
     Args:
-        setup: The scene's ingredients.
+        setup: The problem set up from the scene.
         comm: MPI communicator; None for this process alone.
+        put_on_body: What puts a half-space model on the scene's body, where that was solved for
+            already, see `on_body`.
 
     Note:
         Collective.
@@ -55,8 +58,8 @@ def contact_model(setup: ProblemSetup, comm: Any) -> MicroModel:
     model = setup.model
     embedded = setup.embedded and setup.scene.coupling.kind != "isolated"
     if isinstance(model, HalfSpaceModel):
-        order = SLOPES if setup.finite_slopes else 0
-        return on_body(setup, comm, half_space=not embedded)(model, order)
+        put_on_body = put_on_body or on_body(setup, comm, half_space=not embedded)
+        return put_on_body(model, SLOPES if setup.finite_slopes else 0)
     if not embedded:
         return model
     body = scene_body(setup)
@@ -230,14 +233,15 @@ def embedding(setup: ProblemSetup, comm: Any) -> Interface:
     return Interface(Block(mesh, block_material(setup), sides=section.sides), setup.patches)
 
 
-def load_together(scene: Scene, comm: Any) -> None:
-    """Load the finite elements on all ranks where a scene may need them.
+def load_finite_elements(scene: Scene, comm: Any) -> None:
+    """Import the finite elements on all ranks where a scene may need them.
 
-    PETSc starts with collective calls on all processes of the job: one rank alone must not.
+    PETSc starts with collective calls on all processes of the job, so that one rank alone must not
+    import it.
 
     Args:
         scene: The scene.
-        comm: MPI communicator; None for this process alone, which loads them when it needs them.
+        comm: MPI communicator; None for this process alone, which imports them when it needs them.
 
     Note:
         Collective.
@@ -254,7 +258,7 @@ def block_material(setup: ProblemSetup) -> Material:
     return Material(young_modulus=section.young_modulus, poisson_ratio=section.poisson_ratio)
 
 
-def final_field(setup: ProblemSetup, pressure: Array, comm: Any) -> tuple[Interface, Array]:
+def field_under(setup: ProblemSetup, pressure: Array, comm: Any) -> tuple[Interface, Array]:
     """Return the meshed block and its displacements under pressures that are uniform on patches.
 
     Args:
@@ -268,3 +272,25 @@ def final_field(setup: ProblemSetup, pressure: Array, comm: Any) -> tuple[Interf
     interface = embedding(setup, comm)
     function = interface.block.solve(interface.load(pressure))
     return interface, function.x.array[: interface.block.owned_dofs].copy()
+
+
+def free_blocks(blocks: list[Block]) -> None:
+    """Free blocks that nothing else refers to any more.
+
+    PETSc keeps objects that Python drops until it is asked on their own communicator. Without this
+    a program that makes many runs would grow by a block with each.
+
+    Args:
+        blocks: The blocks; the list is emptied.
+
+    Note:
+        Collective.
+    """
+    from macro.compat import free_dropped
+
+    comms = [block.stiffness.comm.duplicate() for block in blocks]  # these outlive their blocks
+    blocks.clear()
+    gc.collect()  # a block and its contact problem refer to each other
+    for comm in comms:
+        free_dropped(comm)
+        comm.destroy()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from multiscale.laws.files import LawTable
+from multiscale.laws.law_table import LawTable
 from multiscale.setup.problem import ProblemSetup
 
 MOST_CYCLES_PER_STEP = 12
@@ -56,7 +56,7 @@ def newton_choice(setup: ProblemSetup, table: LawTable | None = None) -> NewtonC
     coupling = setup.scene.coupling
     if coupling.decomposed:
         return NewtonChoice(condensed=True, why="the decomposed block is its compliance")
-    flat = 0 if table is None else sum(law.is_punch for law in table.laws)
+    flat = 0 if table is None else sum(law.is_flat for law in table.laws)
     if flat and _left_open(setup):
         why = (
             f"{flat} of {setup.patches.count} patches are flat, and their pressure is a function "

@@ -1,4 +1,4 @@
-"""One accepted load step, and what every patch carries in it."""
+"""The record of one load step, and of every patch in it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PatchState:
-    """What every patch carries at one load step.
+    """State of every patch at one load step.
 
     Attributes:
         closure_mm: Mean closure of each patch, shape (N,) [mm].
@@ -30,7 +30,7 @@ class LoadStep:
     """One accepted load step; the fields up to `reason` are columns of ``history.csv``.
 
     Attributes:
-        step: Number of the step, from 1.
+        step: Number of the step, from 1; 0 before it is accepted.
         approach_mm: Approach of the rigid plane from first touch [mm].
         force_N: Normal force on the plane [N].
         mean_pressure_MPa: Force over nominal contact area [MPa].
@@ -61,7 +61,7 @@ class LoadStep:
             [N]; empty where they were not measured.
     """
 
-    step: int
+    step: int = 0
     approach_mm: float
     force_N: float
     mean_pressure_MPa: float
@@ -69,9 +69,9 @@ class LoadStep:
     mean_separation_mm: float
     contacts: int
     newton_iterations: int
-    linear_iterations: int
-    wall_s: float
-    reason: str
+    linear_iterations: int = 0
+    wall_s: float = 0.0
+    reason: str = "CONVERGED"
     patches: PatchState
     imbalance: float | None = None
     residuals: tuple[float, ...] = ()

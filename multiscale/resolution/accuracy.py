@@ -18,7 +18,7 @@ from geometry.surface import Surface
 from micro import HalfSpaceModel, resampled
 from multiscale.costs.prediction import predicted_cost
 from multiscale.couplings.blocks import SLOPES, OnBody, on_body
-from multiscale.couplings.reference import make_reference, recorded
+from multiscale.couplings.reference import make_reference
 from multiscale.errors.load_steps import error_probe
 from multiscale.machine.rates import this_machine
 from multiscale.resolution.auto_keys import accuracy_of, auto_keys, couplings, map_grid
@@ -210,7 +210,7 @@ class _Search:
         coupling = make_reference(setup, None)
         load_history = setup.scene.loading.load_history
         step = coupling.press(load_history.control(load_history.largest))
-        (found,) = recorded(setup, coupling, [step]).with_errors([step])
+        (found,) = coupling.record([step]).with_errors([step])
         if not step.force_N > 0.0:
             return 0.0
         if found.force_error_N is None or found.approach_error_mm is None:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from multiscale.laws.files import LawTable
+from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 
 
@@ -31,7 +31,7 @@ def range_notes(steps: Sequence[LoadStep], table: LawTable | None) -> Iterator[s
 
 def _beyond(steps: Sequence[LoadStep], table: LawTable) -> dict[int, str]:
     """Return what to say of the steps with patches loaded beyond the range of their laws."""
-    limit = np.array([law.warned_from for law in table.laws])
+    limit = np.array([law.warning_pressure for law in table.laws])
     told = {}
     for step in steps:
         pressure = step.patches.pressure_MPa

@@ -78,7 +78,7 @@ def by_laws(body, face, count):
             displacements=lambda pressures: pressures @ compliance.T,
             most_rows=rows,
         )
-        used = max(law.approach.size for law in table.laws)
+        used = max(len(law.rows) for law in table.laws)
         print(f"laws of {count**2} patches on the block, 256², {used} rows: {spent:.2f} s")
     spent, _ = median(condensed, table, compliance)
     print(f"100 condensed load steps, {count**2} patches: {spent:.3f} s")

@@ -13,9 +13,10 @@ from geometry.errors import NotConverged
 from geometry.patches import PatchGrid
 from micro import contact_modulus, influence_matrix
 from multiscale.couplings.dense_newton import DenseNewton
-from multiscale.laws.packed import PatchLaws
+from multiscale.laws.law_table import PatchLaws
 from multiscale.laws.patch_law import PatchLaw
-from multiscale.laws.repair import evened_law
+from multiscale.laws.repair import repaired_law
+from multiscale.laws.rows import LawRows
 from multiscale.run import Run
 
 every_kind = pytest.mark.parametrize("kind", KINDS)
@@ -110,10 +111,11 @@ def test_a_gap_shifted_by_a_ten_thousandth(kind):
 def law(closure, pressure, shift=0.0):
     closure, pressure = np.array(closure) + shift, np.array(pressure)
     zero = np.zeros(len(closure))
-    return PatchLaw(
+    rows = LawRows(
         closure=closure, pressure=pressure, approach=closure, contact_area_fraction=zero,
-        contacts=zero.astype(int), relief=zero, touch=float(closure[0]), reach=0.02,
+        contacts=zero.astype(int), unresolved_displacement=zero,
     )  # fmt: skip
+    return PatchLaw(rows=rows, first_touch=float(closure[0]), initial_separation=0.02)
 
 
 STEEP = np.array([0.0, 1e-3, 1e-3 + 1e-9, 9e-3])
@@ -160,7 +162,7 @@ def test_sixteen_patches_with_such_laws(name, by_force):
         noise = np.random.default_rng(4).normal(0.0, 0.3, len(pressure))
         pressure = np.abs(pressure * (1.0 + noise))
     laws = [law(closure, pressure, shift) for shift in np.linspace(0.0, 4e-3, 16)]
-    laws = laws if name != "noisy" else list(map(evened_law, laws))
+    laws = laws if name != "noisy" else list(map(repaired_law, laws))
     patches = PatchGrid(grid=(4, 4), lengths=(1.0, 1.0))
     yields = influence_matrix(patches) / (np.pi * 4092.0)
     newton = DenseNewton(PatchLaws(laws), yields, patches)
