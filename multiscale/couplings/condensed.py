@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from geometry.control import Control
 from geometry.errors import NotConverged
 from multiscale.couplings.dense_newton import DenseNewton
-from multiscale.couplings.load_steps import beyond_law, patch_load_step
+from multiscale.couplings.load_steps import beyond_law
 from multiscale.couplings.loaded_patches import DenseState
 from multiscale.laws.consistent import Displacements
 from multiscale.laws.interpolation import LawPoint
@@ -58,13 +58,13 @@ class CondensedCoupling:
             )
             raise beyond_law(control, problem, self._table)
         self._last = state
-        return patch_load_step(
+        return LoadStep.of_patches(
             self._table.patches,
             plane=state.plane,
             load=state.load,
             closure=state.closure,
             pressure=state.pressure,
-            contact=self._laws.contact(state.local),
+            **self._laws.contact(state.local)._asdict(),
             newton_iterations=state.iterations,
             residuals=state.residuals,
         )
@@ -129,13 +129,13 @@ class FreePlaneCoupling:
                 remedy=f"their closures miss {residual:.1%} of the approach: make the laws for "
                 "this block and mesh",
             )
-        return patch_load_step(
+        return LoadStep.of_patches(
             patches,
             plane=(approach, *tilt),
             load=(self._force(approach), *path.moment_at(approach)),
             closure=closure,
             pressure=point.pressure,
-            contact=self._laws.contact(everywhere),
+            **self._laws.contact(everywhere)._asdict(),
             newton_iterations=evaluations,
             residuals=(float(residual),),
         )

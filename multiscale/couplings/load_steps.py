@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,9 +11,9 @@ from geometry.collective import on_root
 from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
-from micro import START_KINDS, MicroModel, Response, RigidPlane
-from multiscale.laws.law_table import ContactValues, LawTable
-from multiscale.loading.load_step import LoadStep, PatchState
+from micro import START_KINDS, MicroModel
+from multiscale.laws.law_table import LawTable
+from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import BeyondLaws, described
 from multiscale.storage.serialisation import Arrays, packed, unpacked
 
@@ -51,7 +50,19 @@ class ContactCoupling:
             response, plane, self._start = self._model.press(
                 control, patches=self._patches, mean_heights=self._mean_heights, start=self._start
             )
-            return response_load_step(response, self._patches, plane)
+            return LoadStep.of_patches(
+                self._patches,
+                plane=(plane.approach, *plane.tilt),
+                load=(response.force[0], *response.moment[0]),
+                closure=plane.means(self._patches) - response.patch_displacement[0],
+                pressure=response.patch_force[0] / self._patches.area,
+                area_fraction=response.patch_contact_area[0] / self._patches.area,
+                separation=response.mean_separation,
+                contacts=response.contacts,
+                newton_iterations=int(response.iterations[0]),
+                residuals=(float(response.residual[0]),),
+                warnings=response.warnings,
+            )
 
         return on_root(self._comm, solve)
 
@@ -130,91 +141,27 @@ class EmbeddedCoupling:
             return self._problem.patch_means(functions)
 
         try:
-            area, separation = means("contact_area_fraction"), means("separation")
+            area_fraction, separation = means("contact_area_fraction"), means("separation")
         except InputError as error:
             falls = not all(law.is_function for law in laws)
             raise beyond_law(control, str(error), self._table, falls=falls) from error
         mean_closures = zip(laws, state.closure, strict=True)
         contacts = [law.at(closure, extend=True).contacts for law, closure in mean_closures]
-        return patch_load_step(
+        return LoadStep.of_patches(
             self._table.patches,
             plane=(state.approach, *state.tilt),
             load=(state.force, *state.moment),
             closure=state.closure,
             pressure=state.pressure,
-            contact=ContactValues(area, separation, np.array(contacts)),
+            area_fraction=area_fraction,
+            separation=separation,
+            contacts=contacts,
             newton_iterations=state.newton_iterations,
             linear_iterations=state.linear_iterations,
             reason=state.reason,
             imbalance=(state.force - state.reaction) / state.force if state.force else 0.0,
             residuals=tuple(map(float, state.residuals)),
         )
-
-
-def response_load_step(response: Response, patches: PatchGrid, plane: RigidPlane) -> LoadStep:
-    """Return the load step that a micro model's response to one plane is.
-
-    Args:
-        response: The response, of one row.
-        patches: The partition that it is summed over.
-        plane: The plane.
-    """
-    return LoadStep(
-        approach_mm=plane.approach,
-        force_N=float(response.force[0]),
-        mean_pressure_MPa=float(response.mean_pressure[0]),
-        contact_area_fraction=float(response.contact_area_fraction[0]),
-        mean_separation_mm=float(response.mean_separation[0]),
-        contacts=int(response.contacts[0]),
-        newton_iterations=int(response.iterations[0]),
-        patches=PatchState(
-            closure_mm=plane.means(patches) - response.patch_displacement[0],
-            pressure_MPa=response.patch_force[0] / patches.area,
-            contact_area_fraction=response.patch_contact_area[0] / patches.area,
-        ),
-        residuals=(float(response.residual[0]),),
-        tilt=plane.tilt,
-        moment_N_mm=(float(response.moment[0, 0]), float(response.moment[0, 1])),
-        warnings=response.warnings,
-    )
-
-
-def patch_load_step(
-    grid: PatchGrid,
-    *,
-    plane: Sequence[float] | Array,
-    load: Sequence[float] | Array,
-    closure: Array,
-    pressure: Array,
-    contact: ContactValues,
-    **other: Any,
-) -> LoadStep:
-    """Return the load step of patches on a block.
-
-    Args:
-        grid: The partition.
-        plane: Approach at the middle of the interface [mm], and slopes of the approach.
-        load: Force on the plane [N], and first moments of the forces about the middle [N mm].
-        closure: Mean closures of the patches, shape (N,) [mm].
-        pressure: Mean pressures of the patches, shape (N,) [MPa].
-        contact: Contact area fractions, separations and contacts of the patches.
-        **other: Other fields of the load step.
-    """
-    (approach, tx, ty), (force, mx, my) = map(float, plane), map(float, load)
-    return LoadStep(
-        approach_mm=approach,
-        force_N=force,
-        mean_pressure_MPa=force / (grid.area * grid.count),
-        contact_area_fraction=float(np.mean(contact.area_fraction)),
-        mean_separation_mm=float(np.mean(contact.separation)),
-        contacts=int(np.sum(contact.contacts)),
-        patches=PatchState(
-            closure_mm=closure, pressure_MPa=pressure, contact_area_fraction=contact.area_fraction
-        ),
-        tilt=(tx, ty),
-        moment_N_mm=(mx, my),
-        **other,
-    )
 
 
 def beyond_law(

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from geometry.control import Control
 from geometry.errors import InputError
 from multiscale.couplings.blocks import block_material
-from multiscale.couplings.load_steps import patch_load_step
-from multiscale.laws.law_table import ContactValues
 from multiscale.loading.load_step import LoadStep
 from multiscale.results.reference_record import ReferenceRecord, reference_record
 from multiscale.setup.problem import ProblemSetup
@@ -81,17 +79,15 @@ class ReferenceCoupling:
         finest, nominal = states[-1], self._patches.area * self._patches.count
         # patches count whole nodes; all together they have the area with its border in the facets
         share = finest.contact_area_fine / finest.contact_area if finest.contact_area else 0.0
-        return patch_load_step(
+        return LoadStep.of_patches(
             self._patches,
             plane=(finest.approach, *finest.tilt),
             load=(finest.force, *finest.moment),
             closure=finest.patch_closure,
             pressure=finest.patch_force / self._patches.area,
-            contact=ContactValues(
-                area_fraction=share * finest.patch_area / self._patches.area,
-                separation=np.array(finest.mean_separation),
-                contacts=np.array(finest.contacts),
-            ),
+            area_fraction=share * finest.patch_area / self._patches.area,
+            separation=finest.mean_separation,
+            contacts=finest.contacts,
             newton_iterations=sum(state.active_sets for state in states),
             linear_iterations=sum(state.linear_iterations for state in states),
             reason=finest.reason,

@@ -240,7 +240,9 @@ def test_a_plane_on_nothing_but_its_own_law_counts_from_rounding():
             dclosure=np.ones(2), dpressure=1.5e5 * np.sqrt(depth),
         )  # fmt: skip
 
-    newton = DenseNewton(SimpleNamespace(touch=touch, along=along), np.diag([1e-6, 1e-6]), patches)
+    newton = DenseNewton(
+        SimpleNamespace(first_touch=touch, along=along), np.diag([1e-6, 1e-6]), patches
+    )
     state = newton.solve(Control(approach=1e-6, tilt=(0.0, 0.0)))
     depth = brentq(lambda s: s + 1e-6 * 1e5 * s**1.5 - 1e-6, 0.0, 1e-6, xtol=1e-20, rtol=1e-14)
     assert state.pressure[0] == pytest.approx(1e5 * depth**1.5, rel=1e-6)
