@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.collective import on_root, together
+from geometry.collective import on_root, shared
 from geometry.control import Control
 from geometry.patches import PatchGrid
 from micro import MicroModel, Response, RigidPlane, influence_matrix
@@ -221,22 +221,17 @@ class WholeSurface:
         """Solve the contact problem at all approaches, shared by the ranks."""
         count = _ROWS_TOGETHER
         parts = [approaches[k : k + count] for k in range(0, len(approaches), count)]
-        rank, size = (0, 1) if self.comm is None else (self.comm.rank, self.comm.size)
-        before = -(-len(self._solved) // count)  # parts of earlier calls: the next rank continues
-        own = parts[(rank - before) % size :: size]
-        mine = together(self.comm, lambda: [self._in_sequence(part) for part in own])
-        if size == 1:
-            return [row for part in mine for row in part]
-        gathered = self.comm.allgather(mine)
-        return [row for k in range(len(parts)) for row in gathered[(k + before) % size][k // size]]
 
-    def _in_sequence(self, approaches: Array) -> list[tuple[Response, RigidPlane]]:
-        found, start = [], None
-        for approach in approaches:
-            control = Control(approach=float(approach), tilt=self.tilt)
-            response, plane, start = self._press(control, start)
-            found.append((response, plane))
-        return found
+        def solve(part: int) -> list[tuple[Response, RigidPlane]]:
+            found, start = [], None
+            for approach in parts[part]:
+                control = Control(approach=float(approach), tilt=self.tilt)
+                response, plane, start = self._press(control, start)
+                found.append((response, plane))
+            return found
+
+        before = -(-len(self._solved) // count)  # parts of earlier calls: the next rank continues
+        return [row for rows in shared(self.comm, len(parts), solve, before) for row in rows]
 
     def _press(self, control: Control, start: Any) -> tuple[Response, RigidPlane, Any]:
         return self.model.press(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.collective import together
+from geometry.collective import shared
 from geometry.patches import PatchGrid
 from micro import MicroModel
 from micro.closed_forms.love import love_centre, love_mean
@@ -177,20 +177,19 @@ def isolated_laws(
     Source:
         Waddad et al. 2016, section 3.2, eq. 29-31, doi 10.1016/j.triboint.2015.12.023.
     """
+    # the largest first, so that the ranks end together
+    order = np.argsort(-_predicted_work(model, patches, closure_ends), kind="stable")
 
-    def make(index: int) -> PatchLaw:
+    def make(task: int) -> PatchLaw:
+        index = int(order[task])
         alone, patch = model.of_patch(patches, index)
         isolated = IsolatedPatch(
             model=alone, patch=patch, mean_height=float(mean_heights[index]), love=love
         )
         return isolated.law(float(closure_ends[index]), tolerance, most_rows)
 
-    rank, size = (0, 1) if comm is None else (comm.rank, comm.size)
-    mine = _shared(_predicted_work(model, patches, closure_ends), size)[rank]
-    made = together(comm, lambda: {index: make(index) for index in mine})
-    parts = [made] if comm is None else comm.allgather(made)
-    by_index = {index: law for part in parts for index, law in part.items()}
-    laws = tuple(by_index[index] for index in range(patches.count))
+    made = shared(comm, patches.count, make)
+    laws = tuple(made[task] for task in np.argsort(order))
     return LawTable(
         patches=patches,
         laws=laws,
@@ -217,14 +216,3 @@ def _predicted_work(model: MicroModel, patches: PatchGrid, closure_ends: Array) 
     owner = patches.index_of(x, y)
     touchable = model.reference_height - z < closure_ends[owner]
     return np.bincount(owner[touchable], minlength=patches.count).astype(float)
-
-
-def _shared(work: Array, ranks: int) -> list[list[int]]:
-    """Share patches among ranks: the largest first, each to the rank with the least work so far."""
-    shares: list[list[int]] = [[] for _ in range(ranks)]
-    loads = np.zeros(ranks)
-    for index in np.argsort(-work, kind="stable"):
-        rank = int(np.argmin(loads))
-        shares[rank].append(int(index))
-        loads[rank] += work[index] + 1.0
-    return shares
