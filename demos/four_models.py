@@ -18,8 +18,16 @@ from pathlib import Path
 
 import numpy as np
 
-from geometry import PatchGrid, Spectrum, find_asperities, patch_means, roughness, synthesise
-from micro import MODELS, asperity_model, contact_modulus
+from geometry import (
+    Material,
+    PatchGrid,
+    Spectrum,
+    find_asperities,
+    patch_means,
+    roughness,
+    synthesise,
+)
+from micro import MODELS, asperity_model
 from multiscale.output.figures import models_figure, surface_figure
 
 parser = argparse.ArgumentParser()
@@ -45,9 +53,10 @@ surface_figure(surface, asperities, PatchGrid(grid=(4, 4), lengths=(1.0, 1.0))).
 # One response per model over the approach, from first touch to 16 µm.
 
 # %%
+MODULUS = Material(young_modulus=4000.0, poisson_ratio=0.15).contact_modulus
 approaches = np.linspace(0.0, 16e-3, 9 if choice.quick else 81)[1:]
 responses = {
-    name: asperity_model(name, asperities, contact_modulus=contact_modulus(4000.0, 0.15)).respond(
+    name: asperity_model(name, asperities, contact_modulus=MODULUS).respond(
         approaches, patches=whole, mean_heights=patch_means(surface, whole)
     )
     for name in MODELS

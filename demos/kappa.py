@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from geometry import PatchGrid, Spectrum, patch_means, synthesise
-from micro import contact_modulus, micro_model
+from geometry import Material, PatchGrid, Spectrum, patch_means, synthesise
+from micro import micro_model
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -30,6 +30,7 @@ APPROACHES = np.linspace(1e-3, 34e-3, 34)
 FRACTIONS = np.array([0.005, 0.01, 0.02, 0.05, 0.08])
 MODELS = ("half-space", "elliptic", "circular", "elliptic-independent", "circular-independent")
 SLOPE = 0.215
+MODULUS = Material(young_modulus=4000.0, poisson_ratio=0.15).contact_modulus
 WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
 
 
@@ -37,7 +38,7 @@ def kappa(name, seed):
     """Return κ at the area fractions; NaN beyond those that the approaches reach."""
     spectrum = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=SLOPE, seed=seed)
     surface = synthesise(spectrum, grid=(GRID, GRID), lengths=(1.0, 1.0))
-    model = micro_model(name, surface, contact_modulus=contact_modulus(4000.0, 0.15))
+    model = micro_model(name, surface, contact_modulus=MODULUS)
     means = patch_means(surface, WHOLE)
     response = model.respond(APPROACHES, patches=WHOLE, mean_heights=means)
     area = np.maximum.accumulate(response.contact_area_fraction)

@@ -22,8 +22,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from geometry import PatchGrid, Spectrum, patch_means, synthesise
-from micro import contact_modulus, micro_model
+from geometry import Material, PatchGrid, Spectrum, patch_means, synthesise
+from micro import micro_model
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -33,7 +33,7 @@ SETS = {"Set 1": {"waves": (2, 10)}, "Set 2": {"waves_x": (2, 7), "waves_y": (2,
 SEEDS = range(1, 3) if choice.quick else range(1, 21)
 CELLS = (32, 64, 128) if choice.quick else (32, 64, 128, 256, 512, 1024)
 APPROACHES = np.array([4e-3, 8e-3, 12e-3, 18e-3])
-MODULUS = contact_modulus(4000.0, 0.15)
+MODULUS = Material(young_modulus=4000.0, poisson_ratio=0.15).contact_modulus
 WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
 CONTACT, BORDER = {"curvature": "contact"}, {"border": "include"}
 ASPERITY_GRID = 128 if choice.quick else 256

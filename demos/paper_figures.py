@@ -16,8 +16,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from paper.page import Page
 
-from geometry import PatchGrid, Spectrum, find_asperities, power_spectrum, synthesise
-from micro import HertzContact, contact_modulus
+from geometry import Material, PatchGrid, Spectrum, find_asperities, power_spectrum, synthesise
+from micro import HertzContact
 from micro.closed_forms.ellipse import (
     area_factor,
     eccentricity,
@@ -31,7 +31,8 @@ parser.add_argument("--quick", action="store_true")
 parser.add_argument("--out", type=Path, default=Path("results/paper_figures"))
 choice = parser.parse_args()
 page = Page(choice.out)
-GRID, MODULUS = 64 if choice.quick else 256, contact_modulus(4000.0, 0.15)
+GRID = 64 if choice.quick else 256
+MODULUS = Material(young_modulus=4000.0, poisson_ratio=0.15).contact_modulus
 BLUE, RED, GREEN = "#0b3c5d", "#d1495b", "#1b998b"
 
 # %% [markdown]

@@ -15,8 +15,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from paper.page import Page
 
-from geometry import PatchGrid, Spectrum, patch_means, synthesise
-from micro import contact_modulus, micro_model
+from geometry import Material, PatchGrid, Spectrum, patch_means, synthesise
+from micro import micro_model
 from multiscale.output.figures import models_figure
 
 parser = argparse.ArgumentParser()
@@ -25,7 +25,8 @@ parser.add_argument("--out", type=Path, default=Path("results/paper_figures"))
 choice = parser.parse_args()
 page = Page(choice.out)
 GRID, SEEDS = (64, range(1, 6)) if choice.quick else (256, range(1, 21))
-MODULUS, SLOPE, WHOLE = contact_modulus(4000.0, 0.15), 0.215, PatchGrid(grid=(1, 1), lengths=(1, 1))
+MODULUS = Material(young_modulus=4000.0, poisson_ratio=0.15).contact_modulus
+SLOPE, WHOLE = 0.215, PatchGrid(grid=(1, 1), lengths=(1, 1))
 SETS = {7: {"waves": (2, 10)}, 9: {"waves_x": (2, 7), "waves_y": (2, 12)}}
 MODELS = ("elliptic", "circular", "elliptic-independent", "circular-independent", "half-space")
 

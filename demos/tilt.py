@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
-from micro import HalfSpaceModel, contact_modulus, influence_matrix
+from geometry import Control, Material, PatchGrid, Spectrum, patch_means, synthesise
+from micro import HalfSpaceModel, influence_matrix
 from multiscale import CondensedCoupling, consistent_laws
 
 parser = argparse.ArgumentParser()
@@ -30,7 +30,8 @@ choice = parser.parse_args()
 choice.out.mkdir(parents=True, exist_ok=True)
 SEEDS = (1, 2) if choice.quick else (1, 2, 3, 4, 5, 6)
 GRIDS = (8,) if choice.quick else (1, 4, 8, 16)
-TILT, APPROACH, MODULUS = (10e-3, 0.0), 8e-3, contact_modulus(4000.0, 0.15)
+TILT, APPROACH = (10e-3, 0.0), 8e-3
+MODULUS = Material(young_modulus=4000.0, poisson_ratio=0.15).contact_modulus
 
 
 # %%

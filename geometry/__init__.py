@@ -5,18 +5,18 @@ means over patches; a block shape gives the mesh of the body that carries it.
 """
 
 from geometry.asperities import Asperities, find_asperities
-from geometry.control import Control
 from geometry.errors import InputError, NotConverged, PatchlawError
 from geometry.files import read_surface
-from geometry.meshes.block import Alignment, BlockShape, alignment, flat_block
+from geometry.materials import Material, MaterialPair
+from geometry.meshes.block import Alignment, BlockShape, alignment
 from geometry.meshes.families import characteristic_size, reference_shapes
-from geometry.meshes.refined_block import RefinedShape, places_in_reach
-from geometry.partition import Partition, UnevenPartition
-from geometry.patches import PatchGrid, overlaps, patch_means
+from geometry.meshes.refined_block import RefinedShape
+from geometry.meshes.refinement import places_in_reach, suggested_fine
+from geometry.patches import Partition, PatchGrid, UnevenPartition, overlaps, patch_means
+from geometry.rigid_plane import Control, RigidPlane
 from geometry.spectrum import Spectrum, synthesise
 from geometry.statistics import PowerSpectrum, Roughness, power_spectrum, roughness
 from geometry.surface import Surface
-from geometry.typical_contact import suggested_fine
 
 __all__ = [
     "Alignment",
@@ -24,12 +24,15 @@ __all__ = [
     "BlockShape",
     "Control",
     "InputError",
+    "Material",
+    "MaterialPair",
     "NotConverged",
     "Partition",
     "PatchGrid",
     "PatchlawError",
     "PowerSpectrum",
     "RefinedShape",
+    "RigidPlane",
     "Roughness",
     "Spectrum",
     "Surface",
@@ -37,7 +40,6 @@ __all__ = [
     "alignment",
     "characteristic_size",
     "find_asperities",
-    "flat_block",
     "overlaps",
     "patch_means",
     "places_in_reach",

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry.ascent import coincident, constrained_summits
 from geometry.checks import frozen_array, positive_lengths
 from geometry.errors import InputError
-from geometry.maxima import grid_maxima
+from geometry.rigid_plane import RigidPlane
+from geometry.summits import coincident, constrained_summits, grid_maxima
 from geometry.surface import Surface
 
 Array = NDArray[np.float64]
@@ -100,6 +100,17 @@ class Asperities:
     def radius(self) -> Array:
         """Equivalent radii R = sqrt(R' R''), shape (n,) [mm]."""
         return np.sqrt(self.radius_major * self.radius_minor)
+
+    def interference(self, plane: RigidPlane) -> Array:
+        """Return how far undisplaced summits would penetrate a plane, shape (n,) [mm].
+
+        Returns:
+            δ(x_k) − (z_M − z_k), negative for a summit that the plane stays above.
+
+        Source:
+            Waddad et al. 2016, eq. 6, doi 10.1016/j.triboint.2015.12.023.
+        """
+        return plane.at(self.x, self.y) - (self.highest - self.z)
 
     def subset(self, mask: ArrayLike) -> Asperities:
         """Return some of the asperities, with the border maxima and the surface's numbers kept.

@@ -13,10 +13,16 @@ from typing import Any, BinaryIO, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.checks import LARGEST, cell_counts, check_scale, is_level, positive_lengths
+from geometry.checks import (
+    LARGEST,
+    cell_counts,
+    check_scale,
+    is_level,
+    positive_lengths,
+    process_memory,
+)
 from geometry.errors import InputError
 from geometry.instruments import read_instrument
-from geometry.memory import process_memory
 from geometry.missing import filled
 from geometry.surface import Surface
 

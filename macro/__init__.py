@@ -1,19 +1,19 @@
 """The elastic block in dolfinx, pressed by a rigid plane through one contact law per patch.
 
 BlockShape → block_mesh → Block (with a Material) → Interface (with a PatchGrid)
-→ LawContactProblem (with one ContactLaw per patch) → PressState for every load step.
+→ LawContactProblem (with one ContactLaw per patch) → LawContactState for every load step.
 
 `face_compliance` is the displacement of the contact face in smooth modes; rough_block_mesh → Block
 → UnilateralContactProblem meshes the roughness itself, as a reference.
 """
 
+from geometry.materials import Material
 from macro.block import Block
 from macro.compliance.face_compliance import FaceCompliance, cached_face_compliance, face_compliance
-from macro.compliance.patch_compliance import displacements_under, plain_compliance
+from macro.compliance.patch_compliance import displacements_under, patch_compliance_matrix
 from macro.contact.law_interface import ContactLaw, Interface
-from macro.contact.law_problem import LawContactProblem, PressState
+from macro.contact.law_problem import LawContactProblem, LawContactState
 from macro.contact.unilateral_problem import UnilateralContactProblem, UnilateralContactState
-from macro.elasticity import Material
 from macro.fields import write_fields, write_rough_fields
 from macro.mesh.block import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
 from macro.mesh.rough_surface import MeshQuality, rough_block_mesh
@@ -28,16 +28,16 @@ __all__ = [
     "FaceCompliance",
     "Interface",
     "LawContactProblem",
+    "LawContactState",
     "Material",
     "MeshQuality",
-    "PressState",
     "UnilateralContactProblem",
     "UnilateralContactState",
     "block_mesh",
     "cached_face_compliance",
     "displacements_under",
     "face_compliance",
-    "plain_compliance",
+    "patch_compliance_matrix",
     "rough_block_mesh",
     "write_fields",
     "write_rough_fields",

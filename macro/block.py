@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.errors import InputError
+from geometry.materials import Material
 from macro import compat
-from macro.elasticity import Material, rigid_body_modes, stiffness_form
+from macro.elasticity import rigid_body_modes, stiffness_form
 from macro.linear_solvers.multigrid import Lattice, lattice_of
 from macro.linear_solvers.options import solve_linear
 from macro.linear_solvers.selection import block_solver
@@ -133,7 +134,7 @@ class Block:
         return function
 
     def reaction(self, displacement: PETSc.Vec) -> float:
-        """Return the force that the clamped bottom bears, from nodal residuals [N].
+        """Return the reaction force of the clamped bottom, from nodal residuals [N].
 
         Args:
             displacement: Owned degrees of freedom [mm].
@@ -146,13 +147,13 @@ class Block:
 
     @cached_property
     def _form(self) -> Any:
-        # exact on boxes and affine tetrahedra, full integration on distorted hexahedra
+        # exact on boxes and straight tetrahedra, full integration on distorted hexahedra
         degree = 2 * self.degree if self.mesh.shape.hexahedral else 2 * (self.degree - 1)
         return stiffness_form(self.space, self.material, degree)
 
     @property
     def free(self) -> PETSc.Vec:
-        """1 for degrees of freedom that no condition holds, 0 for the others."""
+        """1 for free degrees of freedom, 0 for those that the supports constrain."""
         free = self.stiffness.createVecRight()
         free.set(1.0)
         for condition in self.conditions:
@@ -171,10 +172,11 @@ class Block:
         return self.mesh.facet_tags.find(marker)
 
     def _nodes(self, facets: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Return the nodes of all ranks' facets that this rank sees, ghosts too, ascending.
+        """Return this rank's nodes and ghosts on some facets of any rank, ascending.
 
-        dolfinx asks the ranks that a rank exchanges nodes with. Two ranks that both see a node of
-        a third need not be such, but the third, who has the node, is asked by both.
+        `locate_dofs_topological` finds the nodes of this rank's facets, and those that neighbouring
+        ranks report. Two ranks may both have a node of a third rank without being neighbours; the
+        owner of the node knows of it, so that its ghosts are updated from the owner.
         """
         marks = fem.Function(self.space)
         marks.x.array[3 * fem.locate_dofs_topological(self.space, 2, facets)] = 1.0

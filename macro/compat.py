@@ -6,7 +6,6 @@ all releases share, and petsc4py.
 
 from __future__ import annotations
 
-import ctypes
 import inspect
 import logging
 from collections.abc import Iterator, Sequence
@@ -24,12 +23,15 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.errors import InputError
-from geometry.meshes.lattice import sigint_kept
+from geometry.meshes.gmsh_session import sigint_untouched
 from macro.form_cache import TIMEOUT, explained
 
 _JIT = {"timeout": TIMEOUT}  # another process may be compiling the same form on a slow machine
 HAS_VTX = hasattr(io, "VTXWriter")
 """Whether this dolfinx was built with ADIOS2."""
+
+_FILES_NOT_CLOSED: list[Any] = []
+"""XDMF files that could not be closed, kept from their destructor until the process ends."""
 
 _CELLS = {"hexahedron": basix.CellType.hexahedron, "tetrahedron": basix.CellType.tetrahedron}
 
@@ -82,7 +84,7 @@ def mesh_from_gmsh(model: Any, comm: Any) -> tuple[Any, Any]:
     Note:
         Collective. Facet tags may include ghost facets (dolfinx 0.5).
     """
-    with sigint_kept():  # here, for it brings gmsh, which lattices do without
+    with sigint_untouched():  # the import loads gmsh, which lattices do not need
         try:
             from dolfinx.io import gmsh as reader
         except ImportError:
@@ -264,7 +266,7 @@ def assemble_vector(form: Any) -> PETSc.Vec:
     return vector
 
 
-def free_dropped(comm: PETSc.Comm) -> None:
+def collect_garbage(comm: PETSc.Comm) -> None:
     """Free the matrices and vectors that Python has dropped on all ranks, and every rank's own.
 
     PETSc from 3.18 on keeps them until it is asked, because ranks drop them at different times;
@@ -313,6 +315,6 @@ def write_xdmf(path: str, mesh: Any, functions: Sequence[Any]) -> None:
             file.write_function(function)
         file.close()
     except RuntimeError:
-        # on a full disk it cannot be closed, and dropping it would try again and end the process
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(file))
+        # on a full disk it cannot be closed, and its destructor would try again and end the process
+        _FILES_NOT_CLOSED.append(file)
         raise

@@ -1,9 +1,7 @@
-"""Linear isotropic elasticity: the material, its stiffness form and the rigid body modes."""
+"""Linear isotropic elasticity: stiffness form and rigid body modes."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,50 +10,7 @@ from dolfinx import fem
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from geometry.errors import InputError
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Material:
-    """Linear, isotropic, elastic material.
-
-    Args:
-        young_modulus: Young's modulus E [MPa], positive.
-        poisson_ratio: Poisson's ratio ν, −1 < ν < 0.5.
-
-    Raises:
-        InputError: When a constant is outside its range.
-    """
-
-    young_modulus: float
-    poisson_ratio: float
-
-    def __post_init__(self) -> None:
-        if not (math.isfinite(self.young_modulus) and self.young_modulus > 0.0):
-            raise InputError(
-                "Young's modulus must be positive", value=self.young_modulus, allowed="E > 0 MPa"
-            )
-        if not -1.0 < self.poisson_ratio < 0.5:
-            raise InputError(
-                "Poisson's ratio is impossible", value=self.poisson_ratio, allowed="-1 < ν < 0.5"
-            )
-
-    @property
-    def contact_modulus(self) -> float:
-        """E* = E / (1 − ν²) against a rigid plane [MPa]."""
-        return self.young_modulus / (1.0 - self.poisson_ratio**2)
-
-    @property
-    def confined_modulus(self) -> float:
-        """E (1 − ν) / ((1 + ν)(1 − 2ν)) = λ + 2μ: stress over strain without side strain [MPa]."""
-        first, shear = self.lame
-        return first + 2.0 * shear
-
-    @property
-    def lame(self) -> tuple[float, float]:
-        """Lamé's constants (λ, μ) [MPa]."""
-        e, nu = self.young_modulus, self.poisson_ratio
-        return e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), e / (2.0 * (1.0 + nu))
+from geometry.materials import Material
 
 
 def strain(displacement: Any) -> Any:

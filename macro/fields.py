@@ -1,4 +1,4 @@
-"""Writes the fields of a pressed block for ParaView."""
+"""Writes displacements and contact pressures of a block for ParaView."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from macro.mesh.contact_face import top_facets
 
 Array = NDArray[np.float64]
 
-_NONE = 1e-9  # of a basis function: rounding
+_ZERO = 1e-9
+"""Value below which a basis function counts as zero at a node."""
 
 
 def write_fields(
@@ -26,14 +27,14 @@ def write_fields(
 ) -> None:
     """Write displacements [mm] and patch pressures [MPa] as XDMF, with an HDF5 file beside it.
 
-    Quadratic displacements are written at the vertices. The pressure of a cell is the mean over
-    its facet of the top, to which the patches on it contribute by area; it is zero elsewhere. Where
-    dolfinx has ADIOS2, displacements of any degree are also written as VTX, in a folder beside it
-    that ends in ``.bp``.
+    Quadratic displacements are written at the vertices. The pressure of a cell is the mean pressure
+    over its facet on the top, weighted by the areas of the patches there, and zero elsewhere. Where
+    dolfinx has ADIOS2, displacements of any degree are also written as VTX, in a folder of the same
+    name that ends in ``.bp``.
 
     Args:
         path: File to write, ending in ``.xdmf``.
-        interface: Patches and block that were pressed.
+        interface: Patches on the block.
         displacement: This rank's owned displacements, dof by dof [mm].
         pressure: Mean pressures of the patches, shape (N,) [MPa].
 
@@ -42,80 +43,80 @@ def write_fields(
     """
     block = interface.block
     mesh = block.mesh.mesh
-    moved = block.function(displacement)
+    shown = block.function(displacement)
     if compat.HAS_VTX:
-        compat.write_vtx(str(Path(path).with_suffix(".bp")), moved)
+        compat.write_vtx(str(Path(path).with_suffix(".bp")), shown)
     if block.degree > 1:
-        moved = _interpolated(compat.vector_space(mesh, 1), moved, moved.name)
-    pressed = fem.Function(compat.cellwise_space(mesh), name="pressure")
+        shown = _interpolated(compat.vector_space(mesh, 1), shown, shown.name)
+    pressures = fem.Function(compat.cellwise_space(mesh), name="pressure")
     points, facets = interface.quadrature, top_facets(block.mesh)
-    cells = compat.cell_nodes(pressed.function_space)[:, 0]
+    cells = compat.cell_nodes(pressures.function_space)[:, 0]
     force = points.weight * pressure[points.patch]
-    total = np.bincount(cells[points.cell], force, minlength=len(pressed.x.array))
+    total = np.bincount(cells[points.cell], force, minlength=len(pressures.x.array))
     loaded = cells[facets.cell]
-    pressed.x.array[loaded] = total[loaded] / facets.area
-    pressed.x.scatter_forward()
-    compat.write_xdmf(str(path), mesh, [moved, pressed])
+    pressures.x.array[loaded] = total[loaded] / facets.area
+    pressures.x.scatter_forward()
+    compat.write_xdmf(str(path), mesh, [shown, pressures])
 
 
 def write_rough_fields(
-    path: Path | str, obstacle: UnilateralContactProblem, state: UnilateralContactState
+    path: Path | str, problem: UnilateralContactProblem, state: UnilateralContactState
 ) -> None:
     """Write displacements [mm] and contact pressures [MPa] of a rough block as XDMF.
 
-    The pressure of a vertex is the contact force there over the tributary area, to which nodes
-    between vertices give their parts; values between vertices are linear. Quadratic displacements
-    of straight cells are written at the vertices.
+    The pressure of a vertex is its contact force over its tributary area, including its shares of
+    the nodes between vertices; the pressure is linear between vertices. Quadratic displacements of
+    straight cells are written at the vertices.
 
     Args:
         path: File to write, ending in ``.xdmf``; an HDF5 file goes beside it.
-        obstacle: The rough block that was pressed.
+        problem: The contact problem of the rough block.
         state: The load step.
 
     Note:
         Collective.
     """
-    block, mesh = obstacle.block, obstacle.block.mesh.mesh
-    # files take functions of the degree that cells are bent by, numbered as the mesh is
+    block, mesh = problem.block, problem.block.mesh.mesh
+    # XDMF files hold functions of the degree of the mesh's cells only
     degree = 2 if compat.cell_vertices(mesh).shape[1] == 10 else 1
-    moved = _interpolated(
+    displacements = _interpolated(
         compat.vector_space(mesh, degree), block.function(state.displacement), "displacement"
     )
-    pressed = _interpolated(
-        compat.scalar_space(mesh, degree), _vertex_pressures(obstacle, state), "pressure"
+    pressures = _interpolated(
+        compat.scalar_space(mesh, degree), _vertex_pressures(problem, state), "pressure"
     )
-    compat.write_xdmf(str(path), mesh, [moved, pressed])
+    compat.write_xdmf(str(path), mesh, [displacements, pressures])
 
 
-def _vertex_pressures(obstacle: UnilateralContactProblem, state: UnilateralContactState) -> Any:
+def _vertex_pressures(problem: UnilateralContactProblem, state: UnilateralContactState) -> Any:
     """Return contact pressures, linear between vertices, zero away from the top [MPa].
 
-    The nodes of an element of degree 2 do not have pressures of their own: its vertices have no
-    area in triangles, and a ninth of the middle's in squares.
+    Single nodes of elements of degree 2 have no useful pressures: a vertex of a triangle has no
+    tributary area, and one of a square far less than the middle node.
     """
-    block, top = obstacle.block, obstacle.top
-    pressed = fem.Function(compat.scalar_space(block.mesh.mesh, 1))
-    vertices, cells = compat.cell_nodes(pressed.function_space), compat.cell_nodes(block.space)
+    block, top = problem.block, problem.top
+    pressures = fem.Function(compat.scalar_space(block.mesh.mesh, 1))
+    vertices, cells = compat.cell_nodes(pressures.function_space), compat.cell_nodes(block.space)
     cell_name = block.mesh.mesh.topology.cell_name()
     shares = compat.lagrange_values(
         cell_name, 1, compat.lagrange_points(cell_name, block.degree)
-    )  # of the vertices in the nodes of a cell
-    shares[shares < _NONE] = 0.0
+    )  # weights of the vertices in the nodes of a cell
+    shares[shares < _ZERO] = 0.0
     place = np.empty(cells.max(initial=-1) + 1, dtype=np.intp)
-    place[cells.ravel()] = np.arange(cells.size)  # any cell of a node
+    place[cells.ravel()] = np.arange(cells.size)  # one of the cells of each node
     cell, node = np.divmod(place[top.dofs // 3], cells.shape[1])
-    numbers = pressed.function_space.dofmap.index_map
+    numbers = pressures.function_space.dofmap.index_map
     rows = numbers.local_to_global(vertices[cell].ravel()).astype(PETSc.IntType)
     force, area = (
         PETSc.Vec().createMPI((numbers.size_local, None), comm=block.mesh.comm) for _ in range(2)
     )
-    for vector, values in ((force, state.pressing), (area, top.area)):
+    for vector, values in ((force, state.nodal_force), (area, top.area)):
         vector.setValues(rows, (shares[node] * values[:, None]).ravel(), addv=True)
         vector.assemble()
-    known = area.array_r > 0.0
-    pressed.x.array[: numbers.size_local][known] = force.array_r[known] / area.array_r[known]
-    pressed.x.scatter_forward()
-    return pressed
+    loaded = area.array_r > 0.0
+    pressures.x.array[: numbers.size_local][loaded] = force.array_r[loaded] / area.array_r[loaded]
+    pressures.x.scatter_forward()
+    return pressures
 
 
 def _interpolated(space: Any, function: Any, name: str) -> Any:

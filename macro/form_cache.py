@@ -17,7 +17,7 @@ TIMEOUT = 60
 """Seconds that a process waits for another one that compiles the same form."""
 
 
-def left_locks(folder: Path, older_than: float = 2.0 * TIMEOUT) -> list[Path]:
+def stale_locks(folder: Path, older_than: float = 2.0 * TIMEOUT) -> list[Path]:
     """Return sources whose compilation was cut short.
 
     The first process that wants a form makes its source; others wait for the mark that it is
@@ -76,7 +76,7 @@ def explained(folder: Path) -> Iterator[None]:
 
 def _remedy(folder: Path, detail: str) -> str:
     """Return what to do, judged by the state of the cache and the last line of the error."""
-    if left_locks(folder, older_than=0.0):
+    if stale_locks(folder, older_than=0.0):
         return f"a compilation was cut short in {folder}: patchlaw warm clears it"
     if "[Errno" in detail or not writable(folder):
         return f"{folder} cannot be written to: set XDG_CACHE_HOME to a folder that can"

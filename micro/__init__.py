@@ -6,6 +6,7 @@ along approaches each gives a `Response` of the surface and its patches; `love` 
 of pressure move the half-space.
 """
 
+from geometry.rigid_plane import RigidPlane
 from micro.asperities.many_summits import PAIR_SUMS
 from micro.asperities.model import MODELS, SOLVERS, AsperityModel, ModelKind, asperity_model
 from micro.asperities.scaled_model import BORDERS, CURVATURES, ScaledModel
@@ -21,7 +22,7 @@ from micro.closed_forms.ellipse import (
     eccentricity_approximate,
     force_factor,
 )
-from micro.closed_forms.hertz import HertzContact, contact_modulus
+from micro.closed_forms.hertz import HertzContact
 from micro.closed_forms.influence import influence_matrix, mutual_influence
 from micro.closed_forms.love import love_centre, love_integral, love_mean, love_mutual
 from micro.compliance.body_modes import BodyModes
@@ -41,7 +42,6 @@ from micro.half_space.state import HalfSpaceState
 from micro.islands.model import IslandModel
 from micro.islands.state import IslandState
 from micro.model import MicroModel
-from micro.plane import RigidPlane
 from micro.response import Pressed, Response
 
 __all__ = [
@@ -81,7 +81,6 @@ __all__ = [
     "axis_ratio",
     "choose",
     "coarse_grid",
-    "contact_modulus",
     "eccentricity",
     "eccentricity_approximate",
     "find_contacts",

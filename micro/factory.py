@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from geometry import Surface, find_asperities
 from geometry.errors import InputError
+from geometry.rigid_plane import RigidPlane
 from micro.asperities.model import MODELS, Balanced, asperity_model
 from micro.asperities.scaled_model import ScaledModel
 from micro.complementarity.contact_problem import Solution
 from micro.half_space.model import HalfSpaceModel
 from micro.islands.model import IslandModel
 from micro.model import MicroModel
-from micro.plane import RigidPlane
 
 MODEL_NAMES = (*MODELS, "islands", "half-space")
 """Names of all micro models, the cheapest kinds first."""

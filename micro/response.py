@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from geometry import Partition
 from geometry.errors import InputError
-from micro.plane import RigidPlane
+from geometry.rigid_plane import RigidPlane
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]

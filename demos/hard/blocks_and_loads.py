@@ -10,7 +10,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from geometry import BlockShape, PatchGrid
-from geometry.control import Control
+from geometry.rigid_plane import Control
 from macro import Block, Material, block_mesh
 from micro import influence_matrix
 from multiscale.couplings.dense_newton import DenseNewton

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from hard.bench import CELLS, case, lawless, of_heights, off, solved
 
-from geometry import Asperities
-from micro import asperity_model, contact_modulus
+from geometry import Asperities, Material
+from micro import asperity_model
 
 x = (np.arange(CELLS) + 0.5) / CELLS - 0.5
 DOME = -(x[:, None] ** 2 + x**2) / 0.8
@@ -26,7 +26,13 @@ def first_touch() -> tuple[Any, ...]:
     grid = (np.arange(33) + 0.5) / 33 - 0.5
     ball, way = of_heights(-(grid[:, None] ** 2 + grid**2)), [1e-10, 1e-8, 1e-6]
     found = solved("consistent", micro__model="circular", load__approach=[*way, 0.0], **ball)
-    hertz = 4 / 3 * contact_modulus(4000.0, 0.15) * np.sqrt(0.5) * np.array(way) ** 1.5
+    hertz = (
+        4
+        / 3
+        * Material(young_modulus=4000.0, poisson_ratio=0.15).contact_modulus
+        * np.sqrt(0.5)
+        * np.array(way) ** 1.5
+    )
     return off(found.force_N[:3], hertz) + found.force_N[3], found
 
 

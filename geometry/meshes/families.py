@@ -20,9 +20,9 @@ import numpy as np
 
 from geometry.errors import InputError
 from geometry.meshes.block import BlockShape
-from geometry.meshes.refined_block import RefinedShape, places_in_reach
+from geometry.meshes.refined_block import RefinedShape
+from geometry.meshes.refinement import EDGES, contact_radius, places_in_reach
 from geometry.surface import Surface
-from geometry.typical_contact import EDGES, contact_radius
 
 Shape: TypeAlias = BlockShape | RefinedShape
 Cells: TypeAlias = Literal["tetrahedra", "hexahedra"]

@@ -14,8 +14,7 @@ from scipy.spatial import cKDTree
 
 from geometry.checks import positive_lengths
 from geometry.errors import InputError
-from geometry.meshes.lattice import gmsh_session
-from geometry.surface import Surface
+from geometry.meshes.gmsh_session import gmsh_session
 
 Array = NDArray[np.float64]
 
@@ -100,9 +99,11 @@ class RefinedShape:
 
     @contextmanager
     def meshed(self) -> Iterator[Any]:
-        """Mesh the block in gmsh for as long as the context lasts; faces as in `flat_block`.
+        """Mesh the block in gmsh for as long as the context lasts.
 
-        The geometry has the order of the element, and its lengths are in `unit`.
+        The cells form the physical volume ``block`` (1); the physical surfaces are ``bottom`` (1),
+        ``top`` (2) and ``sides`` (3). The geometry has the order of the element, and its lengths
+        are in `unit`. A gmsh session of the caller goes on afterwards, with its model and options.
         """
         width, depth, height, fine, coarse = (
             float(f"{length / self.unit:.{_DIGITS}g}")
@@ -121,54 +122,6 @@ class RefinedShape:
             _generate(gmsh, shape)
             gmsh.model.mesh.setOrder(shape.degree)
             yield gmsh.model
-
-
-def places_in_reach(
-    surface: Surface,
-    approach: float,
-    *,
-    spacing: float,
-    tilt: tuple[float, float] = (0.0, 0.0),
-) -> Array:
-    """Return places that the plane can touch: where the surface stands out behind it.
-
-    The half-space only moves away under pressure, so that nothing else can come into contact.
-
-    Args:
-        surface: The rough surface.
-        approach: Largest approach at the middle of the surface [mm].
-        spacing: Distance between places [mm].
-        tilt: Slopes of the approach along x and y.
-
-    Returns:
-        Points of a square lattice, shape (n, 2) [mm]; at least that of the largest depth.
-    """
-    x, y = (
-        np.linspace(0.0, length, max(2, math.ceil(length / spacing) + 1))
-        for length in surface.lengths
-    )
-    lattice = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-    grid = np.vstack([lattice, surface.highest_point])
-    depth = depth_below_plane(surface, grid, approach, tilt)
-    return grid[depth >= min(0.0, float(depth.max()))]
-
-
-def depth_below_plane(
-    surface: Surface, points: Array, approach: float, tilt: tuple[float, float] = (0.0, 0.0)
-) -> Array:
-    """Return how far the undeformed surface stands out behind the rigid plane [mm].
-
-    Args:
-        surface: The rough surface.
-        points: Places on it, shape (…, 2) [mm].
-        approach: Approach at the middle of the surface, from first touch of a level plane [mm].
-        tilt: Slopes of the approach along x and y.
-
-    Returns:
-        Depths, shape (…); negative where there is a gap.
-    """
-    lean = (points - 0.5 * np.array(surface.lengths)) @ np.array(tilt)
-    return surface.height_at(points[..., 0], points[..., 1]) - surface.highest + approach + lean
 
 
 def _name_faces(gmsh: Any, box: int, height: float) -> None:

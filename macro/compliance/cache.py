@@ -1,6 +1,6 @@
-"""Keeps what the elastic block was solved for on disk, under a key of all that it depends on.
+"""Caches solutions of the elastic block on disk, under a key of everything that they depend on.
 
-That includes the code: files made by other sources of the packages that make them are not found.
+The key includes the sources of the packages that make them: other sources do not find the files.
 """
 
 from __future__ import annotations
@@ -25,16 +25,18 @@ VARIABLE = "PATCHLAW_CACHE"
 """Environment variable: the cache's directory, or ``off``."""
 
 MOST_BYTES = 500_000_000
-"""Size of all files together, beyond which those go that were not used for longest [B]."""
+"""Largest size of all files together; beyond it the least recently used are removed [B]."""
 
-_FORMAT = 3  # of the files; the code that fills them counts by itself
+_FORMAT = 3  # of the files; sources are part of the key anyway
 
 _SOURCES = "macro", "geometry"
-"""Packages that make what is kept."""
+"""Packages whose sources make the cached arrays."""
+
+_TOP = Path(__file__).resolve().parents[2]
 
 
 def cache_directory() -> Path | None:
-    """Return where results are kept, None when the user switched the cache off or has no home.
+    """Return the cache's directory, None when the user switched the cache off or has no home.
 
     ``PATCHLAW_CACHE`` wins, then ``XDG_CACHE_HOME/patchlaw``, then ``~/.cache/patchlaw``.
     """
@@ -51,26 +53,26 @@ def cache_directory() -> Path | None:
 
 
 def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], comm: Any) -> Arrays:
-    """Return arrays from the cache, or compute and keep them.
+    """Return arrays from the cache, or compute and cache them.
 
-    The first rank alone reads and writes, and what it has is what all ranks get. A file that
-    cannot be read is computed again; one that cannot be written is done without.
+    Rank 0 alone reads and writes, and all ranks get its arrays. Arrays whose file cannot be read
+    are computed again, and a file that cannot be written is left out.
 
     Args:
-        kind: Name of what is kept.
-        key: All that it depends on: numbers, words, tuples and dataclasses of them.
-        compute: Collective; the first rank's arrays count.
+        kind: Name of the kind of arrays.
+        key: Everything that they depend on: numbers, words, tuples and dataclasses of them.
+        compute: Makes the arrays; collective. Those of rank 0 are used.
         comm: MPI communicator.
 
     Raises:
-        TypeError: When a key holds anything else.
+        TypeError: When a key holds anything else, on every rank.
 
     Note:
         Collective.
     """
-    place = _place(kind, key)  # on every rank, lest a key that will not do fails on one
+    place = _path(kind, key)  # on every rank, so that a wrong key raises on all of them
     path = place if comm.rank == 0 else None
-    large = pkl5.Intracomm(comm)  # of 128 × 128 patches they are more than MPI counts in a message
+    large = pkl5.Intracomm(comm)  # for arrays of more than 2³¹ bytes, as 128 × 128 patches have
     found: Arrays | None = large.bcast(_read(path) if path else None, root=0)
     if found is not None:
         return found
@@ -79,44 +81,33 @@ def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], co
         with suppress(OSError):
             _write(path, made)
             _clear(path.parent)
-    kept: Arrays = large.bcast(made, root=0)
-    return kept
-
-
-def is_cached(kind: str, key: tuple[object, ...]) -> bool:
-    """Tell whether `cached` would find arrays, without reading them.
-
-    Args:
-        kind: Name of what is kept.
-        key: All that it depends on, as for `cached`.
-    """
-    path = _place(kind, key)
-    try:
-        return path is not None and path.is_file()
-    except OSError:  # a folder above it that this user may not enter
-        return False
+    made = large.bcast(made, root=0)
+    return made
 
 
 @cache
-def sources_digest() -> str:
-    """Return a digest of the sources of the packages that make what is kept."""
+def sources_digest(top: Path = _TOP) -> str:
+    """Return a digest of the sources of the packages that make the cached arrays.
+
+    Args:
+        top: Folder of the packages.
+    """
     found = hashlib.sha256()
-    top = Path(__file__).resolve().parents[2]
     for package in _SOURCES:
         for path in sorted((top / package).rglob("*.py")):
             found.update(path.relative_to(top).as_posix().encode() + b"\0" + path.read_bytes())
     return found.hexdigest()
 
 
-def _place(kind: str, key: tuple[object, ...]) -> Path | None:
+def _path(kind: str, key: tuple[object, ...]) -> Path | None:
     directory = cache_directory()
-    words = repr(_spelt((_FORMAT, sources_digest(), kind, key)))
+    words = repr(_spelled((_FORMAT, sources_digest(), kind, key)))
     digest = hashlib.sha256(words.encode()).hexdigest()[:32]
     return directory / f"{kind}-{digest}.npz" if directory else None
 
 
-def _spelt(value: object) -> object:
-    """Return words for a value that do not depend on how numpy prints its numbers."""
+def _spelled(value: object) -> object:
+    """Return a value in built-in types, so that its text does not depend on numpy's printing."""
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, float):
@@ -124,9 +115,9 @@ def _spelt(value: object) -> object:
     if value is None or isinstance(value, bool | int | str):
         return value
     if isinstance(value, tuple | list):
-        return tuple(_spelt(part) for part in value)
+        return tuple(_spelled(part) for part in value)
     if is_dataclass(value) and not isinstance(value, type):
-        parts = ((field.name, _spelt(getattr(value, field.name))) for field in fields(value))
+        parts = ((field.name, _spelled(getattr(value, field.name))) for field in fields(value))
         return type(value).__name__, *parts
     raise TypeError(f"{type(value).__name__} in a key of the cache")
 
@@ -135,15 +126,15 @@ def _read(path: Path) -> Arrays | None:
     try:
         with np.load(path, allow_pickle=False) as file:
             found = {name: file[name] for name in file.files}
-    except Exception:  # zip, zlib and numpy have many for a damaged file; it is made anew
+    except Exception:  # zip, zlib and numpy raise many kinds for a damaged file
         return None
     with suppress(OSError):
-        os.utime(path)  # it is in use
+        os.utime(path)  # marks it as recently used
     return found
 
 
 def _write(path: Path, arrays: Arrays) -> None:
-    """Write beside the place and move there, so that nobody reads half a file."""
+    """Write a temporary file and move it, so that nobody reads half a file."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
     try:
@@ -156,7 +147,7 @@ def _write(path: Path, arrays: Arrays) -> None:
 
 
 def _clear(directory: Path) -> None:
-    """Remove the files that were not used for longest until the rest is small enough."""
+    """Remove the least recently used files until the rest is small enough."""
     files = sorted(directory.glob("*-*.npz"), key=lambda path: path.stat().st_mtime, reverse=True)
     total = 0
     for path in files:

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from geometry.collective import together
 from geometry.errors import InputError
+from geometry.materials import Material
 from macro.block import Sides
 from macro.compliance.cache import Arrays, cached
-from macro.compliance.division import division
+from macro.compliance.elements import division
 from macro.compliance.quarter import Parity, Quarter, Response
-from macro.elasticity import Material
 
 Array = NDArray[np.float64]
 
@@ -29,9 +29,9 @@ class FaceCompliance:
 
     Args:
         normal: C, downwards, symmetric, shape (K², K²) [mm/N].
-        growth: Derivative of C to the height of the block, symmetric, shape (K², K²) [1/N].
-        stresses: The same of σ_xx, σ_yy and σ_xy in the face, which is pressed by −σ_zz, shape
-            (3, K², K²) [1/mm²].
+        growth: Derivative of C with respect to the block's height, symmetric, (K², K²) [1/N].
+        stresses: The same for the stresses σ_xx, σ_yy and σ_xy in the face, shape (3, K², K²)
+            [1/mm²].
     """
 
     normal: Array
@@ -54,11 +54,11 @@ def face_compliance(
     *,
     coarse: bool = False,
 ) -> FaceCompliance:
-    """Solve for what every mode of pressure does to a block's top.
+    """Solve for the response of a block's top to every mode of pressure.
 
-    The modes are smooth, and so are the displacements but at the edges of the clamped bottom: few
-    elements of high order do. Modes of different parity do not mix: they are solved for apart, on
-    a quarter of the block, by the ranks in turn.
+    The modes are smooth, and so are the displacements except at the edges of the clamped bottom, so
+    that few elements of high order suffice. Modes of different parity are not coupled. Each parity
+    is solved for on a quarter of the block, and the ranks share the parities.
 
     Args:
         lengths: Sides (Lx, Ly) of the block's top, all of which the modes cover [mm].
@@ -67,7 +67,7 @@ def face_compliance(
         sides: Support of the block's sides.
         count: Modes K along a side of the top.
         comm: MPI communicator.
-        coarse: Whether to take lower degrees: the difference bounds the error of the usual ones.
+        coarse: Whether to take lower degrees. The difference bounds the error of the usual ones.
 
     Returns:
         The compliance, the same on every rank and for every number of ranks.
@@ -76,8 +76,8 @@ def face_compliance(
         InputError: When a length is not positive, or there is no mode.
 
     Note:
-        Collective. A free cube with 8 × 8 modes takes 0.14 s on one core, and its mean compliance
-        lacks 8e-6, 6e-5 and 4e-4 at ν = 0.15, 0.3 and 0.45.
+        Collective. A free cube with 8 × 8 modes takes 0.14 s on one core. Its mean compliance is
+        too small by 8e-6, 6e-5 and 4e-4 at ν = 0.15, 0.3 and 0.45.
     """
     if not all(math.isfinite(length) and length > 0.0 for length in (*lengths, height)):
         raise InputError(
@@ -104,8 +104,8 @@ def face_compliance(
     for part in comm.allgather(together(comm, solved)):
         found |= part
     if alike and count > 1:  # exchange x and y
-        turned = Response(*(part.transpose(1, 0, 3, 2) for part in found[0, 1]))
-        found[1, 0] = turned._replace(xx=turned.yy, yy=turned.xx)
+        exchanged = Response(*(part.transpose(1, 0, 3, 2) for part in found[0, 1]))
+        found[1, 0] = exchanged._replace(xx=exchanged.yy, yy=exchanged.xx)
     return _gathered(found, lengths, count, material)
 
 
@@ -148,7 +148,7 @@ def cached_face_compliance(
 def _gathered(
     found: dict[Parity, Response], lengths: tuple[float, float], count: int, material: Material
 ) -> FaceCompliance:
-    """Put the modes of all parities together, per force."""
+    """Join the modes of all parities, per unit of force."""
     area = lengths[0] * lengths[1]
     total = np.zeros((len(Response._fields), *4 * (count,)))
     for (odd_x, odd_y), response in found.items():
@@ -158,14 +158,14 @@ def _gathered(
             field[seen_x::2, seen_y::2, odd_x::2, odd_y::2] = part
     normal, xx, yy, xy, growth = total.reshape(-1, count**2, count**2) / area**2
     return FaceCompliance(
-        normal=0.5 * (normal + normal.T),  # rounding apart it is symmetric
+        normal=0.5 * (normal + normal.T),  # symmetric up to rounding
         growth=0.5 * (growth + growth.T),
         stresses=_stresses(xx, yy, xy, np.eye(count**2) / area, material),
     )
 
 
 def _stresses(xx: Array, yy: Array, xy: Array, pressure: Array, material: Material) -> Array:
-    """Return σ_xx, σ_yy, σ_xy where σ_zz = −p, by the strains in the face: Hooke's law."""
+    """Return σ_xx, σ_yy, σ_xy from the strains in the face and σ_zz = −p by Hooke's law."""
     nu = material.poisson_ratio
     modulus = material.young_modulus / (1.0 - nu**2)
     pushed = nu / (1.0 - nu) * pressure

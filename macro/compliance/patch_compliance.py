@@ -11,7 +11,7 @@ from macro.contact.law_interface import Interface
 Array = NDArray[np.float64]
 
 
-def plain_compliance(interface: Interface) -> Array:
+def patch_compliance_matrix(interface: Interface) -> Array:
     """Return the mean downward displacement of patch i by unit pressure on patch j.
 
     By reciprocity the matrix is symmetric for patches of equal area; what the linear solver's
@@ -55,5 +55,5 @@ def displacements_under(interface: Interface, pressures: Array) -> Array:
         displacement = block.solve(interface.load(row))
         work.array[:] = displacement.x.array[: block.owned_dofs]
         rows.append(interface.patch_displacements(work))
-        compat.free_dropped(work.comm)
+        compat.collect_garbage(work.comm)
     return np.array(rows)

@@ -1,8 +1,8 @@
-"""A quarter of a block, in which even and odd modes of pressure are solved for apart.
+"""A quarter of a block, in which even and odd modes of pressure are solved for separately.
 
-The planes through the middle of the block divide it into quarters. Displacements along an axis are
-odd along it where the pressure is even, and even where it is odd; along the other axis they are as
-the pressure is.
+The two vertical planes of symmetry divide the block into quarters. Under a pressure that is even
+along an axis, the displacement component along that axis is odd along it, and the other components
+are even; under an odd pressure it is the other way round.
 """
 
 from __future__ import annotations
@@ -16,33 +16,32 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import bmat, csr_matrix, kron
 
+from geometry.materials import Material
 from macro.block import Sides
-from macro.compliance.division import Division
-from macro.compliance.line import Line, mode_integrals
-from macro.elasticity import Material
+from macro.compliance.elements import Division, Line, mode_integrals
 from macro.linear_solvers.direct import set_up
 
 Array = NDArray[np.float64]
 Parity = tuple[int, int]
-"""0 for pressures that are even along x, and along y; 1 for odd ones."""
+"""Parity of a pressure along x and along y: 0 even, 1 odd."""
 
-_NOUGHT = 1e-13
-"""Entries below this share of the largest are rounding of integrals that vanish."""
+_NEGLIGIBLE = 1e-13
+"""Share of the largest entry below which an entry is the rounding error of a zero integral."""
 
 
 class Response(NamedTuple):
-    """What modes of pressure do to the top, as integrals over it of modes times fields.
+    """Response of the top to modes of pressure: integrals over the top of modes times fields.
 
-    Fields are per mode of pressure of mean square 1 MPa², and have the shape (k, l, m, n): k and l
-    count the modes of the field's parity, m and n those of the pressure's. That of σ_xy is the
-    other one along both axes.
+    Fields are those of a mode of pressure of mean square 1 MPa². The shape is (k, l, m, n): k and l
+    count the modes of the field's parity, m and n those of the pressure's. The parity of the shear
+    strain is the opposite one along both axes.
 
     Attributes:
         normal: Displacements downwards [mm³/MPa].
         xx: Strains along x [mm²/MPa].
         yy: Strains along y [mm²/MPa].
-        xy: Shear strains, half the change of the angle [mm²/MPa].
-        growth: Derivative of ``normal`` to the height of the block [mm²/MPa].
+        xy: Shear strains ε_xy, half the change of the angle [mm²/MPa].
+        growth: Derivative of ``normal`` with respect to the height of the block [mm²/MPa].
     """
 
     normal: Array
@@ -54,14 +53,14 @@ class Response(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Quarter:
-    """The quarter of a block beyond the middle of its top, clamped at the bottom.
+    """The quarter of a block at x and y beyond the middle of its top, clamped at the bottom.
 
     Args:
         division: Its elements.
         lengths: Sides (Lx, Ly) of the top [mm].
         material: Elastic constants.
         sides: Support of the block's sides.
-        parity: That of the pressures.
+        parity: Parity of the pressures.
     """
 
     division: Division
@@ -71,12 +70,12 @@ class Quarter:
     parity: Parity
 
     def response(self, count: int) -> Response:
-        """Return how the modes of the parity displace and stretch the top.
+        """Return the displacements and strains of the top by the modes of the parity.
 
         Args:
             count: Modes K along a side, even and odd together.
         """
-        free = np.concatenate([kept.ravel() for kept in self._kept])
+        free = np.concatenate([part.ravel() for part in self._free])
         top, place = self._top
         x, y = ([self._modes(component, axis, count) for component in range(3)] for axis in (0, 1))
         loads = np.kron(x[2], y[2])[:, place[2]].T
@@ -94,7 +93,7 @@ class Quarter:
             for axis in (0, 1)
         )
         normal = -seen(2, x[2], y[2])
-        # the derivative of an inverse, all elements getting higher alike
+        # derivative of the inverse stiffness when all elements grow in proportion
         change = self._stiffness(by_height=True)[free][:, free]
         growth = -4.0 * solved.T @ (change @ solved)
         return Response(
@@ -125,8 +124,8 @@ class Quarter:
         ]
 
     @cached_property
-    def _kept(self) -> list[NDArray[np.bool_]]:
-        """Unknowns (ix, iy, iz) that no roller holds, by component."""
+    def _free(self) -> list[NDArray[np.bool_]]:
+        """Which unknowns (ix, iy, iz) no roller constrains, by component."""
         found = [np.ones([len(line.unknowns) for line in lines], bool) for lines in self._lines]
         if self.sides == "roller":
             for axis in (0, 1):
@@ -135,21 +134,21 @@ class Quarter:
 
     @property
     def _top(self) -> tuple[list[NDArray[np.intp]], list[NDArray[np.intp]]]:
-        """Kept unknowns that are values on top, by component, and their places (ix, iy), flat."""
+        """Free unknowns with values on the top, by component, and their flat indices (ix, iy)."""
         top, place, before = [], [], 0
-        for kept in self._kept:
-            number = before + np.cumsum(kept).reshape(kept.shape) - 1
-            here = kept[:, :, self.division.z.end]
+        for free in self._free:
+            number = before + np.cumsum(free).reshape(free.shape) - 1
+            here = free[:, :, self.division.z.end]
             top.append(number[:, :, self.division.z.end][here])
             place.append(np.flatnonzero(here))
-            before += int(kept.sum())
+            before += int(free.sum())
         return top, place
 
     def _stiffness(self, *, by_height: bool = False) -> csr_matrix:
         """Return the stiffness of all unknowns (component, ix, iy, iz) [N/mm].
 
         Args:
-            by_height: Whether its derivative to the height of the block is wanted [N/mm²].
+            by_height: Return its derivative with respect to the block's height instead [N/mm²].
         """
         lame, shear = self.material.lame
         blocks: list[list[Any]] = [[None] * 3 for _ in range(3)]
@@ -172,9 +171,9 @@ class Quarter:
         """Return the integrals of products of two components' slopes, or their derivative.
 
         Args:
-            components: Of the rows and of the columns.
-            slopes: Axis along which the slopes of the rows' are taken, and of the columns'.
-            by_height: Whether the derivative to the height is wanted.
+            components: Component of the rows, and of the columns.
+            slopes: Axis of the slopes of the rows' component, and of the columns'.
+            by_height: Return the derivative with respect to the height instead.
         """
         factors = []
         for axis in range(3):
@@ -182,9 +181,9 @@ class Quarter:
             left = one.slopes if axis == slopes[0] else one.values
             right = other.slopes if axis == slopes[1] else other.values
             matrix = (left * one.weights) @ right.T
-            large = np.abs(matrix) > _NOUGHT * np.abs(matrix).max(initial=0.0)
+            large = np.abs(matrix) > _NEGLIGIBLE * np.abs(matrix).max(initial=0.0)
             factors.append(csr_matrix(np.where(large, matrix, 0.0)))
-        # elements of height λ: integrals over z grow as λ, and every slope along z as 1/λ
+        # with the height λ of elements integrals over z grow as λ, and slopes along z as 1/λ
         share = (1.0 - slopes.count(2)) / -self.division.z.ticks[0] if by_height else 1.0
         return share * reduce(kron, factors)
 
@@ -214,6 +213,6 @@ def _solved(stiffness: csr_matrix, right: Array) -> Array:
         for array in (right, solution)
     ]
     conditioner.getFactorMatrix().matSolve(*dense)
-    for part in (*dense, conditioner, solver, matrix):  # PETSc would keep what Python drops
+    for part in (*dense, conditioner, solver, matrix):  # PETSc keeps objects that Python drops
         part.destroy()
     return solution

@@ -20,13 +20,13 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from geometry.control import Control
+from geometry.rigid_plane import Control
 from macro.block import Block
 from macro.contact.extrapolated_start import Start, StepHistory
 from macro.contact.face_nodes import TopNodes
-from macro.contact.rigid_plane import RigidPlane, Task, not_found
+from macro.contact.plane_over_nodes import PlaneOverNodes, not_found
 from macro.contact.unilateral_state import Found
-from macro.linear_solvers.constrained import FreeSolver, asked_tolerance
+from macro.linear_solvers.constrained import ConstrainedSolver, contact_tolerance
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -39,7 +39,7 @@ _ROUNDING = 1e-15  # of the block's size: nothing
 _SOFT = 8.0  # springs under a plane that nothing holds yet: E* times this over the block's width
 
 
-class ActiveNodes:
+class PrimalDualActiveSet:
     """Presses the nodes of a rough top; see the module.
 
     Args:
@@ -51,18 +51,18 @@ class ActiveNodes:
         Everything here is collective.
     """
 
-    def __init__(self, block: Block, top: TopNodes, plane: RigidPlane) -> None:
+    def __init__(self, block: Block, top: TopNodes, plane: PlaneOverNodes) -> None:
         self._block, self._top, self._plane = block, top, plane
         # one layer of quadratic elements reaches as far as two of linear ones
-        self._solver = FreeSolver(block.stiffness, block.solver.pc, layers=3 - block.degree)
-        self._tolerance = asked_tolerance()
+        self._solver = ConstrainedSolver(block.stiffness, block.solver.pc, layers=3 - block.degree)
+        self._tolerance = contact_tolerance()
         self._residual = block.stiffness.createVecRight()
         self._history = StepHistory(block.owned_dofs, len(top.dofs))
-        modulus, half = block.material.contact_modulus, plane.half
+        modulus, half = block.material.contact_modulus, plane.levers.half
         self._nothing = 1e-17 * modulus * half**2  # N
         self._springs = top.area * modulus * _SOFT / (2.0 * half)
 
-    def press(self, control: Control) -> Found:
+    def solve(self, control: Control) -> Found:
         """Find the contact of a load step, starting from those before.
 
         Raises:
@@ -70,20 +70,20 @@ class ActiveNodes:
                 linear solve fails; earlier solutions stay what they were.
         """
         start = self._history.start(control)
-        task = self._plane.task(control, start.plane)
+        placed = self._plane.placed(control, start.plane)
         displacement = self._block.stiffness.createVecRight()
         displacement.array[:] = start.displacement
-        plane, active = self._started(task, start, displacement)
+        plane, active = self._started(control, placed, start, displacement)
         sets, spent, tolerance, changed, fewest, waited = 1, 0, _LOOSE, 1, np.inf, 0
         for _ in range(_MOST_SOLVES):
-            held = self._held(task, active)
+            held = self._held(control, active)
             if held is None:
-                plane, active = self._resettled(task, plane, displacement, active)
+                plane, active = self._put_on_springs(control, plane, displacement, active)
                 sets, changed = sets + 1, 1
                 continue
             if changed:
                 self._put_on(plane, displacement, active)
-            more, missed = self._solve(task, plane, displacement, active, held, tolerance)
+            more, missed = self._solve(control, plane, displacement, active, held, tolerance)
             spent += more
             forces, depth = self._forces, self._depth(plane, displacement)
             large = self._largest(forces[active])
@@ -107,34 +107,36 @@ class ActiveNodes:
             return _LOOSE
         return self._tolerance if tolerance <= _CLOSER else _CLOSER
 
-    def _started(self, task: Task, start: Start, displacement: PETSc.Vec) -> tuple[Array, Flags]:
+    def _started(
+        self, control: Control, plane: Array, start: Start, displacement: PETSc.Vec
+    ) -> tuple[Array, Flags]:
         """Return the first plane and active set: those of before and nodes that penetrate."""
-        active, plane = start.contact > 0.0, task.plane
-        if task.free.any() and not self._count(active):
-            plane = self._plane.settled(task, self._sag(displacement), self._springs)
+        active = start.contact > 0.0
+        if control.free.any() and not self._count(active):
+            return self._put_on_springs(control, plane, displacement, active)
         return plane, active | self._beyond(plane, displacement)
 
-    def _resettled(
-        self, task: Task, plane: Array, displacement: PETSc.Vec, active: Flags
+    def _put_on_springs(
+        self, control: Control, plane: Array, displacement: PETSc.Vec, active: Flags
     ) -> tuple[Array, Flags]:
         """Let a plane that its active nodes cannot hold come to rest on springs."""
-        at = task._replace(plane=np.where(task.free, plane, task.plane))
-        plane = self._plane.settled(at, self._sag(displacement), self._springs)
+        sag = self._sag(displacement)
+        plane = self._plane.on_springs(control, plane, sag, self._springs)
         return plane, active | self._beyond(plane, displacement)
 
-    def _held(self, task: Task, active: Flags) -> Array | None:
-        """Return the free motions that the active nodes resist; see `RigidPlane.held`.
+    def _held(self, control: Control, active: Flags) -> Array | None:
+        """Return the free motions that active nodes resist, see `PlaneOverNodes`.
 
         None when there is a load along a motion that they do not resist.
         """
-        held = self._plane.held(task.free, active)
-        borne = held @ np.linalg.lstsq(held, task.wanted, rcond=None)[0]
-        lost = np.abs(task.wanted - borne).max(initial=0.0)
-        return None if lost > self._tolerance * (task.force or 0.0) else held
+        held, wanted = self._plane.supported_motions(control.free, active), _wanted(control)
+        borne = held @ np.linalg.lstsq(held, wanted, rcond=None)[0]
+        lost = np.abs(wanted - borne).max(initial=0.0)
+        return None if lost > self._tolerance * (control.force or 0.0) else held
 
     def _solve(
         self,
-        task: Task,
+        control: Control,
         plane: Array,
         displacement: PETSc.Vec,
         active: Flags,
@@ -148,20 +150,21 @@ class ActiveNodes:
         """
         if not self._count(active):
             return 0, 0.0
-        dofs, levers = self._top.dofs[active], self._plane.levers(task.free)[active]
+        free, wanted = control.free, _wanted(control)
+        dofs, levers = self._top.dofs[active], self._plane.levers.scaled(free)[active]
         motions = levers @ held
         before = displacement.array_r[dofs].copy()
         residual = self._residual.copy()
         scale = self._norm(residual.array_r[dofs])
-        residual.array[dofs] -= motions @ (held.T @ task.wanted)
-        scale = max(scale, float(np.linalg.norm(held.T @ task.wanted)), self._nothing)
-        self._solver.hold(dofs, motions)
+        residual.array[dofs] -= motions @ (held.T @ wanted)
+        scale = max(scale, float(np.linalg.norm(held.T @ wanted)), self._nothing)
+        self._solver.constrain(dofs, motions)
         allowed = 0.5 * tolerance * scale
         spent = self._solver.improve(displacement, residual, allowed)
         if spent:
             self._update_residual(displacement)
         shares = self._sum(motions.T @ (before - displacement.array_r[dofs]))
-        plane[task.free] += self._plane.unit[task.free] * (held @ shares)
+        plane[free] += self._plane.levers.unit[free] * (held @ shares)
         return spent, allowed
 
     def _found(
@@ -176,20 +179,20 @@ class ActiveNodes:
         depth = self._depth(plane, displacement)
         displacement.array[self._top.dofs] -= np.where(active, depth, np.maximum(depth, 0.0))
         self._update_residual(displacement)
-        pressing = np.where(active, np.maximum(self._forces, 0.0), 0.0)
+        nodal_force = np.where(active, np.maximum(self._forces, 0.0), 0.0)
         # vertices of quadratic triangles touch without a force
         touching = active | (depth > -_CLOSED * self._largest(displacement.array_r))
         found = Found(
             plane=plane,
             displacement=displacement.array_r.copy(),
-            pressing=pressing,
+            nodal_force=nodal_force,
             touching=touching,
             active_sets=sets,
             linear_iterations=spent,
             reason="CONVERGED_ACTIVE_SET" if self._count(active) else "CONVERGED_NO_CONTACT",
         )
-        force = float(self._plane.loads(found.pressing)[0])
-        self._history.add(Start(plane, found.displacement, found.pressing), force)
+        force = float(self._plane.levers.loads(found.nodal_force)[0])
+        self._history.add(Start(plane, found.displacement, found.nodal_force), force)
         return found
 
     def _put_on(self, plane: Array, displacement: PETSc.Vec, active: Flags) -> None:
@@ -216,10 +219,10 @@ class ActiveNodes:
         return -displacement.array_r[self._top.dofs]
 
     def _depth(self, plane: Array, displacement: PETSc.Vec) -> Array:
-        return self._plane.closure(plane, self._sag(displacement))
+        return self._plane.penetration(plane, self._sag(displacement))
 
     def _beyond(self, plane: Array, displacement: PETSc.Vec) -> Flags:
-        return self._depth(plane, displacement) > _ROUNDING * self._plane.half
+        return self._depth(plane, displacement) > _ROUNDING * self._plane.levers.half
 
     def _first(self, moved: Flags) -> Flags:
         """Keep the first of the flags, over all ranks (Murty 1974: such changes cannot cycle)."""
@@ -242,3 +245,8 @@ class ActiveNodes:
 
     def _sum(self, values: Array) -> Array:
         return self._block.mesh.comm.allreduce(values, op=MPI.SUM)
+
+
+def _wanted(control: Control) -> Array:
+    """Return the loads along the free motions of the plane, shape (k,) [N]."""
+    return control.loads[control.free]

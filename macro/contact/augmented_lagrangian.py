@@ -17,8 +17,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from geometry.control import Control
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
 from macro.block import Block
 from macro.contact.augmented_law import AugmentedLaw, facet_sizes
 from macro.contact.augmented_newton import LOOSEST, SPARE, FacetNewton
@@ -27,9 +27,9 @@ from macro.contact.equilibrium import Equilibrium
 from macro.contact.extrapolated_start import Start, StepHistory
 from macro.contact.face_nodes import TopNodes
 from macro.contact.law_interface import Interface
-from macro.contact.rigid_plane import RigidPlane, not_found
+from macro.contact.plane_over_nodes import PlaneOverNodes, not_found
 from macro.contact.unilateral_state import Found
-from macro.linear_solvers.constrained import asked_tolerance
+from macro.linear_solvers.constrained import contact_tolerance
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ _NO_FORCE = 1e-6  # of the largest nodal force: none
 _TINY = 1e-300
 
 
-class AugmentedFacets:
+class AugmentedLagrangian:
     """Presses the facets of a rough top; see the module.
 
     Args:
@@ -61,18 +61,24 @@ class AugmentedFacets:
     """
 
     def __init__(
-        self, block: Block, top: TopNodes, plane: RigidPlane, penalty: float | None, *, exact: bool
+        self,
+        block: Block,
+        top: TopNodes,
+        plane: PlaneOverNodes,
+        penalty: float | None,
+        *,
+        exact: bool,
     ) -> None:
         self._block, self._top, self._plane, self._exact = block, top, plane, exact
         whole = PatchGrid(grid=(1, 1), lengths=block.mesh.shape.interface)
         self._interface = interface = Interface(block, whole, degree=2 * block.degree)
         self._sampling = sampling = interface.pointwise
-        (rest,) = top.spread(plane.rest)
+        (rest,) = top.spread(plane.distance)
         points = interface.quadrature
         unit = block.material.contact_modulus / facet_sizes(points.cell, points.weight)
         self._stiff = _HARD * unit if penalty is None else np.full_like(unit, penalty)
         self._soft = np.minimum(_SOFT * unit, self._stiff)
-        self._tolerance = asked_tolerance()
+        self._tolerance = contact_tolerance()
         self._penetration = PENETRATION[block.degree]
         self._law = AugmentedLaw(np.sum(points.values * rest[points.nodes], axis=1))
         self._contact = Contact(interface, sampling, [self._law])
@@ -80,7 +86,7 @@ class AugmentedFacets:
         self._newton = FacetNewton(self._equilibrium, self._law, interface, top, plane)
         self._history = StepHistory(block.owned_dofs, len(points.x))
 
-    def press(self, control: Control) -> Found:
+    def solve(self, control: Control) -> Found:
         """Find the contact of a load step, starting from those before.
 
         Raises:
@@ -88,9 +94,8 @@ class AugmentedFacets:
                 stay what they were.
         """
         start = self._history.start(control)
-        task = self._plane.task(control, start.plane)
         contact, law = self._contact, self._law
-        contact.plane, contact.free, contact.force = task.plane, task.free, task.force
+        contact.control, contact.plane = control, self._plane.placed(control, start.plane)
         law.multiplier = np.maximum(start.contact, 0.0) if self._exact else 0.0 * start.contact
         displacement = self._block.stiffness.createVecRight()
         displacement.array[:] = start.displacement
@@ -123,22 +128,24 @@ class AugmentedFacets:
         samples = self._sampling.operator.createVecRight()
         samples.array[:] = pressure
         self._sampling.operator.mult(samples, load)
-        pressing = -load.array_r[self._top.dofs]
-        gap = -self._plane.closure(plane, -displacement.array_r[self._top.dofs])
-        touching = pressing > _NO_FORCE * self._largest(pressing)
-        if self._exact and self._largest(pressing):
+        nodal_force = -load.array_r[self._top.dofs]
+        gap = -self._plane.penetration(plane, -displacement.array_r[self._top.dofs])
+        touching = nodal_force > _NO_FORCE * self._largest(nodal_force)
+        if self._exact and self._largest(nodal_force):
             touching |= gap < self._penetration * self._largest(displacement.array_r)
         values = displacement.array_r.copy()
-        self._history.add(Start(plane, values, pressure), float(self._plane.loads(pressing)[0]))
+        self._history.add(
+            Start(plane, values, pressure), float(self._plane.levers.loads(nodal_force)[0])
+        )
         reason = "CONVERGED_MULTIPLIERS" if self._exact else "CONVERGED_PENALTY"
         return Found(
             plane=plane,
             displacement=values,
-            pressing=pressing,
+            nodal_force=nodal_force,
             touching=touching,
             active_sets=steps,
             linear_iterations=spent,
-            reason=reason if self._largest(pressing) else "CONVERGED_NO_CONTACT",
+            reason=reason if self._largest(nodal_force) else "CONVERGED_NO_CONTACT",
         )
 
     def _largest(self, values: Array) -> float:

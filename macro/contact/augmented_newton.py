@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
-from geometry.control import Control
+from geometry.rigid_plane import Control
 from macro import compat
 from macro.contact.augmented_law import AugmentedLaw
 from macro.contact.equilibrium import Equilibrium
 from macro.contact.face_nodes import TopNodes
 from macro.contact.law_interface import Interface
-from macro.contact.rigid_plane import RigidPlane, not_found
+from macro.contact.plane_over_nodes import PlaneOverNodes, not_found
 from macro.linear_solvers.options import reason_name
 from macro.linear_solvers.stiff_preconditioner import StiffPreconditioner
 
@@ -43,7 +43,7 @@ class FacetNewton:
         law: AugmentedLaw,
         interface: Interface,
         top: TopNodes,
-        plane: RigidPlane,
+        plane: PlaneOverNodes,
     ) -> None:
         self._equilibrium, self._law, self._interface = equilibrium, law, interface
         self._top, self._plane, block = top, plane, equilibrium.block
@@ -89,7 +89,7 @@ class FacetNewton:
                 name = reason_name(PETSc.KSP.ConvergedReason, self._ksp.reason)
                 raise not_found(control, name, spent)
             self._advance(displacement, residual, step, control)
-            compat.free_dropped(displacement.comm)  # a field of every step
+            compat.collect_garbage(displacement.comm)  # a field of every step
         raise not_found(control, "NEWTON", _MOST_STEPS)
 
     def _linearise(self, displacement: PETSc.Vec) -> None:
@@ -100,8 +100,9 @@ class FacetNewton:
         rows, columns = np.nonzero((np.abs(points.values) > _ON) & (slope > 0.0)[:, None])
         marks = self._top.collect(points.nodes[rows, columns], np.ones(len(rows)))
         sprung = marks > 0.0
-        free = self._equilibrium.contact.free
-        motions = self._plane.levers(free)[sprung] @ self._plane.held(free, sprung)
+        free = self._equilibrium.contact.control.free
+        motions = self._plane.levers.scaled(free)[sprung]
+        motions = motions @ self._plane.supported_motions(free, sprung)
         self._preconditioner.update(slope / points.weight, self._top.dofs[sprung], motions)
 
     def _advance(

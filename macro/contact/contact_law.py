@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from geometry.collective import together
-from geometry.control import Control
+from geometry.plane_equilibrium import UNSUPPORTED, PlaneResponse, find_equilibrium, plane_failure
+from geometry.rigid_plane import Control, PlaneLevers
 from macro.contact.law_interface import ContactLaw, Interface, Sampling
-from macro.contact.plane_equilibrium import LOOSE, Excess, settle, touch
 
 Array = NDArray[np.float64]
+
+_FIRST, _FARTHEST = 1e-6, 1e3
+"""First and last approach that first touch is looked for at, in halves of the diagonal."""
 
 
 class Contact:
@@ -35,11 +36,9 @@ class Contact:
         laws: One law per patch, the same on every rank.
 
     Attributes:
-        half: Half the diagonal of the patches' rectangle: what moments are divided by [mm].
-        unit: Motions of the plane that move its edge by one, shape (3,).
+        levers: Levers of this rank's samples about the middle of the patches.
         plane: Approach at the middle of the patches [mm] and slopes along x and y, shape (3,).
-        free: Which of them follow from the loads, shape (3,).
-        force: Force that is wanted, if one is [N].
+        control: What the load step prescribes of the plane.
 
     Note:
         Every method is collective.
@@ -50,14 +49,11 @@ class Contact:
     ) -> None:
         self._comm, self._sampling, self._laws = interface.block.mesh.comm, sampling, laws
         patches = interface.patches
-        middle = patches.middle
-        x, y = sampling.x - middle[0], sampling.y - middle[1]
-        self._lever = np.column_stack((np.ones_like(x), x, y))
-        self.half = 0.5 * float(np.hypot(*patches.lengths))
-        self.unit = np.array([1.0, 1.0 / self.half, 1.0 / self.half])
+        self.levers = PlaneLevers.at(
+            sampling.x, sampling.y, patches.lengths, centre=patches.middle, comm=self._comm
+        )
         self.plane: Array = np.zeros(3)
-        self.free: NDArray[np.bool_] = np.zeros(3, dtype=bool)
-        self.force: float | None = None
+        self.control = Control(approach=0.0)
 
     def prescribe(self, control: Control, plane: Array) -> None:
         """Set what is given of the plane; without any force the plane just touches the surface.
@@ -69,31 +65,36 @@ class Contact:
         Raises:
             NotConverged: When the plane should touch what cannot be touched.
         """
-        force, self.plane = control.force, plane.copy()
-        turns = control.tilt is None and force != 0.0
-        self.force, self.free = force or None, np.array([bool(force), turns, turns])
-        if control.tilt is not None:
-            self.plane[1:] = control.tilt
-        if control.approach is not None:
-            self.plane[0] = control.approach
-        elif force == 0.0:
-            self.plane[0] = touch(self._touched, self.half)
+        self.control, self.plane = control, control.prescribed(plane)
+        if control.force == 0.0:
+            self.plane[0] = first_touch(self._touched, control, self.levers.half)
 
-    def closure(self, sag: Array) -> Array:
-        """Balance the plane, and return the closures of this rank's samples, shape (n,) [mm].
+    def closure(self, displacement: Array) -> Array:
+        """Bring the plane into equilibrium, and return the closures of this rank's samples.
 
         Args:
-            sag: Downward displacements of this rank's samples, shape (n,) [mm].
+            displacement: Downward displacements of this rank's samples, shape (n,) [mm].
+
+        Returns:
+            Closures, shape (n,) [mm].
 
         Raises:
             NotConverged: When nothing can hold the plane.
         """
-        free = self.free
-        if free.any():
-            start = self.plane[free] / self.unit[free]
-            rest = self._lever @ np.where(free, 0.0, self.plane) - sag
-            self.plane[free] = self.unit[free] * settle(_Motions(self, rest), start)
-        return self._lever @ self.plane - sag
+
+        def respond(plane: Array) -> PlaneResponse[Array]:
+            closure = self.levers.matrix @ plane - displacement
+            weight = self._sampling.weight
+            return PlaneResponse(
+                loads=self.loads(self.pressure(closure)),
+                stiffness=lambda: self.levers.stiffness(weight * self.stiffness(closure)),
+                state=closure,
+            )
+
+        if not self.control.free.any():
+            return self.levers.matrix @ self.plane - displacement
+        self.plane, closure = find_equilibrium(respond, self.control, self.plane, self.levers.half)
+        return closure
 
     def pressure(self, closure: Array) -> Array:
         """Return the laws' pressures at this rank's samples, shape (n,) [MPa].
@@ -112,7 +113,7 @@ class Contact:
         Args:
             pressure: Pressures of this rank's samples, shape (n,) [MPa].
         """
-        return self._sum(self._lever.T @ (self._sampling.weight * pressure))
+        return self.levers.loads(self._sampling.weight * pressure)
 
     def border(self, stiffness: Array) -> Array:
         """Return E, shape (n, k'): the plane's motions take E Eᵀ w ds off D ds as they follow s.
@@ -120,58 +121,40 @@ class Contact:
         Args:
             stiffness: D of this rank's samples, shape (n,) [MPa/mm].
         """
-        columns = self.levers * stiffness[:, None]
-        if not self.free.any():
+        free, unit = self.control.free, self.levers.unit
+        columns = self.levers.scaled(free) * stiffness[:, None]
+        if not free.any():
             return columns
-        values, vectors = np.linalg.eigh(self.resistance(stiffness))
-        held = values > LOOSE * max(values[-1], 0.0)
-        return columns @ (vectors[:, held] / np.sqrt(values[held]))
-
-    def resistance(self, stiffness: Array) -> Array:
-        """Return the derivative of the loads over the free motions, shape (k, k) [N/mm].
-
-        Args:
-            stiffness: D of this rank's samples, shape (n,) [MPa/mm].
-        """
-        weighted = (self._sampling.weight * stiffness)[:, None] * self.levers
-        return self._sum(self.levers.T @ weighted)
-
-    @property
-    def levers(self) -> Array:
-        """Change of the closures by free motions that move the edge by one, shape (n, k)."""
-        return self._lever[:, self.free] * self.unit[self.free]
+        resistance = self.levers.stiffness(self._sampling.weight * stiffness)
+        values, vectors = np.linalg.eigh((resistance * np.outer(unit, unit))[np.ix_(free, free)])
+        supported = values > UNSUPPORTED * max(values[-1], 0.0)
+        return columns @ (vectors[:, supported] / np.sqrt(values[supported]))
 
     def _touched(self, approach: float) -> bool:
         """Tell whether the block at rest is touched at an approach."""
-        closure = self._lever @ np.array([approach, *self.plane[1:]])
+        closure = self.levers.matrix @ np.array([approach, *self.plane[1:]])
         return float(self.loads(self.pressure(closure))[0]) > 0.0
 
-    def _sum(self, values: Any) -> Any:
-        return self._comm.allreduce(values, op=MPI.SUM)
 
+def first_touch(touched: Callable[[float], bool], control: Control, half: float) -> float:
+    """Find the largest approach at which a plane is not in contact yet [mm].
 
-class _Motions:
-    """Free motions of a plane over samples that stand still."""
+    Args:
+        touched: Tells whether it is at an approach.
+        control: What is prescribed of the plane, for an error.
+        half: Half the diagonal of the interface [mm].
 
-    def __init__(self, contact: Contact, rest: Array) -> None:
-        self._contact, self._rest, self._levers = contact, rest, contact.levers
-        self.half = contact.half
-
-    def excess(self, motion: Array) -> Excess:
-        """Return the loads beyond those wanted."""
-        contact = self._contact
-        loads = contact.loads(contact.pressure(self._rest + self._levers @ motion))
-        wanted = np.array([contact.force or 0.0, 0.0, 0.0])
-        force = float(loads[0])
-        excess = (loads * contact.unit - wanted)[contact.free]
-        return Excess(excess, force, contact.force or force)
-
-    def stiffness(self, motion: Array) -> Array:
-        """Return the derivative of the loads."""
-        contact = self._contact
-        return contact.resistance(contact.stiffness(self._rest + self._levers @ motion))
-
-    def reach(self, motion: Array) -> float:
-        """Return the displacement of the plane's edge, at most [mm]."""
-        fixed = np.where(self._contact.free, 0.0, self._contact.plane / self._contact.unit)
-        return float(np.abs(fixed).sum() + np.abs(motion).sum())
+    Raises:
+        NotConverged: When it never is.
+    """
+    below, above, width = -_FIRST * half, _FIRST * half, np.inf
+    while touched(below):
+        below, above = 3.0 * below, below
+    while not touched(above):
+        below, above = above, 3.0 * above
+        if above > _FARTHEST * half:
+            raise plane_failure(control, "NO_CONTACT")
+    while 0.0 < above - below < width:  # to neighbouring numbers
+        width, middle = above - below, 0.5 * (below + above)
+        below, above = (below, middle) if touched(middle) else (middle, above)
+    return below

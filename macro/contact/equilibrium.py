@@ -10,7 +10,7 @@ from petsc4py import PETSc
 from macro.block import Block
 from macro.contact.contact_law import Contact
 from macro.contact.law_interface import Sampling
-from macro.linear_solvers.weak_contexts import Borrowed
+from macro.linear_solvers.options import WeakContext
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ class Equilibrium:
         self._samples = sampling.operator.createVecRight()
         self._action = _TangentAction(stiffness, sampling)
         self.tangent = PETSc.Mat().createPython(
-            stiffness.getSizes(), Borrowed(self._action), comm=stiffness.comm
+            stiffness.getSizes(), WeakContext(self._action), comm=stiffness.comm
         )
         self.tangent.setUp()
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.control import Control
+from geometry.rigid_plane import Control
 
 Array = NDArray[np.float64]
 

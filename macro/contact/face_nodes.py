@@ -87,16 +87,16 @@ class TopNodes:
     def _lattice(self) -> FacetLattice:
         return facet_lattice(self._block.mesh.mesh.topology.cell_name(), self._block.degree)
 
-    def covered_area(self, touching: NDArray[np.bool_], pressing: Array, gap: Array) -> float:
+    def covered_area(self, touching: NDArray[np.bool_], nodal_force: Array, gap: Array) -> float:
         """Return the contact area with its border within the facets; see `covered` [mm²].
 
         Args:
             touching: Whether this rank's nodes are in contact, shape (n,).
-            pressing: Their contact forces, shape (n,) [N].
+            nodal_force: Their contact forces, shape (n,) [N].
             gap: Their gaps, shape (n,) [mm].
         """
         triangles, area = self.triangles
-        pressure = pressing / (self._thirds * self._block.material.contact_modulus)
+        pressure = nodal_force / (self._thirds * self._block.material.contact_modulus)
         values = self.spread(touching.astype(float), pressure, gap)
         flags, pressure, gap = (value[triangles] for value in values)
         share = covered(flags > 0.5, pressure, gap, self.edges)

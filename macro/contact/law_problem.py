@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.collective import together
-from geometry.control import Control
 from geometry.errors import InputError
+from geometry.rigid_plane import Control
 from macro import compat
 from macro.block import Block
 from macro.contact.contact_law import Contact
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PressState:
+class LawContactState:
     """Equilibrium of the block at one load step; the same on every rank but for the displacement.
 
     Args:
@@ -82,7 +82,7 @@ class LawContactProblem:
         InputError: When there is not one law per patch, or no such mode.
 
     Note:
-        Construction and ``press`` are collective.
+        Construction and ``solve`` are collective.
     """
 
     def __init__(
@@ -104,10 +104,10 @@ class LawContactProblem:
         self._plane: Array = np.zeros(3)
         self._closure: Array = np.zeros(len(self._sampling.weight))
 
-    def press(self, control: Control) -> PressState:
+    def solve(self, control: Control) -> LawContactState:
         """Find the equilibrium of one load step.
 
-        A force and a moment of zero are met to `macro.contact.plane_equilibrium.TOLERANCE`. Without
+        A force and a moment of zero are met to `geometry.plane_equilibrium.TOLERANCE`. Without
         any force the plane just touches the highest patch, as it is tilted or was last.
 
         Args:
@@ -123,13 +123,13 @@ class LawContactProblem:
         solution = equilibrium.block.stiffness.createVecRight()
         self._basis.start(solution)
         report = self.newton.solve(
-            solution, what=_described(control), remedy="take more load steps (load.steps)"
+            solution, what=f"the block at {control}", remedy="take more load steps (load.steps)"
         )
         self._basis.add(solution)
         comm = equilibrium.block.mesh.comm
         seconds = comm.allreduce(time.perf_counter() - began, op=MPI.MAX)
         state = self._state(solution, report, seconds)
-        compat.free_dropped(solution.comm)
+        compat.collect_garbage(solution.comm)
         return state
 
     def start_from(self, pressure: Array) -> None:
@@ -168,14 +168,14 @@ class LawContactProblem:
         values = together(comm, lambda: sampling.by_patch(functions, self._closure))
         return sampling.patch_sums(values) / self._interface.areas
 
-    def _state(self, solution: PETSc.Vec, report: NewtonReport, wall_s: float) -> PressState:
+    def _state(self, solution: PETSc.Vec, report: NewtonReport, wall_s: float) -> LawContactState:
         contact, sampling = self.equilibrium.contact, self._sampling
         self._closure = closure = self.equilibrium.closure(solution)
         self._plane = plane = contact.plane.copy()
         pressure = contact.pressure(closure)
         forces, load = sampling.patch_sums(pressure), contact.loads(pressure)
         areas = self._interface.areas
-        return PressState(
+        return LawContactState(
             approach=float(plane[0]),
             tilt=(float(plane[1]), float(plane[2])),
             displacement=solution.array_r.copy(),
@@ -190,9 +190,3 @@ class LawContactProblem:
             reason=report.reason,
             wall_s=wall_s,
         )
-
-
-def _described(control: Control) -> str:
-    if control.force is not None:
-        return f"the block under a force of {control.force:g} N"
-    return f"the block at an approach of {control.approach:g} mm"

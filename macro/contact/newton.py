@@ -11,8 +11,13 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.errors import NotConverged
-from macro.linear_solvers.options import KRYLOV_DEFAULTS, PREFIX, default_options, reason_name
-from macro.linear_solvers.weak_contexts import Borrowed
+from macro.linear_solvers.options import (
+    KRYLOV_DEFAULTS,
+    PREFIX,
+    WeakContext,
+    default_options,
+    reason_name,
+)
 
 NONLINEAR_DEFAULTS: Mapping[str, object] = {
     "snes_type": "newtonls",
@@ -90,7 +95,7 @@ class NewtonSolver:
             self.snes.setFromOptions()
         self.snes.ksp.pc.setType("python")
         self._preconditioner = _OfAnother(preconditioner.pc)
-        self.snes.ksp.pc.setPythonContext(Borrowed(self._preconditioner))
+        self.snes.ksp.pc.setPythonContext(WeakContext(self._preconditioner))
 
     def solve(self, solution: PETSc.Vec, *, what: str, remedy: str) -> NewtonReport:
         """Solve from a start that the solution replaces.

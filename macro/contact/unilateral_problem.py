@@ -7,15 +7,15 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.control import Control
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
 from macro import compat
 from macro.block import Block
-from macro.contact.active_set import ActiveNodes
-from macro.contact.augmented_lagrangian import AugmentedFacets
+from macro.contact.active_set import PrimalDualActiveSet
+from macro.contact.augmented_lagrangian import AugmentedLagrangian
 from macro.contact.face_nodes import TopNodes
-from macro.contact.rigid_plane import RigidPlane
+from macro.contact.plane_over_nodes import PlaneOverNodes
 from macro.contact.unilateral_state import UnilateralContactState, measured
 
 Array = NDArray[np.float64]
@@ -66,17 +66,17 @@ class UnilateralContactProblem:
         patches = patches or PatchGrid(grid=(1, 1), lengths=lengths)
         _check_top(block, patches)
         self.block, self.top = block, TopNodes(block, patches)
-        self._plane = RigidPlane(
+        self._plane = PlaneOverNodes(
             self.top.x, self.top.y, highest - self.top.height, lengths, block.mesh.comm
         )
-        self._method: ActiveNodes | AugmentedFacets
+        self._method: PrimalDualActiveSet | AugmentedLagrangian
         if method == "active-set":
-            self._method = ActiveNodes(block, self.top, self._plane)
+            self._method = PrimalDualActiveSet(block, self.top, self._plane)
         else:
             exact = method == "augmented-lagrangian"
-            self._method = AugmentedFacets(block, self.top, self._plane, penalty, exact=exact)
+            self._method = AugmentedLagrangian(block, self.top, self._plane, penalty, exact=exact)
 
-    def press(self, control: Control) -> UnilateralContactState:
+    def solve(self, control: Control) -> UnilateralContactState:
         """Find the contact of one load step, starting from those before.
 
         A force and a moment of zero are met to `macro.linear_solvers.constrained.TOLERANCE` of the
@@ -90,8 +90,8 @@ class UnilateralContactProblem:
             NotConverged: When an iteration fails, or nothing can hold the plane; the earlier
                 solutions stay what they were, so that a smaller step can be tried.
         """
-        state = measured(self.block, self.top, self._plane, self._method.press(control))
-        compat.free_dropped(self.block.stiffness.comm)
+        state = measured(self.block, self.top, self._plane, self._method.solve(control))
+        compat.collect_garbage(self.block.stiffness.comm)
         return state
 
 

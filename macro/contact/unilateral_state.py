@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from macro.block import Block
 from macro.contact.face_nodes import TopNodes
-from macro.contact.rigid_plane import RigidPlane
+from macro.contact.plane_over_nodes import PlaneOverNodes
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -25,7 +25,7 @@ class UnilateralContactState:
         approach: Rigid approach at the middle of the interface [mm].
         tilt: Change of the approach along x and y [mm/mm].
         displacement: This rank's owned degrees of freedom [mm].
-        pressing: Contact forces of this rank's nodes of the top, shape (n,) [N].
+        nodal_force: Contact forces of this rank's nodes of the top, shape (n,) [N].
         force: Normal force from the nodes [N].
         moment: First moments of the contact forces along x and y, about the middle of the
             interface, shape (2,) [N mm].
@@ -47,7 +47,7 @@ class UnilateralContactState:
     approach: float
     tilt: tuple[float, float]
     displacement: Array
-    pressing: Array
+    nodal_force: Array
     force: float
     moment: Array
     reaction: float
@@ -70,7 +70,7 @@ class Found(NamedTuple):
     Attributes:
         plane: Approach at the middle [mm] and slopes, shape (3,).
         displacement: Owned degrees of freedom [mm].
-        pressing: Contact forces of the nodes of the top, shape (n,) [N].
+        nodal_force: Contact forces of the nodes of the top, shape (n,) [N].
         touching: Whether these nodes are in contact, shape (n,).
         active_sets: Active sets that were solved for.
         linear_iterations: Iterations of the linear solver.
@@ -79,7 +79,7 @@ class Found(NamedTuple):
 
     plane: Array
     displacement: Array
-    pressing: Array
+    nodal_force: Array
     touching: Flags
     active_sets: int
     linear_iterations: int
@@ -87,7 +87,7 @@ class Found(NamedTuple):
 
 
 def measured(
-    block: Block, top: TopNodes, plane: RigidPlane, found: Found
+    block: Block, top: TopNodes, plane: PlaneOverNodes, found: Found
 ) -> UnilateralContactState:
     """Measure what is told of a solution.
 
@@ -103,10 +103,10 @@ def measured(
     displacement = block.stiffness.createVecRight()
     displacement.array[:] = found.displacement
     sag = -found.displacement[top.dofs]
-    gap = -plane.closure(found.plane, sag)
-    loads = plane.loads(found.pressing)
-    lean = (top.patches.centres - plane.middle) @ found.plane[1:]
-    pressing, touching = np.maximum(found.pressing, 0.0), found.touching
+    gap = -plane.penetration(found.plane, sag)
+    loads = plane.levers.loads(found.nodal_force)
+    lean = (top.patches.centres - plane.centre) @ found.plane[1:]
+    nodal_force, touching = np.maximum(found.nodal_force, 0.0), found.touching
     area = np.where(touching, top.area, 0.0)
     weight = np.stack([top.area, top.area * gap, area, touching], axis=1)
     whole, room, contact, nodes = block.mesh.comm.allreduce(weight.sum(axis=0), op=MPI.SUM)
@@ -114,16 +114,16 @@ def measured(
         approach=float(found.plane[0]),
         tilt=(float(found.plane[1]), float(found.plane[2])),
         displacement=found.displacement,
-        pressing=found.pressing,
+        nodal_force=found.nodal_force,
         force=float(loads[0]),
         moment=loads[1:],
         reaction=block.reaction(displacement),
         contact_area=float(contact),
-        contact_area_fine=top.covered_area(touching, pressing, np.maximum(gap, 0.0)),
+        contact_area_fine=top.covered_area(touching, nodal_force, np.maximum(gap, 0.0)),
         nodes=round(nodes),
         contacts=top.regions(touching),
         mean_separation=float(room / whole),
-        patch_force=top.patch_sums(found.pressing),
+        patch_force=top.patch_sums(found.nodal_force),
         patch_area=top.patch_sums(area),
         patch_closure=found.plane[0] + lean - top.patch_means(sag),
         active_sets=found.active_sets,

@@ -1,4 +1,4 @@
-"""Solves in a part of the displacements with the matrix and the preconditioner of all of them."""
+"""Conjugate gradients for displacements some of which are constrained, without a new matrix."""
 
 from __future__ import annotations
 
@@ -7,78 +7,81 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.errors import NotConverged
-from macro.linear_solvers.constrained_preconditioner import HeldPreconditioner
-from macro.linear_solvers.options import PREFIX, reason_name
-from macro.linear_solvers.projection import Projection
-from macro.linear_solvers.weak_contexts import Borrowed
+from macro.linear_solvers.constrained_preconditioner import ConstrainedPreconditioner, Projection
+from macro.linear_solvers.options import PREFIX, WeakContext, reason_name
 
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-10
-"""What a contact may miss: residual and complementarity, relative to the contact forces.
+"""Tolerance of contact: residual and complementarity relative to the contact forces.
 
-Ten times more would leave forces known to 2e-11 and contact areas to 3e-11, but forces of single
-nodes to 2e-10 of the largest: a resumed run, which starts from other guesses, shall give the same
-history to 1e-10. Each tenth costs one iteration on hexahedra and two to three on quadratic
+With 1e-9 total forces were known to 2e-11 and contact areas to 3e-11, but single nodal forces only
+to 2e-10 of the largest. A resumed run starts from other initial guesses and must give the same
+history to 1e-10. Each factor of ten costs one iteration on hexahedra and two to three on quadratic
 tetrahedra, of 12 and 30.
 """
 
+_MOST_ITERATIONS = 1000
 
-def asked_tolerance() -> float:
-    """Return `TOLERANCE`, or what the user asks for by ``-patchlaw_ksp_rtol``."""
+
+def contact_tolerance() -> float:
+    """Return `TOLERANCE`, or the user's ``-patchlaw_ksp_rtol``."""
     return float(PETSc.Options(PREFIX).getReal("ksp_rtol", TOLERANCE))
 
 
-class FreeSolver:
-    """Conjugate gradients where some degrees of freedom are held, or move together.
+class ConstrainedSolver:
+    """Conjugate gradients where some degrees of freedom are constrained, or move together.
 
-    With P the orthogonal projection on the vectors that are left, the operator is P A P and the
-    preconditioner P M P, mended (see `HeldPreconditioner`). Held degrees of freedom that a rigid
-    plane takes along add as many unknowns as the plane has motions, and no second solve.
+    With P the orthogonal projection on the displacements that the constraints allow, the operator
+    is P A P and the preconditioner is that of `ConstrainedPreconditioner`. Motions of a rigid plane
+    that takes constrained degrees of freedom along are part of the same solve: they add as many
+    unknowns as the plane has motions.
 
     Args:
-        matrix: Symmetric positive definite matrix A of all of them.
-        preconditioner: A preconditioner M of it.
-        layers: Of unknowns around held ones that the preconditioner is mended on.
+        matrix: Symmetric positive definite matrix A of all degrees of freedom.
+        preconditioner: A preconditioner M of A.
+        layers: Layers of nodes around constrained ones near which M is corrected.
 
     Note:
         Every method is collective.
     """
 
     def __init__(self, matrix: PETSc.Mat, preconditioner: PETSc.PC, layers: int = 2) -> None:
-        self._left = Projection(matrix.comm.tompi4py())
-        self._projected = _Projected(matrix, self._left)
+        self._projection = Projection(matrix.comm.tompi4py())
+        self._operator = _ProjectedMatrix(matrix, self._projection)
         operator = PETSc.Mat().createPython(
-            matrix.getSizes(), Borrowed(self._projected), comm=matrix.comm
+            matrix.getSizes(), WeakContext(self._operator), comm=matrix.comm
         )
         operator.setUp()
         self._ksp = PETSc.KSP().create(matrix.comm)
         self._ksp.setOperators(operator)
         self._ksp.setType("cg")
         self._ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
-        self._ksp.setTolerances(max_it=1000)
+        self._ksp.setTolerances(max_it=_MOST_ITERATIONS)
         self._ksp.pc.setType("python")
-        self._mended = HeldPreconditioner(matrix, preconditioner, self._left, layers)
-        self._ksp.pc.setPythonContext(Borrowed(self._mended))
+        self._preconditioner = ConstrainedPreconditioner(
+            matrix, preconditioner, self._projection, layers
+        )
+        self._ksp.pc.setPythonContext(WeakContext(self._preconditioner))
 
-    def hold(self, dofs: NDArray[np.intp], motions: Array | None = None) -> None:
-        """Hold degrees of freedom but for common motions, and free all others.
+    def constrain(self, dofs: NDArray[np.intp], motions: Array | None = None) -> None:
+        """Constrain degrees of freedom, apart from common motions, and free all others.
 
         Args:
-            dofs: Local indices of what this rank owns, shape (n,).
+            dofs: Local indices of those that this rank owns, shape (n,).
             motions: Displacements of these by every motion that is left to them, shape (n, k);
-                orthonormal, all ranks together. None: they stand still.
+                orthonormal over all ranks. None: they stand still.
         """
-        self._left.hold(dofs, np.zeros((len(dofs), 0)) if motions is None else motions)
-        self._mended.hold(dofs)
+        self._projection.constrain(dofs, np.zeros((len(dofs), 0)) if motions is None else motions)
+        self._preconditioner.constrain(dofs)
 
     def improve(self, solution: PETSc.Vec, residual: PETSc.Vec, tolerance: float) -> int:
-        """Change what is free of a solution until its residual is small.
+        """Change the free part of a solution until its residual is small.
 
         Args:
             solution: Changed in place.
-            residual: b − A x; overwritten.
-            tolerance: Norm of the residual of what is free, at the end.
+            residual: b − A x of the solution x; overwritten.
+            tolerance: Norm of the projected residual to reach.
 
         Returns:
             Iterations.
@@ -86,7 +89,7 @@ class FreeSolver:
         Raises:
             NotConverged: When conjugate gradients fail.
         """
-        self._left.project(residual)
+        self._projection.project(residual)
         norm = residual.norm()
         if norm <= tolerance:
             return 0
@@ -104,12 +107,12 @@ class FreeSolver:
         return int(self._ksp.its)
 
 
-class _Projected:
-    """P A: what PETSc calls to multiply vectors of the range of P."""
+class _ProjectedMatrix:
+    """The operator P A, which PETSc applies to vectors in the range of P."""
 
-    def __init__(self, matrix: PETSc.Mat, left: Projection) -> None:
-        self._matrix, self._left = matrix, left
+    def __init__(self, matrix: PETSc.Mat, projection: Projection) -> None:
+        self._matrix, self._projection = matrix, projection
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         self._matrix.mult(x, y)
-        self._left.project(y)
+        self._projection.project(y)

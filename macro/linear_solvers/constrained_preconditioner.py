@@ -1,167 +1,199 @@
-"""Preconditioner of a block some of whose degrees of freedom are held."""
+"""Preconditioner of a block some of whose degrees of freedom are constrained."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_array
-
-from macro.linear_solvers.projection import Projection
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 _SWEEPS = 2
+"""Symmetric Gauss–Seidel sweeps near the constrained degrees of freedom."""
+
 _FROM_ZERO = int(PETSc.Mat.SORType.SYMMETRY_SWEEP) | int(PETSc.Mat.SORType.ZERO_INITIAL_GUESS)
 
 
-class HeldPreconditioner:
-    """The preconditioner M of all degrees of freedom, mended around those that are held.
+class Projection:
+    """Orthogonal projection P: identity on free degrees of freedom, Q Qᵀ on constrained ones.
 
-    P M P, with P the projection on what is left, errs most beside held degrees of freedom: what M
-    wants to move there is just cut off. Symmetric Gauss–Seidel sweeps S ≈ A⁻¹ on the unknowns
-    close by, before and after it, smooth that away (a multiplicative Schwarz method; Smith,
-    Bjørstad & Gropp 1996, ch. 1):
+    The columns of Q are the common motions that constraints leave, such as those of a rigid plane.
+
+    Args:
+        comm: MPI communicator.
+    """
+
+    def __init__(self, comm: Any) -> None:
+        self._comm = comm
+        self._dofs: Indices = np.empty(0, dtype=np.intp)
+        self._motions: Array = np.empty((0, 0))
+
+    def constrain(self, dofs: Indices, motions: Array) -> None:
+        """Constrain degrees of freedom to motions Q; see `ConstrainedSolver.constrain`."""
+        self._dofs, self._motions = dofs, motions
+
+    def project(self, vector: PETSc.Vec) -> None:
+        """Project a vector in place; collective."""
+        values, q = vector.array, self._motions
+        shares = q.T @ values[self._dofs]
+        if shares.size:
+            shares = self._comm.allreduce(shares, op=MPI.SUM)
+        values[self._dofs] = q @ shares
+
+
+class ConstrainedPreconditioner:
+    """The preconditioner M of the unconstrained matrix A, corrected near the constraints.
+
+    P M P, with P the projection on the free displacements, is least accurate beside constrained
+    degrees of freedom, because it cuts off what M wants to move there. Symmetric Gauss–Seidel
+    sweeps S ≈ A⁻¹ on the unknowns nearby, before and after it, remove that error. This is a
+    multiplicative Schwarz method (Smith, Bjørstad & Gropp 1996, ch. 1):
 
         2 S − S A S + (1 − S A) P M P (1 − A S),
 
-    symmetric and positive definite like M. Unknowns that have entries with those of other ranks do
-    not count as close by: the products with A need no messages then, and are whole.
+    symmetric and positive definite like M. Unknowns that are coupled with other ranks are left
+    out of the sweeps, so that the products with A need no messages.
 
     Args:
         matrix: Symmetric positive definite matrix A.
         preconditioner: M.
-        left: P; its user tells it what is held.
-        layers: Of unknowns around held ones that count as close by.
+        projection: P; its owner sets the constraints.
+        layers: Layers of nodes around the constrained ones that are swept.
 
     Note:
         Everything here is collective.
     """
 
     def __init__(
-        self, matrix: PETSc.Mat, preconditioner: PETSc.PC, left: Projection, layers: int
+        self, matrix: PETSc.Mat, preconditioner: PETSc.PC, projection: Projection, layers: int
     ) -> None:
-        self._own = matrix.getDiagonalBlock()
-        self._preconditioner, self._left, self._layers = preconditioner, left, layers
+        self._local = matrix.getDiagonalBlock()
+        self._preconditioner, self._projection = preconditioner, projection
+        self._layers = layers
         self._work = matrix.createVecRight()
-        self._border = _border(matrix, self._own)
-        self._held: Indices = np.empty(0, dtype=np.intp)
-        self._close: _Surroundings | None = None
+        self._shared = _nodes_coupled_to_other_ranks(matrix, self._local)
+        self._dofs: Indices = np.empty(0, dtype=np.intp)
+        self._near: _Neighbourhood | None = None
 
-    def hold(self, dofs: Indices) -> None:
-        """Move to other held degrees of freedom.
+    def constrain(self, dofs: Indices) -> None:
+        """Move to other constrained degrees of freedom.
 
         Args:
-            dofs: Local indices of what this rank owns, shape (n,).
+            dofs: Local indices of those that this rank owns, shape (n,).
         """
-        if np.array_equal(dofs, self._held):
+        if np.array_equal(dofs, self._dofs):
             return
-        if self._close is not None:
-            self._close.destroy()
-        self._held = dofs
-        close = _Surroundings(self._own, dofs, self._layers, self._border)
-        self._close = close if len(close.near) else None
+        if self._near is not None:
+            self._near.square.destroy()  # else it waits for Python's garbage collector
+        self._dofs = dofs
+        near = _nearby(dofs, self._local, self._layers, self._shared)
+        self._near = _Neighbourhood(self._local, *near) if len(near[0]) else None
 
     def apply(self, _pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write the preconditioner's y for x."""
-        close = self._close
+        near = self._near
         x.copy(self._work)
-        if close is not None:
-            before = close.swept(x.array_r[close.near])
-            self._work.array[close.around] -= close.pushed(before)
-        self._left.project(self._work)
+        if near is not None:
+            before = near.swept(x.array_r[near.dofs])
+            self._work.array[near.coupled] -= before @ near.rows
+        self._projection.project(self._work)
         self._preconditioner.apply(self._work, y)
-        self._left.project(y)
-        if close is not None:
-            y.array[close.near] += before
-            left = x.array_r[close.near] - close.forces(y.array_r[close.around])
-            y.array[close.near] += close.swept(left)
+        self._projection.project(y)
+        if near is not None:
+            y.array[near.dofs] += before
+            left = x.array_r[near.dofs] - near.rows @ y.array_r[near.coupled]
+            y.array[near.dofs] += near.swept(left)
 
 
-class _Surroundings:
-    """The part of a matrix of one process around some of its degrees of freedom.
+class _Neighbourhood:
+    """The rows of a rank's own matrix that belong to some unknowns.
 
     Attributes:
-        near: Unknowns close to them, which they do not belong to, shape (n,).
-        around: Unknowns of all nodes that these have entries with, shape (m,).
+        dofs: The unknowns, shape (n,).
+        coupled: Unknowns of all nodes that have entries in these rows, shape (m,).
+        rows: The rows, shape (n, m).
+        square: Their part between the unknowns themselves.
     """
 
-    def __init__(self, matrix: PETSc.Mat, dofs: Indices, layers: int, border: Indices) -> None:
-        nodes = np.unique(dofs // 3)
-        for _ in range(layers):
-            nodes = _neighbours(matrix, nodes)
-        every = _unknowns(nodes) if layers else dofs
-        chosen = ~(np.isin(every, dofs) | np.isin(every // 3, border))
-        self.near = every[chosen]
-        if not len(self.near):
-            return
-        beside = _neighbours(matrix, nodes)
-        self.around = _unknowns(beside)
-        self._rows = _part(matrix, nodes, beside)[chosen]
-        square = csr_array(self._rows[:, np.searchsorted(self.around, self.near)])
+    def __init__(self, matrix: PETSc.Mat, dofs: Indices, nodes: Indices) -> None:
+        self.dofs = dofs
+        neighbours = _neighbours(matrix, nodes)
+        self.coupled = _dofs_of(neighbours)
+        self.rows = node_submatrix(matrix, nodes, neighbours)[np.isin(_dofs_of(nodes), dofs)]
+        square = csr_array(self.rows[:, np.searchsorted(self.coupled, dofs)])
         square.sort_indices()
         pattern = (part.astype(PETSc.IntType) for part in (square.indptr, square.indices))
         csr = (*pattern, square.data)
-        self._square = PETSc.Mat().createAIJ(square.shape, csr=csr, comm=PETSc.COMM_SELF)
-        self._load, self._sag = self._square.createVecs()
+        self.square = PETSc.Mat().createAIJ(square.shape, csr=csr, comm=PETSc.COMM_SELF)
+        self._load, self._solution = self.square.createVecs()
 
     def swept(self, load: Array) -> Array:
-        """Return the displacements of `near` that sweeps find under their load, shape (n,)."""
+        """Return the approximate displacements of the unknowns under their load, shape (n,)."""
         self._load.array[:] = load
-        self._square.SOR(self._load, self._sag, sortype=_FROM_ZERO, its=_SWEEPS)
-        return self._sag.array_r.copy()
-
-    def pushed(self, sag: Array) -> Array:
-        """Return the forces on `around` by displacements of `near`, shape (m,)."""
-        forces: Array = sag @ self._rows
-        return forces
-
-    def forces(self, sag: Array) -> Array:
-        """Return the forces on `near` by displacements of `around`, shape (n,)."""
-        forces: Array = self._rows @ sag
-        return forces
-
-    def destroy(self) -> None:
-        """Give the matrix back, which would else wait for Python's collector."""
-        self._square.destroy()
+        self.square.SOR(self._load, self._solution, sortype=_FROM_ZERO, its=_SWEEPS)
+        return self._solution.array_r.copy()
 
 
-def _border(matrix: PETSc.Mat, own: PETSc.Mat) -> Indices:
-    """Return this rank's nodes that have entries with those of other ranks.
+def _nearby(
+    constrained: Indices, matrix: PETSc.Mat, layers: int, excluded: Indices
+) -> tuple[Indices, Indices]:
+    """Return the free unknowns within some layers of constrained ones, and all nodes there."""
+    nodes = np.unique(constrained // 3)
+    for _ in range(layers):
+        nodes = _neighbours(matrix, nodes)
+    dofs = _dofs_of(nodes) if layers else constrained
+    return dofs[~(np.isin(dofs, constrained) | np.isin(dofs // 3, excluded))], nodes
 
-    There, and nowhere else, a product with random numbers is not that of the rank's own part.
+
+def _nodes_coupled_to_other_ranks(matrix: PETSc.Mat, local: PETSc.Mat) -> Indices:
+    """Return this rank's nodes whose rows have entries in columns of other ranks.
+
+    There, and nowhere else, the product of the matrix with random numbers differs from the
+    product of the rank's own part with them.
     """
     numbers, whole = matrix.createVecs()
-    part, alone = own.createVecs()
+    part, alone = local.createVecs()
     part.array[:] = np.random.default_rng(1).standard_normal(part.local_size)
     numbers.array[:] = part.array_r
     matrix.mult(numbers, whole)
-    own.mult(part, alone)
+    local.mult(part, alone)
     differs = (whole.array_r != alone.array_r).reshape(-1, 3)
     return np.flatnonzero(differs.any(axis=1))
 
 
 def _neighbours(matrix: PETSc.Mat, nodes: Indices) -> Indices:
-    """Return the nodes that nodes have entries with, ascending."""
+    """Return the nodes that have entries in the rows of some nodes, ascending."""
     if not len(nodes):
         return nodes
     every = np.arange(matrix.getSize()[1] // 3)
-    return np.unique(_part(matrix, nodes, every).indices // 3).astype(np.intp)
+    return np.unique(node_submatrix(matrix, nodes, every).indices // 3).astype(np.intp)
 
 
-def _part(matrix: PETSc.Mat, rows: Indices, columns: Indices) -> csr_array:
-    """Return the part of a matrix that belongs to nodes; matrices of blocks give no less."""
-    part = matrix.createSubMatrix(_blocks(rows), _blocks(columns))
+def node_submatrix(matrix: PETSc.Mat, rows: Indices, columns: Indices) -> csr_array:
+    """Return the part of a rank's own matrix that belongs to some nodes.
+
+    Whole nodes are taken because matrices of PETSc's type ``baij`` give no smaller parts.
+
+    Args:
+        matrix: Matrix of this process alone, three unknowns per node.
+        rows: Nodes of the rows, ascending.
+        columns: Nodes of the columns, ascending.
+    """
+    rows_of, columns_of = (
+        PETSc.IS().createBlock(3, nodes.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
+        for nodes in (rows, columns)
+    )
+    part = matrix.createSubMatrix(rows_of, columns_of)
     starts, places, entries = part.getValuesCSR()
     size = part.getSize()
     part.destroy()
     return csr_array((entries, places, starts), shape=size)
 
 
-def _blocks(nodes: Indices) -> PETSc.IS:
-    return PETSc.IS().createBlock(3, nodes.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
-
-
-def _unknowns(nodes: Indices) -> Indices:
+def _dofs_of(nodes: Indices) -> Indices:
     return (3 * nodes[:, None] + np.arange(3)).ravel()

@@ -1,12 +1,12 @@
-"""Factorisations by MUMPS, which get more room where it estimated too little.
+"""Factorisations by MUMPS, which are repeated with more memory where its estimate was too small.
 
-What a front needs is estimated before pivots are known and before it is known which rank works on
-what: on several ranks, the same matrix fits in one run and not in the next (its error −9).
+MUMPS estimates the memory of a front before it knows the pivots and which rank works on what. On
+several ranks the same matrix fits in one run and fails in the next (error −9).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from petsc4py import PETSc
 
@@ -18,19 +18,22 @@ DIRECT_DEFAULTS: Mapping[str, object] = {
 }
 """A factorisation, distributed over the ranks."""
 
-_ROOM = 14  # MUMPS's ICNTL(14): room beyond the estimate
-_ROOMS = (50, 200, 800, 3200)  # in percent; MUMPS itself takes 20
-_SHORT_OF_ROOM = (-8, -9, -14, -15, -17, -20)  # its errors, which its guide answers with more room
+MARGINS = (50, 200, 800, 3200)
+"""Memory beyond MUMPS's estimate that is tried in turn, in percent; its own default is 20."""
+
+_MARGIN = 14  # MUMPS's ICNTL(14): memory beyond the estimate, in percent
+_OUT_OF_MEMORY = (-8, -9, -14, -15, -17, -20)  # errors that its guide answers with ICNTL(14)
 
 
-def set_up(solver: PETSc.KSP) -> None:
-    """Set up a solver; a factorisation by MUMPS that runs out of room is repeated with more.
+def set_up(solver: PETSc.KSP, margins: Sequence[int] = MARGINS) -> None:
+    """Set up a solver; a factorisation by MUMPS that runs out of memory is repeated with more.
 
     Args:
-        solver: With its operators and options; another preconditioner is set up as it is.
+        solver: With its operators and options. Any other preconditioner is set up as it is.
+        margins: Memory beyond MUMPS's estimate to try in turn [%].
 
     Raises:
-        NotConverged: When MUMPS fails otherwise, or runs out of all the room that it may have.
+        NotConverged: When MUMPS fails otherwise, or with the largest margin.
 
     Note:
         Collective.
@@ -38,18 +41,18 @@ def set_up(solver: PETSc.KSP) -> None:
     if not _by_mumps(solver.pc):
         solver.setUp()
         return
-    for room in _ROOMS:
-        solver.pc.setFactorSetUpSolverType()  # makes the factor, to be told its room
+    for margin in margins:
+        solver.pc.setFactorSetUpSolverType()  # makes the factor, which then takes its options
         factor = solver.pc.getFactorMatrix()
-        factor.setMumpsIcntl(_ROOM, room)
+        factor.setMumpsIcntl(_MARGIN, margin)
         solver.setUp()
         error = factor.getMumpsInfog(1)
         if error >= 0:
             return
-        if error not in _SHORT_OF_ROOM:
+        if error not in _OUT_OF_MEMORY:
             break
         operators = solver.getOperators()
-        solver.pc.reset()  # a factor that failed is never tried again
+        solver.pc.reset()  # PETSc never retries a factor that failed
         solver.setOperators(*operators)
     raise NotConverged(
         "the factorisation of the block",
@@ -59,8 +62,8 @@ def set_up(solver: PETSc.KSP) -> None:
     )
 
 
-def _by_mumps(conditioner: PETSc.PC) -> bool:
-    if conditioner.getType() not in ("cholesky", "lu"):
+def _by_mumps(preconditioner: PETSc.PC) -> bool:
+    if preconditioner.getType() not in ("cholesky", "lu"):
         return False
-    conditioner.setFactorSetUpSolverType()  # before it, the one that PETSc will take is open
-    return str(conditioner.getFactorSolverType()) == "mumps"
+    preconditioner.setFactorSetUpSolverType()  # PETSc chooses the package here
+    return str(preconditioner.getFactorSolverType()) == "mumps"

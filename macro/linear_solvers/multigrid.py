@@ -1,9 +1,9 @@
 """Geometric multigrid on blocks whose nodes form a rectangular lattice: the transfers.
 
-Grids coarsen where the planes of the lattice are close (see `coarsenings`), displacements are
-interpolated trilinearly in the flat lattice, and the coarser matrices are Galerkin's products, so
-that all follows the true matrix, on rough blocks too. A node of a coarser grid lives on the rank of
-the node of the finer grid that it is.
+Grids coarsen where the planes of the lattice are close (see `coarsenings`). Displacements are
+interpolated trilinearly in the flat lattice, also on rough blocks, and the coarser matrices are
+Galerkin's products of the true matrix. A coarse node is one of the finer grid's nodes, and lives on
+the same rank.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ _CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lattice:
-    """The rectangular lattice that the nodes of a space form, without gaps.
+    """The rectangular lattice that the nodes of a space form.
 
     Args:
         grid: The planes across x, y and z.
-        nodes: Which of them meet at this rank's nodes, in the order of the unknowns, shape (n, 3).
+        nodes: Indices of the planes that meet at each of this rank's nodes, shape (n, 3).
     """
 
     grid: Sequence[Lines]
@@ -48,9 +48,9 @@ class Transfer:
     """From a grid to the next finer one.
 
     Args:
-        weights: Of nodes by coarse nodes.
-        interpolation: Of unknowns by coarse unknowns, held ones apart.
-        free: 1 for unknowns of the finer grid that are free, 0 for those that are held.
+        weights: Interpolation of nodes from coarse nodes.
+        interpolation: Interpolation of unknowns from coarse unknowns, constrained ones apart.
+        free: 1 for unknowns of the finer grid that are free, 0 for constrained ones.
         coarse_free: The same for the coarser grid.
     """
 
@@ -87,8 +87,9 @@ def coarser_grids(lattice: Lattice, matrix: PETSc.Mat, free: PETSc.Vec) -> list[
 
     Args:
         lattice: Nodes of the finest grid.
-        matrix: Its matrix, of PETSc's type ``baij``, with unit rows and columns where held.
-        free: 1 for unknowns that are free, 0 for those that are held.
+        matrix: Its matrix, of PETSc's type ``baij``, with unit rows and columns where
+            constrained.
+        free: 1 for unknowns that are free, 0 for constrained ones.
 
     Note:
         Collective.
@@ -104,12 +105,12 @@ def coarser_grids(lattice: Lattice, matrix: PETSc.Mat, free: PETSc.Vec) -> list[
 def transfers(lattice: Lattice, free: PETSc.Vec) -> Iterator[Transfer]:
     """Yield the transfers from every grid but the finest to the next finer one.
 
-    What is held stays apart on every grid: held unknowns neither give nor take, and the coarser
-    matrices have unit rows for them like the finest.
+    Constrained unknowns are separate on every grid: they neither contribute to others nor take
+    from others, and every coarser matrix has unit rows for them.
 
     Args:
         lattice: Nodes of the finest grid.
-        free: 1 for unknowns that are free, 0 for those that are held.
+        free: 1 for unknowns that are free, 0 for constrained ones.
 
     Yields:
         Finest grid first.
@@ -130,7 +131,7 @@ def transfers(lattice: Lattice, free: PETSc.Vec) -> Iterator[Transfer]:
 def _node_weights(
     grid: Sequence[Lines], kept: Kept, nodes: Indices, comm: PETSc.Comm
 ) -> tuple[sparse.csr_matrix, Indices]:
-    """Return trilinear weights (nodes of this rank, all coarse nodes), and the nodes that stay."""
+    """Return trilinear weights (nodes of this rank, all coarse nodes), and the kept nodes."""
     shares = [lines.shares(of) for lines, of in zip(grid, kept, strict=True)]
     before = np.stack([share[0][nodes[:, k]] for k, share in enumerate(shares)], axis=1)
     ahead = np.stack([share[1][nodes[:, k]] for k, share in enumerate(shares)], axis=1)
@@ -139,7 +140,7 @@ def _node_weights(
     size = [len(of) for of in kept]
     corners = np.ravel_multi_index(tuple((before[:, None] + _CORNERS)[used].T), size)
     stay = np.flatnonzero((ahead == 0.0).all(axis=1))
-    # numbers of coarse nodes follow ranks; the directory of who has which is spread over the ranks
+    # coarse nodes are numbered rank after rank; PETSc distributes the table of their numbers
     own = np.ravel_multi_index(tuple(before[stay].T), size).astype(PETSc.IntType)
     directory = PETSc.AO().createMemoryScalable(own, comm=comm)
     wanted, back = np.unique(corners, return_inverse=True)
@@ -153,7 +154,7 @@ def _node_weights(
 def _distributed(
     rows: sparse.csr_matrix, columns: int, comm: PETSc.Comm, block_size: int | None = None
 ) -> PETSc.Mat:
-    """Return a matrix from its rows on every rank, and how many columns each owns."""
+    """Return a matrix from the rows on every rank and the number of columns that this rank owns."""
     pattern = (part.astype(PETSc.IntType) for part in (rows.indptr, rows.indices))
     size = ((rows.shape[0], None), (columns, None))
     return PETSc.Mat().createAIJ(size, bsize=block_size, csr=(*pattern, rows.data), comm=comm)
@@ -162,16 +163,16 @@ def _distributed(
 def for_displacements(
     weights: sparse.csr_matrix, stay: Indices, free: PETSc.Vec, *, blocks: bool = False
 ) -> tuple[PETSc.Mat, PETSc.Vec]:
-    """Interpolate three components at a time, held ones apart.
+    """Interpolate all three components of displacements, constrained unknowns apart.
 
     Args:
-        weights: What this rank's nodes take from all coarse nodes, numbered rank after rank.
-        stay: The nodes that are this rank's coarse nodes.
-        free: 1 for unknowns that are free, 0 for those that are held.
-        blocks: Whether the matrix, and what is formed with it, shall know of the components.
+        weights: Weights of all coarse nodes, numbered rank after rank, in this rank's nodes.
+        stay: This rank's nodes that are its coarse nodes.
+        free: 1 for unknowns that are free, 0 for constrained ones.
+        blocks: Whether the matrix has PETSc's block size 3, which products with it inherit.
 
     Returns:
-        The matrix, and what ``free`` is for the coarse unknowns.
+        The matrix, and ``free`` of the coarse unknowns.
 
     Note:
         Collective.
@@ -185,14 +186,14 @@ def for_displacements(
     same = (3 * stay[:, None] + np.arange(3)).ravel()
     coarse.array[:] = free.array_r[same]
     matrix.diagonalScale(free, coarse)
-    held = np.flatnonzero(coarse.array_r == 0.0)
-    if len(held):
+    fixed = np.flatnonzero(coarse.array_r == 0.0)
+    if len(fixed):
         first_row, first_column = matrix.getOwnershipRange()[0], coarse.getOwnershipRange()[0]
         matrix.setValuesIJV(
-            np.arange(len(held) + 1, dtype=PETSc.IntType),
-            (held + first_column).astype(PETSc.IntType),
-            np.ones(len(held)),
-            rowmap=(same[held] + first_row).astype(PETSc.IntType),
+            np.arange(len(fixed) + 1, dtype=PETSc.IntType),
+            (fixed + first_column).astype(PETSc.IntType),
+            np.ones(len(fixed)),
+            rowmap=(same[fixed] + first_row).astype(PETSc.IntType),
         )
     matrix.assemble()
     return matrix, coarse

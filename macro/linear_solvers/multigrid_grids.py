@@ -12,13 +12,13 @@ Array = NDArray[np.float64]
 Kept = tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]
 
 _SLACK = 1.5
-"""Longest merged interval, in lengths that the grid wants; 1.2 and 2 cost more iterations."""
+"""Longest merged interval relative to the target length; 1.2 and 2 took more iterations."""
 
 _LEAST = 1.2
-"""A coarser grid has at least this factor fewer nodes, lest it cost more than it gives."""
+"""Smallest factor by which a coarser grid has fewer nodes; less would not repay its cost."""
 
 COARSEST = 1500
-"""Unknowns that are solved for directly."""
+"""Number of unknowns at which coarsening ends; the coarsest grid is solved by a factorisation."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,8 +27,8 @@ class Lines:
 
     Args:
         ticks: Their coordinates, ascending, shape (n,) [mm].
-        middle: Whether they hold nodes amid the elements, of shape functions of degree 2, which
-            cannot stay when a neighbour goes; shape (n,).
+        middle: Whether a plane holds the middle nodes of elements of degree 2, shape (n,). It
+            cannot be kept without both of its neighbours.
     """
 
     ticks: Array
@@ -36,7 +36,7 @@ class Lines:
 
     @classmethod
     def of_elements(cls, ticks: Array, degree: int) -> Lines:
-        """Return the planes of the nodes of degree 1 or 2 of elements between some planes."""
+        """Return the planes through the nodes of elements of degree 1 or 2 between grid planes."""
         count = degree * (len(ticks) - 1) + 1
         finer = np.interp(np.arange(count) / degree, np.arange(len(ticks)), ticks)
         return cls(finer, np.arange(count) % degree > 0)
@@ -49,10 +49,10 @@ class Lines:
         return Lines(self.ticks[kept], self.middle[kept])
 
     def merged(self, longest: float) -> NDArray[np.intp]:
-        """Return what stays when pairs of intervals merge, from the last down.
+        """Return the planes that are kept when pairs of intervals merge, from the last one down.
 
         Args:
-            longest: Length that a pair must not exceed [mm].
+            longest: Largest length of a merged pair [mm].
         """
         kept = [len(self) - 1]
         while kept[-1] > 0:
@@ -69,11 +69,11 @@ class Lines:
         """Interpolate linearly from some planes to all.
 
         Args:
-            kept: The planes from which.
+            kept: Indices of the planes to interpolate from.
 
         Returns:
-            For every plane the last kept one at or before it, counted among the kept, and the
-            weight of the next one, exactly 0 on a kept plane; shapes (n,).
+            For every plane the last kept plane at or before it, as an index into ``kept``, and the
+            weight of the next kept plane, exactly 0 on a kept plane; shapes (n,).
         """
         before = np.searchsorted(kept, np.arange(len(self)), side="right") - 1
         after = np.minimum(before + 1, len(kept) - 1)
@@ -85,18 +85,18 @@ class Lines:
 def coarsenings(grid: Sequence[Lines], coarsest: int = COARSEST) -> list[Kept]:
     """Coarsen a lattice where its planes are close, until few unknowns are left.
 
-    Unknowns couple most strongly along the shortest edges, and pointwise smoothing leaves errors
-    that are smooth along them only. So the length that a grid wants doubles from grid to grid, and
-    intervals merge where, and only where, they are shorter than that: flat cells become thick
-    first, graded layers become even. In the end all cells grow in all directions.
+    Unknowns are coupled most strongly along the shortest edges, and pointwise smoothing removes
+    errors along those edges only. So a target length doubles from grid to grid, and intervals merge
+    only where they are shorter than it: flat cells become thick first, and graded layers become
+    even. After that all cells grow in all directions.
 
     Args:
         grid: The planes across x, y and z.
-        coarsest: Unknowns, three per node, that need no coarser grid.
+        coarsest: Number of unknowns, three per node, at which coarsening ends.
 
     Returns:
-        Which planes of a grid stay on the next one, for every grid but the coarsest. At least one
-        coarser grid where there are nodes between corners.
+        The kept planes of every grid but the coarsest. There is at least one coarser grid unless
+        all nodes are corners of the block.
     """
     found: list[Kept] = []
     longest = _SLACK * (1.0 + 1e-6) * min(float(np.diff(lines.ticks).min()) for lines in grid)

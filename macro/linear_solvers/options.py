@@ -1,10 +1,12 @@
-"""PETSc's solvers under one prefix: defaults that the user's options override."""
+"""PETSc's solvers under one prefix, with defaults that the user's options override."""
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 from petsc4py import PETSc
 
@@ -30,8 +32,9 @@ ALGEBRAIC_DEFAULTS: Mapping[str, object] = {
     "mg_levels_ksp_chebyshev_esteig": "0,0.05,0,1.05",
     "mg_levels_pc_type": "jacobi",
 }
-"""Smoothed aggregation; Jacobi smooths on every release of PETSc. Four steps over a wide range of
-eigenvalues take a fourth fewer iterations than the usual two, in about the same time."""
+"""Smoothed aggregation. Jacobi is the smoother that works on every release of PETSc. Four steps
+over a wide range of eigenvalues take a quarter fewer iterations than the usual two, in about the
+same time."""
 
 GEOMETRIC_DEFAULTS: Mapping[str, object] = {
     "pc_type": "mg",
@@ -42,28 +45,29 @@ GEOMETRIC_DEFAULTS: Mapping[str, object] = {
     "mg_coarse_telescope_ksp_type": "preonly",
     "mg_coarse_telescope_pc_type": "cholesky",
 }
-"""Grids of the block itself. One rank alone solves on the coarsest: to have all of them do it takes
-messages from all to all. Two steps of smoothing before and after: one takes 1.7 to 1.9 times the
-iterations and three 0.7 to 0.8 of them, in the same time; Gauss–Seidel takes two to four times it.
-"""
+"""Geometric multigrid on grids of the block. One rank alone solves on the coarsest grid, which
+saves messages between all ranks. Two smoothing steps before and after: one step took 1.7 to 1.9
+times the iterations and three took 0.7 to 0.8 of them, in the same time; Gauss–Seidel took two to
+four times as long."""
 
 
 def users_options() -> tuple[tuple[str, str], ...]:
-    """Return the user's PETSc options under `PREFIX`, by name, which results depend on."""
+    """Return the user's PETSc options under `PREFIX`, sorted by name; results depend on them."""
     found = PETSc.Options(PREFIX).getAll()
     return tuple(sorted((name, str(value)) for name, value in found.items()))
 
 
 @contextmanager
 def default_options(prefix: str, defaults: Mapping[str, object]) -> Iterator[None]:
-    """Put defaults into PETSc's option database where the user left them open, then take them out.
+    """Set defaults in PETSc's option database where the user set none; remove them at the end.
 
     Args:
-        prefix: Prefix of the options; must not be empty, lest other solvers see the defaults.
+        prefix: Prefix of the options. Without one other solvers would see the defaults.
         defaults: Option names without prefix, and values.
 
     Raises:
         ValueError: When the prefix is empty.
+        InputError: When PETSc refuses an option while they are set.
     """
     if not prefix:
         raise ValueError("PETSc options need a prefix")
@@ -106,9 +110,9 @@ def linear_solver(
     Args:
         matrix: The matrix, with its near-nullspace attached.
         prefix: Prefix of its PETSc options.
-        coarser: Makes the coarser grids of a geometric multigrid, finest first; called unless the
-            user chooses another preconditioner.
-        preconditioner: Options of the preconditioner that stand before the usual ones.
+        coarser: Makes the coarser grids of a multigrid, finest first. It is called unless the user
+            chooses another preconditioner.
+        preconditioner: Options of the preconditioner, which override the defaults here.
 
     Note:
         Collective.
@@ -118,7 +122,12 @@ def linear_solver(
     geometric = coarser is not None and PETSc.Options(prefix).getString("pc_type", "mg") == "mg"
     if coarser is not None and geometric:
         solver.setOperators(matrix)
-        _set_grids(solver.pc, coarser())
+        grids = coarser()
+        solver.pc.setType("mg")
+        solver.pc.setMGLevels(len(grids) + 1)
+        for level, grid in enumerate(reversed(grids)):
+            solver.pc.setMGInterpolation(level + 1, grid.interpolation)
+            solver.pc.getMGSmoother(level).setOperators(grid.matrix)
     else:
         solver.setOperators(matrix, _pointwise(matrix))
     one_rank = {"mg_coarse_pc_telescope_reduction_factor": matrix.comm.size}
@@ -129,16 +138,8 @@ def linear_solver(
     return solver
 
 
-def _set_grids(preconditioner: PETSc.PC, grids: Sequence[CoarserGrid]) -> None:
-    preconditioner.setType("mg")
-    preconditioner.setMGLevels(len(grids) + 1)
-    for level, grid in enumerate(reversed(grids)):
-        preconditioner.setMGInterpolation(level + 1, grid.interpolation)
-        preconditioner.getMGSmoother(level).setOperators(grid.matrix)
-
-
 def _pointwise(matrix: PETSc.Mat) -> PETSc.Mat:
-    """Return a matrix without blocks, which is all that most preconditioners take."""
+    """Return a matrix of type ``aij``, because few preconditioners take 3 × 3 blocks."""
     if not matrix.getType().endswith("baij"):
         return matrix
     copy = matrix.convert("aij", PETSc.Mat())
@@ -180,5 +181,35 @@ def reason_name(reasons: type, code: int) -> str:
         code: The number that a solver reports.
     """
     names = [name for name, value in vars(reasons).items() if value == code and name.isupper()]
-    # short aliases such as MAX_IT exist: the longest name is the one that PETSc documents
+    # short aliases such as MAX_IT exist; PETSc documents the longest name
     return max(names, key=len, default=f"reason {code}")
+
+
+class WeakContext:
+    """The Python context of a PETSc matrix or preconditioner, which its owner must keep alive.
+
+    PETSc holds this object and this object holds the real context weakly. A context that PETSc
+    held itself would let go of its own matrices only while PETSc frees dropped objects
+    (`macro.compat.collect_garbage`), and what is dropped during that is never freed.
+
+    Args:
+        context: Has ``mult`` or ``apply``, as petsc4py asks of contexts.
+    """
+
+    def __init__(self, context: Any) -> None:
+        self._context = weakref.ref(context)
+
+    def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write a matrix's product y with x."""
+        self._owned.mult(matrix, x, y)
+
+    def apply(self, preconditioner: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write a preconditioner's y for x."""
+        self._owned.apply(preconditioner, x, y)
+
+    @property
+    def _owned(self) -> Any:
+        context = self._context()
+        if context is None:
+            raise ReferenceError("the owner of a PETSc context is gone")
+        return context

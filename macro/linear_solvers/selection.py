@@ -1,10 +1,11 @@
 """Which linear solver a block gets: by its mesh, its element and its Poisson's ratio.
 
-Towards ν = ½ the volume becomes stiff beside the shape by λ/μ = 2ν/(1 − 2ν), and what smooths the
-one on a grid, or interpolates it to the next, does nothing for the other: iterations grow with
-(1 − 2ν)^-½. On lattices a polynomial over a range of eigenvalues that is wider by as much, and of a
-degree that follows, buys this back up to ν = 0.495; beyond, and on other meshes, so does a
-factorisation, where it fits. Counted to 1e-8, from 10⁴ to 2·10⁵ unknowns:
+Towards ν = ½ the resistance to volume changes grows beside that to shear as
+λ/μ = 2ν/(1 − 2ν). What smooths one kind of error on a grid, or interpolates it to the next grid,
+does not smooth the other, and iterations grow with (1 − 2ν)^-½. On lattices a Chebyshev smoother of
+higher degree over a wider range of eigenvalues compensates for that up to ν = 0.495. Beyond, and on
+other meshes, a factorisation is used where it fits into memory. Iterations to 1e-8, measured from
+10⁴ to 2·10⁵ unknowns:
 
     lattices        7 to 10 with tetrahedra; at ν = 0.49 13 (Q1), 14 (P1), 16 to 23 (Q2)
     refined meshes  11 to 15 up to ν = 0.3, 18 at 0.4, 24 at 0.45
@@ -14,39 +15,44 @@ factorisation, where it fits. Counted to 1e-8, from 10⁴ to 2·10⁵ unknowns:
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
 from petsc4py import PETSc
 
+from geometry.materials import Material
 from geometry.meshes.block import BlockShape
 from geometry.meshes.refined_block import RefinedShape
-from macro.elasticity import Material
 from macro.linear_solvers.direct import DIRECT_DEFAULTS
 from macro.linear_solvers.multigrid import Lattice, coarser_grids
-from macro.linear_solvers.multigrid_degrees import two_degree_solver
-from macro.linear_solvers.options import PREFIX, linear_solver
+from macro.linear_solvers.multigrid_degrees import QUADRATIC_DEFAULTS, vertex_grid
+from macro.linear_solvers.options import PREFIX, CoarserGrid, linear_solver
 
 COMPRESSIBLE = 0.45
-"""Poisson's ratio up to which multigrid does without a lattice."""
+"""Largest Poisson's ratio at which multigrid is used without a lattice."""
 
 SOFT = 0.3
-"""Poisson's ratio up to which points alone smooth hexahedra; beyond, more smoothing takes half the
-iterations in the same time."""
+"""Largest Poisson's ratio at which pointwise smoothing is used for hexahedra. Beyond it, stronger
+smoothing takes half the iterations in the same time."""
 
 STIFF = 0.495
-"""Poisson's ratio up to which multigrid does on lattices, with more smoothing."""
+"""Largest Poisson's ratio at which multigrid is used on lattices, with stronger smoothing."""
 
 FACTORISED = 100_000
-"""Unknowns up to which a factorisation replaces multigrid for what is nearly incompressible; what
-is larger has multigrid as it is, and twice its iterations for every fourth of 1 − 2ν."""
+"""Largest number of unknowns for which a factorisation replaces multigrid when nearly
+incompressible. Larger systems keep multigrid and take twice the iterations for every factor of four
+in 1 − 2ν."""
 
-_DEGREES = (4, 8)  # of the smoothing polynomial
-_SMALLEST = 0.005  # eigenvalue smoothed, over the largest
+_DEGREES = (4, 8)
+"""Smallest and largest degree of the smoothing polynomial."""
+
+_SMALLEST = 0.005
+"""Smallest eigenvalue that is smoothed, relative to the largest."""
+
 _ESTIMATES = 20
-"""Steps that find the largest eigenvalue. PETSc's 10 miss up to 8 % of it, beyond which these wide
-ranges make a smoother that is not definite; 20 miss 1 %."""
+"""Iterations that estimate the largest eigenvalue. PETSc's 10 miss up to 8 % of it, and with these
+wide ranges a smoother that misses more than 5 % is not definite; 20 miss 1 %."""
 
 
 def block_solver(
@@ -60,28 +66,31 @@ def block_solver(
     """Return a solver for a block's stiffness; PETSc's options of the user win.
 
     Args:
-        matrix: The stiffness with unit rows for held unknowns, its near-nullspace attached.
+        matrix: The stiffness with unit rows for constrained unknowns, its near-nullspace attached.
         space: Its space.
-        shape: What was meshed.
-        lattice: The lattice that its nodes form, if they do.
-        material: What it is of.
-        free: 1 for unknowns that are free, 0 for those that are held.
+        shape: Shape that was meshed.
+        lattice: The lattice that its nodes form, if they form one.
+        material: Elastic constants of the block.
+        free: 1 for unknowns that are free, 0 for constrained ones.
 
     Note:
         Collective.
     """
     ratio = material.poisson_ratio
-    asked = PETSc.Options(PREFIX).getString("pc_type", "")
+    requested = PETSc.Options(PREFIX).getString("pc_type", "")
     limit = COMPRESSIBLE if lattice is None else STIFF
-    if not asked and ratio > limit and matrix.getSize()[0] <= FACTORISED:
+    if not requested and ratio > limit and matrix.getSize()[0] <= FACTORISED:
         return linear_solver(matrix, preconditioner=DIRECT_DEFAULTS)
-    if lattice is not None and isinstance(shape, BlockShape):
-        smoother = smoothing(ratio, hexahedral=shape.hexahedral) if asked in ("", "mg") else {}
+    grids: Callable[[], Sequence[CoarserGrid]] | None = None
+    smoother: Mapping[str, object] = {}
+    if lattice is not None:
         grids = partial(coarser_grids, lattice, matrix, free)
-        return linear_solver(matrix, coarser=grids, preconditioner=smoother)
-    if asked in ("", "mg") and shape.degree == 2:
-        return two_degree_solver(matrix, space, free)
-    return linear_solver(matrix)
+        smoother = smoothing(ratio, hexahedral=shape.hexahedral)
+    elif shape.degree == 2:
+        grids, smoother = partial(vertex_grid, matrix, space, free), QUADRATIC_DEFAULTS
+    return linear_solver(
+        matrix, coarser=grids, preconditioner=smoother if requested in ("", "mg") else {}
+    )
 
 
 def smoothing(poisson_ratio: float, *, hexahedral: bool) -> Mapping[str, object]:

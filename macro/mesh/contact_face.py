@@ -24,7 +24,7 @@ class FacetQuadrature:
         y: Ordinates, shape (n,) [mm].
         weight: Weights, whose sum over a patch and all ranks is its area, shape (n,) [mm²].
         patch: Flat index of the patch, ascending, shape (n,).
-        cell: Rank-local cell behind, shape (n,).
+        cell: Rank-local cell that the point belongs to, shape (n,).
         nodes: Rank-local nodes of that cell, shape (n, m).
         values: Basis functions of these nodes, shape (n, m).
     """
@@ -43,8 +43,8 @@ class TopFacets:
     """Facets of the top whose cells this rank owns; affine images of a triangle or a square.
 
     Args:
-        cell: Rank-local cell behind, shape (n,).
-        side: Which of its facets it is, shape (n,).
+        cell: Rank-local cell that the facet belongs to, shape (n,).
+        side: Index of the facet in its cell, shape (n,).
         reference: Vertices on the reference cell, shape (n, 3 or 4, 3).
         corners: Vertices in the plane, shape (n, 3 or 4, 2) [mm].
     """
@@ -74,8 +74,8 @@ def facet_quadrature(
 ) -> FacetQuadrature:
     """Place quadrature points on the part of the block's top that the patches cover.
 
-    Every facet is cut into triangles along the borders of the patches, so that an integral over a
-    patch is exact for polynomials of the degree also where borders run through elements.
+    Every facet is cut into triangles along the borders of the patches, so that integrals over a
+    patch are exact for polynomials of the degree also where a border runs through elements.
 
     Args:
         block: Mesh of the block.
@@ -159,7 +159,7 @@ def _cut(
     if not crossed.any():
         return triangles, facet
     side, corner = side[crossed], triangles[crossed]
-    # the vertex that is alone on its side comes first
+    # the vertex that is alone on its side of the line comes first
     lonely = np.where((side > 0).sum(axis=1) == 1, 1, -1)
     first = np.argmax(side == lonely[:, None], axis=1)
     turn = (first[:, None] + np.arange(3)) % 3

@@ -19,17 +19,16 @@ from macro.mesh.block import BlockMesh, block_mesh
 Array = NDArray[np.float64]
 
 _DECAY = 3.0
-"""Power of the distance from the bottom with which the roughness fades into the depth."""
+"""Power of the height above the bottom with which the roughness decays into the depth."""
 
 _LEAST_VOLUME = 0.05
-"""Volume relative to that of the flat block, below which cells are refused."""
+"""Smallest volume of a cell relative to that in the flat block; smaller cells are refused."""
 
 _STEEPEST = 2.0
-"""Slope between neighbouring nodes above which a top is refused: edges at 27° to each other."""
-
+"""Largest slope between neighbouring nodes; steeper tops are refused (edges 27° apart)."""
 
 _LEAST_BENT = 0.3
-"""The same, below which the edges of a quadratic tetrahedron are made straight."""
+"""Relative volume below which the edges of a quadratic tetrahedron are made straight."""
 
 _EDGES = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])
 """Ends of a quadratic tetrahedron's edges, in dolfinx's order of the nodes 4 … 9 between them."""
@@ -54,15 +53,15 @@ def rough_block_mesh(
 ) -> tuple[BlockMesh, MeshQuality]:
     """Mesh a flat block and move its nodes onto the roughness.
 
-    The top becomes z = h(x, y) − <h>, from the surface's interpolant at the nodes; below, the
-    movement fades as (1 + z/height)³. Every rank moves the nodes that it has.
+    The top becomes z = h(x, y) − <h>, with the surface's interpolant h at the nodes. Below the top
+    the movement decays as (1 + z/height)³. Every rank moves its own nodes.
 
-    The edges of quadratic tetrahedra bend with the roughness, but for the few cells, long against
-    its waves and far from contact, that this would turn inside out: they stay straight.
+    The edges of quadratic tetrahedra bend with the roughness. They stay straight in the few cells
+    that bending would turn inside out: cells far from contact that are long beside its waves.
 
-    Along every vertical line the movement keeps the order of points as long as the deepest valley
-    lies less than height/3 below the mean. Hexahedra, whose sides are vertical, then stay
-    hexahedra; tetrahedra are looked at one by one.
+    Along a vertical line the movement keeps the order of points if the deepest valley lies less
+    than height/3 below the mean. Hexahedra have vertical sides and then stay valid; tetrahedra are
+    checked one by one.
 
     Args:
         shape: The flat block, without margin; its interface is the surface's rectangle.
@@ -134,7 +133,7 @@ def _check_depth(shape: BlockShape | RefinedShape, surface: Surface) -> None:
 
 
 def _straighten(flat: BlockMesh, moved: Array) -> None:
-    """Put the middles of edges onto the chord in cells that bend too much, on all ranks alike."""
+    """Move the middle nodes of edges onto the chord in cells that bend too much, on all ranks."""
     cells, names = compat.cell_vertices(flat.mesh), flat.mesh.geometry.input_global_indices
     done: Array = np.empty(0, dtype=np.int64)
     while True:
@@ -167,8 +166,8 @@ def _volumes(flat: BlockMesh, moved: Array) -> Array:
 def _slopes(nodes: int) -> Array:
     """Return the shape functions' gradients at the nodes of a cell, shape (points, nodes, 3).
 
-    Nodes of hexahedra (8) and tetrahedra (4 or 10) in the order of dolfinx; of a linear
-    tetrahedron's gradients, which are the same everywhere, one.
+    Nodes of hexahedra (8) and tetrahedra (4 or 10) are in the order of dolfinx. The gradients of a
+    linear tetrahedron are constant and given at one point.
     """
     if nodes == 8:
         return _trilinear_slopes()
@@ -177,7 +176,7 @@ def _slopes(nodes: int) -> Array:
         return linear[None]
     i, j = _EDGES.T
     at = np.vstack([np.eye(4), 0.5 * (np.eye(4)[i] + np.eye(4)[j])])[:, :, None]
-    # of L (2 L - 1) at vertices, of 4 L L' in the middle of edges
+    # gradients of L (2 L - 1) at vertices and of 4 L L' in the middle of edges
     vertices = (4.0 * at - 1.0) * linear
     middles = 4.0 * (at[:, i] * linear[j] + at[:, j] * linear[i])
     return np.concatenate([vertices, middles], axis=1)

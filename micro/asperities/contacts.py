@@ -22,7 +22,7 @@ from micro.compliance.body_modes import BodyModes
 from micro.pairs.body_points import BodyPoints
 from micro.pairs.interaction import MERGING_SLOPE, Interaction
 from micro.pairs.multipoles import moments
-from micro.plane_equilibrium import contact_stiffness
+from micro.plane_on_peaks import contact_stiffness
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

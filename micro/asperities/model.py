@@ -19,6 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from geometry import Asperities, Control, Partition, PatchGrid
 from geometry.errors import InputError
+from geometry.plane_equilibrium import PlaneResponse
+from geometry.rigid_plane import PlaneLevers, RigidPlane
 from micro.asperities.contacts import SOLVERS, SummitContacts
 from micro.asperities.many_summits import PAIR_SUMS
 from micro.asperities.patch_sums import PatchSums
@@ -26,8 +28,7 @@ from micro.asperities.state import AsperityState
 from micro.checks import checked_approaches, checked_means
 from micro.complementarity.contact_problem import Solution
 from micro.compliance.body_modes import BodyModes
-from micro.plane import RigidPlane
-from micro.plane_equilibrium import Held, Peaks, balanced
+from micro.plane_on_peaks import Peaks
 from micro.response import Pressed, Response
 
 Array = NDArray[np.float64]
@@ -168,14 +169,14 @@ class AsperityModel:
         """
         plane = RigidPlane.above(self.asperities, approach, tilt)
         first = np.zeros(len(self.asperities)) if start is None else start.indentation
-        return self.state(plane, self.contacts.solution(plane.overlap(self.asperities), first))
+        return self.state(plane, self.contacts.solution(self.asperities.interference(plane), first))
 
     def state(self, plane: RigidPlane, solution: Solution) -> AsperityState:
         """Return the contacts of a solution under a plane."""
         own, hertz = solution.indentation, self.contacts.hertz
         return AsperityState(
             approach=plane.approach,
-            required=plane.required(self.asperities),
+            required=np.maximum(self.asperities.interference(plane), 0.0),
             displacement=own + self.contacts.lift(own),
             indentation=own,
             semi_axes=hertz.semi_axes * np.sqrt(own)[:, None],
@@ -205,7 +206,7 @@ class AsperityModel:
             plane = RigidPlane.above(self.asperities, given[index], tilt)
             # Going on as before is right to second order when the steps are equal.
             start = np.maximum(2.0 * own - before, 0.0)
-            found = self.contacts.solution(plane.overlap(self.asperities), start)
+            found = self.contacts.solution(self.asperities.interference(plane), start)
             own, before = found.indentation, own
             rows[int(index)] = sums.row(plane, found)
         return sums.response(self.name, [rows[index] for index in range(len(given))])
@@ -249,17 +250,20 @@ class AsperityModel:
             )
         peaks, first = self._peaks, self.first_plane(control, start)
 
-        def evaluate(motion: Array) -> tuple[Held, Balanced]:
+        def evaluate(motion: Array) -> PlaneResponse[Balanced]:
             nonlocal own, spent
-            plane = self._plane(motion)
-            found = self.contacts.solution(plane.overlap(self.asperities), own)
+            plane = RigidPlane.moved(self.asperities, motion)
+            found = self.contacts.solution(self.asperities.interference(plane), own)
             own, spent = found.indentation, spent + found.iterations
-            loads = peaks.lever.T @ (self.contacts.hertz.force * own**1.5)
+            loads = peaks.levers.loads(self.contacts.hertz.force * own**1.5)
             known = Balanced(plane, found._replace(iterations=spent))
-            return Held(loads, self.contacts.stiffness(own, peaks.lever)), known
+            return PlaneResponse(
+                loads=loads,
+                stiffness=lambda: self.contacts.stiffness(known.solution.indentation, peaks.lever),
+                state=known,
+            )
 
-        motion = np.array([first.approach, *first.tilt])
-        return balanced(evaluate, control, motion, peaks)[1]
+        return peaks.equilibrium(evaluate, control, first.motion)[1]
 
     def first_plane(self, control: Control, start: Balanced | None = None) -> RigidPlane:
         """Return the plane that an equilibrium is looked for from.
@@ -274,24 +278,18 @@ class AsperityModel:
         near = None
         if start is not None and (start.solution.indentation.any() or control.force == 0.0):
             near = start.plane
-        return self._plane(self._peaks.first_plane(control, near))
-
-    def _plane(self, motion: Array) -> RigidPlane:
-        approach, *tilt = map(float, motion)
-        return RigidPlane.above(self.asperities, approach, (tilt[0], tilt[1]))
+        return RigidPlane.moved(self.asperities, self._peaks.first_plane(control, near))
 
     @property
     def _peaks(self) -> Peaks:
         """The summits as the plane sees them; not kept, for models are sent between processes."""
-        a = self.asperities
-        middle, sides = 0.5 * np.asarray(a.lengths), np.hypot(*a.lengths)
-        lever = np.stack([np.ones(len(a)), a.x - middle[0], a.y - middle[1]], axis=1)
-        force = self.contacts.hertz.force
+        a, force = self.asperities, self.contacts.hertz.force
 
         def alone(overlap: Array) -> float:
             return float(force @ np.maximum(overlap, 0.0) ** 1.5)
 
-        return Peaks(lever=lever, below=a.highest - a.z, force=alone, half=0.5 * sides)
+        levers = PlaneLevers.at(a.x, a.y, a.lengths)
+        return Peaks(levers=levers, depth=a.highest - a.z, force=alone)
 
     def surface_displacement(self, state: AsperityState, x: ArrayLike, y: ArrayLike) -> Array:
         """Return the normal displacement of the surface at points, by all contacts [mm].

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Asperities, Partition
+from geometry.rigid_plane import RigidPlane
 from micro.asperities.patch_shares import shares
 from micro.asperities.state import HertzCoefficients
 from micro.complementarity.contact_problem import Solution
 from micro.pairs.body_points import BodyPoints
 from micro.patch_displacement import patch_displacements
-from micro.plane import RigidPlane
 from micro.response import Response
 
 Array = NDArray[np.float64]

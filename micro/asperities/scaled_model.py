@@ -19,13 +19,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from geometry import Asperities, Control, Partition, PatchGrid, Surface
 from geometry.errors import InputError, NotConverged
+from geometry.rigid_plane import RigidPlane
 from micro.asperities.contact_scale import ScaledAsperities
 from micro.asperities.model import MODELS, AsperityModel, Balanced, asperity_model
 from micro.asperities.state import AsperityState
 from micro.checks import checked_approaches, checked_means
 from micro.complementarity.contact_problem import Solution
 from micro.compliance.body_modes import BodyModes
-from micro.plane import RigidPlane
 from micro.relaxation import Relaxation
 from micro.response import Pressed, Response
 
@@ -210,7 +210,7 @@ class ScaledModel:
         own: Array | None = None,
     ) -> _Fitted:
         """Fit the curvatures to the contacts and solve for the contacts until both agree."""
-        required = plane.required(scaled.summits)
+        required = np.maximum(scaled.summits.interference(plane), 0.0)
         nothing = np.zeros_like(required)
         found = near or Balanced(plane, Solution(nothing, nothing, 0, 0.0, 0))
         own = found.solution.indentation if own is None else own
@@ -223,7 +223,7 @@ class ScaledModel:
             first = found.solution.indentation
             spent += max(found.solution.iterations, 1)
             change = first - own
-            scale = float(found.plane.required(scaled.summits).max(initial=0.0)) or 1.0
+            scale = float(scaled.summits.interference(found.plane).max(initial=0.0)) or 1.0
             if np.abs(change).max(initial=0.0) <= max(_TOLERANCE * scale, rounding):
                 return _Fitted(model, found.plane, found.solution._replace(iterations=spent))
             own = np.maximum(relaxed.next(own, change), 0.0)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import label
 
 from geometry import Surface, roughness
-from geometry.maxima import grid_maxima
+from geometry.summits import grid_maxima
 
 _LEAST_REGION = 0.25
 """Cells above the plane that are assumed where only the interpolant rises above it."""

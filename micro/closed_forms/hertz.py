@@ -15,34 +15,6 @@ from micro.closed_forms.hertz_field import elliptic_field
 Array = NDArray[np.float64]
 
 
-def contact_modulus(E1: float, nu1: float, E2: float = np.inf, nu2: float = 0.0) -> float:
-    """Return the contact modulus E* of two bodies, 1/E* = (1 − ν1²)/E1 + (1 − ν2²)/E2.
-
-    Args:
-        E1: Young's modulus of the first body [MPa].
-        nu1: Its Poisson's ratio.
-        E2: Young's modulus of the second body [MPa]; infinite when it is rigid.
-        nu2: Its Poisson's ratio.
-
-    Raises:
-        InputError: When a modulus is not positive, both are infinite, or a Poisson's ratio lies
-            outside (−1, 0.5].
-
-    Source:
-        Johnson, Contact Mechanics (1985), eq. 3.36.
-    """
-    for modulus in (E1, E2):
-        if not modulus > 0.0:
-            raise InputError("Young's modulus must be positive", value=modulus, allowed="E > 0 MPa")
-    for ratio in (nu1, nu2):
-        if not -1.0 < ratio <= 0.5:
-            raise InputError("Poisson's ratio is impossible", value=ratio, allowed="−1 < ν ≤ 0.5")
-    compliance = (1.0 - nu1**2) / E1 + (1.0 - nu2**2) / E2
-    if compliance == 0.0:
-        raise InputError("both bodies are rigid", value=(E1, E2), allowed="one finite modulus")
-    return float(1.0 / compliance)
-
-
 def checked_modulus(contact_modulus: float) -> None:
     """Refuse a contact modulus that is not positive and finite.
 

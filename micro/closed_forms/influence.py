@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import toeplitz
 
-from geometry.partition import Partition
-from geometry.patches import PatchGrid
+from geometry.patches import Partition, PatchGrid
 from micro.closed_forms.love import fourfold_integral, love_mutual
 
 Array = NDArray[np.float64]

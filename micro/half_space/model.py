@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from geometry import Control, Partition, PatchGrid, Surface
 from geometry.errors import InputError
+from geometry.rigid_plane import RigidPlane
 from micro.checks import checked_approaches, checked_means, whole_patch
 from micro.compliance.elastic_grid import BodyTerm, ElasticGrids, SurfaceTerm
 from micro.compliance.free_sides import FreeSides
@@ -20,7 +21,6 @@ from micro.contact.problem import Pressures
 from micro.contact.rigid_motions import Motions
 from micro.half_space.patch_sums import CellSums
 from micro.half_space.state import HalfSpaceState
-from micro.plane import RigidPlane
 from micro.response import Pressed, Response
 
 Array = NDArray[np.float64]

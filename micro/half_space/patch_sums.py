@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Partition, Surface, overlaps, patch_means
+from geometry.rigid_plane import RigidPlane
 from micro.half_space.contact_spots import true_area
 from micro.half_space.state import HalfSpaceState
-from micro.plane import RigidPlane
 
 Array = NDArray[np.float64]
 

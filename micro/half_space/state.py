@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.rigid_plane import RigidPlane
 from micro.compliance.bounding_box import Box
 from micro.compliance.elastic_grid import ElasticGrids
 from micro.half_space.contact_spots import Contacts, find_contacts
-from micro.plane import RigidPlane
 
 Array = NDArray[np.float64]
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control
+from geometry.plane_equilibrium import PlaneResponse
 from micro.complementarity.active_set import active_set
 from micro.complementarity.contact_problem import ContactProblem, solve
 from micro.complementarity.newton_krylov import newton_krylov
@@ -22,7 +23,7 @@ from micro.islands.shapes import Islands
 from micro.islands.volumes import Relief
 from micro.pairs.body_points import BodyPoints
 from micro.pairs.interaction import Lift
-from micro.plane_equilibrium import Held, Peaks, balanced, contact_stiffness
+from micro.plane_on_peaks import Peaks, contact_stiffness
 
 Array = NDArray[np.float64]
 
@@ -126,19 +127,24 @@ class IslandContact:
         x, y = self.relief.x[top], self.relief.y[top]
         arms = moved + np.stack([np.zeros(len(x)), found.x - x, found.y - y], axis=1)
 
-        def evaluate(trial: Array) -> tuple[Held, Array]:
+        def evaluate(trial: Array) -> PlaneResponse[Array]:
             nonlocal depth
             required = over + moved @ (trial - self.motion)
             depth = forces.solve(np.asarray(required, float), depth)
             loads = self.contact_modulus * (arms.T @ (forces.law * depth**1.5))
-            return Held(loads, self.contact_modulus * forces.stiffness(depth, arms)), depth
+            now = depth
+            return PlaneResponse(
+                loads=loads,
+                stiffness=lambda: self.contact_modulus * forces.stiffness(now, arms),
+                state=now,
+            )
 
-        goal, depth = balanced(evaluate, self.control, motion, self.peaks)
+        goal, depth = self.peaks.equilibrium(evaluate, self.control, motion)
         # other peaks than those of these islands hold a plane that moves far
         most = float(found.depth.max())
         part = min(1.0, most / max(float(np.abs(lever @ (goal - motion)).max()), most))
         motion = goal if part == 1.0 else motion + part * (goal - motion)
         if part < 1.0:
-            depth = evaluate(motion)[1]
+            depth = evaluate(motion).state
         lift = kernel @ (forces.law * depth**1.5) - lever @ (motion - self.motion)
         return Answer(lift, motion, found.under(depth))

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geometry import Control, Partition, PatchGrid, Surface
+from geometry.rigid_plane import PlaneLevers, RigidPlane
 from micro.checks import checked_approaches, checked_means, whole_patch
 from micro.closed_forms.hertz import checked_modulus
 from micro.compliance.body_modes import BodyModes
@@ -34,8 +35,7 @@ from micro.islands.shapes import total_force
 from micro.islands.state import IslandState
 from micro.islands.volumes import Relief
 from micro.pairs.body_points import BodyPoints
-from micro.plane import RigidPlane
-from micro.plane_equilibrium import Peaks
+from micro.plane_on_peaks import Peaks
 from micro.response import Pressed, Response
 
 Array = NDArray[np.float64]
@@ -177,7 +177,7 @@ class IslandModel:
         if not self._is_kept and (control.force or control.tilt is None):
             # every peak is known, but not what lies below a floor: first where the plane may come
             peaks = self._peaks(self._relief(plane), plane)
-            plane = self._deeper(self._plane(peaks.first_plane(control, near)))
+            plane = self._deeper(RigidPlane.moved(self.surface, peaks.first_plane(control, near)))
         for _ in range(_MOST_CUTS):
             found = self._settled(self._relief(plane), plane, control, near)
             turn = np.hypot(*np.subtract(found.plane.tilt, plane.tilt)) * 0.5
@@ -189,22 +189,16 @@ class IslandModel:
             plane = self._deeper(near)
         return found
 
-    def _plane(self, motion: Array) -> RigidPlane:
-        approach, *tilt = map(float, motion)
-        return RigidPlane.above(self.surface, approach, (tilt[0], tilt[1]))
-
     def _deeper(self, plane: RigidPlane) -> RigidPlane:
         return replace(plane, approach=plane.approach + (_MARGIN - 1.0) * abs(plane.approach))
 
     def _peaks(self, relief: Relief, leant: RigidPlane) -> Peaks:
         """Return the peaks of catchments under the slopes of a plane."""
-        middle, half = 0.5 * np.asarray(self.surface.lengths), 0.5 * np.hypot(*self.surface.lengths)
-        lever = np.stack([np.ones(len(relief)), relief.x - middle[0], relief.y - middle[1]], axis=1)
+        levers = PlaneLevers.at(relief.x, relief.y, self.surface.lengths)
         return Peaks(
-            lever=lever,
-            below=self.reference_height - relief.z + lever[:, 1:] @ leant.tilt,
+            levers=levers,
+            depth=self.reference_height - relief.z + levers.matrix[:, 1:] @ leant.tilt,
             force=lambda over: self.contact_modulus * total_force(relief, over),
-            half=half,
         )
 
     def _settled(
@@ -231,7 +225,7 @@ class IslandModel:
             body=body,
         )
         settled = settle(relief, level, motion, contact.answer)
-        return _Cut(relief, self._plane(settled.motion), settled)
+        return _Cut(relief, RigidPlane.moved(self.surface, settled.motion), settled)
 
     def _row(self, found: _Cut, patches: Partition, means: Array) -> dict[str, Any]:
         sums = IslandSums(

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Partition, overlaps
+from geometry.rigid_plane import RigidPlane
 from micro.compliance.body_modes import BodyModes
 from micro.islands.passes import Settled
 from micro.islands.state import IslandState
 from micro.islands.volumes import Relief
 from micro.pairs.body_points import BodyPoints
 from micro.patch_displacement import patch_displacements
-from micro.plane import RigidPlane
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -17,7 +17,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from geometry import Surface
-from geometry.ascent import coincident, constrained_summits
+from geometry.summits import coincident, constrained_summits
 from micro.islands.watersheds import Passes, passes_between, sampled, watersheds
 
 Array = NDArray[np.float64]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from geometry.control import Control
 from geometry.errors import InputError
+from geometry.rigid_plane import Control
 from micro import MicroModel
 from multiscale.couplings.blocks import embedding, patch_compliance, patch_displacements
 from multiscale.couplings.condensed import CondensedCoupling, FreePlaneCoupling

@@ -202,12 +202,12 @@ def patch_compliance(setup: ProblemSetup, comm: Any) -> Array:
         return body.patch_compliance(setup.patches, comm)
     from mpi4py import MPI
 
-    from macro import plain_compliance
+    from macro import patch_compliance_matrix
     from macro.compliance.cache import cached
     from macro.linear_solvers.options import users_options
 
     def compute() -> dict[str, Array]:
-        return {"compliance": plain_compliance(embedding(setup, comm))}
+        return {"compliance": patch_compliance_matrix(embedding(setup, comm))}
 
     sides = setup.scene.block.sides
     key = (setup.shape, block_material(setup), sides, setup.patches, users_options())
@@ -286,11 +286,11 @@ def free_blocks(blocks: list[Block]) -> None:
     Note:
         Collective.
     """
-    from macro.compat import free_dropped
+    from macro.compat import collect_garbage
 
     comms = [block.stiffness.comm.duplicate() for block in blocks]  # these outlive their blocks
     blocks.clear()
     gc.collect()  # a block and its contact problem refer to each other
     for comm in comms:
-        free_dropped(comm)
+        collect_garbage(comm)
         comm.destroy()

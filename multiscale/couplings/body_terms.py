@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.checks import process_memory
 from geometry.errors import InputError
-from geometry.memory import process_memory
 from micro import (
     BodyModes,
     BodyStresses,

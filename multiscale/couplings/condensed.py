@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.control import Control
 from geometry.errors import NotConverged
+from geometry.rigid_plane import Control, RigidPlane
 from multiscale.couplings.dense_newton import DenseNewton
 from multiscale.couplings.load_steps import beyond_law
 from multiscale.couplings.loaded_patches import DenseState
@@ -14,7 +14,6 @@ from multiscale.laws.consistent import Displacements
 from multiscale.laws.interpolation import LawPoint
 from multiscale.laws.law_table import LawTable, PatchLaws
 from multiscale.loading.load_step import LoadStep
-from multiscale.loading.stepper import described
 from multiscale.storage.serialisation import Arrays, packed, unpacked
 
 Array = NDArray[np.float64]
@@ -117,13 +116,13 @@ class FreePlaneCoupling:
             raise beyond_law(control, problem, self._table)
         everywhere, tilt = np.full(patches.count, approach), path.tilt_at(approach)
         point = self._laws.along(everywhere)
-        local = patches.mean_approaches(approach, tilt)
+        local = RigidPlane.above(patches, approach, tilt).means(patches)
         closure = local - self._displacements(point.pressure[None])[0]
         residual = np.abs(np.where(point.pressure > 0.0, closure - point.closure, 0.0)).max()
         residual /= float(np.abs(local).max()) or 1.0
         if residual > _OTHER_MODEL:
             raise NotConverged(
-                f"the patches at {described(control)}",
+                f"the patches at {control}",
                 reason="OTHER_BODY",
                 iterations=0,
                 remedy=f"their closures miss {residual:.1%} of the approach: make the laws for "

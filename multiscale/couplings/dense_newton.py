@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
+from geometry.plane_equilibrium import UNSUPPORTED, plane_failure
+from geometry.rigid_plane import Control
 from multiscale.couplings.loaded_patches import TOLERANCE, DenseState, Laws, LoadedPatches
 
 Array = NDArray[np.float64]
@@ -19,7 +20,6 @@ _MOST_STEPS = 100
 _MOST_HALVINGS = 40
 _MEMORY = 4  # residuals that a step is compared with: at kinks of the laws it may rise for a while
 _DECREASE = 1e-4  # share of the predicted decrease that a step must bring
-_UNSUPPORTED = 1e-11  # of the largest stiffness against motions of the plane: no support at all
 _PAST_TOUCH = 0.02  # of the largest approach: way beyond touch of a plane that gains a support
 
 
@@ -69,10 +69,10 @@ class DenseNewton:
             problem = self._problem(problem.at_first_touch(plane))
         if start is not None:
             try:
-                return _equilibrium(problem, start.local, problem.prescribed(plane))
+                return _equilibrium(problem, start.local, problem.control.prescribed(plane))
             except NotConverged:  # a law has a kink in between: try without the earlier solution
                 pass
-        return _equilibrium(problem, *problem.initial_guess(problem.prescribed(plane)))
+        return _equilibrium(problem, *problem.initial_guess(problem.control.prescribed(plane)))
 
     def _problem(self, control: Control) -> LoadedPatches:
         return LoadedPatches(self._laws, self._compliance, self._patches, control)
@@ -99,41 +99,35 @@ def _equilibrium(problem: LoadedPatches, local: Array, plane: Array) -> DenseSta
 
 def _newton_step(problem: LoadedPatches, now: DenseState) -> tuple[Array, Array, bool]:
     """Return the change of s and of the plane, and whether it is Newton's."""
-    unit = problem.unit[problem.free]
-    lever = problem.lever[:, problem.free] * unit
+    free = problem.control.free
+    unit, lever = problem.levers.unit[free], problem.levers.scaled(free)
     solved = problem.tangent(now).solve(np.column_stack((now.residual, lever)))
     step, columns = solved[:, 0], solved[:, 1:]
     change = np.zeros(3)
-    if not problem.free.any():
+    if not free.any():
         return step, change, True
     loads = problem.area * lever.T * now.point.dpressure
     stiffness = loads @ columns
     values, vectors = np.linalg.eigh(0.5 * (stiffness + stiffness.T))
     residual = vectors.T @ (problem.load_residual(now) - loads @ step)
-    loose = values <= _UNSUPPORTED * max(values[-1], 0.0)
+    loose = values <= UNSUPPORTED * max(values[-1], 0.0)
     falling = loose & (np.abs(residual) > TOLERANCE * (problem.force_scale or 1.0))
     if falling.any():
-        change[problem.free] = unit * (vectors @ np.where(falling, residual, 0.0))
+        change[free] = unit * (vectors @ np.where(falling, residual, 0.0))
         return *_to_next_touch(problem, now, change), False
     motion = vectors @ np.divide(residual, values, out=np.zeros_like(residual), where=~loose)
-    change[problem.free] = unit * motion
+    change[free] = unit * motion
     return step + columns @ motion, change, True
 
 
 def _to_next_touch(problem: LoadedPatches, now: DenseState, motion: Array) -> tuple[Array, Array]:
     """Return the change of s and of the plane along a motion until one more patch is touched."""
-    rise = problem.lever @ motion
+    rise = problem.levers.matrix @ motion
     gap = problem.laws.first_touch - now.point.closure
     coming = (now.pressure == 0.0) & (rise > 1e-9 * np.abs(rise).max()) & (gap < np.inf)
     if not coming.any():
-        raise NotConverged(
-            "the equilibrium of the plane",
-            reason="NO_SUPPORT",
-            iterations=0,
-            remedy="no further patch can be touched that would hold the plane: prescribe its "
-            "tilt (load.tilt) or take more patches (patches.grid)",
-        )
-    largest = max(float(np.abs(problem.lever @ now.plane).max()), float(gap[coming].max()))
+        raise plane_failure(problem.control, "NO_SUPPORT")
+    largest = max(float(np.abs(problem.levers.matrix @ now.plane).max()), float(gap[coming].max()))
     way = np.maximum(gap[coming], 0.0) + _PAST_TOUCH * largest
     share = float(np.min(way / rise[coming]))
     return share * rise, share * motion

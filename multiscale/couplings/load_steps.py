@@ -8,17 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.collective import on_root
-from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
 from micro import START_KINDS, MicroModel
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
-from multiscale.loading.stepper import BeyondLaws, described
+from multiscale.loading.stepper import BeyondLaws
 from multiscale.storage.serialisation import Arrays, packed, unpacked
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import Block, Interface, LawContactProblem, PressState
+    from macro import Block, Interface, LawContactProblem, LawContactState
 
 Array = NDArray[np.float64]
 
@@ -86,7 +86,7 @@ class EmbeddedCoupling:
 
     def __init__(self, problem: LawContactProblem, table: LawTable, interface: Interface) -> None:
         self._problem, self._table, self.interface = problem, table, interface
-        self._last: PressState | None = None
+        self._last: LawContactState | None = None
 
     @property
     def blocks(self) -> list[Block]:
@@ -107,7 +107,7 @@ class EmbeddedCoupling:
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `Coupling.press`."""
         try:
-            state = self._problem.press(control)
+            state = self._problem.solve(control)
         except NotConverged as error:
             if not any(law.is_flat for law in self._table.laws):
                 raise
@@ -130,9 +130,9 @@ class EmbeddedCoupling:
         if state:
             approach, tilt, pressure = unpacked(state, ())
             self._problem.start_from(pressure)
-            self._last = self._problem.press(Control(approach=approach, tilt=tilt))
+            self._last = self._problem.solve(Control(approach=approach, tilt=tilt))
 
-    def _step(self, control: Control, state: PressState) -> LoadStep:
+    def _step(self, control: Control, state: LawContactState) -> LoadStep:
         """Return the load step, with area, contacts and separation of the laws."""
         laws = self._table.laws
 
@@ -192,7 +192,7 @@ def beyond_law(
             "made for: take coupling.kind = 'concurrent', which needs none"
         )
     return BeyondLaws(
-        f"the patches at {described(control)}",
+        f"the patches at {control}",
         reason=f"LAW_RANGE: {problem}",
         iterations=0,
         remedy=remedy,

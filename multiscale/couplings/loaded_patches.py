@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from geometry.control import Control
 from geometry.errors import NotConverged
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control, PlaneLevers
 from multiscale.laws.interpolation import LawPoint, Tangent
-from multiscale.loading.stepper import described
 
 Array = NDArray[np.float64]
 
@@ -87,30 +86,23 @@ class LoadedPatches:
         control: What is prescribed of the plane.
 
     Attributes:
-        lever: Displacements of the patches by unit motions of the plane, shape (N, 3).
+        levers: How the plane's motions move the patches.
         area: Area of a patch [mm²].
-        free: Which of the plane's approach and slopes are unknown, shape (3,).
-        unit: Motions of the plane that move the interface's corner by 1 mm, shape (3,).
         force_scale: Largest force so far, which loads are compared with [N].
     """
 
     def __init__(self, laws: Laws, compliance: Array, patches: PatchGrid, control: Control) -> None:
         self.laws, self.compliance, self.control = laws, compliance, control
         self.area = patches.area
-        self.lever: Array = np.column_stack(
-            (np.ones(patches.count), patches.centres - patches.middle)
-        )
-        self._half = 0.5 * float(np.hypot(*patches.lengths))
-        self.unit = np.array([1.0, 1.0 / self._half, 1.0 / self._half])
-        turning = control.tilt is None
-        self.free = np.array([control.force is not None, turning, turning])
+        x, y = patches.centres.T
+        self.levers = PlaneLevers.at(x, y, patches.lengths, centre=patches.middle)
         self.force_scale = control.force or 0.0
 
     def at(self, local: Array, plane: Array) -> DenseState:
         """Evaluate a state."""
         point = self.laws.along(local)
-        residual = self.lever @ plane - point.closure - self.compliance @ point.pressure
-        load = self.area * (self.lever.T @ point.pressure)
+        residual = self.levers.matrix @ plane - point.closure - self.compliance @ point.pressure
+        load = self.levers.loads(self.area * point.pressure)
         return DenseState(local=local, plane=plane, point=point, residual=residual, load=load)
 
     def along_laws(self, now: DenseState, step: Array, plane: Array) -> DenseState:
@@ -146,8 +138,7 @@ class LoadedPatches:
 
     def load_residual(self, state: DenseState) -> Array:
         """Return prescribed less present loads along the plane's free motions [N]."""
-        prescribed = np.array([self.control.force or 0.0, 0.0, 0.0])
-        return ((prescribed - state.load) * self.unit)[self.free]
+        return ((self.control.loads - state.load) * self.levers.unit)[self.control.free]
 
     def norm(self, state: DenseState) -> float:
         """Return the norm of all residuals, relative to the largest approach and force."""
@@ -173,19 +164,10 @@ class LoadedPatches:
             loads / max(force, of_force / TOLERANCE),
         )
 
-    def prescribed(self, plane: Array) -> Array:
-        """Return approach and slopes of a plane, with the prescribed ones put in."""
-        found = plane.copy()
-        if self.control.approach is not None:
-            found[0] = self.control.approach
-        if self.control.tilt is not None:
-            found[1:] = self.control.tilt
-        return found
-
     def at_first_touch(self, plane: Array) -> Control:
         """Return what stands for a force of zero: the plane where its first patch is touched."""
-        plane = self.prescribed(plane)
-        tilted = self.lever[:, 1:] @ plane[1:]
+        plane = self.control.prescribed(plane)
+        tilted = self.levers.matrix[:, 1:] @ plane[1:]
         touch = self.laws.first_touch
         approach = float(np.min(touch - tilted))
         if not np.isfinite(approach):
@@ -200,7 +182,7 @@ class LoadedPatches:
         Args:
             plane: A plane with the prescribed approach and slopes.
         """
-        tilted, force = self.lever[:, 1:] @ plane[1:], self.control.force
+        tilted, force = self.levers.matrix[:, 1:] @ plane[1:], self.control.force
 
         def mean_approach(point: LawPoint) -> float:
             approaches = point.closure + self.compliance @ point.pressure - tilted
@@ -214,13 +196,13 @@ class LoadedPatches:
                 return self.area * float(point.pressure.sum()) - force
             return mean_approach(point) - float(plane[0])
 
-        below, above = -self._half, 1e-6 * self._half
+        below, above = -self.levers.half, 1e-6 * self.levers.half
         while excess(above) < 0.0:
             below, above = above, 2.0 * above
-            if above > _FARTHEST * self._half:
+            if above > _FARTHEST * self.levers.half:
                 if force is not None:
                     raise self.failure("NO_CONTACT", 0)
-                return self.lever @ plane, plane  # nothing is in contact
+                return self.levers.matrix @ plane, plane  # nothing is in contact
         accuracy = _GUESS * (above - below)
         common = min(brentq(excess, below, above, xtol=accuracy) + accuracy, above)
         if force is not None:
@@ -230,7 +212,7 @@ class LoadedPatches:
     def failure(self, reason: str, iterations: int) -> NotConverged:
         """Return the error of an iteration that found no equilibrium."""
         return NotConverged(
-            f"the condensed block at {described(self.control)}",
+            f"the condensed block at {self.control}",
             reason=reason,
             iterations=iterations,
             remedy="take more load steps (load.steps)",
@@ -238,4 +220,4 @@ class LoadedPatches:
 
     def _largest_approach(self, state: DenseState) -> float:
         """Return the largest approach of the plane to a patch [mm]."""
-        return max(float(np.abs(self.lever @ state.plane).max()), 1e-9 * self._half)
+        return max(float(np.abs(self.levers.matrix @ state.plane).max()), 1e-9 * self.levers.half)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.control import Control
 from geometry.errors import InputError
+from geometry.rigid_plane import Control
 from multiscale.couplings.blocks import block_material
 from multiscale.loading.load_step import LoadStep
 from multiscale.results.reference_record import ReferenceRecord, reference_record
@@ -75,7 +75,7 @@ class ReferenceCoupling:
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step on every mesh; see `Coupling.press`."""
-        self._last = states = tuple(problem.press(control) for problem in self._problems)
+        self._last = states = tuple(problem.solve(control) for problem in self._problems)
         finest, nominal = states[-1], self._patches.area * self._patches.count
         # patches count whole nodes; all together they have the area with its border in the facets
         share = finest.contact_area_fine / finest.contact_area if finest.contact_area else 0.0
@@ -105,7 +105,7 @@ class ReferenceCoupling:
         """Press every mesh by its plane again; see `Restorable`."""
         planes = unpacked(state, ()) if state else ()
         self._last = tuple(
-            problem.press(Control(approach=approach, tilt=(tx, ty)))
+            problem.solve(Control(approach=approach, tilt=(tx, ty)))
             for problem, (approach, tx, ty) in zip(self._problems, planes, strict=False)
         )
 

@@ -60,7 +60,7 @@ def cache(comm: Any) -> list[Finding]:
     slowest = max(_gathered(comm, _small_file_s(folder) if writable else 0.0))
     fewest = min(_gathered(comm, finished))
     text = f"{folder}, {finished} compiled"
-    if left := jit.left_locks(folder):
+    if left := jit.stale_locks(folder):
         text = f"{text}; {len(left)} compilation(s) cut short, such as {left[0].name}"
         return [Finding("form cache", "fail", text, "clear them with: patchlaw warm")]
     if not writable:
@@ -122,9 +122,9 @@ def known_solve(comm: Any) -> list[Finding]:
     """
     from mpi4py import MPI
 
-    from geometry.control import Control
     from geometry.meshes.block import BlockShape
     from geometry.patches import PatchGrid
+    from geometry.rigid_plane import Control
     from macro import Block, Interface, LawContactProblem, Material, block_mesh
 
     began = time.perf_counter()
@@ -133,7 +133,7 @@ def known_solve(comm: Any) -> list[Finding]:
     block = Block(block_mesh(shape, comm or MPI.COMM_SELF), material, sides="roller")
     patches = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
     pressed = LawContactProblem(block, Interface(block, patches), [_Spring()] * patches.count)
-    state = pressed.press(Control(approach=_APPROACH))
+    state = pressed.solve(Control(approach=_APPROACH))
     seconds = time.perf_counter() - began
     expected = _APPROACH / (1.0 / _SPRING + 1.0 / material.confined_modulus)
     error = abs(state.force / expected - 1.0)

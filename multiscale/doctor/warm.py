@@ -42,7 +42,7 @@ def _compile_all(elements: Sequence[str]) -> tuple[Path, int]:
 
     folder = form_cache()
     if jit.writable(folder):
-        for source in jit.left_locks(folder):
+        for source in jit.stale_locks(folder):
             source.unlink(missing_ok=True)
     for element in elements:
         _use_all_forms(element)

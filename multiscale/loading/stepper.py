@@ -9,8 +9,8 @@ from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 
-from geometry.control import Control
 from geometry.errors import NotConverged
+from geometry.rigid_plane import Control
 from multiscale.loading.load_step import LoadStep
 from multiscale.storage.serialisation import Arrays
 
@@ -216,7 +216,7 @@ class LoadStepper:
                 if beyond or abs(ahead[-1] - last) <= self.position.smallest:
                     halved = "" if beyond else f"it was halved {_MOST_HALVINGS} times; "
                     raise NotConverged(
-                        f"load step {self.position.steps + 1} ({described(control)})",
+                        f"load step {self.position.steps + 1} ({control})",
                         reason=error.reason,
                         iterations=error.iterations,
                         remedy=halved + error.remedy,
@@ -249,10 +249,3 @@ class LoadStepper:
         )
         self._newton, self._linear, self._seconds = 0, 0, 0.0
         return accepted
-
-
-def described(control: Control) -> str:
-    """Say what a load step prescribes, for messages."""
-    if control.force is not None:
-        return f"force {control.force:.6g} N"
-    return f"approach {control.approach:.6g} mm"

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from geometry.checks import PROGRAM, address_space
 from geometry.errors import InputError
-from geometry.memory import PROGRAM, address_space
 
 _LEAST_DATA = 0.5e9
 """Address space that a small run takes beside the program: 64 × 64 heights do with 0.3 GB [B]."""

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry import Material
 from geometry.patches import PatchGrid, patch_means
 from geometry.surface import Surface
 from micro import (
     Choice,
     MicroModel,
     choose,
-    contact_modulus,
     micro_model,
 )
 from multiscale.costs.contact_work import kind_work, reach
@@ -105,4 +105,6 @@ def find_plane_at_largest_load(
 
 
 def _modulus(scene: Scene) -> float:
-    return contact_modulus(scene.block.young_modulus, scene.block.poisson_ratio)
+    return Material(
+        young_modulus=scene.block.young_modulus, poisson_ratio=scene.block.poisson_ratio
+    ).contact_modulus

@@ -15,8 +15,8 @@ from geometry.errors import InputError
 from geometry.meshes.block import BlockShape
 from geometry.meshes.families import characteristic_size, reference_shapes
 from geometry.meshes.refined_block import RefinedShape
+from geometry.meshes.refinement import contact_radius
 from geometry.surface import Surface
-from geometry.typical_contact import contact_radius
 from multiscale.machine.nodes import ClusterNodes, MemoryRequest
 from multiscale.scene.scene import Scene
 

@@ -76,7 +76,7 @@ def curve(surface, shape, approaches):
     forces, total = [], meshing + setup
     for approach in approaches:
         counts.clear()
-        state, wall = block.press(Control(approach=approach)), clock.lap()
+        state, wall = block.solve(Control(approach=approach)), clock.lap()
         total += wall
         forces.append(state.force)
         say(

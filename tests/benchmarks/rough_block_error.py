@@ -60,7 +60,7 @@ def meshed(surface, scale, approaches, edges):
     for shape in shapes:
         mesh, _ = rough_block_mesh(shape, top, MPI.COMM_SELF)
         block = UnilateralContactProblem(Block(mesh, MATERIAL), top.highest - top.mean_height)
-        forces.append([block.press(Control(approach=scale * a)).force / scale for a in approaches])
+        forces.append([block.solve(Control(approach=scale * a)).force / scale for a in approaches])
     sizes = np.array([characteristic_size(shape) for shape in shapes])
     found = extrapolated(np.array(forces), sizes, 3.0)
     return found.value, found.error

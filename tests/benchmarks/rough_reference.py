@@ -39,7 +39,7 @@ def report(surface, name, shape, scale):
     rough = surface.scaled(scale)
     mesh, _ = rough_block_mesh(shape, rough, COMM)
     block = UnilateralContactProblem(Block(mesh, MATERIAL), rough.highest - rough.mean_height)
-    states = [block.press(Control(approach=approach * scale)) for approach in APPROACHES]
+    states = [block.solve(Control(approach=approach * scale)) for approach in APPROACHES]
     forces = [state.force / scale for state in states]
     if COMM.rank == 0:
         told = ", ".join(f"{force:.4f}" for force in forces)

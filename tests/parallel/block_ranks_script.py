@@ -2,7 +2,6 @@
 
 import json
 import sys
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +11,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "verification"))
 
 from block_cases import PowerLaw, block_of, interface_of, uneven_laws
 
-import geometry.meshes.block
-from geometry.control import Control
 from geometry.errors import InputError, NotConverged
-from geometry.meshes.block import BlockShape
+from geometry.meshes.refined_block import RefinedShape
+from geometry.rigid_plane import Control
 from macro import LawContactProblem, block_mesh
 
 COMM = MPI.COMM_WORLD
@@ -36,11 +34,11 @@ def run(case, mode):
     interface = interface_of(block_of(comm=COMM, **shape), grid)
     pressed = LawContactProblem(interface.block, interface, uneven_laws(np.prod(grid)), mode)
     states = [
-        pressed.press(Control(approach=approach, tilt=(1e-3, 5e-4))) for approach in (4e-3, 8e-3)
+        pressed.solve(Control(approach=approach, tilt=(1e-3, 5e-4))) for approach in (4e-3, 8e-3)
     ]
     # enough for more than two patches: a plane on an edge has no tilt of its own
     force = 20.0 * float(interface.areas.sum())
-    states.append(pressed.press(Control(force=force, tilt=None)))
+    states.append(pressed.solve(Control(force=force, tilt=None)))
     numbers = {
         "force": [state.force for state in states],
         "plane": [states[-1].approach, *states[-1].tilt],
@@ -59,16 +57,19 @@ def run(case, mode):
     }
 
 
+class Unmeshable(RefinedShape):
+    """A block that gmsh gives up on."""
+
+    def meshed(self):
+        """Raise instead of meshing."""
+        raise InputError("gmsh gave up", value=3, allowed="better luck")
+
+
 def fail_in_gmsh():
     """Return the error that every rank meets when meshing fails on rank 0."""
-
-    @contextmanager
-    def broken(_shape):
-        raise InputError("gmsh gave up", value=3, allowed="better luck")
-        yield
-
-    geometry.meshes.block.flat_block = broken
-    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(2, 2, 2))
+    shape = Unmeshable(
+        interface=(1.0, 1.0), height=1.0, places=np.array([[0.5, 0.5]]), fine=0.5, coarse=0.5
+    )
     return error_of(lambda: block_mesh(shape, COMM))
 
 
@@ -87,7 +88,7 @@ def fail_in_law(mode):
     interface = interface_of(block_of(comm=COMM, **shape), grid)
     laws = [*uneven_laws(3), RefusingLaw(1.0)]
     return error_of(
-        lambda: LawContactProblem(interface.block, interface, laws, mode).press(
+        lambda: LawContactProblem(interface.block, interface, laws, mode).solve(
             Control(approach=1e-3)
         )
     )
@@ -98,7 +99,7 @@ def fail_to_converge():
     interface = interface_of(block_of(comm=COMM), (2, 2))
     pressed = LawContactProblem(interface.block, interface, uneven_laws(4))
     pressed.newton.snes.setTolerances(max_it=1)
-    return error_of(lambda: pressed.press(Control(approach=8e-3)))
+    return error_of(lambda: pressed.solve(Control(approach=8e-3)))
 
 
 def fail_to_hold(mode):
@@ -107,7 +108,7 @@ def fail_to_hold(mode):
     interface = interface_of(block_of(comm=COMM, **shape), grid)
     laws = [*[PowerLaw(3e4, touch=np.inf)] * 2, *uneven_laws(2)]
     pressed = LawContactProblem(interface.block, interface, laws, mode)
-    return error_of(lambda: pressed.press(Control(force=1.0, tilt=None)))
+    return error_of(lambda: pressed.solve(Control(force=1.0, tilt=None)))
 
 
 def error_of(action):

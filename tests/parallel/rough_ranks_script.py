@@ -65,7 +65,7 @@ def run(shape, surface, sides, method, controls):
     block = UnilateralContactProblem(
         Block(mesh, MATERIAL, sides), highest, method=method, patches=patches
     )
-    states = [block.press(control) for control in controls]
+    states = [block.solve(control) for control in controls]
     numbers = {
         "force": [state.force for state in states],
         "approach": [state.approach for state in states],

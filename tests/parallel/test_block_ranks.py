@@ -32,9 +32,9 @@ def test_the_cases_are_what_they_claim(found):
 
 
 HELD_BY_NOTHING = (
-    "NotConverged: the balance of the plane did not converge: NO_SUPPORT after 0 iterations; no "
-    "further patch can be touched that would hold the plane: prescribe its tilt (load.tilt) or "
-    "take more patches (patches.grid)"
+    "NotConverged: the equilibrium of the plane at force 1 N did not converge: NO_SUPPORT after 0 "
+    "iterations; no further patch can be touched that would hold the plane: prescribe its tilt "
+    "(load.tilt) or take more patches (patches.grid)"
 )
 
 
@@ -48,7 +48,7 @@ HELD_BY_NOTHING = (
         ("law, pointwise", "InputError: 0.25: closure beyond the table"),
         (
             "newton",
-            "NotConverged: the block at an approach of 0.008 mm did not converge: "
+            "NotConverged: the block at approach 0.008 mm did not converge: "
             "DIVERGED_MAX_IT after 1 iterations; take more load steps (load.steps)",
         ),
     ],

@@ -1,4 +1,4 @@
-"""gmsh's flat blocks and those that all ranks make are the same meshes on any number of ranks."""
+"""Flat blocks are the same meshes on any number of ranks."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def found(mpirun):
 @pytest.mark.parametrize("ranks", MORE)
 @pytest.mark.parametrize("case", CASES)
 def test_meshes_are_the_same(found, case, ranks):
-    meshes = [found[n][case][builder] for n in (1, ranks) for builder in ("gmsh", "lattice")]
+    meshes = [found[n][case] for n in (1, ranks)]
     assert all(mesh["exact"] == meshes[0]["exact"] for mesh in meshes)
     volume, bottom, sides = CASES[case]
     for mesh in meshes:
@@ -40,11 +40,7 @@ def test_meshes_are_the_same(found, case, ranks):
 @pytest.mark.parametrize("ranks", MORE)
 @pytest.mark.parametrize("case", CASES)
 def test_solutions_are_the_same(found, case, ranks):
-    work = [
-        found[n][case][builder]["measures"]["work"]
-        for n in (1, ranks)
-        for builder in ("gmsh", "lattice")
-    ]
+    work = [found[n][case]["measures"]["work"] for n in (1, ranks)]
     # the same matrix but for the order of sums; the solver leaves 1e-10, the work its square
     np.testing.assert_allclose(work, work[0], rtol=1e-12)
     assert work[0] > 0.0
@@ -53,7 +49,7 @@ def test_solutions_are_the_same(found, case, ranks):
 @pytest.mark.parametrize("ranks", MORE)
 def test_supports_hold_nodes_on_every_rank(found, ranks):
     # dealt out, a rank can meet a support in a node alone, whose facets all belong to others
-    whole = found[1]["box"]["gmsh"]["measures"]
+    whole = found[1]["box"]["measures"]
     for measures in found[ranks]["dealt"]:
         assert measures["unknowns"] == whole["unknowns"]
         assert measures["work"] == pytest.approx(whole["work"], rel=1e-12)  # as above
@@ -62,15 +58,15 @@ def test_supports_hold_nodes_on_every_rank(found, ranks):
 @pytest.mark.parametrize("ranks", MORE)
 @pytest.mark.parametrize("case", CASES)
 def test_cells_are_spread_without_ghosts(found, case, ranks):
-    lattice = found[ranks][case]["lattice"]
+    lattice = found[ranks][case]
     assert lattice["ghosts"] == 0 and len(lattice["cells_of_ranks"]) == ranks
 
 
 @pytest.mark.long
 def test_cells_are_spread_in_boxes(found):
-    assert found[2]["quadratic hexahedra"]["lattice"]["cells_of_ranks"] == [8, 4]
-    assert sorted(found[4]["rod"]["lattice"]["cells_of_ranks"]) == [0, 0, 1, 1]
-    assert sorted(found[4]["box"]["lattice"]["cells_of_ranks"]) == [0, 0, 0, 6]
+    assert found[2]["quadratic hexahedra"]["cells_of_ranks"] == [8, 4]
+    assert sorted(found[4]["rod"]["cells_of_ranks"]) == [0, 0, 1, 1]
+    assert sorted(found[4]["box"]["cells_of_ranks"]) == [0, 0, 0, 6]
 
 
 @pytest.mark.parametrize("ranks", [1, *MORE])

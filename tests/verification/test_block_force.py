@@ -6,9 +6,9 @@ from block_cases import PowerLaw, block_of, interface_of, uneven_laws
 from petsc4py import PETSc
 from scipy.optimize import brentq, root
 
-from geometry.control import Control
 from geometry.errors import NotConverged
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
 from macro import Interface, LawContactProblem
 
 MODES = ["patchwise", "pointwise"]
@@ -29,7 +29,7 @@ def test_column_under_a_force_has_a_closed_form(mode):
     stiffness = block.material.confined_modulus / 0.6
     for force in (3.0, 40.0, 1e-3):
         for tilt in ((0.0, 0.0), None):
-            state = pressed.press(Control(force=force, tilt=tilt))
+            state = pressed.solve(Control(force=force, tilt=tilt))
             # uniform strain: the column and the law in series; residuals of 1e-10 of the load
             approach = force / stiffness + 1e-3 + (force / 2e5) ** (2 / 3)
             assert state.approach == pytest.approx(approach, rel=1e-9)
@@ -42,7 +42,7 @@ def test_column_under_a_force_has_a_closed_form(mode):
 def test_force_and_moment_are_met(mode, tilt):
     pressed = uneven_block(mode)
     for force in (0.2, 20.0, 1e-3, 5.0):  # far up and far down
-        state = pressed.press(Control(force=force, tilt=tilt))
+        state = pressed.solve(Control(force=force, tilt=tilt))
         assert abs(state.force - force) <= 1e-10 * force
         if tilt is None:
             assert np.abs(state.moment).max() <= 1e-10 * force * HALF
@@ -50,7 +50,7 @@ def test_force_and_moment_are_met(mode, tilt):
             assert state.tilt == tilt
         assert state.reaction == pytest.approx(force, rel=1e-9)  # residuals of 1e-10 of the load
         # the plane that was found, prescribed: the same state without any border
-        again = pressed.press(Control(approach=state.approach, tilt=state.tilt))
+        again = pressed.solve(Control(approach=state.approach, tilt=state.tilt))
         assert again.force == pytest.approx(force, rel=1e-8)
         np.testing.assert_allclose(again.pressure, state.pressure, atol=1e-8 * force)
         np.testing.assert_allclose(again.moment, state.moment, atol=1e-8 * force * HALF)
@@ -59,11 +59,11 @@ def test_force_and_moment_are_met(mode, tilt):
 @pytest.mark.parametrize("mode", MODES)
 def test_approach_under_a_force_is_that_of_brent(mode):
     """Oracle: bisection and inverse interpolation on approaches that are prescribed."""
-    state = uneven_block(mode).press(Control(force=4.0, tilt=(2e-3, 1e-3)))
+    state = uneven_block(mode).solve(Control(force=4.0, tilt=(2e-3, 1e-3)))
     other = uneven_block(mode)
 
     def missing(approach):
-        return other.press(Control(approach=approach, tilt=(2e-3, 1e-3))).force - 4.0
+        return other.solve(Control(approach=approach, tilt=(2e-3, 1e-3))).force - 4.0
 
     assert state.approach == pytest.approx(brentq(missing, 4e-3, 2e-2, xtol=1e-14), rel=1e-8)
 
@@ -72,11 +72,11 @@ def test_approach_under_a_force_is_that_of_brent(mode):
 @pytest.mark.parametrize("given", [{"approach": 9e-3}, {"force": 4.0}], ids=["approach", "force"])
 def test_free_plane_is_that_of_another_solver(mode, given):
     """Oracle: MINPACK on planes that are prescribed."""
-    state = uneven_block(mode).press(Control(**given, tilt=None))
+    state = uneven_block(mode).solve(Control(**given, tilt=None))
     other = uneven_block(mode)
 
     def loads(plane):
-        found = other.press(Control(approach=plane[0], tilt=tuple(plane[1:])))
+        found = other.solve(Control(approach=plane[0], tilt=tuple(plane[1:])))
         first = found.force - 4.0 if "force" in given else 1e3 * (plane[0] - 9e-3)
         return np.array([first, *found.moment])
 
@@ -94,8 +94,8 @@ def test_no_force_is_first_touch(mode):
     sampling = pressed._sampling
     for tilt in ((0.0, 0.0), (3e-3, -2e-3), None):
         if tilt is None:
-            turned = pressed.press(Control(force=2.0, tilt=None)).tilt
-        state = pressed.press(Control(force=0.0, tilt=tilt))
+            turned = pressed.solve(Control(force=2.0, tilt=None)).tilt
+        state = pressed.solve(Control(force=0.0, tilt=tilt))
         assert state.tilt == (turned if tilt is None else tilt)
         lean = np.column_stack((sampling.x - 0.5, sampling.y - 0.5)) @ state.tilt
         assert state.approach == pytest.approx(np.min(touch[sampling.patch] - lean), abs=1e-17)
@@ -106,7 +106,7 @@ def test_no_force_is_first_touch(mode):
 def test_way_down_is_the_way_up(mode):
     pressed = uneven_block(mode)
     forces = (1.0, 8.0, 1.0, 0.0, 8.0)
-    states = [pressed.press(Control(force=force, tilt=None)) for force in forces]
+    states = [pressed.solve(Control(force=force, tilt=None)) for force in forces]
     for one, other in ((0, 2), (1, 4)):
         # residuals of 1e-10 of the load
         np.testing.assert_allclose(states[one].pressure, states[other].pressure, atol=1e-8)
@@ -122,9 +122,9 @@ def test_one_patch_under_a_force_is_one_linear_solve():
         pressed = LawContactProblem(interface.block, interface, [PowerLaw(3e4)])
     finally:
         options.delValue("ksp_rtol")
-    state = pressed.press(Control(force=3.0))
+    state = pressed.solve(Control(force=3.0))
     assert state.newton_iterations == 1
-    assert pressed.press(Control(force=30.0)).newton_iterations == 0  # ten times as much
+    assert pressed.solve(Control(force=30.0)).newton_iterations == 0  # ten times as much
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -132,9 +132,9 @@ def test_a_force_takes_no_more_than_an_approach(mode):
     """The derivative under a force lies between those of the free block and under a fixed plane."""
     steps = 1.0 + np.arange(6)
     prescribed, forced, freed = (uneven_block(mode, grid=(4, 4)) for _ in range(3))
-    first = [prescribed.press(Control(approach=2e-3 * step)) for step in steps]
+    first = [prescribed.solve(Control(approach=2e-3 * step)) for step in steps]
     for tilt, pressed in (((0.0, 0.0), forced), (None, freed)):
-        second = [pressed.press(Control(force=state.force, tilt=tilt)) for state in first]
+        second = [pressed.solve(Control(force=state.force, tilt=tilt)) for state in first]
         assert max(state.newton_iterations for state in second) <= 5
         # the same tolerances; a free plane takes another path through the laws
         most = 1.3 * sum(state.linear_iterations for state in first)
@@ -145,26 +145,26 @@ def test_what_nothing_holds_is_told_and_changes_nothing():
     interface = interface_of(block_of(cells=(4, 4, 3)), (2, 2))
     right = [PowerLaw(3e4, touch=np.inf)] * 2 + [PowerLaw(3e4), PowerLaw(6e4)]
     pressed = LawContactProblem(interface.block, interface, right)
-    before = pressed.press(Control(force=2.0))
+    before = pressed.solve(Control(force=2.0))
     known = len(pressed._basis)
     with pytest.raises(NotConverged, match=r"NO_SUPPORT .*prescribe its tilt \(load.tilt\)"):
-        pressed.press(Control(force=3.0, tilt=None))
+        pressed.solve(Control(force=3.0, tilt=None))
     assert len(pressed._basis) == known
     np.testing.assert_array_equal(
         pressed.patch_means([np.array] * 4),
         before.closure,  # still of the latest equilibrium
     )
-    assert pressed.press(Control(force=2.0)).approach == pytest.approx(before.approach, rel=1e-9)
+    assert pressed.solve(Control(force=2.0)).approach == pytest.approx(before.approach, rel=1e-9)
     nothing = LawContactProblem(interface.block, interface, [PowerLaw(3e4, touch=np.inf)] * 4)
     for force in (1.0, 0.0):
         with pytest.raises(NotConverged, match="NO_CONTACT"):
-            nothing.press(Control(force=force))
+            nothing.solve(Control(force=force))
 
 
 def test_free_plane_at_an_approach_swings_clear_of_what_lies_on_one_side():
     interface = interface_of(block_of(cells=(4, 4, 3)), (2, 1))
     right = [PowerLaw(3e4, touch=np.inf), PowerLaw(3e4)]
-    state = LawContactProblem(interface.block, interface, right).press(
+    state = LawContactProblem(interface.block, interface, right).solve(
         Control(approach=4e-3, tilt=None)
     )
     assert (state.force, state.approach) == (0.0, 4e-3)
@@ -175,5 +175,5 @@ def test_moments_are_about_the_middle_of_the_patches():
     """Patches on a part of the top: their own middle counts."""
     block = block_of(cells=(4, 4, 3))
     interface = Interface(block, PatchGrid(grid=(1, 1), lengths=(0.5, 0.5), origin=(0.5, 0.0)))
-    state = LawContactProblem(block, interface, [PowerLaw(3e4)]).press(Control(force=1.0))
+    state = LawContactProblem(block, interface, [PowerLaw(3e4)]).solve(Control(force=1.0))
     np.testing.assert_allclose(state.moment, 0.0, atol=1e-15)

@@ -8,7 +8,7 @@ import pytest
 from reference_cases import on_block
 
 from geometry import PatchGrid, Spectrum, Surface, patch_means, synthesise
-from geometry.control import Control
+from geometry.rigid_plane import Control
 from multiscale import Scene, run
 from multiscale.couplings.load_steps import ContactCoupling
 from multiscale.loading.stepper import LoadHistory, load_steps

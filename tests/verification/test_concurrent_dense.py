@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from concurrent_cases import CELLS, coupling, dense_forces
 
-from geometry.control import Control
+from geometry.rigid_plane import Control
 
 CONTROLS = {
     "level": Control(approach=0.02),

@@ -6,7 +6,7 @@ import pytest
 from mpi4py import MPI
 
 from geometry import RefinedShape, places_in_reach
-from geometry.control import Control
+from geometry.rigid_plane import Control
 from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from micro import FiniteSlopes
 from multiscale import Scene, make_setup
@@ -50,7 +50,7 @@ def meshed(surface):
         block = UnilateralContactProblem(
             Block(mesh, Material(**MATERIAL)), scaled.highest - scaled.mean_height
         )
-        forces.append(block.press(Control(approach=APPROACH * scale)).force / scale)
+        forces.append(block.solve(Control(approach=APPROACH * scale)).force / scale)
     return forces[0] / forces[1] - 1.0
 
 

@@ -46,7 +46,7 @@ def test_rubber_under_a_plane():
     mesh, _ = rough_block_mesh(shape, surface, MPI.COMM_SELF)
     block = Block(mesh, Material(young_modulus=4000.0, poisson_ratio=0.4999))
     pressed = UnilateralContactProblem(block, surface.highest - surface.mean_height)
-    state = pressed.press(Control(approach=4e-3))
+    state = pressed.solve(Control(approach=4e-3))
     assert state.nodes > 4
     assert state.reaction == pytest.approx(state.force, rel=1e-9)
     assert state.linear_iterations <= 15 * state.active_sets  # 41 in 4 sets were counted

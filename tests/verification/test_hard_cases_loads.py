@@ -8,10 +8,11 @@ import pytest
 from hard_cases import KINDS, centred, coarse_tables, from_file, history, scene
 from scipy.optimize import brentq
 
-from geometry.control import Control
+from geometry import Material
 from geometry.errors import NotConverged
 from geometry.patches import PatchGrid
-from micro import contact_modulus, influence_matrix
+from geometry.rigid_plane import Control
+from micro import influence_matrix
 from multiscale.couplings.dense_newton import DenseNewton
 from multiscale.laws.law_table import PatchLaws
 from multiscale.laws.patch_law import PatchLaw
@@ -31,7 +32,7 @@ def test_first_touch_of_one_asperity(kind, tmp_path):
     found = history(
         coupling__kind=kind, micro__model="circular", load__approach=[*approach, 0.0], **sphere
     )
-    modulus = contact_modulus(4000.0, 0.15)
+    modulus = Material(young_modulus=4000.0, poisson_ratio=0.15).contact_modulus
     hertz = 4 / 3 * modulus * np.sqrt(0.5) * np.array(approach) ** 1.5
     # the block yields by 1e-3 of 1e-6 mm; closures of 0.5 mm are known to 4e-7 of 1e-10 mm
     np.testing.assert_allclose(found.force_N[:3], hertz, rtol=5e-3)

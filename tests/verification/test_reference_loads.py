@@ -71,7 +71,7 @@ def test_a_flat_top_between_rollers_is_compressed_evenly(shape, method):
     block = UnilateralContactProblem(
         Block(mesh, MATERIAL, sides="roller"), 0.0, method=method, patches=patches
     )
-    state = block.press(Control(approach=1e-3))
+    state = block.solve(Control(approach=1e-3))
     first, shear = MATERIAL.lame
     force = (first + 2.0 * shear) * 1e-3 / 0.5
     # nodes do not penetrate at all, points by 1e-8 or 1e-5 of the displacement
@@ -89,7 +89,7 @@ def test_a_flat_top_between_rollers_is_compressed_evenly(shape, method):
 def test_a_flat_top_holds_a_free_plane_level():
     """By symmetry; its sides bulge, and the corners press hardest."""
     mesh, _ = rough_block_mesh(CUBES, FLAT, COMM)
-    state = UnilateralContactProblem(Block(mesh, MATERIAL), 0.0).press(
+    state = UnilateralContactProblem(Block(mesh, MATERIAL), 0.0).solve(
         Control(force=2.0, tilt=None)
     )
     assert state.force == pytest.approx(2.0, rel=1e-9)

@@ -53,7 +53,7 @@ def curve(case, options, method="active-set", shares=(0.5, 1.0)):
         Block(mesh, material), surface.highest - surface.mean_height, method=method
     )
     controls = (Control(approach=share * case.approach, tilt=case.tilt) for share in shares)
-    return block, surface, [block.press(control) for control in controls]
+    return block, surface, [block.solve(control) for control in controls]
 
 
 def depths(block, surface, state):
@@ -71,9 +71,9 @@ def test_active_sets_meet_the_conditions(case, options):
     for state in states:
         depth, size = depths(block, surface, state), np.abs(state.displacement).max()
         assert depth.max() < 1e-9 * size  # rounding of the heights
-        assert state.pressing.min() >= 0.0
+        assert state.nodal_force.min() >= 0.0
         assert state.force == pytest.approx(state.reaction, rel=1e-9)  # solves to 1e-10
-        bearing = state.pressing > 1e-10 * state.pressing.max()
+        bearing = state.nodal_force > 1e-10 * state.nodal_force.max()
         assert np.abs(depth[bearing]).max() < 1e-9 * size
         # measured 2 to 5, and 7 of tetrahedra where contacts merge
         assert state.active_sets <= 8
@@ -111,7 +111,7 @@ def force_on_a_sphere(poisson_ratio, element, size):
     mesh, _ = rough_block_mesh(shape, surface, COMM)
     block = UnilateralContactProblem(Block(mesh, material), surface.highest - surface.mean_height)
     hertz = 4.0 / 3.0 * material.contact_modulus * np.sqrt(radius) * approach**1.5
-    state = block.press(Control(approach=approach))
+    state = block.solve(Control(approach=approach))
     return state.force / hertz
 
 

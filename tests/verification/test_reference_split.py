@@ -39,7 +39,7 @@ def forces(seed, scale, edges):
     for shape in shapes:
         mesh, _ = rough_block_mesh(shape, top, COMM)
         block = UnilateralContactProblem(Block(mesh, MATERIAL), top.highest - top.mean_height)
-        found.append(block.press(Control(approach=APPROACH * scale)).force / scale)
+        found.append(block.solve(Control(approach=APPROACH * scale)).force / scale)
     return np.array(found), [characteristic_size(shape) for shape in shapes]
 
 

@@ -80,11 +80,11 @@ def independent(mesh, kind, plane):
 def test_getfem_finds_the_same_contact(kind):
     mesh, _ = rough_block_mesh(SHAPES[kind], SURFACE, MPI.COMM_SELF)
     top = SURFACE.highest - SURFACE.mean_height
-    ours = UnilateralContactProblem(Block(mesh, MATERIAL), top).press(Control(approach=APPROACH))
+    ours = UnilateralContactProblem(Block(mesh, MATERIAL), top).solve(Control(approach=APPROACH))
     forces = independent(mesh.mesh, kind, f"{top - APPROACH:.17g}")
     # the same discrete problem; 1e-9 is the tolerance of our linear solver. Measured 3e-11
     assert ours.force == pytest.approx(forces.sum(), rel=1e-9)
     assert ours.nodes == np.count_nonzero(forces > 1e-9)
-    assert np.sort(ours.pressing)[::-1][: ours.nodes] == pytest.approx(
+    assert np.sort(ours.nodal_force)[::-1][: ours.nodes] == pytest.approx(
         np.sort(forces)[::-1][: ours.nodes], rel=1e-6
     )

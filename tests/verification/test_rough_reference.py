@@ -14,7 +14,7 @@ from geometry import (
     reference_shapes,
     synthesise,
 )
-from geometry.control import Control
+from geometry.rigid_plane import Control
 from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from micro import FreeSides, HalfSpaceModel, finite_slope_effect
 
@@ -55,7 +55,7 @@ def pressed(sphere, element, refinement):
     )
     mesh, _ = rough_block_mesh(shape, sphere, MPI.COMM_SELF)
     block = UnilateralContactProblem(Block(mesh, MATERIAL), sphere.highest - sphere.mean_height)
-    return block.press(Control(approach=APPROACH))
+    return block.solve(Control(approach=APPROACH))
 
 
 def test_block_is_felt(expected):
@@ -86,7 +86,7 @@ def test_family_extrapolates_to_the_half_space_with_order_three(sphere, expected
     for shape in shapes:
         mesh, _ = rough_block_mesh(shape, sphere, MPI.COMM_SELF)
         block = UnilateralContactProblem(Block(mesh, MATERIAL), sphere.highest - sphere.mean_height)
-        forces.append(block.press(Control(approach=APPROACH)).force)
+        forces.append(block.solve(Control(approach=APPROACH)).force)
     coarse, fine = (force / expected - 1.0 for force in forces)
     # measured 0.5 to 1.1 % by where nodes happen to lie, and −0.05 to 0.06 % of 18 families
     assert 0.004 < coarse < 0.013
@@ -113,7 +113,7 @@ def test_finite_slopes_soften_the_rough_block_as_estimated():
         block = UnilateralContactProblem(
             Block(mesh, MATERIAL), surface.highest - surface.mean_height
         )
-        forces.append(block.press(Control(approach=approach * scale)).force / scale)
+        forces.append(block.solve(Control(approach=approach * scale)).force / scale)
     measured = forces[1] / forces[0] - 1.0
     nu = MATERIAL.poisson_ratio
     sides = FreeSides(lengths=rough.lengths, poisson_ratio=nu, reach=0.5)
@@ -135,7 +135,7 @@ def test_area_within_facets_is_hertz():
     block = Block(mesh, MATERIAL)
     highest = moved.highest - moved.mean_height
     nodes, points = (
-        UnilateralContactProblem(block, highest, method=method).press(Control(approach=APPROACH))
+        UnilateralContactProblem(block, highest, method=method).solve(Control(approach=APPROACH))
         for method in ("active-set", "augmented-lagrangian")
     )
     # of the force that was found, so that the mesh's stiffness does not count

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from geometry import Asperities, InputError, Spectrum, Surface, find_asperities, synthesise
-from geometry.maxima import grid_maxima
+from geometry.summits import grid_maxima
 
 
 def sampled(function, grid=(24, 30), lengths=(1.2, 1.5), periodic=False):

@@ -83,5 +83,5 @@ def test_what_python_has_dropped_is_freed():
     matrix.setUp()
     alive = weakref.ref(context)
     del matrix, context
-    compat.free_dropped(vector.comm)
+    compat.collect_garbage(vector.comm)
     assert alive() is None  # PETSc held the only reference

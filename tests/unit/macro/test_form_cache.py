@@ -27,9 +27,9 @@ def folder(tmp_path):
 
 
 def test_only_old_sources_without_mark_are_left_locks(folder):
-    assert [path.name for path in jit.left_locks(folder)] == ["libffcx_forms_cut.c"]
-    assert len(jit.left_locks(folder, older_than=0.0)) == 2
-    assert jit.left_locks(folder / "nowhere") == []
+    assert [path.name for path in jit.stale_locks(folder)] == ["libffcx_forms_cut.c"]
+    assert len(jit.stale_locks(folder, older_than=0.0)) == 2
+    assert jit.stale_locks(folder / "nowhere") == []
 
 
 def test_writable_asks_the_nearest_folder_that_exists(tmp_path):
@@ -41,7 +41,7 @@ def test_writable_asks_the_nearest_folder_that_exists(tmp_path):
 def test_folder_that_may_not_be_entered_is_not_writable_and_has_no_locks(monkeypatch, folder):
     monkeypatch.setattr(jit.Path, "exists", refused)
     assert not jit.writable(folder)
-    assert jit.left_locks(folder) == []
+    assert jit.stale_locks(folder) == []
 
 
 def refused(path):

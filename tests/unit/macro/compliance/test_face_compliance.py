@@ -5,10 +5,10 @@ import pytest
 from mpi4py import MPI
 
 from geometry.errors import InputError
+from geometry.materials import Material
 from macro.compliance import face_compliance as module
-from macro.compliance.division import division
+from macro.compliance.elements import division
 from macro.compliance.face_compliance import cached_face_compliance, face_compliance
-from macro.elasticity import Material
 
 SOFT = Material(young_modulus=1.0, poisson_ratio=0.3)
 

@@ -38,7 +38,7 @@ def at_points(found, state):
 
 def forces(shape, control):
     methods = ("active-set", "augmented-lagrangian")
-    return [obstacle(shape, method).press(control).force for method in methods]
+    return [obstacle(shape, method).solve(control).force for method in methods]
 
 
 @pytest.mark.parametrize("element", ["Q1", "P1", "Q2", "P2"])
@@ -55,7 +55,7 @@ LIMIT = {"Q1": 1e-5, "P1": 1e-7, "Q2": 2e-3, "P2": 1e-2}
 @pytest.mark.parametrize("element", ["Q1", "P2"])
 def test_no_point_penetrates_and_none_is_pulled(element):
     found = obstacle(replace(SHAPE, cells=(5, 5, 2), element=element), "augmented-lagrangian")
-    state = found.press(Control(force=30.0, tilt=None))
+    state = found.solve(Control(force=30.0, tilt=None))
     depth, pressure = at_points(found, state)
     assert depth.max() <= PENETRATION[int(element[1])] * np.abs(state.displacement).max()
     assert pressure.min() == 0.0 < pressure.max()
@@ -68,7 +68,7 @@ def test_no_point_penetrates_and_none_is_pulled(element):
 def test_no_point_presses_across_a_gap(element):
     shape = replace(SHAPE, height=1.0, cells=(8, 8, 4), grading=1.0, element=element)
     found = obstacle(shape, "augmented-lagrangian", ROUGH)
-    state = found.press(Control(approach=0.012))
+    state = found.solve(Control(approach=0.012))
     depth, pressure = at_points(found, state)
     widest = -depth[pressure > 0.0].min()
     assert widest <= PENETRATION[1] * np.abs(state.displacement).max()
@@ -78,16 +78,16 @@ def test_no_point_presses_across_a_gap(element):
 def test_without_force_nothing_touches(element):
     shape = replace(SHAPE, height=1.0, cells=(8, 8, 4), grading=1.0, element=element)
     # beyond the highest node, short of the points of the facets around it
-    state = obstacle(shape, "augmented-lagrangian", ROUGH).press(Control(approach=6e-3))
+    state = obstacle(shape, "augmented-lagrangian", ROUGH).solve(Control(approach=6e-3))
     assert (state.force, state.reason) == (0.0, "CONVERGED_NO_CONTACT")
     assert (state.nodes, state.contacts, state.contact_area) == (0, 0, 0.0)
 
 
 def test_error_of_the_penalty_is_its_inverse():
-    exact = obstacle(SHAPE, "augmented-lagrangian").press(Control(approach=0.02)).force
+    exact = obstacle(SHAPE, "augmented-lagrangian").solve(Control(approach=0.02)).force
     stiff = np.array([1e7, 1e8, 1e9])
     found = [
-        obstacle(SHAPE, "penalty", penalty=k).press(Control(approach=0.02)).force for k in stiff
+        obstacle(SHAPE, "penalty", penalty=k).solve(Control(approach=0.02)).force for k in stiff
     ]
     errors = 1.0 - np.array(found) / exact
     assert np.all(errors > 0.0)  # points sink in: too soft
@@ -98,7 +98,7 @@ def test_error_of_the_penalty_is_its_inverse():
 @pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2"])
 def test_flat_top_on_rollers_is_a_column(element):
     shape = replace(SHAPE, cells=(4, 4, 2), element=element)
-    state = obstacle(shape, "augmented-lagrangian", FLAT, "roller").press(Control(approach=1e-3))
+    state = obstacle(shape, "augmented-lagrangian", FLAT, "roller").solve(Control(approach=1e-3))
     # uniform strain on every mesh; the last penetration is 1e-8 of the approach
     assert state.force == pytest.approx(MATERIAL.confined_modulus * 1e-3 / 0.5, rel=1e-7)
     assert state.contact_area == pytest.approx(1.0, rel=1e-12)
@@ -108,6 +108,6 @@ def test_flat_top_on_rollers_is_a_column(element):
 def test_history_does_not_matter():
     found = obstacle(SHAPE, "augmented-lagrangian")
     for approach in (0.01, 0.02, 0.04, 0.015):
-        state = found.press(Control(approach=approach))
-    direct = obstacle(SHAPE, "augmented-lagrangian").press(Control(force=state.force))
+        state = found.solve(Control(approach=approach))
+    direct = obstacle(SHAPE, "augmented-lagrangian").solve(Control(force=state.force))
     assert direct.approach == pytest.approx(0.015, rel=1e-6)  # penetration of 1e-8 on both sides

@@ -16,7 +16,7 @@ from macro import (
     compat,
     displacements_under,
     face_compliance,
-    plain_compliance,
+    patch_compliance_matrix,
     rough_block_mesh,
 )
 
@@ -36,11 +36,11 @@ def kept(capfd):
 
     if not hasattr(PETSc, "garbage_view"):
         pytest.skip("this PETSc keeps nothing")
-    compat.free_dropped(PETSc.COMM_SELF)
+    compat.collect_garbage(PETSc.COMM_SELF)
     PETSc.Vec().createSeq(1)  # dropped at once
     if not count(PETSc.COMM_SELF):
         pytest.skip("this PETSc keeps nothing on a single rank")
-    compat.free_dropped(PETSc.COMM_SELF)
+    compat.collect_garbage(PETSc.COMM_SELF)
     return count
 
 
@@ -57,22 +57,22 @@ def rough_block(method):
 def test_a_rough_block_leaves_nothing_of_a_load_step(kept, method):
     rough = rough_block(method)
     for approach in (6e-3, 9e-3):
-        assert rough.press(Control(approach=approach)).nodes > 0
+        assert rough.solve(Control(approach=approach)).nodes > 0
         assert kept(rough.block.stiffness.comm) + kept(PETSc.COMM_SELF) == 0
 
 
 @pytest.mark.parametrize("method", ["active-set", "augmented-lagrangian"])
 def test_fields_do_not_pile_up_within_a_load_step(kept, monkeypatch, method):
     rough = rough_block(method)
-    comm, free, found = rough.block.stiffness.comm, compat.free_dropped, []
+    comm, free, found = rough.block.stiffness.comm, compat.collect_garbage, []
 
     def counted(of):
         found.append(kept(comm))
         free(of)
 
-    rough.press(Control(approach=6e-3))
-    monkeypatch.setattr(compat, "free_dropped", counted)
-    assert rough.press(Control(approach=12e-3)).active_sets > 2
+    rough.solve(Control(approach=6e-3))
+    monkeypatch.setattr(compat, "collect_garbage", counted)
+    assert rough.solve(Control(approach=12e-3)).active_sets > 2
     assert max(found) <= 10  # of one step of Newton's method
 
 
@@ -81,7 +81,7 @@ def test_a_compliance_keeps_no_fields_of_its_patches(kept):
     found = []
     for grid in ((1, 1), (4, 4)):
         interface = Interface(block, PatchGrid(grid=grid, lengths=(1.0, 1.0)))
-        plain_compliance(interface)
+        patch_compliance_matrix(interface)
         found.append(kept(block.stiffness.comm))
     assert found[1] <= found[0]
 

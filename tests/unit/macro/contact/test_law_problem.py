@@ -9,10 +9,10 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
 from macro import Block, Interface, LawContactProblem, Material, block_mesh, compat, write_fields
 from macro.contact.energy_start import DisplacementBasis
 
@@ -54,7 +54,7 @@ def test_every_patch_needs_a_law(interface):
 
 
 def test_open_interface_is_solved_at_once(interface):
-    state = LawContactProblem(interface.block, interface, [Spring(touch=1.0)] * 4).press(
+    state = LawContactProblem(interface.block, interface, [Spring(touch=1.0)] * 4).solve(
         Control(approach=5e-3)
     )
     assert (state.newton_iterations, state.force, state.reaction) == (0, 0.0, 0.0)
@@ -68,11 +68,11 @@ def test_linear_laws_take_one_newton_step(interface, mode):
     pressed = LawContactProblem(interface.block, interface, [Spring()] * 4, mode)
     pressed.newton.snes.ksp.setTolerances(rtol=1e-12)
     pressed.newton._forcing = False
-    assert pressed.press(Control(approach=5e-3)).newton_iterations == 1
+    assert pressed.solve(Control(approach=5e-3)).newton_iterations == 1
 
 
 def test_tilt_is_about_the_middle(interface):
-    press = LawContactProblem(interface.block, interface, [Spring()] * 4).press
+    press = LawContactProblem(interface.block, interface, [Spring()] * 4).solve
     level, tilted = press(Control(approach=5e-3)), press(Control(approach=5e-3, tilt=(2e-3, 0.0)))
     assert tilted.force == pytest.approx(level.force, rel=1e-7)  # exact for linear laws
     np.testing.assert_array_equal(tilted.pressure > level.pressure, [False, False, True, True])
@@ -81,19 +81,19 @@ def test_tilt_is_about_the_middle(interface):
 def test_failure_is_named_and_keeps_what_was_known(interface):
     laws = [Spring(k=1e3 * (i + 1), touch=1e-3 * i) for i in range(4)]
     pressed = LawContactProblem(interface.block, interface, laws)
-    before = pressed.press(Control(approach=2e-3))
+    before = pressed.solve(Control(approach=2e-3))
     known = len(pressed._basis)
     pressed.newton.snes.setTolerances(max_it=1)
-    with pytest.raises(NotConverged, match=r"approach of 0\.008 mm .* DIVERGED_MAX_IT after 1"):
-        pressed.press(Control(approach=8e-3))
+    with pytest.raises(NotConverged, match=r"approach 0\.008 mm .* DIVERGED_MAX_IT after 1"):
+        pressed.solve(Control(approach=8e-3))
     assert len(pressed._basis) == known
     pressed.newton.snes.setTolerances(max_it=20)
-    assert pressed.press(Control(approach=2e-3)).force == pytest.approx(before.force, rel=1e-9)
+    assert pressed.solve(Control(approach=2e-3)).force == pytest.approx(before.force, rel=1e-9)
 
 
 def test_a_pressed_block_is_freed(interface):
     pressed = LawContactProblem(interface.block, interface, [Spring()] * 4)
-    pressed.press(Control(approach=1e-3))
+    pressed.solve(Control(approach=1e-3))
     gone = [weakref.ref(part) for part in (pressed, pressed.equilibrium, pressed.newton)]
     del pressed
     gc.collect()
@@ -105,9 +105,9 @@ def test_the_block_alone_stays_what_it_is(interface, law):
     pressed = LawContactProblem(interface.block, interface, [law] * 4)
     if isinstance(law, Broken):
         with pytest.raises(NotConverged):
-            pressed.press(Control(approach=5e-3))
+            pressed.solve(Control(approach=5e-3))
     else:
-        pressed.press(Control(approach=5e-3))
+        pressed.solve(Control(approach=5e-3))
     block, load = interface.block, interface.load(np.arange(4.0))
     found = block.stiffness.createVecRight()
     found.array[:] = block.solve(load.copy()).x.array
@@ -118,7 +118,7 @@ def test_the_block_alone_stays_what_it_is(interface, law):
 
 def test_pressure_without_value_is_a_failure(interface):
     with pytest.raises(NotConverged, match="DIVERGED_F"):
-        LawContactProblem(interface.block, interface, [Broken()] * 4).press(Control(approach=1e-3))
+        LawContactProblem(interface.block, interface, [Broken()] * 4).solve(Control(approach=1e-3))
 
 
 def test_the_users_tolerances_win(interface):
@@ -126,7 +126,7 @@ def test_the_users_tolerances_win(interface):
     options["snes_rtol"], options["ksp_rtol"] = 1e-4, 1e-3
     try:
         pressed = LawContactProblem(interface.block, interface, [Spring()] * 4)
-        state = pressed.press(Control(approach=5e-3))
+        state = pressed.solve(Control(approach=5e-3))
     finally:
         options.delValue("snes_rtol"), options.delValue("ksp_rtol")
     assert 1e-10 < state.residuals[-1] <= 1e-4
@@ -152,7 +152,7 @@ def test_fields_are_written_for_paraview(element, tmp_path):
         block_mesh(shape, MPI.COMM_SELF), Material(young_modulus=4000.0, poisson_ratio=0.15)
     )
     interface = Interface(block, PatchGrid(grid=(2, 1), lengths=(1.0, 1.0)))
-    state = LawContactProblem(block, interface, [Spring(), Spring(k=5e3)]).press(
+    state = LawContactProblem(block, interface, [Spring(), Spring(k=5e3)]).solve(
         Control(approach=1e-3)
     )
     write_fields(tmp_path / "fields.xdmf", interface, state.displacement, state.pressure)

@@ -41,13 +41,15 @@ def test_top_is_the_surface():
 
 def test_contact_conditions_and_balance():
     found = obstacle()
-    state = found.press(Control(approach=10e-3))
+    state = found.solve(Control(approach=10e-3))
     gap = SURFACE.highest - SURFACE.mean_height - 10e-3 - found.top.height
     moved = state.displacement[found.top.dofs]
     assert state.force > 0.0
     assert np.all(moved <= gap + 1e-15)
-    assert np.all(state.pressing >= 0.0)
-    np.testing.assert_allclose(moved[state.pressing > 0.0], gap[state.pressing > 0.0], atol=1e-15)
+    assert np.all(state.nodal_force >= 0.0)
+    np.testing.assert_allclose(
+        moved[state.nodal_force > 0.0], gap[state.nodal_force > 0.0], atol=1e-15
+    )
     # the bottom bears what the nodes press, to the tolerance of the linear solver
     assert state.reaction == pytest.approx(state.force, rel=1e-8)
 
@@ -55,17 +57,17 @@ def test_contact_conditions_and_balance():
 def test_unloading_and_direct_loading_lead_to_the_same_contact():
     one, other = obstacle(), obstacle()
     for approach in (4e-3, 12e-3, 8e-3):
-        state = one.press(Control(approach=approach, tilt=(2e-3, -1e-3)))
-    direct = other.press(Control(approach=8e-3, tilt=(2e-3, -1e-3)))
+        state = one.solve(Control(approach=approach, tilt=(2e-3, -1e-3)))
+    direct = other.solve(Control(approach=8e-3, tilt=(2e-3, -1e-3)))
     assert state.nodes == direct.nodes
     assert state.force == pytest.approx(direct.force, rel=1e-8)
 
 
 def test_plane_apart_finds_nothing():
     found = obstacle()
-    found.press(Control(approach=10e-3))
+    found.solve(Control(approach=10e-3))
     for block in (obstacle(), found):
-        state = block.press(Control(approach=-1e-3))
+        state = block.solve(Control(approach=-1e-3))
         assert (state.force, state.nodes, state.contact_area) == (0.0, 0, 0.0)
         assert not state.displacement.any()
 
@@ -76,7 +78,7 @@ def test_flat_top_on_rollers_is_a_column(element):
     # on quadratic triangles a uniform pressure has no force at the vertices
     state = obstacle(
         flat, sides="roller", shape=replace(SHAPE, cells=(6, 5, 3), element=element)
-    ).press(Control(approach=1e-3))
+    ).solve(Control(approach=1e-3))
     # uniform strain: exact for any mesh
     assert state.force == pytest.approx(MATERIAL.confined_modulus * 1e-3, rel=1e-8)
     assert state.contact_area == pytest.approx(1.0, rel=1e-12)
@@ -87,8 +89,8 @@ def test_force_and_approach_are_two_ways_to_the_same_contact():
     by_approach, by_force = obstacle(), obstacle()
     iterations = np.zeros(2)
     for approach in (4e-3, 6e-3, 12e-3, 3e-3):
-        one = by_approach.press(Control(approach=approach, tilt=lean))
-        other = by_force.press(Control(force=one.force, tilt=lean))
+        one = by_approach.solve(Control(approach=approach, tilt=lean))
+        other = by_force.solve(Control(force=one.force, tilt=lean))
         # both are converged to 1e-10 of the contact forces
         assert other.approach == pytest.approx(approach, rel=1e-8)
         assert other.force == pytest.approx(one.force, rel=1e-9)
@@ -100,7 +102,7 @@ def test_force_and_approach_are_two_ways_to_the_same_contact():
 def test_a_small_force_after_a_large_one_is_met():
     found = obstacle()
     for force in (20.0, 1e-6):
-        state = found.press(Control(force=force))
+        state = found.solve(Control(force=force))
         # solves are converged to 1e-10 of the contact forces found, not of those before
         assert state.force == pytest.approx(force, rel=2e-10)
         assert state.reaction == pytest.approx(force, rel=2e-10)
@@ -109,14 +111,14 @@ def test_a_small_force_after_a_large_one_is_met():
 def test_free_plane_turns_until_there_is_no_moment():
     found = obstacle()
     for force in (1e-6, 0.5, 4.0):
-        state = found.press(Control(force=force, tilt=None))
+        state = found.solve(Control(force=force, tilt=None))
         assert state.force == pytest.approx(force, rel=1e-9)
         assert state.reaction == pytest.approx(force, rel=1e-9)
         np.testing.assert_allclose(state.moment, 0.0, atol=1e-9 * force)
         assert state.nodes >= 3  # fewer cannot hold a plane
-    held = obstacle().press(Control(approach=state.approach, tilt=state.tilt))
+    held = obstacle().solve(Control(approach=state.approach, tilt=state.tilt))
     assert held.force == pytest.approx(force, rel=1e-8)
-    turned = obstacle().press(Control(approach=state.approach, tilt=None))
+    turned = obstacle().solve(Control(approach=state.approach, tilt=None))
     assert turned.force == pytest.approx(force, rel=1e-8)
 
 
@@ -125,7 +127,7 @@ def test_no_force_is_first_touch(method):
     found = obstacle(method=method)
     touch = SURFACE.highest - SURFACE.mean_height - found.top.height.max()
     for control in (Control(force=0.0), Control(force=1.0), Control(force=0.0)):
-        state = found.press(control)
+        state = found.solve(control)
         assert (state.nodes > 0) == (state.force > 0.0) == bool(control.force)
     assert state.approach == pytest.approx(touch, rel=1e-12)
     assert state.reason == "CONVERGED_NO_CONTACT"
@@ -137,23 +139,23 @@ def test_no_force_is_first_touch(method):
 def test_one_step_to_merged_contacts(poisson_ratio):
     material = replace(MATERIAL, poisson_ratio=poisson_ratio)
     found, slow = obstacle(material=material), obstacle(material=material)
-    state = found.press(Control(approach=25e-3))
+    state = found.solve(Control(approach=25e-3))
     for approach in (10e-3, 18e-3, 25e-3):
-        small = slow.press(Control(approach=approach))
+        small = slow.solve(Control(approach=approach))
     assert state.force == pytest.approx(small.force, rel=1e-9)
     assert state.contact_area > 0.1
     assert small.active_sets <= 6
     # far back in one step
-    back = found.press(Control(approach=2e-3))
+    back = found.solve(Control(approach=2e-3))
     assert back.force == pytest.approx(
-        obstacle(material=material).press(Control(approach=2e-3)).force, rel=1e-8
+        obstacle(material=material).solve(Control(approach=2e-3)).force, rel=1e-8
     )
 
 
 def test_patches_share_force_area_and_closure():
     patches = PatchGrid(grid=(4, 2), lengths=(1.0, 1.0))
     found = obstacle(patches=patches)
-    state = found.press(Control(approach=12e-3, tilt=(2e-3, 1e-3)))
+    state = found.solve(Control(approach=12e-3, tilt=(2e-3, 1e-3)))
     assert state.patch_force.shape == (8,)
     assert state.patch_force.sum() == pytest.approx(state.force, rel=1e-12)
     assert state.patch_area.sum() == pytest.approx(state.contact_area, rel=1e-12)
@@ -162,7 +164,7 @@ def test_patches_share_force_area_and_closure():
     np.testing.assert_allclose(state.patch_closure, 12e-3 + lean - sag, rtol=1e-12)
     # what the whole top moves is the mean over equal patches
     assert state.patch_closure.mean() == pytest.approx(
-        obstacle().press(Control(approach=12e-3, tilt=(2e-3, 1e-3))).patch_closure[0], rel=1e-9
+        obstacle().solve(Control(approach=12e-3, tilt=(2e-3, 1e-3))).patch_closure[0], rel=1e-9
     )
     # gap and displacement of the top make up the separation
     rest = (
@@ -173,14 +175,14 @@ def test_patches_share_force_area_and_closure():
 
 def test_failed_step_changes_nothing(monkeypatch):
     found = obstacle()
-    found.press(Control(approach=4e-3))
+    found.solve(Control(approach=4e-3))
     monkeypatch.setattr(active_nodes, "_MOST_SOLVES", 1)
-    message = r"the contact of the rough block under an approach of 0\.02 mm did not .*: ACTIVE_SET"
+    message = r"the contact of the rough block at approach 0\.02 mm did not .*: ACTIVE_SET"
     with pytest.raises(NotConverged, match=message):
-        found.press(Control(approach=20e-3))
+        found.solve(Control(approach=20e-3))
     monkeypatch.undo()
-    again = found.press(Control(approach=8e-3))
-    assert again.force == pytest.approx(obstacle().press(Control(approach=8e-3)).force, rel=1e-8)
+    again = found.solve(Control(approach=8e-3))
+    assert again.force == pytest.approx(obstacle().solve(Control(approach=8e-3)).force, rel=1e-8)
 
 
 def test_wrong_input_is_refused():
@@ -198,7 +200,7 @@ def test_wrong_input_is_refused():
 def test_a_patch_without_a_node_is_closed_like_the_nearest():
     patches = PatchGrid(grid=(40, 1), lengths=(1.0, 1.0))  # on 16 cells
     found = obstacle(patches=patches)
-    state = found.press(Control(approach=10e-3))
+    state = found.solve(Control(approach=10e-3))
     assert state.patch_force.sum() == pytest.approx(state.force, rel=1e-12)
     # a node on a border belongs to both sides
     beside = np.abs(found.top.x[:, None] - patches.centres[:, 0])

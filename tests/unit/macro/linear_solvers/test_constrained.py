@@ -7,7 +7,7 @@ from petsc4py import PETSc
 
 from geometry import BlockShape, NotConverged
 from macro import Block, Material, block_mesh
-from macro.linear_solvers.constrained import FreeSolver
+from macro.linear_solvers.constrained import ConstrainedSolver
 
 RANDOM = np.random.default_rng(4)
 
@@ -28,9 +28,9 @@ def test_what_is_free_solves_and_what_is_held_stays(block):
     matrix = block.stiffness.getValues(every, every)
     held = RANDOM.choice(count, count // 4, replace=False)
     start, right = RANDOM.standard_normal((2, count))
-    solver, found = FreeSolver(block.stiffness, block.solver.pc), vector_of(start)
-    solver.hold(np.arange(5))  # forgotten by the next
-    solver.hold(held)
+    solver, found = ConstrainedSolver(block.stiffness, block.solver.pc), vector_of(start)
+    solver.constrain(np.arange(5))  # forgotten by the next
+    solver.constrain(held)
     assert solver.improve(found, vector_of(right - matrix @ start), 1e-8) > 0
     residual = right - matrix @ found.array_r
     free = np.setdiff1d(np.arange(count), held)
@@ -40,7 +40,10 @@ def test_what_is_free_solves_and_what_is_held_stays(block):
 
 
 def test_numbers_that_are_none_do_not_converge(block):
-    solver, found = FreeSolver(block.stiffness, block.solver.pc), block.stiffness.createVecRight()
+    solver, found = (
+        ConstrainedSolver(block.stiffness, block.solver.pc),
+        block.stiffness.createVecRight(),
+    )
     residual = found.duplicate()
     residual.set(np.inf)
     with pytest.raises(NotConverged, match="the linear solve of the rough block"):
@@ -54,8 +57,8 @@ def test_held_degrees_of_freedom_move_together(block):
     held = np.sort(RANDOM.choice(count, count // 4, replace=False))
     motions = np.linalg.qr(RANDOM.standard_normal((len(held), 2)))[0]
     start, right = RANDOM.standard_normal((2, count))
-    solver, found = FreeSolver(block.stiffness, block.solver.pc), vector_of(start)
-    solver.hold(held, motions)
+    solver, found = ConstrainedSolver(block.stiffness, block.solver.pc), vector_of(start)
+    solver.constrain(held, motions)
     solver.improve(found, vector_of(right - matrix @ start), 1e-8)
     free = np.setdiff1d(np.arange(count), held)
     ways = np.zeros((count, len(free) + 2))

@@ -7,9 +7,8 @@ from petsc4py import PETSc
 
 from geometry import BlockShape
 from macro import Block, Material, block_mesh
-from macro.linear_solvers.constrained import TOLERANCE, FreeSolver, asked_tolerance
-from macro.linear_solvers.constrained_preconditioner import HeldPreconditioner
-from macro.linear_solvers.projection import Projection
+from macro.linear_solvers.constrained import TOLERANCE, ConstrainedSolver, contact_tolerance
+from macro.linear_solvers.constrained_preconditioner import ConstrainedPreconditioner, Projection
 
 MATERIAL = Material(young_modulus=4e3, poisson_ratio=0.2)
 
@@ -33,10 +32,10 @@ def test_it_is_symmetric_and_positive(layers, motions):
     dofs, count = pressed_dofs(block, 0.3), block.dofs
     q = np.full((len(dofs), motions), len(dofs) ** -0.5)
     left = Projection(MPI.COMM_SELF)
-    left.hold(dofs, q)
-    mended = HeldPreconditioner(block.stiffness, block.solver.pc, left, layers)
-    mended.hold(np.arange(7))  # forgotten by the next
-    mended.hold(dofs)
+    left.constrain(dofs, q)
+    mended = ConstrainedPreconditioner(block.stiffness, block.solver.pc, left, layers)
+    mended.constrain(np.arange(7))  # forgotten by the next
+    mended.constrain(dofs)
     free = np.setdiff1d(np.arange(count), dofs)
     ways = np.zeros((count, len(free) + motions))  # an orthonormal basis of what is left
     ways[free, np.arange(len(free))] = 1.0
@@ -63,8 +62,8 @@ def test_held_unknowns_cost_few_iterations(cells, options, layers):
     dofs = pressed_dofs(block, 0.26)
 
     def iterations(held, reach):
-        solver = FreeSolver(block.stiffness, block.solver.pc, layers=reach)
-        solver.hold(held)
+        solver = ConstrainedSolver(block.stiffness, block.solver.pc, layers=reach)
+        solver.constrain(held)
         sag, load = (block.stiffness.createVecRight() for _ in range(2))
         sag.array[dofs] = -1.0
         block.stiffness.mult(sag, load)
@@ -79,9 +78,9 @@ def test_held_unknowns_cost_few_iterations(cells, options, layers):
 
 def test_users_say_how_well_contacts_are_solved_for():
     options = PETSc.Options("patchlaw_")
-    assert asked_tolerance() == TOLERANCE
+    assert contact_tolerance() == TOLERANCE
     options["ksp_rtol"] = 1e-5
     try:
-        assert asked_tolerance() == 1e-5
+        assert contact_tolerance() == 1e-5
     finally:
         options.delValue("ksp_rtol")

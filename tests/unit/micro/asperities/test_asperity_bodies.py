@@ -99,7 +99,7 @@ def test_is_the_dense_solution(name, solver, sign):
     model = asperity_model(name, apart(), contact_modulus=MODULUS, solver=solver, body=body(sign))
     state = model.solve(8e-3, tilt=(3e-3, -2e-3))
     plane = model.equilibrium(Control(approach=8e-3, tilt=(3e-3, -2e-3))).plane
-    t, force = dense(model, plane.overlap(model.asperities))
+    t, force = dense(model, model.asperities.interference(plane))
     assert 4 < np.count_nonzero(t) < 9  # some are in contact, some are not
     # contact conditions are met to 1e-10 of the approach
     assert state.force == pytest.approx(force, rel=1e-8, abs=1e-10)

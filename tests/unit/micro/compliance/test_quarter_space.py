@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geometry.partition import UnevenPartition
+from geometry.patches import UnevenPartition
 from micro.closed_forms.boussinesq import HalfSpace
 from micro.compliance.quarter_space import QuarterSpace, side_traction
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, root
 
-from geometry.control import Control
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
 from multiscale.couplings.dense_newton import DenseNewton
 
 

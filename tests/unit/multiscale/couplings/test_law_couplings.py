@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from geometry.control import Control
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
 from multiscale.couplings.load_steps import EmbeddedCoupling
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
@@ -32,7 +32,7 @@ def law(end=1.0, **columns):
 class EasyBlock:
     """Stands for a block that gives way to nothing: closures are the approach."""
 
-    def press(self, control):
+    def solve(self, control):
         self.approach = approach = control.approach
         return SimpleNamespace(
             approach=approach,
@@ -92,9 +92,3 @@ def test_remedy_beyond_a_consistent_law_fits_what_is_wrong(falls, remedy):
     table = LawTable(patches=PATCHES, laws=(law(), bent), made_by={"coupling": "consistent"})
     with pytest.raises(BeyondLaws, match=f"LAW_RANGE: .*: take coupling.{remedy}"):
         EmbeddedCoupling(EasyBlock(), table, interface=None).press(Control(approach=0.8))
-
-
-def test_tilt_turns_about_the_middle():
-    approaches = PATCHES.mean_approaches(0.01, (0.004, 0.1))
-    # patch centres lie a quarter of a millimetre beside the middle, along x only
-    np.testing.assert_allclose(approaches, [0.009, 0.011], rtol=1e-12)

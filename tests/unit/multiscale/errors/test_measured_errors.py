@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.control import Control
 from geometry.errors import NotConverged
+from geometry.rigid_plane import Control
 from multiscale import Run, Scene, run
 from multiscale.couplings.blocks import on_body
 from multiscale.errors.measured import ErrorProbe, MeasuredErrors

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from geometry import PatchGrid, Spectrum, patch_means, synthesise
-from geometry.control import Control
+from geometry.rigid_plane import Control
 from micro import influence_matrix, micro_model
 from multiscale.couplings.condensed import CondensedCoupling, FreePlaneCoupling
 from multiscale.laws.consistent import WholeSurface, consistent_laws

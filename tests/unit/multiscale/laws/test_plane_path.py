@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from geometry import InputError, NotConverged, PatchGrid, Spectrum, patch_means, synthesise
-from geometry.control import Control
+from geometry.rigid_plane import Control
 from micro import influence_matrix, micro_model
 from multiscale.couplings.condensed import FreePlaneCoupling
 from multiscale.laws.consistent import consistent_laws

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from geometry import PatchGrid, Spectrum, patch_means, synthesise
-from geometry.control import Control
+from geometry.rigid_plane import Control
 from micro import BodyModes, micro_model
 from multiscale.couplings.load_steps import ContactCoupling
 from multiscale.laws.consistent import consistent_laws

@@ -1,7 +1,76 @@
+"""Maxima of the interpolant in the closed rectangle."""
+
 import numpy as np
 import pytest
 
-from geometry.maxima import grid_maxima
+from geometry import Surface
+from geometry.summits import coincident, constrained_summits, grid_maxima
+
+N = 20
+
+
+def dome(cx, cy):
+    x = (np.arange(N) + 0.5) / N
+    return Surface(heights=-((x[:, None] - cx) ** 2) - 2 * (x - cy) ** 2, lengths=(1.0, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("centre", "expected"),
+    [
+        ((0.52, 0.48), (0.52, 0.48)),  # inside
+        ((-0.3, 0.48), (0.0, 0.48)),  # falls from the edge inward: maximum along the edge
+        ((0.52, 1.4), (0.52, 1.0)),
+        ((-0.3, 1.4), (0.0, 1.0)),  # corner
+    ],
+)
+def test_quadratic_is_climbed_exactly(centre, expected):
+    start = np.clip(np.floor(np.array(expected) * N), 0, N - 1)
+    found = constrained_summits(dome(*centre), (start[None] + 0.5) / N)
+    assert found[0] == pytest.approx(expected, abs=1e-12)  # the spline is the quadratic
+
+
+def test_convex_flank_ends_on_the_edge():
+    x = (np.arange(N) + 0.5) / N
+    ridge = Surface(heights=(x[:, None] - 0.9) ** 2 - (x - 0.5) ** 2, lengths=(1.0, 1.0))
+    assert constrained_summits(ridge, np.array([[0.025, 0.525]]))[0] == pytest.approx(
+        (0.0, 0.5), abs=1e-12
+    )
+
+
+def test_stays_where_nothing_is_gained():
+    x = (np.arange(N) + 0.5) / N
+    saddle = Surface(heights=(x[:, None] - 0.5) ** 2 - (x - 0.5) ** 2, lengths=(1.0, 1.0))
+    start = np.array([[0.5, 0.5]])
+    assert constrained_summits(saddle, start) == pytest.approx(start)
+    flat = Surface(heights=np.full((N, N), 3.0), lengths=(1.0, 1.0))
+    assert constrained_summits(flat, start) == pytest.approx(start)
+    assert constrained_summits(flat, np.empty((0, 2))).shape == (0, 2)
+
+
+def test_climbs_slopes_and_oblique_ridges_to_their_end():
+    """Samples on such a ridge are higher than their neighbours, many cells from the summit."""
+    x = (np.arange(N) + 0.5) / N
+    slope = Surface(heights=np.add.outer(x, x), lengths=(1.0, 1.0))
+    assert constrained_summits(slope, np.array([[0.5, 0.5]]))[0] == pytest.approx((1.0, 1.0))
+    u, v = np.add.outer(x, -x), np.add.outer(x, x) - 1.04
+    ridge = Surface(heights=-10.0 * (u - 0.1) ** 2 - 0.01 * v**2, lengths=(1.0, 1.0))
+    starts = np.array([[0.225, 0.125], [0.875, 0.775]])
+    found = constrained_summits(ridge, starts)
+    np.testing.assert_allclose(found, 2 * [[0.57, 0.47]], atol=1e-10)
+    assert len(np.unique(coincident(ridge, found))) == 1
+    assert len(np.unique(coincident(ridge, starts))) == 2
+
+
+def test_goes_on_across_the_border_where_that_does_not_end_the_surface():
+    x = (np.arange(N) + 0.5) / N
+    waves = np.cos(2.0 * np.pi * (x - 0.01))
+    surface = Surface(heights=np.add.outer(waves, waves), lengths=(1.0, 1.0), periodic=True)
+    start = np.array([[0.975, 0.025]])
+    # the spline through 20 samples of a wave misses the place by 4e-5
+    free = constrained_summits(surface, start, bounded=False)
+    np.testing.assert_allclose(free, [[1.01, 0.01]], atol=1e-4)
+    held = constrained_summits(surface, start)
+    assert held[0] == pytest.approx((1.0, 0.01), abs=1e-4)
 
 
 def flooded(heights, periodic):

@@ -1,6 +1,6 @@
-"""Size of a typical contact, estimated from the surface alone.
+"""Where a mesh has to be fine, and how fine: judged from the rough surface and the plane alone.
 
-Of a cap in reach of the plane Hertz' contact takes half the area, whatever its curvature.
+Of a cap that the plane can touch, Hertz's contact takes half the area, whatever its curvature.
 """
 
 from __future__ import annotations
@@ -8,16 +8,67 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from geometry.errors import InputError
 from geometry.surface import Surface
+
+Array = NDArray[np.float64]
 
 EDGES = 3.0
 """Edges along the radius of a typical contact, of the finest tetrahedra unless stated."""
 
 _MERGING = 0.05
 """Share of the surface in reach above which contacts merge instead of growing wider."""
+
+
+def places_in_reach(
+    surface: Surface,
+    approach: float,
+    *,
+    spacing: float,
+    tilt: tuple[float, float] = (0.0, 0.0),
+) -> Array:
+    """Return places that the plane can touch: where the surface stands out behind it.
+
+    The half-space only moves away under pressure, so that nothing else can come into contact.
+
+    Args:
+        surface: The rough surface.
+        approach: Largest approach at the middle of the surface [mm].
+        spacing: Distance between places [mm].
+        tilt: Slopes of the approach along x and y.
+
+    Returns:
+        Points of a square lattice, shape (n, 2) [mm]; at least that of the largest depth.
+    """
+    x, y = (
+        np.linspace(0.0, length, max(2, math.ceil(length / spacing) + 1))
+        for length in surface.lengths
+    )
+    lattice = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    grid = np.vstack([lattice, surface.highest_point])
+    depth = depth_below_plane(surface, grid, approach, tilt)
+    return grid[depth >= min(0.0, float(depth.max()))]
+
+
+def depth_below_plane(
+    surface: Surface, points: Array, approach: float, tilt: tuple[float, float] = (0.0, 0.0)
+) -> Array:
+    """Return how far the undeformed surface stands out behind the rigid plane [mm].
+
+    Args:
+        surface: The rough surface.
+        points: Places on it, shape (…, 2) [mm].
+        approach: Approach at the middle of the surface, from first touch of a level plane [mm].
+        tilt: Slopes of the approach along x and y.
+
+    Returns:
+        Depths, shape (…); negative where there is a gap.
+    """
+    lean = (points - 0.5 * np.array(surface.lengths)) @ np.array(tilt)
+    return surface.height_at(points[..., 0], points[..., 1]) - surface.highest + approach + lean
 
 
 def suggested_fine(

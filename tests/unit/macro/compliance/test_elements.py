@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from geometry.legendre_modes import mode_values
-from macro.compliance.line import Line, mode_integrals
+from macro.compliance.elements import Line, mode_integrals
 
 LINES = {
     "any": Line(ticks=(-1.0, -0.3, 0.0), degrees=(3, 5)),

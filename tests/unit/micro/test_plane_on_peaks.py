@@ -1,12 +1,13 @@
-"""Balancing a plane on springs whose loads are known in closed form."""
+"""A plane in equilibrium on springs whose loads are known in closed form."""
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
 from geometry import Control, NotConverged
-from micro.plane import RigidPlane
-from micro.plane_equilibrium import Held, Peaks, balanced, contact_stiffness
+from geometry.plane_equilibrium import PlaneResponse
+from geometry.rigid_plane import PlaneLevers, RigidPlane
+from micro.plane_on_peaks import Peaks, contact_stiffness
 
 X = np.array([-0.4, 0.3, 0.1, -0.2, 0.45])
 Y = np.array([-0.3, -0.4, 0.35, 0.4, 0.05])
@@ -28,13 +29,17 @@ class Springs:
     def __call__(self, plane):
         self.evaluations += 1
         forces, w = self.forces(plane), np.maximum(self.lever @ plane - self.touch, 0.0)
-        stiffness = contact_stiffness(self.lever, 1.5 * LAW * self.known * np.sqrt(w))
-        return Held(self.lever.T @ forces, stiffness), forces
+        rates = 1.5 * LAW * self.known * np.sqrt(w)
+        return PlaneResponse(
+            loads=self.lever.T @ forces,
+            stiffness=lambda: contact_stiffness(self.lever, rates),
+            state=forces,
+        )
 
     def balance(self, control, near=None):
-        peaks = Peaks(lever=self.lever, below=self.touch, force=self.alone, half=HALF)
-        plane, forces = balanced(self, control, peaks.first_plane(control, near), peaks)
-        return plane, forces
+        levers = PlaneLevers(matrix=self.lever, half=HALF)
+        peaks = Peaks(levers=levers, depth=self.touch, force=self.alone)
+        return peaks.equilibrium(self, control, peaks.first_plane(control, near))
 
     @staticmethod
     def alone(overlap):
@@ -130,7 +135,7 @@ def test_plane_turns_away_from_springs_beside_the_middle():
 
 
 def test_force_that_nothing_bears_is_refused():
-    with pytest.raises(NotConverged, match=r"balance of the plane at force .* NO_CONTACT"):
+    with pytest.raises(NotConverged, match=r"equilibrium of the plane at force .* NO_CONTACT"):
         Springs([], [], []).balance(Control(force=1.0))
 
 

@@ -1,0 +1,243 @@
+"""The rigid plane that presses on a rough surface: what is prescribed of it, and where it is.
+
+The plane has three motions: its approach δ at the centre (xc, yc) of the interface, and its slopes
+tx and ty. At a point (x, y) it comes nearer by δ + tx (x − xc) + ty (y − yc), that is by the row
+(1, x − xc, y − yc) of the lever matrix times (δ, tx, ty). The transpose of that matrix sums forces
+at points to the loads of the plane: the force and its two first moments about the centre.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from geometry.errors import InputError
+from geometry.patches import Partition
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+class Rectangular(Protocol):
+    """Anything on a rectangle that starts at the origin, such as a surface."""
+
+    @property
+    def lengths(self) -> tuple[float, float]:
+        """Sides (Lx, Ly) [mm]."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Control:
+    """Approach or force, and tilt or zero moment, of the rigid plane at one load step.
+
+    Args:
+        approach: Approach at the middle of the interface, from first touch [mm]; None when the
+            force is prescribed.
+        force: Normal force, ≥ 0 [N]; None when the approach is prescribed.
+        tilt: Slopes (tx, ty) of the approach about the middle of the interface [mm/mm]; None lets
+            the plane turn until the pressures have no moment about the middle.
+
+    Raises:
+        InputError: When not exactly one of approach and force is given, or a number is not finite
+            or the force negative.
+    """
+
+    approach: float | None = None
+    force: float | None = None
+    tilt: tuple[float, float] | None = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if (self.approach is None) == (self.force is None):
+            raise InputError(
+                "a load step prescribes either the approach or the force",
+                value=(self.approach, self.force),
+                allowed="exactly one of them",
+            )
+        if self.approach is not None:
+            _check_approach(self.approach)
+        if self.force is not None and not (np.isfinite(self.force) and self.force >= 0.0):
+            raise InputError("the force must not be negative", value=self.force, allowed="≥ 0 N")
+        if self.tilt is not None:
+            _check_tilt(self.tilt)
+
+    def __str__(self) -> str:
+        """Say what presses, as in "force 2 N"."""
+        if self.force is not None:
+            return f"force {self.force:.6g} N"
+        return f"approach {self.approach:.6g} mm"
+
+    @property
+    def loads(self) -> Array:
+        """Loads along free motions: the force, and no moments, shape (3,) [N, N mm]."""
+        return np.array([self.force or 0.0, 0.0, 0.0])
+
+    @property
+    def free(self) -> Flags:
+        """Which of approach and slopes follow from the loads, shape (3,).
+
+        Without force nothing turns the plane, and it is placed where it touches first.
+        """
+        turns = self.tilt is None and self.force != 0.0
+        return np.array([bool(self.force), turns, turns])
+
+    def prescribed(self, motion: Array) -> Array:
+        """Return a plane's approach and slopes, shape (3,), with the prescribed ones put in."""
+        found = np.array(motion, dtype=np.float64)
+        if self.approach is not None:
+            found[0] = self.approach
+        if self.tilt is not None:
+            found[1:] = self.tilt
+        return found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RigidPlane:
+    """Approach δ(x, y) = δ + tx (x − xc) + ty (y − yc), counted from first touch when level.
+
+    Args:
+        approach: δ at the centre of the rectangle [mm].
+        tilt: Slopes (tx, ty) [mm/mm].
+        centre: Centre (xc, yc) of the rectangle [mm].
+
+    Raises:
+        InputError: When a number is not finite or the tilt is not a pair.
+    """
+
+    approach: float
+    tilt: tuple[float, float]
+    centre: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        _check_approach(self.approach)
+        _check_tilt(self.tilt)
+
+    @classmethod
+    def above(
+        cls, rough: Rectangular, approach: float, tilt: tuple[float, float] = (0.0, 0.0)
+    ) -> Self:
+        """Return the plane that turns about the centre of a surface's rectangle."""
+        lx, ly = rough.lengths
+        return cls(approach=float(approach), tilt=tilt, centre=(0.5 * lx, 0.5 * ly))
+
+    @classmethod
+    def moved(cls, rough: Rectangular, motion: Array) -> Self:
+        """Return the plane above a surface whose approach and slopes are a vector, shape (3,)."""
+        approach, tx, ty = map(float, motion)
+        return cls.above(rough, approach, (tx, ty))
+
+    @property
+    def motion(self) -> Array:
+        """Approach [mm] and slopes as a vector, shape (3,)."""
+        return np.array([self.approach, *self.tilt])
+
+    def at(self, x: Array, y: Array) -> Array:
+        """Return the approach at points [mm]."""
+        (tx, ty), (xc, yc) = self.tilt, self.centre
+        return self.approach + tx * (x - xc) + ty * (y - yc)
+
+    def means(self, patches: Partition) -> Array:
+        """Return the mean approach over every patch, shape (N,) [mm]."""
+        return self.at(*patches.centres.T)
+
+    def moment(self, x: Array, y: Array, force: Array) -> tuple[float, float]:
+        """Return the first moments of forces at points about the centre [N mm]."""
+        (xc, yc), force = self.centre, np.asarray(force)
+        return float(np.sum(force * (x - xc))), float(np.sum(force * (y - yc)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlaneLevers:
+    """How the motions of a plane move points, and how forces at the points load the plane.
+
+    Args:
+        matrix: Displacements of this rank's points by unit motions, columns 1, x − xc, y − yc,
+            shape (n, 3) [1, mm, mm].
+        half: Half the diagonal of the interface, by which moments are compared with forces [mm].
+        comm: MPI communicator (mpi4py) whose ranks share the points; None for a single process.
+
+    Note:
+        Methods that sum over the points are collective.
+    """
+
+    matrix: Array
+    half: float
+    comm: Any = None
+
+    @classmethod
+    def at(
+        cls,
+        x: Array,
+        y: Array,
+        lengths: tuple[float, float],
+        *,
+        centre: ArrayLike | None = None,
+        comm: Any = None,
+    ) -> Self:
+        """Return the levers of points.
+
+        Args:
+            x: Abscissae of the points, shape (n,) [mm].
+            y: Their ordinates, shape (n,) [mm].
+            lengths: Sides (Lx, Ly) of the interface [mm].
+            centre: Centre (xc, yc) that the plane turns about [mm]; by default that of an interface
+                that begins at the origin.
+            comm: MPI communicator (mpi4py); None for a single process.
+        """
+        xc, yc = 0.5 * np.asarray(lengths) if centre is None else np.asarray(centre)
+        matrix = np.column_stack((np.ones_like(x), x - xc, y - yc))
+        return cls(matrix=matrix, half=0.5 * float(np.hypot(*lengths)), comm=comm)
+
+    @property
+    def unit(self) -> Array:
+        """Approach and slopes by which the interface's corner moves 1 mm, shape (3,)."""
+        return motion_units(self.half)
+
+    def scaled(self, free: Flags) -> Array:
+        """Return what the free motions in `unit` move the points by, shape (n, k)."""
+        return self.matrix[:, free] * self.unit[free]
+
+    def loads(self, forces: Array) -> Array:
+        """Return force and first moments about the centre, shape (3,) [N, N mm].
+
+        Args:
+            forces: Forces at the points, shape (n,) [N].
+        """
+        return self.summed(self.matrix.T @ forces)
+
+    def stiffness(self, rates: Array) -> Array:
+        """Return the derivative of the loads by the motions, shape (3, 3).
+
+        Args:
+            rates: Derivatives of the forces at the points by their displacements, shape (n,)
+                [N/mm].
+        """
+        return self.summed(self.matrix.T @ (rates[:, None] * self.matrix))
+
+    def summed(self, values: Array) -> Array:
+        """Return the sum over all ranks."""
+        return values if self.comm is None else self.comm.allreduce(values)
+
+
+def motion_units(half: float) -> Array:
+    """Return approach and slopes by which an interface's corner moves 1 mm, shape (3,).
+
+    Args:
+        half: Half the diagonal of the interface [mm].
+    """
+    return np.array([1.0, 1.0 / half, 1.0 / half])
+
+
+def _check_approach(approach: float) -> None:
+    if not np.isfinite(approach):
+        raise InputError("the approach must be finite", value=approach, allowed="mm")
+
+
+def _check_tilt(tilt: tuple[float, float]) -> None:
+    if np.shape(tilt) != (2,) or not np.all(np.isfinite(tilt)):
+        raise InputError(
+            "the tilt must be two finite slopes", value=tilt, allowed="(tx, ty) in mm/mm"
+        )

@@ -1,0 +1,127 @@
+"""The rigid plane over the nodes of a rough top: gaps, loads, and rest on springs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.errors import NotConverged
+from geometry.plane_equilibrium import UNSUPPORTED, PlaneResponse, find_equilibrium
+from geometry.rigid_plane import Control, PlaneLevers
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+class PlaneOverNodes:
+    """A rigid plane above this rank's nodes on the top.
+
+    Args:
+        x: Abscissae of the nodes, shape (n,) [mm].
+        y: Their ordinates [mm].
+        distance: Their distances from the plane at no approach and no tilt [mm].
+        lengths: Sides of the interface, about whose centre the plane turns [mm].
+        comm: MPI communicator.
+
+    Attributes:
+        distance: As given.
+        levers: Levers of the nodes.
+        centre: Centre of the interface, shape (2,) [mm].
+
+    Note:
+        Methods that sum over the nodes are collective.
+    """
+
+    def __init__(
+        self, x: Array, y: Array, distance: Array, lengths: tuple[float, float], comm: Any
+    ) -> None:
+        self.distance, self.centre = distance, 0.5 * np.asarray(lengths)
+        self.levers = PlaneLevers.at(x, y, lengths, comm=comm)
+
+    def placed(self, control: Control, plane: Array) -> Array:
+        """Return where the plane is, as far as that is prescribed, and elsewhere the start.
+
+        Without any force the plane just touches the top.
+
+        Args:
+            control: What the load step prescribes.
+            plane: Where the plane may start, shape (3,).
+        """
+        plane = control.prescribed(plane)
+        if control.force == 0.0:
+            plane[0] = self.first_touch(plane[1:])
+        return plane
+
+    def first_touch(self, tilt: Array) -> float:
+        """Return the approach at which a tilted plane first touches the undeformed top [mm]."""
+        levers = self.levers
+        least = float(np.min(self.distance - levers.matrix[:, 1:] @ tilt, initial=np.inf))
+        return float(min(levers.comm.allgather(least)))
+
+    def penetration(self, plane: Array, displacement: Array) -> Array:
+        """Return how far the plane is below the nodes, negative where it is above, (n,) [mm].
+
+        Args:
+            plane: Approach [mm] and slopes, shape (3,).
+            displacement: Downward displacements of the nodes, shape (n,) [mm].
+        """
+        return self.levers.matrix @ plane - displacement - self.distance
+
+    def supported_motions(self, free: Flags, at: Flags) -> Array:
+        """Return the combinations of free motions that move some of the nodes, shape (k, k').
+
+        They are scaled so that ``levers.scaled(free)[at]`` times them has orthonormal columns, all
+        ranks together.
+
+        Args:
+            free: Motions that are free, shape (3,).
+            at: Which of this rank's nodes are meant, shape (n,).
+        """
+        levers = self.levers.scaled(free)[at]
+        values, vectors = np.linalg.eigh(self.levers.summed(levers.T @ levers))
+        found = values > UNSUPPORTED * max(values.max(initial=0.0), 1.0)
+        scaled: Array = vectors[:, found] / np.sqrt(values[found])
+        return scaled
+
+    def on_springs(
+        self, control: Control, start: Array, displacement: Array, stiffness: Array
+    ) -> Array:
+        """Return where the plane comes to rest on springs at the nodes, shape (3,).
+
+        Args:
+            control: What the load step prescribes.
+            start: The plane to start from, with what is prescribed of it, shape (3,).
+            displacement: Downward displacements of the nodes, shape (n,) [mm].
+            stiffness: Stiffnesses of springs that only push, shape (n,) [N/mm].
+
+        Raises:
+            NotConverged: When nothing can hold the plane.
+        """
+
+        def respond(plane: Array) -> PlaneResponse[None]:
+            depth = self.penetration(plane, displacement)
+            return PlaneResponse(
+                loads=self.levers.loads(stiffness * np.maximum(depth, 0.0)),
+                stiffness=lambda: self.levers.stiffness(np.where(depth > 0.0, stiffness, 0.0)),
+                state=None,
+            )
+
+        return find_equilibrium(respond, control, start, self.levers.half)[0]
+
+
+def not_found(control: Control, reason: str, iterations: int) -> NotConverged:
+    """Return the error of a load step whose contact was not found.
+
+    Args:
+        control: What the load step prescribes.
+        reason: Name of the reason.
+        iterations: Iterations that were made.
+    """
+    return NotConverged(
+        f"the contact of the rough block at {control}",
+        reason=reason,
+        iterations=iterations,
+        remedy="take smaller load steps (load.steps)",
+    )

@@ -1,0 +1,1 @@
+"""What a run finds: its history, the record of a reference, notes on validity."""

@@ -1,0 +1,40 @@
+"""Materials and the contact modulus of two bodies."""
+
+import math
+
+import pytest
+
+from geometry import InputError, Material, MaterialPair
+
+RESIN = Material(young_modulus=4000.0, poisson_ratio=0.15)
+STEEL = Material(young_modulus=200e3, poisson_ratio=0.3)
+
+
+@pytest.mark.parametrize(
+    ("e", "nu", "match"),
+    [
+        (0.0, 0.3, r"0\.0: Young's modulus must be positive \(allowed: E > 0 MPa\)"),
+        (-4.0, 0.3, "Young's modulus"),
+        (math.nan, 0.3, "Young's modulus"),
+        (math.inf, 0.3, "Young's modulus"),
+        (1.0, 0.5, r"0\.5: Poisson's ratio is impossible \(allowed: -1 < ν < 0\.5\)"),
+        (1.0, -1.0, "Poisson's ratio"),
+        (1.0, math.nan, "Poisson's ratio"),
+    ],
+)
+def test_impossible_material_is_refused(e, nu, match):
+    with pytest.raises(InputError, match=match):
+        Material(young_modulus=e, poisson_ratio=nu)
+
+
+def test_moduli():
+    assert RESIN.contact_modulus == pytest.approx(4092.0716112531970)
+    assert RESIN.confined_modulus == pytest.approx(4000 * 0.85 / (1.15 * 0.7), rel=1e-14)
+    assert Material(young_modulus=2.0, poisson_ratio=0.0).lame == (0.0, 1.0)
+
+
+def test_both_bodies_count_alike():
+    assert MaterialPair(first=STEEL, second=STEEL).contact_modulus == pytest.approx(1e5 / 0.91)
+    pair, turned = MaterialPair(first=RESIN, second=STEEL), MaterialPair(first=STEEL, second=RESIN)
+    assert pair.contact_modulus == pytest.approx(turned.contact_modulus)
+    assert MaterialPair(first=RESIN).contact_modulus == RESIN.contact_modulus

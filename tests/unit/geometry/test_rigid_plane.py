@@ -1,0 +1,64 @@
+"""What a load step may prescribe of the rigid plane, and where the plane is then."""
+
+import numpy as np
+import pytest
+
+from geometry import Control, InputError, PatchGrid, Surface
+from geometry.rigid_plane import PlaneLevers, RigidPlane
+
+SQUARE = Surface(heights=np.zeros((4, 4)), lengths=(1.0, 1.0))
+
+
+def test_prescribes_approach_or_force_level_unless_told():
+    assert Control(approach=1e-3).tilt == (0.0, 0.0)
+    assert Control(force=2.0, tilt=None).approach is None
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({}, "either the approach or the force"),
+        ({"approach": 1e-3, "force": 1.0}, "exactly one"),
+        ({"approach": np.nan}, "approach must be finite"),
+        ({"force": -1.0}, "must not be negative"),
+        ({"force": np.inf}, "must not be negative"),
+        ({"force": 1.0, "tilt": (0.0, np.inf)}, "two finite slopes"),
+    ],
+)
+def test_refuses_what_is_no_load_step(given, message):
+    with pytest.raises(InputError, match=message):
+        Control(**given)
+
+
+def test_free_motions_follow_from_what_is_prescribed():
+    assert Control(approach=1.0).free.tolist() == [False, False, False]
+    assert Control(approach=1.0, tilt=None).free.tolist() == [False, True, True]
+    assert Control(force=1.0, tilt=None).free.tolist() == [True, True, True]
+    assert Control(force=0.0, tilt=None).free.tolist() == [False, False, False]
+    given = Control(force=1.0, tilt=(0.1, 0.2)).prescribed(np.full(3, 7.0))
+    assert given.tolist() == [7.0, 0.1, 0.2]
+
+
+def test_tilt_turns_about_the_centre():
+    x, y = np.array([0.5, 0.9, 0.1]), np.array([0.5, 0.5, 1.0])
+    plane = RigidPlane.above(SQUARE, 1e-3, (1e-2, -2e-2))
+    assert plane.at(x, y) == pytest.approx([1e-3, 5e-3, -1.3e-2])
+    assert PlaneLevers.at(x, y, SQUARE.lengths).matrix @ plane.motion == pytest.approx(
+        plane.at(x, y)
+    )
+    patches = PatchGrid(grid=(2, 1), lengths=SQUARE.lengths)
+    assert plane.means(patches) == pytest.approx([1e-3 - 2.5e-3, 1e-3 + 2.5e-3])
+    assert RigidPlane.moved(SQUARE, plane.motion) == plane
+
+
+@pytest.mark.parametrize(
+    ("approach", "tilt", "problem"),
+    [
+        (np.nan, (0.0, 0.0), "nan: the approach must be finite"),
+        (1.0, (0.0, np.inf), "the tilt must be two finite slopes"),
+        (1.0, (0.0,), "the tilt must be two finite slopes"),
+    ],
+)
+def test_refuses_what_is_no_plane(approach, tilt, problem):
+    with pytest.raises(InputError, match=problem):
+        RigidPlane.above(SQUARE, approach, tilt)
