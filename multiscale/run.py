@@ -9,7 +9,6 @@ from functools import cached_property
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from geometry.collective import on_root
@@ -17,9 +16,8 @@ from geometry.errors import NotConverged
 from micro import HalfSpaceModel, MicroModel
 from multiscale.couplings import assembly, blocks
 from multiscale.couplings.load_steps import EmbeddedCoupling
-from multiscale.couplings.reference import ReferenceCoupling
-from multiscale.errors.load_steps import checked, error_notes, error_probe
-from multiscale.errors.notes import approximation_notes
+from multiscale.errors.load_steps import checked, error_probe
+from multiscale.errors.notes import noted_history
 from multiscale.laws.files import law_bytes, read_laws
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
@@ -70,20 +68,15 @@ class Run:
         self._notes: list[str] = []
         self._on_body: blocks.OnBody | None = None
         blocks.load_finite_elements(scene, comm)
-        nodes = nodes_of(comm)
-        self.setup: ProblemSetup = on_root(
-            for_large(comm), lambda: make_setup(scene, resolved, nodes)
-        )
-        self.scene = self.setup.scene
-        self.seconds = dict(self.setup.seconds)
+        nodes, large = nodes_of(comm), for_large(comm)
+        self.setup: ProblemSetup = on_root(large, lambda: make_setup(scene, resolved, nodes))
+        self.scene, self.seconds = self.setup.scene, dict(self.setup.seconds)
 
     def make_body(self) -> blocks.OnBody | None:
         """Make what puts the half-space model on its body, once; None for other micro models."""
         if self._on_body is None and isinstance(self.setup.micro, HalfSpaceModel):
             with self.phase("block"):
-                self._on_body = blocks.on_body(
-                    self.setup, self.comm, half_space=not self.setup.embedded
-                )
+                self._on_body = blocks.on_body(self.setup, self.comm)
         return self._on_body
 
     def make_model(self) -> MicroModel:
@@ -104,10 +97,8 @@ class Run:
         """Make what finds the load steps, once, and what it needs."""
         if self.coupling is None:
             with self.phase("block"):
-                made: LawTable | MicroModel | None = None
-                if self.setup.micro is not None:
-                    made = self.make_laws() if self.setup.by_laws else self.make_model()
-                coupling = assembly.assemble(self.setup, made, self.comm)
+                make = self.make_laws if self.setup.by_laws else self.make_model
+                coupling = assembly.assemble(self.setup, make, self.comm)
                 if self._start and isinstance(coupling, Restorable):
                     coupling.restore(self._start)
                 self.coupling = coupling
@@ -129,14 +120,13 @@ class Run:
     def _checked(self, step: LoadStep) -> LoadStep:
         """Return a load step with its errors, where they are to be measured."""
         check = self.scene.output.check
-        wanted = check != "none" and (check != "last" or self.finished)
-        body = self.make_body() if wanted else None
-        if body is None:
+        wanted = check == "all" or (check == "last" and self.finished)
+        if not wanted or (body := self.make_body()) is None:
             return step
         with self.phase("check"):
             try:
-                probe = error_probe(self.setup, body)
-                return checked(step, probe, self.scene.loading.load_history, self.comm)
+                history = self.scene.loading.load_history
+                return checked(step, error_probe(self.setup, body), history, self.comm)
             except NotConverged as error:
                 self._notes.append(f"errors of load step {step.step} not measured: {error}")
                 return step
@@ -144,8 +134,8 @@ class Run:
     @property
     def finished(self) -> bool:
         """Whether the load history has come to its end."""
-        ends = self.position.targets == self.scene.loading.load_history.count
-        return ends and not self.position.ahead
+        targets = self.scene.loading.load_history.count
+        return self.position.targets == targets and not self.position.ahead
 
     @cached_property
     def resolved(self) -> dict[str, Any]:
@@ -172,9 +162,7 @@ class Run:
             laws: What `law_bytes` was then.
         """
         self.steps, self.position, self._start = list(steps), position, state
-        self._notes.append(
-            f"resumed after load step {len(steps)}; times of phases are those since then"
-        )
+        self._notes += [f"resumed after load step {len(steps)}; phase times are those since then"]
         if laws:
             self.table = read_laws(BytesIO(laws))
 
@@ -190,29 +178,23 @@ class Run:
 
     def history(self) -> History:
         """Return the load steps accepted so far, with times and notes."""
-        steps, record = tuple(self.steps), None
-        notes = [*approximation_notes(self.setup, self.table, steps), *self._notes]
-        notes += error_notes(self.steps, self.given.accuracy)
-        if isinstance(self.coupling, ReferenceCoupling):
-            record = self.coupling.record(self.steps)
-            steps = record.with_errors(steps)
-            notes += self.coupling.notes(record, self.steps)
-        return History(
-            steps=steps,
-            patches=self.setup.patches,
-            seconds=dict(self.seconds),
-            notes=tuple(notes),
-            reference=record,
+        return noted_history(
+            self.setup,
+            self.steps,
+            coupling=self.coupling,
+            table=self.table,
+            accuracy=self.given.accuracy,
+            seconds=self.seconds,
+            notes=self._notes,
         )
 
     @property
     def unknowns(self) -> int | None:
         """Degrees of freedom of the mesh that load steps are solved on, where there is one."""
-        if isinstance(self.coupling, ReferenceCoupling | EmbeddedCoupling):
-            return self.coupling.blocks[-1].dofs
-        return None
+        meshed = assembly.meshed_blocks(self.coupling)
+        return meshed[-1].dofs if meshed else None
 
-    def last_field(self) -> tuple[Interface, NDArray[np.float64]]:
+    def last_field(self) -> tuple[Interface, NDArray]:
         """Return the meshed block and its displacements at the last load step, this rank's part.
 
         Where load steps are not solved on a mesh, one is loaded by the patches' mean pressures.
@@ -228,9 +210,8 @@ class Run:
         Note:
             Collective.
         """
-        if isinstance(self.coupling, ReferenceCoupling | EmbeddedCoupling):
-            blocks_to_free, self.coupling = self.coupling.blocks, None
-            blocks.free_blocks(blocks_to_free)
+        meshed, self.coupling = assembly.meshed_blocks(self.coupling), None
+        blocks.free_blocks(meshed)
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:
@@ -244,8 +225,7 @@ class Run:
             yield
         finally:
             within = sum(self.seconds.values()) - others
-            spent = time.perf_counter() - start - within
-            self.seconds[name] = self.seconds.get(name, 0.0) + spent
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start - within
 
 
 def run(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 from geometry.errors import InputError
 from geometry.rigid_plane import Control
@@ -11,12 +12,15 @@ from multiscale.couplings.blocks import embedding, patch_compliance, patch_displ
 from multiscale.couplings.condensed import CondensedCoupling, FreePlaneCoupling
 from multiscale.couplings.load_steps import ContactCoupling, EmbeddedCoupling
 from multiscale.couplings.newton_choice import newton_choice
-from multiscale.couplings.reference import make_reference
+from multiscale.couplings.reference import ReferenceCoupling, make_reference
 from multiscale.laws.consistent import consistent_laws
 from multiscale.laws.isolated import isolated_laws
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.stepper import Coupling
 from multiscale.setup.problem import ProblemSetup
+
+if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
+    from macro import Block
 
 
 def make_table(setup: ProblemSetup, model: MicroModel, comm: Any) -> LawTable:
@@ -70,20 +74,21 @@ def make_table(setup: ProblemSetup, model: MicroModel, comm: Any) -> LawTable:
     )
 
 
-def assemble(setup: ProblemSetup, made: LawTable | MicroModel | None, comm: Any) -> Coupling:
+def assemble(setup: ProblemSetup, make: Callable[[], LawTable | MicroModel], comm: Any) -> Coupling:
     """Put micro and macro model together as the scene asks.
 
     Args:
         setup: The problem set up from the scene.
-        made: The patch laws, of couplings that use them, or else the micro model on the body; None
-            in a reference.
+        make: Makes the patch laws, of couplings that use them, or else the micro model on the body;
+            not called for a reference.
         comm: MPI communicator; None for this process alone.
 
     Note:
         Collective.
     """
-    if made is None:
+    if setup.micro is None:
         return make_reference(setup, comm)
+    made = make()
     if not isinstance(made, LawTable):
         return ContactCoupling(made, setup.patches, setup.mean_heights, comm)
     condensed = newton_choice(setup, made).condensed
@@ -97,3 +102,14 @@ def assemble(setup: ProblemSetup, made: LawTable | MicroModel | None, comm: Any)
     interface = embedding(setup, comm)
     problem = LawContactProblem(interface.block, interface, made.laws, mode=mode)
     return EmbeddedCoupling(problem, made, interface)
+
+
+def meshed_blocks(coupling: Coupling | None) -> list[Block]:
+    """Return the meshed blocks that a coupling solves its load steps on, the finest last.
+
+    Args:
+        coupling: The coupling; None before it is made.
+    """
+    if isinstance(coupling, ReferenceCoupling | EmbeddedCoupling):
+        return coupling.blocks
+    return []

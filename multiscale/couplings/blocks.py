@@ -1,4 +1,4 @@
-"""Blocks for couplings: what the contact problem sees of them, their compliance, their mesh."""
+"""The block of a scene: its terms in the contact problem, its compliance, its mesh."""
 
 from __future__ import annotations
 
@@ -34,13 +34,15 @@ OnBody = Callable[[HalfSpaceModel, int], HalfSpaceModel]
 """Puts a half-space model on a body; with finite slopes up to an order, 0 for none."""
 
 SLOPES = 2
-"""Order of finite slopes where they are seen."""
+"""Order of finite slopes where they are taken into account."""
 
-_REACH = 0.25
-"""Reach of free sides in the micro model, of the shortest side of the block."""
-_SHARP = 1e-10
-"""Residual of half-space solutions: their forces are then right to 1e-12, so that neither the unit
-of length nor the number of ranks is seen in a result. It costs a tenth more than 1e-8."""
+_SIDE_REACH = 0.25
+"""Distance from a free side up to which the micro model sees it, relative to the shortest side of
+the block."""
+
+_RESIDUAL = 1e-10
+"""Residual of half-space solutions. Their forces are then right to 1e-12, so that neither the unit
+of length nor the number of ranks changes a result. It costs a tenth more than 1e-8."""
 
 
 def contact_model(setup: ProblemSetup, comm: Any, put_on_body: OnBody | None = None) -> MicroModel:
@@ -56,11 +58,11 @@ def contact_model(setup: ProblemSetup, comm: Any, put_on_body: OnBody | None = N
         Collective.
     """
     model = setup.model
-    embedded = setup.embedded and setup.scene.coupling.kind != "isolated"
+    isolated = setup.scene.coupling.kind == "isolated"
     if isinstance(model, HalfSpaceModel):
-        put_on_body = put_on_body or on_body(setup, comm, half_space=not embedded)
+        put_on_body = put_on_body or on_body(setup, comm, half_space=isolated)
         return put_on_body(model, SLOPES if setup.finite_slopes else 0)
-    if not embedded:
+    if isolated or not setup.embedded:
         return model
     body = scene_body(setup)
     return replace(model, body=body.term(body.face(comm)))  # type: ignore[type-var]
@@ -78,9 +80,9 @@ def on_body(
     """Return what puts half-space models on a scene's body, which is solved for once.
 
     Args:
-        setup: The scene's ingredients, with a half-space model.
+        setup: The problem set up from the scene, with a half-space model.
         comm: MPI communicator; None for this process alone.
-        half_space: Whether the body is a half-space instead of the scene's block.
+        half_space: Whether the body is a half-space even where the scene has a block.
         modes: Modes of the body along a side; by default those of its shape.
         coarse: Whether to take coarser elements for the body.
         face: What pressures do to the body's top, where that is known; then it is not collective.
@@ -92,16 +94,16 @@ def on_body(
     Note:
         Collective.
     """
-    body = None if half_space else scene_body(setup)
+    body = None if half_space or not setup.embedded else scene_body(setup)
     if body is not None and face is None:
         face = body.face(comm, modes=modes, coarse=coarse)
     section = setup.scene.block
     material = HalfSpace(section.young_modulus, section.poisson_ratio)
 
     def put(model: HalfSpaceModel, order: int) -> HalfSpaceModel:
-        surface, model = model.surface, replace(model, tolerance=_SHARP)
-        # heights count from the highest point, which is near the loads: slopes add least there;
-        # the flat body then reaches up to it, while the block's height is that of the mean plane
+        surface, model = model.surface, replace(model, tolerance=_RESIDUAL)
+        # With finite slopes heights count from the highest point, near the loads, where slopes add
+        # least. The flat body then ends at it, while the block's height is that of the mean plane.
         higher = surface.highest - surface.mean_height if order else 0.0
         beside: list[SurfaceStress] = []
         if body is not None and face is not None:
@@ -127,10 +129,10 @@ def _stresses(body: Body, face: FaceCompliance, surface: Surface) -> list[Surfac
 
 
 def scene_body(setup: ProblemSetup) -> Body:
-    """Return the block of a scene, some of whose free sides its micro model knows of itself.
+    """Return the block of a scene, without the free sides that its micro model has as a term.
 
     Args:
-        setup: The scene's ingredients.
+        setup: The problem set up from the scene.
     """
     return Body(
         shape=setup.shape,
@@ -141,12 +143,12 @@ def scene_body(setup: ProblemSetup) -> Body:
 
 
 def free_sides(setup: ProblemSetup) -> FreeSides | None:
-    """Return the free sides that a scene's half-space model takes into account itself.
+    """Return the free sides that a scene's half-space model has as a term of its own.
 
     None where there are none, or the micro model is another one.
 
     Args:
-        setup: The scene's ingredients.
+        setup: The problem set up from the scene.
     """
     return _block_sides(setup) if isinstance(setup.model, HalfSpaceModel) else None
 
@@ -158,7 +160,7 @@ def _block_sides(setup: ProblemSetup) -> FreeSides | None:
     return FreeSides(
         lengths=setup.surface.lengths,
         poisson_ratio=setup.scene.block.poisson_ratio,
-        reach=_REACH * min(*setup.surface.lengths, setup.shape.height),
+        reach=_SIDE_REACH * min(*setup.surface.lengths, setup.shape.height),
     )
 
 
@@ -166,7 +168,7 @@ def patch_displacements(setup: ProblemSetup, comm: Any, *, dense: bool) -> Calla
     """Return what gives the mean displacements of patches in the macro model of a scene.
 
     Args:
-        setup: The scene's ingredients.
+        setup: The problem set up from the scene.
         comm: MPI communicator; None for this process alone.
         dense: Whether the macro model is the compliance of the patches, or the mesh itself.
 
@@ -177,7 +179,7 @@ def patch_displacements(setup: ProblemSetup, comm: Any, *, dense: bool) -> Calla
     Note:
         Collective.
     """
-    # laws have about as many rows as they may have: fewer patches than that take fewer solves
+    # with fewer patches than rows of laws the compliance takes fewer solutions of the mesh
     if dense or setup.patches.count <= setup.table_rows:
         compliance = patch_compliance(setup, comm)
         return lambda pressures: np.asarray(pressures @ compliance.T)
@@ -191,7 +193,7 @@ def patch_compliance(setup: ProblemSetup, comm: Any) -> Array:
     """Return the compliance of a scene's block under its patches, shape (N, N) [mm/MPa].
 
     Args:
-        setup: The scene's ingredients.
+        setup: The problem set up from the scene.
         comm: MPI communicator; None for this process alone.
 
     Note:
@@ -218,7 +220,7 @@ def embedding(setup: ProblemSetup, comm: Any) -> Interface:
     """Mesh and assemble the block of a scene, with its patches on top.
 
     Args:
-        setup: The scene's ingredients.
+        setup: The problem set up from the scene.
         comm: MPI communicator; None for this process alone.
 
     Note:
@@ -262,7 +264,7 @@ def field_under(setup: ProblemSetup, pressure: Array, comm: Any) -> tuple[Interf
     """Return the meshed block and its displacements under pressures that are uniform on patches.
 
     Args:
-        setup: The scene's ingredients.
+        setup: The problem set up from the scene.
         pressure: Pressures of the patches, shape (N,) [MPa].
         comm: MPI communicator; None for this process alone.
 
@@ -286,6 +288,8 @@ def free_blocks(blocks: list[Block]) -> None:
     Note:
         Collective.
     """
+    if not blocks:
+        return
     from macro.compat import collect_garbage
 
     comms = [block.stiffness.comm.duplicate() for block in blocks]  # these outlive their blocks

@@ -1,26 +1,59 @@
-"""What a run reports of its own approximations, besides the measured errors."""
+"""Makes the history of load steps, with notes on the approximations behind them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from multiscale.couplings.newton_choice import newton_choice
+from multiscale.couplings.reference import ReferenceCoupling
+from multiscale.errors.load_steps import error_notes
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
+from multiscale.loading.stepper import Coupling
+from multiscale.results.history import History
 from multiscale.results.validity import range_notes
 from multiscale.setup.problem import ProblemSetup
 
 
-def approximation_notes(
-    setup: ProblemSetup, table: LawTable | None, steps: Sequence[LoadStep]
-) -> Iterator[str]:
-    """Yield what a report says of the micro model, the laws and the load steps.
+def noted_history(
+    setup: ProblemSetup,
+    steps: Sequence[LoadStep],
+    *,
+    coupling: Coupling | None,
+    table: LawTable | None,
+    accuracy: float | None,
+    seconds: Mapping[str, float],
+    notes: Sequence[str],
+) -> History:
+    """Return the history of load steps.
 
     Args:
-        setup: The problem set up from the scene.
-        table: The laws, where the steps use laws.
+        setup: The problem set up from a scene.
         steps: The load steps accepted so far.
+        coupling: What found them; None before it is made.
+        table: The laws, where the steps use laws.
+        accuracy: Relative error of the force that was asked for; None when it was not.
+        seconds: Wall time of each phase of the run [s].
+        notes: Notes that were taken on the way.
     """
+    said = [*_approximations(setup, table, steps), *notes, *error_notes(list(steps), accuracy)]
+    record = None
+    if isinstance(coupling, ReferenceCoupling):
+        record = coupling.record(steps)
+        said += coupling.notes(record, steps)
+        steps = record.with_errors(steps)
+    return History(
+        steps=tuple(steps),
+        patches=setup.patches,
+        seconds=dict(seconds),
+        notes=tuple(said),
+        reference=record,
+    )
+
+
+def _approximations(
+    setup: ProblemSetup, table: LawTable | None, steps: Sequence[LoadStep]
+) -> Iterator[str]:
     if setup.choice is not None:
         yield f"micro model chosen: {setup.choice.sentence}"
     if table is not None:

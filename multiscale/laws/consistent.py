@@ -245,51 +245,11 @@ def _column(values: NDArray[Any], like: Array) -> NDArray[Any]:
 
 
 def _law(rows: SolvedRows, initial_separation: float) -> PatchLaw:
-    """Return the law of one patch out of all its rows, those before first touch included.
-
-    Where contacts join, the displacement of a block may grow so fast that the local approach of a
-    patch decreases while the plane comes nearer: such rows are left out.
-    """
-    largest_before = np.maximum.accumulate(rows.approach)[:-1]
-    rows = rows[np.append(True, rows.approach[1:] > largest_before)]
-    loaded = np.flatnonzero(rows.pressure > 0.0)
-    first_touch = float(rows.closure.max())
-    if loaded.size:
-        first = max(int(loaded[0]), 1)
-        rows = _first_touch(rows[first - 1 :]).joined(rows[first:])
-        first_touch = float(rows.closure[0])
-    else:
-        rows = rows[:0]
+    """Return the law of one patch out of all its rows, those before first touch included."""
+    touching = rows.from_first_touch()
     return PatchLaw(
-        rows=rows,
-        first_touch=first_touch,
+        rows=touching,
+        first_touch=float(touching.closure[0] if len(touching) else rows.closure.max()),
         initial_separation=initial_separation,
-        warning_pressure=rows.warning_pressure,
-    )
-
-
-def _first_touch(rows: SolvedRows) -> SolvedRows:
-    """Return the row of first touch, between an open row and the first one in contact.
-
-    Its approach is where the straight line of p^(2/3) through the first two rows in contact
-    vanishes (Hertz' law). Closure and displacement are interpolated between the open row and the
-    first one in contact.
-    """
-    share, pressure = 0.0, rows.pressure
-    if len(rows) > 2 and pressure[2] > pressure[1]:
-        root, later = pressure[1:3] ** (2 / 3)
-        back = root / (later - root) * (rows.approach[2] - rows.approach[1])
-        share = np.clip(1.0 - back / (rows.approach[1] - rows.approach[0]), 0.0, 0.99)
-
-    def between(column: Array) -> Array:
-        return column[:1] + share * (column[1:2] - column[:1])
-
-    return SolvedRows(
-        approach=between(rows.approach),
-        closure=between(rows.closure),
-        pressure=np.zeros(1),
-        contact_area_fraction=np.zeros(1),
-        contacts=np.zeros(1, dtype=np.int64),
-        unresolved_displacement=between(rows.unresolved_displacement),
-        outside_range=rows.outside_range[:1],
+        warning_pressure=touching.warning_pressure,
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Self
 
 import numpy as np
@@ -88,3 +88,34 @@ class SolvedRows(LawRows):
     def warning_pressure(self) -> float:
         """Pressure of the first row of one law outside the range [MPa]; infinite without any."""
         return float(np.append(self.pressure[self.outside_range], np.inf)[0])
+
+    def from_first_touch(self) -> Self:
+        """Return the rows of one law from first touch on; none of a patch that stays open.
+
+        First touch lies between the last open row and the first one in contact, at the approach
+        where the straight line of p^(2/3) through the first two rows in contact vanishes (Hertz'
+        law). Closure and displacement are interpolated between the open row and the first one in
+        contact.
+
+        Where contacts join, the displacement of a block may grow so fast that the local approach
+        of a patch decreases while the plane comes nearer: such rows are left out.
+        """
+        largest_before = np.maximum.accumulate(self.approach)[:-1]
+        rows = self[np.append(True, self.approach[1:] > largest_before)]
+        loaded = np.flatnonzero(rows.pressure > 0.0)
+        if not loaded.size:
+            return rows[:0]
+        first = max(int(loaded[0]), 1)
+        before, contact = rows[first - 1 : first], rows[first : first + 2]
+        share = 0.0
+        if len(contact) == 2 and contact.pressure[1] > contact.pressure[0]:
+            power, later = contact.pressure ** (2 / 3)
+            back = power / (later - power) * np.diff(contact.approach)[0]
+            step = contact.approach[0] - before.approach[0]
+            share = float(np.clip(1.0 - back / step, 0.0, 0.99))
+        start = before.mapped(np.zeros_like)
+        columns = {"outside_range": before.outside_range}
+        for name in ("approach", "closure", "unresolved_displacement"):
+            column = getattr(before, name)
+            columns[name] = column + share * (getattr(contact, name)[:1] - column)
+        return replace(start, **columns).joined(rows[first:])
