@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from geometry.errors import InputError
-from geometry.rigid_plane import Control
 from micro import MicroModel
 from multiscale.couplings.blocks import embedding, patch_compliance, patch_displacements
 from multiscale.couplings.condensed import CondensedCoupling, FreePlaneCoupling
@@ -53,9 +52,7 @@ def make_table(setup: ProblemSetup, model: MicroModel, comm: Any) -> LawTable:
             model,
             setup.patches,
             mean_heights=setup.mean_heights,
-            largest=Control(
-                **{load_history.quantity: load_history.largest}, tilt=load_history.tilt
-            ),
+            largest=load_history.control(load_history.largest),
             displacements=patch_displacements(setup, comm, dense=newton_choice(setup).condensed),
             pointwise=setup.scene.coupling.interface == "pointwise",
             tolerance=setup.table_tolerance,

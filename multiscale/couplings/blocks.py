@@ -85,7 +85,7 @@ def on_body(
         half_space: Whether the body is a half-space even where the scene has a block.
         modes: Modes of the body along a side; by default those of its shape.
         coarse: Whether to take coarser elements for the body.
-        face: What pressures do to the body's top, where that is known; then it is not collective.
+        face: Compliance of the body's top, where that was solved for; then it is not collective.
 
     Returns:
         A function from a model and the order of finite slopes, 0 for none, to the model on the
@@ -107,7 +107,7 @@ def on_body(
         higher = surface.highest - surface.mean_height if order else 0.0
         beside: list[SurfaceStress] = []
         if body is not None and face is not None:
-            model = replace(model, sides=body.known, body=body.term(face, higher=higher))
+            model = replace(model, sides=body.side_term, body=body.term(face, higher=higher))
             beside = _stresses(body, face, surface) if order else []
         if not order:
             return model
@@ -122,14 +122,14 @@ def _stresses(body: Body, face: FaceCompliance, surface: Surface) -> list[Surfac
     """Return the stresses in a contact face beyond those of the half-space."""
     grid = coarse_grid(surface)
     found: list[SurfaceStress] = []
-    if body.known is not None:
+    if body.side_term is not None:
         spacing = surface.lengths[0] / grid[0], surface.lengths[1] / grid[1]
-        found.append(side_stresses(body.known, spacing))
+        found.append(side_stresses(body.side_term, spacing))
     return [*found, body.stresses(face, grid)]
 
 
 def scene_body(setup: ProblemSetup) -> Body:
-    """Return the block of a scene, without the free sides that its micro model has as a term.
+    """Return the block of a scene; its free sides are a term of their own in half-space models.
 
     Args:
         setup: The problem set up from the scene.
@@ -138,23 +138,16 @@ def scene_body(setup: ProblemSetup) -> Body:
         shape=setup.shape,
         material=block_material(setup),
         sides=setup.scene.block.sides,
-        known=free_sides(setup),
+        side_term=free_sides(setup) if isinstance(setup.model, HalfSpaceModel) else None,
     )
 
 
 def free_sides(setup: ProblemSetup) -> FreeSides | None:
-    """Return the free sides that a scene's half-space model has as a term of its own.
-
-    None where there are none, or the micro model is another one.
+    """Return the free sides of a scene's block that bound its interface; None without them.
 
     Args:
         setup: The problem set up from the scene.
     """
-    return _block_sides(setup) if isinstance(setup.model, HalfSpaceModel) else None
-
-
-def _block_sides(setup: ProblemSetup) -> FreeSides | None:
-    """Return the free sides of a scene's block that end its interface; None without them."""
     if not setup.embedded or setup.scene.block.sides != "free" or setup.shape.margin:
         return None
     return FreeSides(
@@ -200,7 +193,7 @@ def patch_compliance(setup: ProblemSetup, comm: Any) -> Array:
         Collective.
     """
     if setup.scene.coupling.decomposed:
-        body = replace(scene_body(setup), known=_block_sides(setup))
+        body = replace(scene_body(setup), side_term=free_sides(setup))
         return body.patch_compliance(setup.patches, comm)
     from mpi4py import MPI
 

@@ -12,7 +12,8 @@ from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
 from geometry.plane_equilibrium import UNSUPPORTED, plane_failure
 from geometry.rigid_plane import Control
-from multiscale.couplings.loaded_patches import TOLERANCE, DenseState, Laws, LoadedPatches
+from multiscale.couplings.loaded_patches import TOLERANCE, DenseState, LoadedPatches
+from multiscale.laws.law_table import PatchLaws
 
 Array = NDArray[np.float64]
 
@@ -42,7 +43,7 @@ class DenseNewton:
         InputError: When the compliance is not a finite matrix of the size of the partition.
     """
 
-    def __init__(self, laws: Laws, compliance: Array, patches: PatchGrid) -> None:
+    def __init__(self, laws: PatchLaws, compliance: Array, patches: PatchGrid) -> None:
         count = patches.count
         if compliance.shape != (count, count) or not np.all(np.isfinite(compliance)):
             raise InputError(

@@ -192,8 +192,5 @@ def beyond_law(
             "made for: take coupling.kind = 'concurrent', which needs none"
         )
     return BeyondLaws(
-        f"the patches at {control}",
-        reason=f"LAW_RANGE: {problem}",
-        iterations=0,
-        remedy=remedy,
+        f"the patches at {control}", reason=f"LAW_RANGE: {problem}", iterations=0, remedy=remedy
     )

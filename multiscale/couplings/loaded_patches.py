@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,7 @@ from geometry.errors import NotConverged
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control, PlaneLevers
 from multiscale.laws.interpolation import LawPoint, Tangent
+from multiscale.laws.law_table import PatchLaws
 
 Array = NDArray[np.float64]
 
@@ -26,17 +26,6 @@ _ROUNDING = 8.0 * float(np.finfo(float).eps)  # of approaches and of the closure
 _GUESS = 1e-9  # accuracy of an initial guess relative to the bracket it is found in
 _MOST_STEPS_ALONG_LAWS = 40  # Newton steps or bisections to a point on all laws
 _LEAST_SLOPE = 1e-3  # of a patch's own approach over the local one; laws below count as falling
-
-
-class Laws(Protocol):
-    """Laws of N patches over their local rigid approaches."""
-
-    @property
-    def first_touch(self) -> Array:
-        """Closures at first touch, infinite for a patch that stays open, shape (N,) [mm]."""
-
-    def along(self, approach: Array, /) -> LawPoint:
-        """Return closures, pressures and their derivatives at local approaches, shape (N,)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -91,7 +80,9 @@ class LoadedPatches:
         force_scale: Largest force so far, which loads are compared with [N].
     """
 
-    def __init__(self, laws: Laws, compliance: Array, patches: PatchGrid, control: Control) -> None:
+    def __init__(
+        self, laws: PatchLaws, compliance: Array, patches: PatchGrid, control: Control
+    ) -> None:
         self.laws, self.compliance, self.control = laws, compliance, control
         self.area = patches.area
         x, y = patches.centres.T
@@ -142,21 +133,20 @@ class LoadedPatches:
 
     def norm(self, state: DenseState) -> float:
         """Return the norm of all residuals, relative to the largest approach and force."""
-        closures = state.residual / self._largest_approach(state)
-        loads = self.load_residual(state) / (self.force_scale or 1.0)
-        return float(np.linalg.norm(np.concatenate((closures, loads))))
+        approach, force = self._scales(state)
+        residuals = state.residual / approach, self.load_residual(state) / force
+        return float(np.linalg.norm(np.concatenate(residuals)))
 
     def relative_residual(self, state: DenseState) -> float:
         """Return the largest residual, relative as in `TOLERANCE`."""
-        approach, force = self._largest_approach(state), self.force_scale or 1.0
+        approach, force = self._scales(state)
         closures = float(np.abs(state.residual).max())
         loads = float(np.abs(self.load_residual(state)).max(initial=0.0))
         plain = max(closures / approach, loads / force)
         if plain <= TOLERANCE:
             return plain
-        touch = self.laws.first_touch[np.isfinite(self.laws.first_touch)]
-        # rounding of approaches, and what it makes of closures and of the force
-        rounding = _ROUNDING * max(float(np.abs(touch).max(initial=0.0)), approach)
+        # rounding of approaches, and its effect on closures and on the force
+        rounding = _ROUNDING * max(self._largest_touch(), approach)
         of_closures = self.tangent(state).norm * rounding
         of_force = self.area * float(state.point.dpressure.sum()) * rounding
         return max(
@@ -168,12 +158,11 @@ class LoadedPatches:
         """Return what stands for a force of zero: the plane where its first patch is touched."""
         plane = self.control.prescribed(plane)
         tilted = self.levers.matrix[:, 1:] @ plane[1:]
-        touch = self.laws.first_touch
-        approach = float(np.min(touch - tilted))
+        approach = float(np.min(self.laws.first_touch - tilted))
         if not np.isfinite(approach):
             raise self.failure("NO_CONTACT", 0)
-        largest = np.abs(np.append(touch[np.isfinite(touch)], approach + tilted)).max()
-        approach -= 2.0 * TOLERANCE * float(largest)  # so that a residual is not a contact
+        largest = max(self._largest_touch(), float(np.abs(approach + tilted).max()))
+        approach -= 2.0 * TOLERANCE * largest  # so that a residual is not a contact
         return Control(approach=approach, tilt=(float(plane[1]), float(plane[2])))
 
     def initial_guess(self, plane: Array) -> tuple[Array, Array]:
@@ -218,6 +207,12 @@ class LoadedPatches:
             remedy="take more load steps (load.steps)",
         )
 
-    def _largest_approach(self, state: DenseState) -> float:
-        """Return the largest approach of the plane to a patch [mm]."""
-        return max(float(np.abs(self.levers.matrix @ state.plane).max()), 1e-9 * self.levers.half)
+    def _scales(self, state: DenseState) -> tuple[float, float]:
+        """Return the largest approach of the plane to a patch [mm], and the largest force [N]."""
+        approach = float(np.abs(self.levers.matrix @ state.plane).max())
+        return max(approach, 1e-9 * self.levers.half), self.force_scale or 1.0
+
+    def _largest_touch(self) -> float:
+        """Return the largest closure at first touch [mm]."""
+        touch = self.laws.first_touch
+        return float(np.abs(touch[np.isfinite(touch)]).max(initial=0.0))

@@ -114,7 +114,7 @@ class SolvedRows(LawRows):
             step = contact.approach[0] - before.approach[0]
             share = float(np.clip(1.0 - back / step, 0.0, 0.99))
         start = before.mapped(np.zeros_like)
-        columns = {"outside_range": before.outside_range}
+        columns: dict[str, Any] = {"outside_range": before.outside_range}
         for name in ("approach", "closure", "unresolved_displacement"):
             column = getattr(before, name)
             columns[name] = column + share * (getattr(contact, name)[:1] - column)

@@ -33,7 +33,7 @@ def body(name, height):
         shape=shape,
         material=Material(young_modulus=4000.0, poisson_ratio=0.15),
         sides="roller" if name == "rollers" else "free",
-        known=None if margin or name == "rollers" else sides,
+        side_term=None if margin or name == "rollers" else sides,
     )
 
 

@@ -18,7 +18,7 @@ def body(shape, nu=0.15, known=True, sides="free"):
     reach = 0.25 * min(*shape.interface, shape.height)
     free = FreeSides(lengths=shape.interface, poisson_ratio=nu, reach=reach) if known else None
     material = Material(young_modulus=1.0, poisson_ratio=nu)
-    return Body(shape=shape, material=material, sides=sides, known=free)
+    return Body(shape=shape, material=material, sides=sides, side_term=free)
 
 
 @pytest.mark.parametrize("margin", [{}, {"margin": 0.25, "margin_cells": 2}])

@@ -9,7 +9,7 @@ from geometry.errors import InputError
 from micro import BodyModes, FiniteSlopes, FreeSides
 from multiscale import Scene, make_setup
 from multiscale.costs.contact_work import press_work
-from multiscale.couplings.blocks import contact_model, free_sides, patch_displacements
+from multiscale.couplings.blocks import contact_model, patch_displacements, scene_body
 
 
 def setup(
@@ -50,7 +50,7 @@ def test_cells_know_the_free_sides_of_their_block(kind, coupling):
     found = setup(kind, coupling=coupling)
     # a quarter of the block's height, its shortest side
     expected = FreeSides(lengths=(1.0, 1.0), poisson_ratio=0.15, reach=0.2)
-    assert free_sides(found) == expected
+    assert scene_body(found).side_term == expected
     model = contact_model(found, None)
     assert model.sides == expected
     assert isinstance(model.body, BodyModes)
@@ -64,7 +64,7 @@ def test_cells_know_the_free_sides_of_their_block(kind, coupling):
 )
 def test_other_bodies_have_their_sides_in_the_body_term(given):
     found = setup(slopes=False, **given)
-    assert free_sides(found) is None
+    assert scene_body(found).side_term is None
     model = contact_model(found, None)
     assert isinstance(model.body, BodyModes)
     assert getattr(model, "sides", None) is None
