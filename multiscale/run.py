@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from geometry.collective import on_root
 from geometry.errors import NotConverged
 from micro import HalfSpaceModel, MicroModel
-from multiscale.couplings import assembly, blocks
+from multiscale.couplings import blocks
+from multiscale.couplings.assembly import assemble, make_table, meshed_blocks
 from multiscale.couplings.load_steps import EmbeddedCoupling
 from multiscale.errors.load_steps import checked, error_probe
 from multiscale.errors.notes import noted_history
@@ -90,7 +91,7 @@ class Run:
         if self.table is None:
             model = self.make_model()
             with self.phase("laws"):
-                self.table = assembly.make_table(self.setup, model, self.comm)
+                self.table = make_table(self.setup, model, self.comm)
         return self.table
 
     def make_coupling(self) -> Coupling:
@@ -98,7 +99,7 @@ class Run:
         if self.coupling is None:
             with self.phase("block"):
                 make = self.make_laws if self.setup.by_laws else self.make_model
-                coupling = assembly.assemble(self.setup, make, self.comm)
+                coupling = assemble(self.setup, make, self.comm)
                 if self._start and isinstance(coupling, Restorable):
                     coupling.restore(self._start)
                 self.coupling = coupling
@@ -125,8 +126,8 @@ class Run:
             return step
         with self.phase("check"):
             try:
-                history = self.scene.loading.load_history
-                return checked(step, error_probe(self.setup, body), history, self.comm)
+                probe, loads = error_probe(self.setup, body), self.scene.loading.load_history
+                return checked(step, probe, loads, self.comm)
             except NotConverged as error:
                 self._notes.append(f"errors of load step {step.step} not measured: {error}")
                 return step
@@ -134,8 +135,7 @@ class Run:
     @property
     def finished(self) -> bool:
         """Whether the load history has come to its end."""
-        targets = self.scene.loading.load_history.count
-        return self.position.targets == targets and not self.position.ahead
+        return self.position.is_at_end(self.scene.loading.load_history)
 
     @cached_property
     def resolved(self) -> dict[str, Any]:
@@ -191,7 +191,7 @@ class Run:
     @property
     def unknowns(self) -> int | None:
         """Degrees of freedom of the mesh that load steps are solved on, where there is one."""
-        meshed = assembly.meshed_blocks(self.coupling)
+        meshed = meshed_blocks(self.coupling)
         return meshed[-1].dofs if meshed else None
 
     def last_field(self) -> tuple[Interface, NDArray]:
@@ -210,7 +210,7 @@ class Run:
         Note:
             Collective.
         """
-        meshed, self.coupling = assembly.meshed_blocks(self.coupling), None
+        meshed, self.coupling = meshed_blocks(self.coupling), None
         blocks.free_blocks(meshed)
 
     @contextmanager
@@ -220,12 +220,12 @@ class Run:
         Args:
             name: Its name in `seconds`.
         """
-        start, others = time.perf_counter(), sum(self.seconds.values())
+        start = time.perf_counter() - sum(self.seconds.values())
         try:
             yield
         finally:
-            within = sum(self.seconds.values()) - others
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start - within
+            spent = time.perf_counter() - sum(self.seconds.values()) - start
+            self.seconds[name] = self.seconds.get(name, 0.0) + spent
 
 
 def run(

@@ -129,6 +129,10 @@ class LoadPosition:
     force: float = 0.0
     largest: float = 0.0
 
+    def is_at_end(self, load_history: LoadHistory) -> bool:
+        """Whether all load steps of a load history are accepted."""
+        return self.targets == load_history.count and not self.ahead
+
 
 def load_steps(coupling: Coupling, load_history: LoadHistory) -> Iterator[LoadStep]:
     """Yield the load steps of a load history as they are accepted.
@@ -170,7 +174,7 @@ class LoadStepper:
     def __iter__(self) -> Iterator[LoadStep]:
         """Yield the load steps from the position on."""
         targets = self._load_history.targets
-        while self.position.ahead or self.position.targets < len(targets):
+        while not self.position.is_at_end(self._load_history):
             now = self.position
             if not now.ahead:
                 target = targets[now.targets]
