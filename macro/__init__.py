@@ -9,7 +9,7 @@ BlockShape → block_mesh → Block (with a Material) → Interface (with a Patc
 
 from geometry.materials import Material
 from macro.block import Block
-from macro.compliance.face_compliance import FaceCompliance, cached_face_compliance, face_compliance
+from macro.compliance.face_compliance import FaceCompliance, face_compliance
 from macro.compliance.patch_compliance import displacements_under, patch_compliance_matrix
 from macro.contact.law_interface import ContactLaw, Interface
 from macro.contact.law_problem import LawContactProblem, LawContactState
@@ -34,7 +34,6 @@ __all__ = [
     "UnilateralContactProblem",
     "UnilateralContactState",
     "block_mesh",
-    "cached_face_compliance",
     "displacements_under",
     "face_compliance",
     "patch_compliance_matrix",

@@ -77,7 +77,7 @@ class Block:
     @cached_property
     def conditions(self) -> list[Any]:
         """Dirichlet conditions: the clamped bottom and, on request, the rollers."""
-        clamped = self._nodes(self._facets(BOTTOM))
+        clamped = self._nodes(self.mesh.facet_tags.find(BOTTOM))
         conditions = [fem.dirichletbc(np.zeros(3, PETSc.ScalarType), clamped, self.space)]
         if self.sides == "roller":
             conditions += [self._roller(axis) for axis in (0, 1)]
@@ -90,13 +90,9 @@ class Block:
         matrix = compat.assemble_matrix(compat.compile_form(self._form), self.conditions, kind)
         if kind == "aij":
             matrix.setOption(PETSc.Mat.Option.SPD, True)  # for the user's direct solvers
-        matrix.setNearNullSpace(rigid_body_modes(self.space))
+        points = self.space.tabulate_dof_coordinates()[: self.owned_dofs // 3]
+        matrix.setNearNullSpace(rigid_body_modes(points, self.mesh.comm))
         return matrix
-
-    @property
-    def unsupported_stiffness(self) -> PETSc.Mat:
-        """Stiffness matrix without any support [N/mm], assembled anew."""
-        return compat.assemble_matrix(compat.compile_form(self._form), [])
 
     @cached_property
     def solver(self) -> PETSc.KSP:
@@ -165,11 +161,8 @@ class Block:
     def _bottom_row(self) -> PETSc.Vec:
         """Sum of the unconstrained stiffness' rows of the bottom's vertical displacements."""
         lift = fem.Function(self.space)
-        lift.x.array[3 * self._nodes(self._facets(BOTTOM)) + 2] = 1.0
+        lift.x.array[3 * self._nodes(self.mesh.facet_tags.find(BOTTOM)) + 2] = 1.0
         return compat.assemble_vector(compat.compile_form(ufl.action(self._form, lift)))
-
-    def _facets(self, marker: int) -> NDArray[np.int32]:
-        return self.mesh.facet_tags.find(marker)
 
     def _nodes(self, facets: NDArray[np.int32]) -> NDArray[np.int32]:
         """Return this rank's nodes and ghosts on some facets of any rank, ascending.
@@ -185,7 +178,7 @@ class Block:
 
     def _roller(self, axis: int) -> Any:
         """Fix the normal displacement on the two side planes across an axis."""
-        facets = self._facets(SIDES)
+        facets = self.mesh.facet_tags.find(SIDES)
         shape = self.mesh.shape
         low, high = -shape.margin, shape.interface[axis] + shape.margin
         place = dmesh.compute_midpoints(self.mesh.mesh, 2, facets)[:, axis]

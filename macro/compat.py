@@ -152,24 +152,17 @@ def vector_space(mesh: Any, degree: int) -> Any:
 
 
 @_compiling()
-def scalar_space(mesh: Any, degree: int) -> Any:
-    """Return the continuous Lagrange space of scalars.
+def scalar_space(mesh: Any, degree: int, family: str = "Lagrange") -> Any:
+    """Return a space of scalars.
 
     Args:
         mesh: dolfinx mesh.
         degree: Polynomial degree.
+        family: ``"Lagrange"``, continuous, or ``"DG"``, discontinuous between cells.
     """
     if hasattr(fem, "functionspace"):
-        return fem.functionspace(mesh, ("Lagrange", degree))
-    return fem.FunctionSpace(mesh, ("Lagrange", degree))
-
-
-@_compiling()
-def cellwise_space(mesh: Any) -> Any:
-    """Return the space of scalars that are constant on every cell."""
-    if hasattr(fem, "functionspace"):
-        return fem.functionspace(mesh, ("DG", 0))
-    return fem.FunctionSpace(mesh, ("DG", 0))
+        return fem.functionspace(mesh, (family, degree))
+    return fem.FunctionSpace(mesh, (family, degree))
 
 
 def cell_nodes(space: Any) -> NDArray[np.int32]:
@@ -201,6 +194,18 @@ def lagrange_values(cell_name: str, degree: int, points: NDArray[np.float64]) ->
     if not len(points):  # basix 0.5 aborts the process on no points
         return np.empty((0, element.dim))
     return element.tabulate(0, points)[0].reshape(len(points), -1)
+
+
+def lagrange_gradients(cell_name: str, degree: int) -> NDArray[np.float64]:
+    """Return the gradients of the scalar Lagrange basis at its nodes, shape (nodes, basis, 3).
+
+    Args:
+        cell_name: Name of the cell, such as ``hexahedron``.
+        degree: Polynomial degree.
+    """
+    element = _lagrange(cell_name, degree)
+    slopes = np.asarray(element.tabulate(1, element.points)[1:])
+    return np.moveaxis(slopes.reshape(3, element.dim, element.dim), 0, 2)
 
 
 def lagrange_points(cell_name: str, degree: int) -> NDArray[np.float64]:

@@ -46,21 +46,8 @@ def stiffness_form(space: Any, material: Material, quadrature_degree: int) -> An
     return ufl.inner(stress(trial, (first, shear)), strain(test)) * dx
 
 
-def rigid_body_modes(space: Any) -> PETSc.NullSpace:
-    """Return the six rigid body modes, which algebraic multigrid needs as near-nullspace.
-
-    Args:
-        space: Vector Lagrange space, three components per node.
-
-    Note:
-        Collective.
-    """
-    owned = space.dofmap.index_map.size_local
-    return rigid_body_modes_at(space.tabulate_dof_coordinates()[:owned], space.mesh.comm)
-
-
-def rigid_body_modes_at(points: NDArray[np.float64], comm: Any) -> PETSc.NullSpace:
-    """Return the six rigid body modes of nodes.
+def rigid_body_modes(points: NDArray[np.float64], comm: Any) -> PETSc.NullSpace:
+    """Return the six rigid body modes of nodes, the near-nullspace for algebraic multigrid.
 
     Args:
         points: Coordinates of the nodes of this rank, shape (n, 3) [mm].

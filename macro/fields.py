@@ -12,8 +12,7 @@ from petsc4py import PETSc
 
 from macro import compat
 from macro.contact.law_interface import Interface
-from macro.contact.unilateral_problem import UnilateralContactProblem
-from macro.contact.unilateral_state import UnilateralContactState
+from macro.contact.unilateral_problem import UnilateralContactProblem, UnilateralContactState
 from macro.mesh.contact_face import top_facets
 
 Array = NDArray[np.float64]
@@ -48,7 +47,7 @@ def write_fields(
         compat.write_vtx(str(Path(path).with_suffix(".bp")), shown)
     if block.degree > 1:
         shown = _interpolated(compat.vector_space(mesh, 1), shown, shown.name)
-    pressures = fem.Function(compat.cellwise_space(mesh), name="pressure")
+    pressures = fem.Function(compat.scalar_space(mesh, 0, "DG"), name="pressure")
     points, facets = interface.quadrature, top_facets(block.mesh)
     cells = compat.cell_nodes(pressures.function_space)[:, 0]
     force = points.weight * pressure[points.patch]

@@ -10,7 +10,6 @@ from contextlib import contextmanager
 from types import ModuleType
 from typing import Any
 
-# Settings that a caller's own gmsh session may have changed; they are put back afterwards.
 _OPTIONS = {
     "General.AbortOnError": 2,  # errors raise exceptions; 4 would end the process
     "General.Verbosity": 0,
@@ -27,6 +26,7 @@ _OPTIONS = {
     "Mesh.MeshSizeFromCurvature": 0,
     "Mesh.MeshSizeExtendFromBoundary": 0,
 }
+"""Options that a caller's own session may have changed; they are restored afterwards."""
 
 
 @contextmanager
@@ -60,7 +60,7 @@ def sigint_untouched() -> Iterator[None]:
 
 @contextmanager
 def gmsh_session(name: str) -> Iterator[Any]:
-    """Give a silent gmsh with a new current model, and leave a caller's session as it was.
+    """Open a silent session of gmsh with a new current model; restore a caller's afterwards.
 
     Args:
         name: Name of the new model, which is removed at the end.
@@ -75,7 +75,7 @@ def gmsh_session(name: str) -> Iterator[Any]:
         if owned:
             gmsh.initialize(["", "-v", "0"], readConfigFiles=False)
     current = gmsh.model.getCurrent()
-    kept = {option: gmsh.option.getNumber(option) for option in _OPTIONS}
+    before = {option: gmsh.option.getNumber(option) for option in _OPTIONS}
     try:
         for option, value in _OPTIONS.items():
             gmsh.option.setNumber(option, value)
@@ -89,15 +89,15 @@ def gmsh_session(name: str) -> Iterator[Any]:
             gmsh.model.setCurrent(name)
             gmsh.model.remove()
             gmsh.model.setCurrent(current)
-            for option, value in kept.items():
+            for option, value in before.items():
                 gmsh.option.setNumber(option, value)
 
 
 def is_initialised(gmsh: Any) -> bool:
-    """Tell whether gmsh has a session, calling nothing that may end the process.
+    """Tell whether gmsh has a session, without a call that may end the process.
 
-    A call before the first session makes gmsh 4.8 report an error. It then reads how to treat
-    errors from memory that nothing has set, and where that holds a 4 it exits without a word.
+    Before its first session gmsh 4.8 answers calls with an error. How it treats errors it then
+    reads from uninitialised memory, and where that holds a 4 it ends the process without a message.
     """
     if hasattr(gmsh, "isInitialized"):
         return bool(gmsh.isInitialized())
@@ -110,10 +110,10 @@ def is_initialised(gmsh: Any) -> bool:
 
 
 def _has_context(gmsh: Any) -> bool:
-    """Tell whether gmsh has had a session, which leaves its options' singleton behind.
+    """Tell whether gmsh has had a session, by the singleton of options that a session creates.
 
-    Where the library hides that (no release that we know does so and lacks ``isInitialized``),
-    the answer is no, and a caller's session, if there is one, ends with ours.
+    Where the library does not export it, the answer is no, and a caller's session ends with ours.
+    No release is known that lacks both this symbol and ``isInitialized``.
     """
     try:
         return ctypes.c_void_p.in_dll(gmsh.lib, "_ZN3CTX9_instanceE").value is not None

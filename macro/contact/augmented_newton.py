@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from geometry.plane_equilibrium import slope_search
 from geometry.rigid_plane import Control
 from macro import compat
-from macro.contact.augmented_law import AugmentedLaw
 from macro.contact.equilibrium import Equilibrium
 from macro.contact.face_nodes import TopNodes
 from macro.contact.law_interface import Interface
@@ -15,21 +16,54 @@ from macro.contact.plane_over_nodes import PlaneOverNodes, not_found
 from macro.linear_solvers.options import reason_name
 from macro.linear_solvers.stiff_preconditioner import StiffPreconditioner
 
-LOOSEST, SPARE = 0.03, 0.3
-"""Relative residual of linear solves, at first, and in tolerances that are asked for."""
+Array = NDArray[np.float64]
 
-_MOST_STEPS, _HALVINGS = 60, 30
-_ON = 1e-12  # of a basis function: its node is not on the facet
-_ENOUGH = 0.9  # share of the energy's slope that a step may leave
+LOOSEST = 0.03
+"""Largest relative residual of linear solves, and tolerance of the first equilibrium."""
+
+SPARE = 0.3
+"""Share of a tolerance that an inner solve aims at."""
+
+_MOST_STEPS, _MOST_ITERATIONS = 60, 1000
+"""Newton steps of an equilibrium, and linear iterations of a step."""
+
+_ON = 1e-12
+"""Value of a basis function below which its node does not lie on the facet."""
+
+
+class AugmentedLaw:
+    """The law p = ⟨p₀ + k d⟩ of this rank's quadrature points; a `ContactLaw`.
+
+    Args:
+        distance: Distances d₀ of the points from the plane at no approach and no tilt, shape (n,)
+            [mm]; the penetration d is the closure minus d₀.
+
+    Attributes:
+        distance: As given.
+        slope: Stiffness k of the points, shape (n,) [MPa/mm].
+        multiplier: Pressures p₀ at no penetration, shape (n,) [MPa].
+    """
+
+    def __init__(self, distance: Array) -> None:
+        self.distance = distance
+        self.slope, self.multiplier = np.zeros_like(distance), np.zeros_like(distance)
+
+    def pressure(self, closure: Array) -> Array:
+        """Return the pressures, shape (n,) [MPa]."""
+        return np.maximum(self.multiplier + self.slope * (closure - self.distance), 0.0)
+
+    def stiffness(self, closure: Array) -> Array:
+        """Return their derivatives, shape (n,) [MPa/mm]."""
+        return np.where(self.pressure(closure) > 0.0, self.slope, 0.0)
 
 
 class FacetNewton:
-    """Newton's method under fixed multipliers, its steps shortened where the energy asks for it.
+    """Newton's method under fixed multipliers, with a line search on the slope of the energy.
 
     Args:
         equilibrium: The equations.
         law: Law of the quadrature points; multipliers and stiffnesses may change between solves.
-        interface: Whose quadrature points they are.
+        interface: The interface whose quadrature points they are.
         top: Nodes of the top.
         plane: The plane over the nodes.
 
@@ -60,12 +94,12 @@ class FacetNewton:
         """Find the equilibrium.
 
         Args:
-            displacement: Start; receives the solution [mm].
+            displacement: Initial guess; receives the solution [mm].
             tolerance: Norm of the residual relative to that of the contact forces.
             control: What is prescribed, for an error.
 
         Returns:
-            Newton's steps and the linear iterations.
+            Newton steps and linear iterations.
 
         Raises:
             NotConverged: When Newton's method, its line search or a linear solve fails.
@@ -77,19 +111,20 @@ class FacetNewton:
             norm, scale = residual.norm(), equilibrium.scale
             if norm <= tolerance * scale:
                 return steps, spent
-            if not scale:  # nothing presses
+            if not scale:  # no contact
                 displacement.set(0.0)
                 continue
             self._linearise(displacement)
             rtol = max(min(LOOSEST, norm / scale), SPARE * tolerance * scale / norm)
-            self._ksp.setTolerances(rtol=rtol, max_it=1000)
+            self._ksp.setTolerances(rtol=rtol, max_it=_MOST_ITERATIONS)
             self._ksp.solve(residual, step)
             spent += int(self._ksp.its)
             if self._ksp.reason < 0:
                 name = reason_name(PETSc.KSP.ConvergedReason, self._ksp.reason)
                 raise not_found(control, name, spent)
-            self._advance(displacement, residual, step, control)
-            compat.collect_garbage(displacement.comm)  # a field of every step
+            if not self._advance(displacement, residual, step):
+                raise not_found(control, "LINE_SEARCH", steps)
+            compat.collect_garbage(displacement.comm)  # every step leaves a field
         raise not_found(control, "NEWTON", _MOST_STEPS)
 
     def _linearise(self, displacement: PETSc.Vec) -> None:
@@ -98,25 +133,19 @@ class FacetNewton:
         slope = self._law.stiffness(self._equilibrium.closure(displacement))
         points = self._interface.quadrature
         rows, columns = np.nonzero((np.abs(points.values) > _ON) & (slope > 0.0)[:, None])
-        marks = self._top.collect(points.nodes[rows, columns], np.ones(len(rows)))
-        sprung = marks > 0.0
+        loaded = self._top.collect(points.nodes[rows, columns], np.ones(len(rows))) > 0.0
         free = self._equilibrium.contact.control.free
-        motions = self._plane.levers.scaled(free)[sprung]
-        motions = motions @ self._plane.supported_motions(free, sprung)
-        self._preconditioner.update(slope / points.weight, self._top.dofs[sprung], motions)
+        motions = self._plane.levers.scaled(free)[loaded]
+        motions = motions @ self._plane.supported_motions(free, loaded)
+        self._preconditioner.update(slope / points.weight, self._top.dofs[loaded], motions)
 
-    def _advance(
-        self, displacement: PETSc.Vec, residual: PETSc.Vec, step: PETSc.Vec, control: Control
-    ) -> None:
-        """Go back along a step until the slope of the energy along it has fallen."""
-        slope, low, high, share = residual.dot(step), 0.0, np.inf, 1.0
+    def _advance(self, displacement: PETSc.Vec, residual: PETSc.Vec, step: PETSc.Vec) -> bool:
+        """Subtract a share of a step after which the slope of the energy along it has fallen."""
         start = displacement.copy()
-        for _ in range(_HALVINGS):
+
+        def slope_after(share: float) -> float:
             displacement.waxpy(-share, step, start)
             self._equilibrium.residual(displacement, residual)
-            left = residual.dot(step)
-            if abs(left) <= _ENOUGH * abs(slope):
-                return
-            low, high = (share, high) if left > 0.0 else (low, share)
-            share = 3.0 * share if high == np.inf else 0.5 * (low + high)
-        raise not_found(control, "LINE_SEARCH", _HALVINGS)
+            return -float(residual.dot(step))
+
+        return slope_search(slope_after, -float(residual.dot(step)), 1.0) is not None

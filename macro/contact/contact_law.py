@@ -1,4 +1,4 @@
-"""Contact laws under a rigid plane, which is given or follows from its force and moment."""
+"""LawContact laws under a rigid plane, which is given or follows from its force and moment."""
 
 from __future__ import annotations
 
@@ -18,17 +18,15 @@ _FIRST, _FARTHEST = 1e-6, 1e3
 """First and last approach that first touch is looked for at, in halves of the diagonal."""
 
 
-class Contact:
+class LawContact:
     """Laws at the samples of an interface, under a rigid plane.
 
-    Motions of the plane that are not prescribed (its approach where the force is, its slopes where
-    they are free) follow from the displacement s of the samples at once: they balance the plane,
-    the force is the one wanted and there is no moment about the middle of the patches. So a
-    bordered Newton's method needs no unknowns beyond the displacements: the plane is eliminated
-    where it is known, at the samples, nonlinearly, and the least energy over its motions is as
-    convex in s as the energy under a fixed plane. With D the stiffness of the laws, W the areas of
-    the samples and G their levers, closures change by G dq − ds with
-    (Gᵀ W D G) dq = Gᵀ W D ds.
+    Free motions of the plane follow from the displacement s of the samples: the force is the
+    prescribed one, and there is no moment about the middle of the patches. The plane is eliminated
+    by that nonlinear equilibrium, so that displacements are the only unknowns of Newton's method.
+    The minimum of the energy over the motions of the plane is convex in s where the energy under a
+    fixed plane is. With the stiffness D of the laws, the areas W of the samples and their levers G,
+    closures change by G dq − ds, where (Gᵀ W D G) dq = Gᵀ W D ds.
 
     Args:
         interface: The patches.
@@ -47,7 +45,9 @@ class Contact:
     def __init__(
         self, interface: Interface, sampling: Sampling, laws: Sequence[ContactLaw]
     ) -> None:
-        self._comm, self._sampling, self._laws = interface.block.mesh.comm, sampling, laws
+        self._comm, self._sampling = interface.block.mesh.comm, sampling
+        self._pressures = [law.pressure for law in laws]
+        self._stiffnesses = [law.stiffness for law in laws]
         patches = interface.patches
         self.levers = PlaneLevers.at(
             sampling.x, sampling.y, patches.lengths, centre=patches.middle, comm=self._comm
@@ -56,7 +56,7 @@ class Contact:
         self.control = Control(approach=0.0)
 
     def prescribe(self, control: Control, plane: Array) -> None:
-        """Set what is given of the plane; without any force the plane just touches the surface.
+        """Set what a load step prescribes; without any force the plane just touches the surface.
 
         Args:
             control: What a load step prescribes.
@@ -101,11 +101,11 @@ class Contact:
 
         What a law raises on one rank is raised on all.
         """
-        return together(self._comm, lambda: self._sampling.pressure(self._laws, closure))
+        return together(self._comm, lambda: self._sampling.by_patch(self._pressures, closure))
 
     def stiffness(self, closure: Array) -> Array:
         """Return the laws' stiffnesses dp/dc likewise, shape (n,) [MPa/mm]."""
-        return together(self._comm, lambda: self._sampling.stiffness(self._laws, closure))
+        return together(self._comm, lambda: self._sampling.by_patch(self._stiffnesses, closure))
 
     def loads(self, pressure: Array) -> Array:
         """Return force and first moments about the middle of pressures, shape (3,) [N, N mm].
@@ -116,7 +116,7 @@ class Contact:
         return self.levers.loads(self._sampling.weight * pressure)
 
     def border(self, stiffness: Array) -> Array:
-        """Return E, shape (n, k'): the plane's motions take E Eᵀ w ds off D ds as they follow s.
+        """Return E, shape (n, k'): free motions of the plane reduce D ds by E Eᵀ W ds.
 
         Args:
             stiffness: D of this rank's samples, shape (n,) [MPa/mm].
@@ -131,7 +131,7 @@ class Contact:
         return columns @ (vectors[:, supported] / np.sqrt(values[supported]))
 
     def _touched(self, approach: float) -> bool:
-        """Tell whether the block at rest is touched at an approach."""
+        """Return whether the plane touches the undeformed block at an approach."""
         closure = self.levers.matrix @ np.array([approach, *self.plane[1:]])
         return float(self.loads(self.pressure(closure))[0]) > 0.0
 
@@ -140,7 +140,7 @@ def first_touch(touched: Callable[[float], bool], control: Control, half: float)
     """Find the largest approach at which a plane is not in contact yet [mm].
 
     Args:
-        touched: Tells whether it is at an approach.
+        touched: Returns whether the plane is in contact at an approach.
         control: What is prescribed of the plane, for an error.
         half: Half the diagonal of the interface [mm].
 

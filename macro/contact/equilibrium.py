@@ -1,4 +1,4 @@
-"""Equilibrium of the block and its contact laws: residual and exact tangent."""
+"""Equilibrium of a block with contact laws: residual and exact tangent."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from macro.block import Block
-from macro.contact.contact_law import Contact
+from macro.contact.contact_law import LawContact
 from macro.contact.law_interface import Sampling
 from macro.linear_solvers.options import WeakContext
 
@@ -18,11 +18,12 @@ Array = NDArray[np.float64]
 class Equilibrium:
     """The equations K u = B p(c(u)) of a block in contact with a rigid plane.
 
-    Closures are c = δ − Bᵀu / w; what of the plane's approaches δ is not prescribed follows from u
-    (see `Contact`). The residual K u − B p is the gradient of a convex energy when no law softens.
-    Its derivative K + B (diag(p'/w) − E Eᵀ) Bᵀ is applied without being assembled: B has few
-    columns (patches) or few rows (nodes of the interface) with entries, E a column for every motion
-    of the plane that follows from u. It lies between K and the derivative under a fixed plane.
+    Closures are c = δ − Bᵀu / w, with the approach δ of the plane at the samples. Motions of the
+    plane that are not prescribed follow from u (see `LawContact`). The residual K u − B p is the
+    gradient of a convex energy if no law softens. Its derivative K + B (diag(p'/w) − E Eᵀ) Bᵀ is
+    applied without being assembled: B has few columns (patches) or few rows with entries (nodes of
+    the interface), and E has a column for every free motion of the plane. The derivative lies
+    between K and the derivative under a fixed plane.
 
     Args:
         block: The elastic block.
@@ -38,20 +39,21 @@ class Equilibrium:
         Every method is collective.
     """
 
-    def __init__(self, block: Block, sampling: Sampling, contact: Contact) -> None:
+    def __init__(self, block: Block, sampling: Sampling, contact: LawContact) -> None:
         self.block, self.contact, self._sampling = block, contact, sampling
         self.scale = 0.0
         stiffness = block.stiffness
         self._load = stiffness.createVecLeft()
         self._samples = sampling.operator.createVecRight()
-        self._action = _TangentAction(stiffness, sampling)
+        self._slope: Array = np.zeros(len(sampling.weight))  # p'/w
+        self._border: Array = np.zeros((len(sampling.weight), 0))  # E
         self.tangent = PETSc.Mat().createPython(
-            stiffness.getSizes(), WeakContext(self._action), comm=stiffness.comm
+            stiffness.getSizes(), WeakContext(self), comm=stiffness.comm
         )
         self.tangent.setUp()
 
     def closure(self, displacement: PETSc.Vec) -> Array:
-        """Balance the plane, and return the closures of this rank's samples, shape (n,) [mm]."""
+        """Bring the plane into equilibrium, and return this rank's closures, shape (n,) [mm]."""
         self._sampling.operator.multTranspose(displacement, self._samples)
         return self.contact.closure(self._samples.array_r / self._sampling.weight)
 
@@ -71,32 +73,20 @@ class Equilibrium:
     def update_tangent(self, displacement: PETSc.Vec) -> None:
         """Move the tangent to a displacement."""
         stiffness = self.contact.stiffness(self.closure(displacement))
-        self._action.slope = stiffness / self._sampling.weight
-        self._action.border = self.contact.border(stiffness)
-
-
-class _TangentAction:
-    """What PETSc calls to multiply by the tangent.
-
-    Apart from :class:`Equilibrium`, which holds the matrix that is multiplied by.
-    """
-
-    def __init__(self, stiffness: PETSc.Mat, sampling: Sampling) -> None:
-        self._stiffness, self._operator = stiffness, sampling.operator
-        self._comm = stiffness.comm.tompi4py()
-        self._stretch = sampling.operator.createVecRight()
-        self.slope: Array = np.zeros(len(sampling.weight))  # p'/w
-        self.border: Array = np.zeros((len(sampling.weight), 0))  # E
+        self._slope = stiffness / self._sampling.weight
+        self._border = self.contact.border(stiffness)
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Write K x + B (diag(p'/w) − E Eᵀ) Bᵀ x."""
-        self._stiffness.mult(x, y)
-        self._operator.multTranspose(x, self._stretch)
-        stretch = self._stretch.array_r
-        pressure = self.slope * stretch
-        if self.border.shape[1]:
-            pressure -= self.border @ self._comm.allreduce(self.border.T @ stretch, op=MPI.SUM)
-        self._stretch.array[:] = pressure
-        self._operator.multAdd(self._stretch, y, y)
+        """Write the tangent's product K x + B (diag(p'/w) − E Eᵀ) Bᵀ x; PETSc calls this."""
+        operator, samples = self._sampling.operator, self._samples
+        self.block.stiffness.mult(x, y)
+        operator.multTranspose(x, samples)
+        stretch = samples.array_r
+        pressure = self._slope * stretch
+        if self._border.shape[1]:
+            comm = self.block.mesh.comm
+            pressure -= self._border @ comm.allreduce(self._border.T @ stretch, op=MPI.SUM)
+        samples.array[:] = pressure
+        operator.multAdd(samples, y, y)
 
     multTranspose = mult

@@ -137,35 +137,18 @@ class TopNodes:
             touching: Whether this rank's nodes are in contact, shape (n,).
         """
         (flags,) = self.spread(touching.astype(float))
-        nodes, linked = self.facets, flags[self.facets] > 0.5
+        linked = flags[self.facets] > 0.5
         some = linked.any(axis=1)
-        nodes, linked = nodes[some], linked[some]
-        hub = np.where(linked, nodes, -1).max(axis=1, initial=-1)
+        nodes, linked = self._numbers(self.facets[some]), linked[some]
+        hub = np.where(linked, nodes, -1).max(axis=1, initial=-1)  # one node of every facet
         pairs = np.stack([np.broadcast_to(hub[:, None], nodes.shape)[linked], nodes[linked]])
-        found, ends = np.unique(pairs, return_inverse=True)
-        count, region = _connected(ends.reshape(2, -1), len(found))
-        return self._joined(count, region, found)
-
-    def _joined(self, count: int, region: Index, nodes: Index) -> int:
-        """Count the regions of all ranks, those that share nodes as one.
-
-        Args:
-            count: Number of regions of this rank.
-            region: Region of some rank-local nodes, shape (n,).
-            nodes: These nodes, shape (n,).
-        """
-        comm, numbers = self._block.mesh.comm, self._numbers(nodes)
-        ghost = nodes >= self._block.space.dofmap.index_map.size_local
-        # only nodes at the borders of ranks are told to others
-        border = ghost | np.isin(numbers, np.concatenate(comm.allgather(numbers[ghost])))
-        parts = comm.allgather((count, region[border], numbers[border]))
-        first = np.cumsum([0, *(part[0] for part in parts)])
-        regions = np.concatenate(
-            [start + part[1] for start, part in zip(first, parts, strict=False)]
-        )
-        names, shared = np.unique(np.concatenate([part[2] for part in parts]), return_inverse=True)
-        pairs = np.stack([regions, first[-1] + shared.ravel()])
-        return _connected(pairs, int(first[-1]) + len(names))[0]
+        pairs = np.concatenate(self._block.mesh.comm.allgather(pairs), axis=1)
+        names, ends = np.unique(pairs, return_inverse=True)
+        if not len(names):
+            return 0
+        shape = (len(names), len(names))
+        graph = coo_array((np.ones(pairs.shape[1]), tuple(ends.reshape(2, -1))), shape=shape)
+        return int(connected_components(graph, directed=False)[0])
 
     @cached_property
     def _empty(self) -> tuple[NDArray[np.bool_], csr_array]:
@@ -239,12 +222,3 @@ class TopNodes:
 
     def _sum(self, values: Array) -> Array:
         return self._block.mesh.comm.allreduce(values, op=MPI.SUM)
-
-
-def _connected(pairs: Index, count: int) -> tuple[int, Index]:
-    """Return how many components pairs (2, n) of things connect, and that of every thing."""
-    if not count:
-        return 0, np.empty(0, dtype=np.intp)
-    graph = coo_array((np.ones(pairs.shape[1]), tuple(pairs)), shape=(count, count))
-    found, component = connected_components(graph, directed=False)
-    return int(found), component

@@ -12,7 +12,7 @@ from macro import compat
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-_STEPS = 40  # Newton's, monotone from above; a handful are taken
+_TINY = 1e-100
 
 
 class FacetLattice(NamedTuple):
@@ -86,13 +86,11 @@ def covered(touching: NDArray[np.bool_], pressure: Array, gap: Array, length: Ar
 
 
 def _inside(pressure: Array, gap: Array, length: Array) -> Array:
-    """Return the share of edges that is in contact: 1 − z with c z³ + z = 1."""
-    known = gap > 0.0
-    c = np.divide(4.0 * pressure * length, 3.0 * gap, out=np.zeros_like(gap), where=known) ** 2
-    z = np.minimum(1.0, 1.0 / np.cbrt(np.maximum(c, 1e-300)))
-    for _ in range(_STEPS):
-        step = (c * z**3 + z - 1.0) / (3.0 * c * z**2 + 1.0)
-        z -= step
-        if not np.any(np.abs(step) > 1e-12):
-            break
-    return np.where(known, 1.0 - z, 1.0)
+    """Return the share of edges that is in contact: 1 − z with c z³ + z = 1.
+
+    The real root is z = 2/√(3c) sinh(asinh(3√(3c)/2)/3), a hyperbolic form of Cardano's.
+    """
+    open_ = gap > 0.0
+    c = np.divide(4.0 * pressure * length, 3.0 * gap, out=np.zeros_like(gap), where=open_) ** 2
+    root = np.sqrt(3.0 * np.maximum(c, _TINY))
+    return np.where(open_, 1.0 - 2.0 / root * np.sinh(np.arcsinh(1.5 * root) / 3.0), 1.0)

@@ -22,10 +22,12 @@ Mode = Literal["patchwise", "pointwise"]
 
 
 class ContactLaw(Protocol):
-    """Pressure over closure; must answer every closure that an iteration may try.
+    """Contact pressure p of a patch as a function of its closure c.
 
-    Closure is the rigid approach minus the downward displacement of the block's surface [mm];
-    pressures are positive in compression [MPa]; stiffness is dp/dc ≥ 0 [MPa/mm].
+    Closure is the approach of the plane minus the downward displacement of the block's surface
+    [mm]. Pressures are positive in compression [MPa], and the stiffness is dp/dc ≥ 0 [MPa/mm]. Both
+    must be defined for every closure, because Newton's iterates may leave the range of a tabulated
+    law: whoever tabulates laws extends them and checks the converged closures.
     """
 
     def pressure(self, closure: Array, /) -> Array:
@@ -39,11 +41,11 @@ class ContactLaw(Protocol):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sampling:
-    """Where the laws are evaluated, and how their pressures load the block.
+    """The samples that laws are evaluated at, and the loads by their pressures.
 
-    A sample is a whole patch or a quadrature point. With u the nodal displacements, p the
-    pressures and w the weights of the samples, the nodal load is ``B p`` and the downward
-    displacement of the samples is ``(Bᵀ u) / w``: one operator, so every tangent is symmetric.
+    A sample is a whole patch or a quadrature point. With the nodal displacements u, the pressures p
+    and the weights w of the samples, the nodal load is ``B p`` and the downward displacement of the
+    samples is ``(Bᵀ u) / w``. The same operator in both makes every tangent symmetric.
 
     Args:
         operator: B, rows like the displacements, columns like the samples [mm²].
@@ -60,24 +62,6 @@ class Sampling:
     y: Array
     patch: NDArray[np.intp]
     count: int
-
-    def pressure(self, laws: Sequence[ContactLaw], closure: Array) -> Array:
-        """Return the laws' pressures at this rank's samples, shape (n,) [MPa].
-
-        Args:
-            laws: One law per patch.
-            closure: Closures of the samples, shape (n,) [mm].
-        """
-        return self.by_patch([law.pressure for law in laws], closure)
-
-    def stiffness(self, laws: Sequence[ContactLaw], closure: Array) -> Array:
-        """Return the laws' stiffnesses dp/dc at this rank's samples, shape (n,) [MPa/mm].
-
-        Args:
-            laws: One law per patch.
-            closure: Closures of the samples, shape (n,) [mm].
-        """
-        return self.by_patch([law.stiffness for law in laws], closure)
 
     def patch_sums(self, values: Array) -> Array:
         """Return the integrals of sampled values over every patch, shape (N,); collective."""
@@ -106,14 +90,14 @@ class Interface:
     Args:
         block: The elastic block.
         patches: Patches inside the block's interface.
-        degree: Polynomial degree that the quadrature is exact for; None: products of two basis
-            functions.
+        degree: Polynomial degree that the quadrature is exact for; None: that of products of two
+            basis functions.
 
     Raises:
         InputError: When a patch reaches beyond the top.
 
     Note:
-        Everything here is collective. A rank may own no facet, or nothing of a patch.
+        Everything here is collective. A rank may own no facet, or no part of a patch.
     """
 
     block: Block
@@ -169,7 +153,7 @@ class Interface:
 
     @cached_property
     def patchwise(self) -> Sampling:
-        """Laws at the mean closures of the patches, which are shared out over the ranks."""
+        """Laws at the mean closures of the patches, which are distributed over the ranks."""
         points, comm = self.quadrature, self.block.mesh.comm
         member = PETSc.Mat().createAIJ(
             ((len(points.x), None), (None, self.patches.count)),
@@ -210,9 +194,9 @@ class Interface:
 
     @cached_property
     def points_by_dofs(self) -> PETSc.Mat:
-        """−w φ of the vertical displacements behind every point, shape (points, dofs) [mm²]."""
+        """−w φ of the vertical displacements at every point, shape (points, dofs) [mm²]."""
         points, nodes = self.quadrature, self.block.space.dofmap.index_map
-        used = np.abs(points.values) > 1e-12  # the nodes that are not on the facet
+        used = np.abs(points.values) > 1e-12  # excludes nodes that are not on the facet
         columns = 3 * nodes.local_to_global(points.nodes[used]).astype(np.int64) + 2
         starts = np.concatenate([[0], np.cumsum(used.sum(axis=1))])
         entries = -(points.weight[:, None] * points.values)[used]

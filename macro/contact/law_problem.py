@@ -1,13 +1,11 @@
-"""A block pressed by a rigid plane through its contact laws: one load step at a time."""
+"""A block with contact laws on its top, under a rigid plane: one load step at a time."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
@@ -16,9 +14,9 @@ from geometry.errors import InputError
 from geometry.rigid_plane import Control
 from macro import compat
 from macro.block import Block
-from macro.contact.contact_law import Contact
-from macro.contact.energy_start import DisplacementBasis
+from macro.contact.contact_law import LawContact
 from macro.contact.equilibrium import Equilibrium
+from macro.contact.initial_guess import DisplacementBasis
 from macro.contact.law_interface import ContactLaw, Interface, Mode
 from macro.contact.newton import NewtonReport, NewtonSolver
 
@@ -27,7 +25,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LawContactState:
-    """Equilibrium of the block at one load step; the same on every rank but for the displacement.
+    """Equilibrium of the block at one load step.
+
+    All but the displacement is the same on every rank.
 
     Args:
         approach: Approach of the rigid plane at the middle of the patches [mm].
@@ -44,7 +44,6 @@ class LawContactState:
         residuals: Norm of the residual before each Newton step and at the end, relative to the
             norm of the interface's load there.
         reason: Name of PETSc's reason to stop.
-        wall_s: Wall time of the slowest rank [s].
     """
 
     approach: float
@@ -59,17 +58,15 @@ class LawContactState:
     linear_iterations: int
     residuals: Array
     reason: str
-    wall_s: float
 
 
 class LawContactProblem:
-    """A block under a rigid plane, solved for one load step after the other by Newton's method.
+    """A block with contact laws under a rigid plane, solved by Newton's method.
 
-    The plane's approach or force, and its tilt or no moment, are prescribed: both ways are one
-    Newton's method in the displacements, with as many linear solves.
-    The tangent is the exact derivative; conjugate gradients are preconditioned by the multigrid of
-    the block alone, which is made once. A load step starts from the best combination of all
-    earlier solutions.
+    Each load step prescribes the plane's approach or force, and its tilt or zero moment. All take
+    the same Newton's method in the displacements, and about as many linear solves. The tangent is
+    the exact derivative. Conjugate gradients are preconditioned by the multigrid of the block
+    alone, which is made once. The initial guess is the best combination of earlier solutions.
 
     Args:
         block: The elastic block.
@@ -97,7 +94,7 @@ class LawContactProblem:
                 "every patch needs a law", value=len(laws), allowed=f"{interface.patches.count}"
             )
         self._interface, self._sampling = interface, interface.sampling(mode)
-        contact = Contact(interface, self._sampling, laws)
+        contact = LawContact(interface, self._sampling, laws)
         self.equilibrium = Equilibrium(block, self._sampling, contact)
         self.newton = NewtonSolver(self.equilibrium, block.solver)
         self._basis = DisplacementBasis(self.equilibrium, self._sampling)
@@ -108,7 +105,7 @@ class LawContactProblem:
         """Find the equilibrium of one load step.
 
         A force and a moment of zero are met to `geometry.plane_equilibrium.TOLERANCE`. Without
-        any force the plane just touches the highest patch, as it is tilted or was last.
+        any force the plane touches the highest patch, with the prescribed tilt or the last one.
 
         Args:
             control: What is prescribed of the plane.
@@ -117,23 +114,20 @@ class LawContactProblem:
             NotConverged: When Newton's method fails, or nothing can hold the plane; the earlier
                 solutions stay what they were, so that a smaller step can be tried.
         """
-        began = time.perf_counter()
         equilibrium = self.equilibrium
         equilibrium.contact.prescribe(control, self._plane)
         solution = equilibrium.block.stiffness.createVecRight()
-        self._basis.start(solution)
+        self._basis.write_guess(solution)
         report = self.newton.solve(
             solution, what=f"the block at {control}", remedy="take more load steps (load.steps)"
         )
         self._basis.add(solution)
-        comm = equilibrium.block.mesh.comm
-        seconds = comm.allreduce(time.perf_counter() - began, op=MPI.MAX)
-        state = self._state(solution, report, seconds)
+        state = self._state(solution, report)
         compat.collect_garbage(solution.comm)
         return state
 
     def start_from(self, pressure: Array) -> None:
-        """Let the next load step start from the displacements by mean pressures of the patches.
+        """Add the displacements by mean pressures of the patches to the initial guesses.
 
         Args:
             pressure: Pressures, shape (N,) [MPa].
@@ -168,7 +162,7 @@ class LawContactProblem:
         values = together(comm, lambda: sampling.by_patch(functions, self._closure))
         return sampling.patch_sums(values) / self._interface.areas
 
-    def _state(self, solution: PETSc.Vec, report: NewtonReport, wall_s: float) -> LawContactState:
+    def _state(self, solution: PETSc.Vec, report: NewtonReport) -> LawContactState:
         contact, sampling = self.equilibrium.contact, self._sampling
         self._closure = closure = self.equilibrium.closure(solution)
         self._plane = plane = contact.plane.copy()
@@ -188,5 +182,4 @@ class LawContactProblem:
             linear_iterations=report.linear_iterations,
             residuals=report.residuals,
             reason=report.reason,
-            wall_s=wall_s,
         )

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.errors import NotConverged
+from macro.contact.equilibrium import Equilibrium
 from macro.linear_solvers.options import (
     KRYLOV_DEFAULTS,
     PREFIX,
@@ -25,31 +25,19 @@ NONLINEAR_DEFAULTS: Mapping[str, object] = {
     "snes_rtol": 1e-9,
     "snes_max_it": 50,
 }
-"""Newton with backtracking; ``snes_rtol`` is relative to the problem's scale, not to the start.
-On the paper's scene it leaves 2e-11 of the force and of the largest patch pressure."""
+"""Newton with backtracking; ``snes_rtol`` is relative to the problem's scale, not to the initial
+residual. On the paper's scene it leaves 2e-11 of the force and of the largest patch pressure."""
 
-_LOOSEST = 0.1  # inner tolerance far from the solution
-_SPARE = 0.3  # share of the tolerance that the last linear solve aims at
+_LOOSEST = 0.1
+"""Relative tolerance of linear solves far from the solution."""
 
-
-class NonlinearProblem(Protocol):
-    """Equations r(u) = 0 with a tangent, and a scale to measure r by."""
-
-    tangent: PETSc.Mat
-    scale: float
-
-    def residual(self, displacement: PETSc.Vec, residual: PETSc.Vec, /) -> None:
-        """Write r(u), and set the scale."""
-        ...
-
-    def update_tangent(self, displacement: PETSc.Vec, /) -> None:
-        """Move the tangent to u."""
-        ...
+_SPARE = 0.3
+"""Share of the tolerance that the last linear solve aims at."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NewtonReport:
-    """How a solve went.
+    """Iterations and residuals of a solve.
 
     Args:
         iterations: Newton steps.
@@ -65,22 +53,22 @@ class NewtonReport:
 
 
 class NewtonSolver:
-    """Solves one problem as often as wanted, with one preconditioner.
+    """Solves a problem repeatedly with one preconditioner.
 
-    A linear system is solved to the tolerance max(min(ρ, 0.1), 0.3 rtol/ρ), ρ being the relative
-    residual: proportional to ρ, which keeps convergence quadratic (Dembo, Eisenstat & Steihaug
-    1982, doi 10.1137/0719025), and no further than the end asks for. A user's
-    ``-patchlaw_ksp_rtol`` or ``-patchlaw_snes_ksp_ew`` replaces this rule.
+    A linear system is solved to the tolerance max(min(ρ, 0.1), 0.3 rtol/ρ), where ρ is the relative
+    residual. A tolerance proportional to ρ keeps convergence quadratic (Dembo, Eisenstat & Steihaug
+    1982, doi 10.1137/0719025), and the lower bound avoids needless iterations in the last step. A
+    user's ``-patchlaw_ksp_rtol`` or ``-patchlaw_snes_ksp_ew`` replaces this rule.
 
     Args:
         problem: The equations.
-        preconditioner: A linear solver whose preconditioner, already set up, fits every tangent.
+        preconditioner: A linear solver whose preconditioner is set up and used for every tangent.
 
     Note:
         Collective.
     """
 
-    def __init__(self, problem: NonlinearProblem, preconditioner: PETSc.KSP) -> None:
+    def __init__(self, problem: Equilibrium, preconditioner: PETSc.KSP) -> None:
         self._problem = problem
         self._residuals: list[float] = []
         base = preconditioner.getOperators()[1]
@@ -88,20 +76,20 @@ class NewtonSolver:
         self._forcing = not (user.hasName("ksp_rtol") or user.hasName("snes_ksp_ew"))
         self.snes = PETSc.SNES().create(base.comm)
         self.snes.setOptionsPrefix(PREFIX)
-        self.snes.setFunction(self._residual, base.createVecLeft())
+        self.snes.setFunction(lambda _, *vectors: problem.residual(*vectors), base.createVecLeft())
         self.snes.setJacobian(self._tangent, problem.tangent, base)
         self.snes.setConvergenceTest(self._converged)
         with default_options(PREFIX, {**KRYLOV_DEFAULTS, **NONLINEAR_DEFAULTS}):
             self.snes.setFromOptions()
         self.snes.ksp.pc.setType("python")
-        self._preconditioner = _OfAnother(preconditioner.pc)
+        self._preconditioner = _SharedPreconditioner(preconditioner.pc)
         self.snes.ksp.pc.setPythonContext(WeakContext(self._preconditioner))
 
     def solve(self, solution: PETSc.Vec, *, what: str, remedy: str) -> NewtonReport:
-        """Solve from a start that the solution replaces.
+        """Solve from an initial guess.
 
         Args:
-            solution: The start; on return the solution.
+            solution: The initial guess; receives the solution.
             what: What is being solved, for the error.
             remedy: What to change when it fails, for the error.
 
@@ -120,9 +108,6 @@ class NewtonSolver:
             reason=reason,
         )
 
-    def _residual(self, _snes: PETSc.SNES, displacement: PETSc.Vec, residual: PETSc.Vec) -> None:
-        self._problem.residual(displacement, residual)
-
     def _tangent(
         self, snes: PETSc.SNES, displacement: PETSc.Vec, _tangent: PETSc.Mat, _base: PETSc.Mat
     ) -> None:
@@ -138,11 +123,11 @@ class NewtonSolver:
         return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE) if done else 0
 
 
-class _OfAnother:
+class _SharedPreconditioner:
     """Another solver's preconditioner.
 
-    PETSc's solvers multiply by the matrix that their preconditioner carries: where two share it,
-    the first solves with the matrix of the second from then on.
+    PETSc keeps a solver's matrix in its preconditioner. If two solvers shared one, the first would
+    solve with the matrix of the second.
     """
 
     def __init__(self, preconditioner: PETSc.PC) -> None:

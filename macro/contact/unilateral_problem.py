@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 
 from geometry.errors import InputError
@@ -15,11 +17,60 @@ from macro.block import Block
 from macro.contact.active_set import PrimalDualActiveSet
 from macro.contact.augmented_lagrangian import AugmentedLagrangian
 from macro.contact.face_nodes import TopNodes
+from macro.contact.initial_guess import ContactSolution
 from macro.contact.plane_over_nodes import PlaneOverNodes
-from macro.contact.unilateral_state import UnilateralContactState, measured
 
 Array = NDArray[np.float64]
 Method = Literal["active-set", "augmented-lagrangian", "penalty"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class UnilateralContactState:
+    """Contact between a rough top and a rigid plane at one load step.
+
+    Numbers, and arrays by patch, are the same on every rank.
+
+    Attributes:
+        approach: Rigid approach at the middle of the interface [mm].
+        tilt: Change of the approach along x and y [mm/mm].
+        displacement: This rank's owned degrees of freedom [mm].
+        nodal_force: Contact forces of this rank's nodes of the top, shape (n,) [N].
+        force: Normal force from the nodes [N].
+        moment: First moments of the contact forces along x and y, about the middle of the
+            interface, shape (2,) [N mm].
+        reaction: Force that the bottom bears [N]; equals ``force`` in equilibrium.
+        contact_area: Tributary area of the nodes in contact [mm²].
+        contact_area_fine: Area whose border lies between nodes, see `covered` [mm²].
+        nodes: Number of nodes in contact.
+        contacts: Number of connected regions of contact.
+        mean_separation: Mean gap between the plane and the top [mm].
+        patch_force: Forces on the patches, shape (N,) [N].
+        patch_area: Contact areas of the patches, as ``contact_area``, shape (N,) [mm²].
+        patch_closure: Approach of the plane over the middle of each patch minus the mean downward
+            displacement of the patch's top, shape (N,) [mm].
+        active_sets: Active sets that were solved for.
+        linear_iterations: Iterations of the linear solver.
+        reason: Why the iteration stopped.
+    """
+
+    approach: float
+    tilt: tuple[float, float]
+    displacement: Array
+    nodal_force: Array
+    force: float
+    moment: Array
+    reaction: float
+    contact_area: float
+    contact_area_fine: float
+    nodes: int
+    contacts: int
+    mean_separation: float
+    patch_force: Array
+    patch_area: Array
+    patch_closure: Array
+    active_sets: int
+    linear_iterations: int
+    reason: str
 
 
 class UnilateralContactProblem:
@@ -27,15 +78,17 @@ class UnilateralContactProblem:
 
     Args:
         block: The block; its top is where the mesh puts it.
-        highest: Height of the highest point of the top, which the approach counts from [mm].
+        reference_height: Height of the highest point of the top, from which the approach counts
+            [mm].
         method: ``"active-set"``: no node of the top penetrates; ``"augmented-lagrangian"``: no
             quadrature point of its facets does; ``"penalty"``: quadrature points penetrate in
             proportion to their pressure.
-        patches: Patches on the top that forces and areas are told for; None: the whole top.
-        penalty: Pressure per depth, for the last two methods [MPa/mm]; None: from the mesh.
+        patches: Patches on the top whose forces and areas are wanted; None: the whole top.
+        penalty: Pressure per penetration, for the last two methods [MPa/mm]; None: from the mesh.
 
     Attributes:
         top: Nodes of the top, of this rank.
+        method: The method that finds the contact.
 
     Raises:
         InputError: When there is no such method, the penalty is not positive, the block's top has
@@ -48,7 +101,7 @@ class UnilateralContactProblem:
     def __init__(
         self,
         block: Block,
-        highest: float,
+        reference_height: float,
         *,
         method: Method = "active-set",
         patches: PatchGrid | None = None,
@@ -67,17 +120,17 @@ class UnilateralContactProblem:
         _check_top(block, patches)
         self.block, self.top = block, TopNodes(block, patches)
         self._plane = PlaneOverNodes(
-            self.top.x, self.top.y, highest - self.top.height, lengths, block.mesh.comm
+            self.top.x, self.top.y, reference_height - self.top.height, lengths, block.mesh.comm
         )
-        self._method: PrimalDualActiveSet | AugmentedLagrangian
+        self.method: PrimalDualActiveSet | AugmentedLagrangian
         if method == "active-set":
-            self._method = PrimalDualActiveSet(block, self.top, self._plane)
+            self.method = PrimalDualActiveSet(block, self.top, self._plane)
         else:
             exact = method == "augmented-lagrangian"
-            self._method = AugmentedLagrangian(block, self.top, self._plane, penalty, exact=exact)
+            self.method = AugmentedLagrangian(block, self.top, self._plane, penalty, exact=exact)
 
     def solve(self, control: Control) -> UnilateralContactState:
-        """Find the contact of one load step, starting from those before.
+        """Find the contact of one load step, with an initial guess from the steps before.
 
         A force and a moment of zero are met to `macro.linear_solvers.constrained.TOLERANCE` of the
         force, or to what ``-patchlaw_ksp_rtol`` asks for. Without any force the plane just touches
@@ -90,13 +143,13 @@ class UnilateralContactProblem:
             NotConverged: When an iteration fails, or nothing can hold the plane; the earlier
                 solutions stay what they were, so that a smaller step can be tried.
         """
-        state = measured(self.block, self.top, self._plane, self._method.solve(control))
+        state = _state(self.block, self.top, self._plane, self.method.solve(control))
         compat.collect_garbage(self.block.stiffness.comm)
         return state
 
 
 def _check_top(block: Block, patches: PatchGrid) -> None:
-    """Refuse what the plane would press on outside the interface, and patches out there."""
+    """Refuse a top with a margin, and patches that reach beyond it."""
     shape = block.mesh.shape
     if shape.margin:
         raise InputError(
@@ -113,3 +166,39 @@ def _check_top(block: Block, patches: PatchGrid) -> None:
             value=(patches.origin, patches.lengths),
             allowed=f"inside the interface {shape.interface} mm",
         )
+
+
+def _state(
+    block: Block, top: TopNodes, plane: PlaneOverNodes, found: ContactSolution
+) -> UnilateralContactState:
+    """Return the state of a solution; collective."""
+    displacement = block.stiffness.createVecRight()
+    displacement.array[:] = found.displacement
+    downward = -found.displacement[top.dofs]
+    gap = -plane.penetration(found.plane, downward)
+    loads = plane.levers.loads(found.nodal_force)
+    tilted = (top.patches.centres - plane.centre) @ found.plane[1:]
+    nodal_force, touching = np.maximum(found.nodal_force, 0.0), found.touching
+    area = np.where(touching, top.area, 0.0)
+    weight = np.stack([top.area, top.area * gap, area, touching], axis=1)
+    whole, volume, contact, nodes = block.mesh.comm.allreduce(weight.sum(axis=0), op=MPI.SUM)
+    return UnilateralContactState(
+        approach=float(found.plane[0]),
+        tilt=(float(found.plane[1]), float(found.plane[2])),
+        displacement=found.displacement,
+        nodal_force=found.nodal_force,
+        force=float(loads[0]),
+        moment=loads[1:],
+        reaction=block.reaction(displacement),
+        contact_area=float(contact),
+        contact_area_fine=top.covered_area(touching, nodal_force, np.maximum(gap, 0.0)),
+        nodes=round(nodes),
+        contacts=top.regions(touching),
+        mean_separation=float(volume / whole),
+        patch_force=top.patch_sums(found.nodal_force),
+        patch_area=top.patch_sums(area),
+        patch_closure=found.plane[0] + tilted - top.patch_means(downward),
+        active_sets=found.active_sets,
+        linear_iterations=found.linear_iterations,
+        reason=found.reason,
+    )

@@ -48,10 +48,8 @@ class ConstrainedSolver:
 
     def __init__(self, matrix: PETSc.Mat, preconditioner: PETSc.PC, layers: int = 2) -> None:
         self._projection = Projection(matrix.comm.tompi4py())
-        self._operator = _ProjectedMatrix(matrix, self._projection)
-        operator = PETSc.Mat().createPython(
-            matrix.getSizes(), WeakContext(self._operator), comm=matrix.comm
-        )
+        self._matrix = matrix
+        operator = PETSc.Mat().createPython(matrix.getSizes(), WeakContext(self), comm=matrix.comm)
         operator.setUp()
         self._ksp = PETSc.KSP().create(matrix.comm)
         self._ksp.setOperators(operator)
@@ -106,13 +104,7 @@ class ConstrainedSolver:
         solution.axpy(1.0, step)
         return int(self._ksp.its)
 
-
-class _ProjectedMatrix:
-    """The operator P A, which PETSc applies to vectors in the range of P."""
-
-    def __init__(self, matrix: PETSc.Mat, projection: Projection) -> None:
-        self._matrix, self._projection = matrix, projection
-
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write the operator's product y = P A x for x in the range of P; PETSc calls this."""
         self._matrix.mult(x, y)
         self._projection.project(y)

@@ -18,7 +18,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from macro import compat
-from macro.elasticity import rigid_body_modes_at
+from macro.elasticity import rigid_body_modes
 from macro.linear_solvers.multigrid import for_displacements
 from macro.linear_solvers.options import ALGEBRAIC_DEFAULTS, CoarserGrid
 
@@ -50,7 +50,7 @@ def vertex_grid(matrix: PETSc.Mat, space: Any, free: PETSc.Vec) -> list[CoarserG
     transfer, points = vertex_transfer(space, free)
     coarse = matrix.ptap(transfer)
     coarse.setOption(PETSc.Mat.Option.SPD, True)
-    coarse.setNearNullSpace(rigid_body_modes_at(points, matrix.comm))
+    coarse.setNearNullSpace(rigid_body_modes(points, matrix.comm))
     return [CoarserGrid(transfer, coarse)]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
@@ -43,11 +45,16 @@ class StiffPreconditioner:
         self, matrix: PETSc.Mat, preconditioner: PETSc.PC, points_by_dofs: PETSc.Mat, layers: int
     ) -> None:
         self._matrix, self._points = matrix, points_by_dofs
-        self._split = _Split(matrix, preconditioner, layers)
+        self._work, self._projection = matrix.createVecRight(), Projection(matrix.comm.tompi4py())
+        self._constrained = ConstrainedPreconditioner(
+            matrix, preconditioner, self._projection, layers
+        )
+        self._dofs: NDArray[np.intp] = np.empty(0, dtype=np.intp)
+        self._factors: Any = None
         self.pc = PETSc.PC().create(matrix.comm)
         self.pc.setOperators(matrix)
         self.pc.setType("python")
-        self.pc.setPythonContext(WeakContext(self._split))
+        self.pc.setPythonContext(WeakContext(self))
 
     def update(self, stiffness: Array, dofs: NDArray[np.intp], motions: Array) -> None:
         """Move to other springs.
@@ -69,37 +76,24 @@ class StiffPreconditioner:
             node_submatrix(matrix.getDiagonalBlock(), nodes, nodes)[among][:, among]
             for matrix in (self._matrix, springs)
         )
-        self._split.update(dofs, motions, csc_array(part))
         springs.destroy()
         scaled.destroy()
-
-
-class _Split:
-    """What PETSc calls to apply the preconditioner."""
-
-    def __init__(self, matrix: PETSc.Mat, preconditioner: PETSc.PC, layers: int) -> None:
-        self._work, self._projection = matrix.createVecRight(), Projection(matrix.comm.tompi4py())
-        self._constrained = ConstrainedPreconditioner(
-            matrix, preconditioner, self._projection, layers
-        )
-        self._dofs: NDArray[np.intp] = np.empty(0, dtype=np.intp)
-        self._factors: object = None
-
-    def update(self, dofs: NDArray[np.intp], motions: Array, square: csc_array) -> None:
         self._dofs = dofs
         self._projection.constrain(dofs, motions)
         self._constrained.constrain(dofs)
-        self._factors = splu(square) if len(dofs) else None
+        self._factors = splu(csc_array(part)) if len(dofs) else None
 
     def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write the preconditioner's y for x; PETSc calls this."""
+        work = self._work
         self._constrained.apply(pc, x, y)
-        x.copy(self._work)
-        self._projection.project(self._work)
-        self._work.axpby(1.0, -1.0, x)  # (1 − P) x, which is zero but at the dofs with springs
-        rest = self._work.array_r[self._dofs]
-        self._work.set(0.0)
+        x.copy(work)
+        self._projection.project(work)
+        work.axpby(1.0, -1.0, x)  # (1 − P) x, which is zero but at the dofs with springs
+        rest = work.array_r[self._dofs]
+        work.set(0.0)
         if self._factors is not None:
-            self._work.array[self._dofs] = self._factors.solve(rest)  # type: ignore[attr-defined]
-        y.axpy(1.0, self._work)
-        self._projection.project(self._work)
-        y.axpy(-1.0, self._work)
+            work.array[self._dofs] = self._factors.solve(rest)
+        y.axpy(1.0, work)
+        self._projection.project(work)
+        y.axpy(-1.0, work)

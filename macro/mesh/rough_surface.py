@@ -156,41 +156,12 @@ def _volumes(flat: BlockMesh, moved: Array) -> Array:
     cells, points = compat.cell_vertices(flat.mesh), flat.mesh.geometry.x
     x, y, before, after = (row[cells] for row in (*points.T, moved[:, 2]))
     smallest = np.full(len(cells), np.inf)
-    for slopes in _slopes(cells.shape[1]) if len(cells) else ():
+    degree = 2 if cells.shape[1] == 10 else 1
+    for slopes in compat.lagrange_gradients(flat.mesh.topology.cell_name(), degree):
         normal = np.cross(x @ slopes, y @ slopes)
         volumes = (np.einsum("ci,ci->c", normal, z @ slopes) for z in (after, before))
         np.minimum(smallest, np.divide(*volumes), out=smallest)
     return smallest
-
-
-def _slopes(nodes: int) -> Array:
-    """Return the shape functions' gradients at the nodes of a cell, shape (points, nodes, 3).
-
-    Nodes of hexahedra (8) and tetrahedra (4 or 10) are in the order of dolfinx. The gradients of a
-    linear tetrahedron are constant and given at one point.
-    """
-    if nodes == 8:
-        return _trilinear_slopes()
-    linear = np.vstack([np.full(3, -1.0), np.eye(3)])
-    if nodes == 4:
-        return linear[None]
-    i, j = _EDGES.T
-    at = np.vstack([np.eye(4), 0.5 * (np.eye(4)[i] + np.eye(4)[j])])[:, :, None]
-    # gradients of L (2 L - 1) at vertices and of 4 L L' in the middle of edges
-    vertices = (4.0 * at - 1.0) * linear
-    middles = 4.0 * (at[:, i] * linear[j] + at[:, j] * linear[i])
-    return np.concatenate([vertices, middles], axis=1)
-
-
-def _trilinear_slopes() -> Array:
-    corners = np.array(list(np.ndindex(2, 2, 2)))[:, ::-1]  # x runs first
-    slopes = np.zeros((8, 8, 3))
-    for point, node in np.ndindex(8, 8):
-        apart = corners[point] != corners[node]
-        for axis in range(3):
-            if not np.delete(apart, axis).any():
-                slopes[point, node, axis] = 2 * corners[node, axis] - 1
-    return slopes
 
 
 def _steepest(flat: BlockMesh, rise: Array) -> float:

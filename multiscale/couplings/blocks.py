@@ -98,7 +98,7 @@ def on_body(
     if body is not None and face is None:
         face = body.face(comm, modes=modes, coarse=coarse)
     section = setup.scene.block
-    material = HalfSpace(section.young_modulus, section.poisson_ratio)
+    material = HalfSpace(young_modulus=section.young_modulus, poisson_ratio=section.poisson_ratio)
 
     def put(model: HalfSpaceModel, order: int) -> HalfSpaceModel:
         surface, model = model.surface, replace(model, tolerance=_RESIDUAL)

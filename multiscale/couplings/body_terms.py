@@ -132,11 +132,11 @@ class Body:
         """
         from mpi4py import MPI
 
-        from macro import cached_face_compliance
+        from macro import face_compliance
 
         count = modes or self.modes
         self._check_memory(count)
-        return cached_face_compliance(
+        return face_compliance(
             self.lengths,
             self.shape.height,
             self.material,
@@ -144,6 +144,7 @@ class Body:
             count,
             comm or MPI.COMM_SELF,
             coarse=coarse,
+            use_cache=True,
         )
 
     def term(self, face: FaceCompliance, *, higher: float = 0.0) -> BodyModes:

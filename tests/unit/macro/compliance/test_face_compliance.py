@@ -6,9 +6,8 @@ from mpi4py import MPI
 
 from geometry.errors import InputError
 from geometry.materials import Material
-from macro.compliance import face_compliance as module
 from macro.compliance.elements import division
-from macro.compliance.face_compliance import cached_face_compliance, face_compliance
+from macro.compliance.face_compliance import face_compliance
 
 SOFT = Material(young_modulus=1.0, poisson_ratio=0.3)
 
@@ -101,14 +100,15 @@ def test_impossible_blocks_are_refused():
         compliance((1.0, 1.0), -1.0)
 
 
-def test_kept_compliance_is_the_one_computed(monkeypatch, tmp_path):
+def test_cached_compliance_is_the_one_computed(monkeypatch, tmp_path):
     monkeypatch.setenv("PATCHLAW_CACHE", str(tmp_path))
-    every = ((1.0, 1.0), 1.0, SOFT, "free", 3, MPI.COMM_SELF)
-    first = cached_face_compliance(*every)
-    monkeypatch.setattr(module, "face_compliance", None)
-    second = cached_face_compliance(*every)
-    np.testing.assert_array_equal(second.normal, first.normal)
-    np.testing.assert_array_equal(second.growth, first.growth)
-    np.testing.assert_array_equal(second.stresses, first.stresses)
-    with pytest.raises(TypeError):  # another block is not found
-        cached_face_compliance((1.0, 1.0), 1.1, *every[2:])
+    block = ((1.0, 1.0), 1.0, SOFT, "free", 3, MPI.COMM_SELF)
+    first = face_compliance(*block, use_cache=True)
+    (path,) = tmp_path.iterdir()
+    written = path.stat().st_ino
+    second = face_compliance(*block, use_cache=True)
+    for name in ("normal", "growth", "stresses"):
+        np.testing.assert_array_equal(getattr(second, name), getattr(first, name))
+    assert path.stat().st_ino == written  # it was read
+    face_compliance((1.0, 1.0), 1.1, *block[2:], use_cache=True)  # another block is not found
+    assert len(list(tmp_path.iterdir())) == 2

@@ -30,10 +30,10 @@ def obstacle(shape, method, surface=SPHERE, sides="free", **options):
 
 def at_points(found, state):
     """Return depths and pressures of the quadrature points."""
-    method, displacement = found._method, found.block.stiffness.createVecRight()
+    method, displacement = found.method, found.block.stiffness.createVecRight()
     displacement.array[:] = state.displacement
     closure = method._equilibrium.closure(displacement)
-    return closure - method._law.rest, method._law.pressure(closure)
+    return closure - method._law.distance, method._law.pressure(closure)
 
 
 def forces(shape, control):

@@ -89,5 +89,5 @@ def test_blocks_are_those_of_the_matrix():
 
 def test_other_types_of_matrices_are_refused():
     with pytest.raises(PETSc.Error):
-        with block_rows(make().unsupported_stiffness):
+        with block_rows(make().stiffness.convert("aij", PETSc.Mat())):
             pass

@@ -47,7 +47,6 @@ class EasyBlock:
             linear_iterations=10,
             residuals=np.array([1.0, 1e-11]),
             reason="CONVERGED_FNORM_RELATIVE",
-            wall_s=0.0,
         )
 
     def patch_means(self, functions):
