@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.materials import Material
 from geometry.surface import Surface
 from micro import (
     FiniteSlopes,
@@ -26,7 +27,7 @@ from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import Block, FaceCompliance, Interface, Material
+    from macro import Block, FaceCompliance, Interface
 
 Array = NDArray[np.float64]
 
@@ -247,8 +248,6 @@ def load_finite_elements(scene: Scene, comm: Any) -> None:
 
 def block_material(setup: ProblemSetup) -> Material:
     """Return the elastic constants of a scene's block."""
-    from macro import Material
-
     section = setup.scene.block
     return Material(young_modulus=section.young_modulus, poisson_ratio=section.poisson_ratio)
 

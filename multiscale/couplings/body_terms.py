@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from geometry.checks import process_memory
 from geometry.errors import InputError
+from geometry.materials import Material
 from micro import (
     BodyModes,
     BodyStresses,
@@ -29,7 +30,7 @@ from micro import (
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from geometry import BlockShape, Partition
-    from macro import FaceCompliance, Material
+    from macro import FaceCompliance
     from macro.block import Sides
 
 Array = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Patch laws on a block of which only the displacements of the patches are known."""
+"""Patch laws on the displacements of a block's patches alone, without its mesh."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ _MOST_STEPS = 100
 _MOST_HALVINGS = 40
 _MEMORY = 4  # residuals that a step is compared with: at kinks of the laws it may rise for a while
 _DECREASE = 1e-4  # share of the predicted decrease that a step must bring
-_PAST_TOUCH = 0.02  # of the largest approach: way beyond touch of a plane that gains a support
+_PAST_TOUCH = 0.02  # of the largest approach: distance beyond touch when a plane gains a support
 
 
 class DenseNewton:
@@ -142,10 +142,10 @@ def _line_search(
     reference: float,
     iterations: int,
 ) -> DenseState:
-    """Halve a Newton step, or bend it along the laws, until the residual falls.
+    """Shorten a Newton step until the residual falls, straight or along the laws.
 
     A straight step is taken where it lowers the residual. Otherwise the better one of the straight
-    and the bent step is taken where its residual is below the reference.
+    step and the one along the laws is taken where its residual is below the reference.
     """
     before = problem.norm(now)
     for share in 0.5 ** np.arange(_MOST_HALVINGS):

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 TOLERANCE = 1e-12
 """Residual of a solution: of the closures relative to the largest approach, of the force and the
 moments relative to the largest force and that force times half the interface's diagonal. Near first
-touch, where rounding leaves more of closures, it is relative to what rounding leaves."""
+touch rounding changes closures by more than that, and the residual is relative to its effect."""
 
 _FARTHEST = 1e3  # halves of the diagonal up to which a first contact is looked for
 _ROUNDING = 8.0 * float(np.finfo(float).eps)  # of approaches and of the closures at first touch

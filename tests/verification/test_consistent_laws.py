@@ -62,7 +62,7 @@ def test_force_of_the_whole_surface(name, count):
         assert macro_force(table, distance) == pytest.approx(force, rel=allowed)
 
 
-def test_rows_run_out_where_they_are_told_to():
+def test_no_more_rows_than_allowed():
     surface = rough(2)
     patches = PatchGrid(grid=(4, 4), lengths=surface.lengths)
     _, _, few = table_of(surface, patches, tolerance=1e-6, most_rows=40)

@@ -68,7 +68,7 @@ def test_a_step_a_hundred_times_too_large_and_back(kind):
     assert there.force_N[0] == pytest.approx(slow.force_N[-1], rel=1e-5)
 
 
-def test_a_patch_alone_at_full_contact_on_the_mesh_is_told():
+def test_a_patch_alone_at_full_contact_on_the_mesh_is_refused():
     # hard: the pressure stops being a function of closure, and no smaller step helps
     with pytest.raises(
         NotConverged, match=r"stops being a function.*coupling.newton = 'condensed'"

@@ -112,6 +112,6 @@ def test_displacements_of_patches_are_those_of_the_macro_model(way):
 def test_blocks_too_flat_for_their_modes_are_refused(key, block):
     with pytest.raises(
         InputError, match=r"so flat a block, in \d+ modes a side, needs about"
-    ) as told:
+    ) as caught:
         contact_model(setup(approach=1e-6, **block), None)
-    assert told.value.key == key
+    assert caught.value.key == key
