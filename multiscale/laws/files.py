@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import h5py
+import numpy as np
 
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from multiscale.laws.law_table import LawTable, PlanePath
 from multiscale.laws.patch_law import PatchLaw
-from multiscale.laws.repair import repaired_law
 from multiscale.laws.rows import LawRows
 from multiscale.storage.checksummed_hdf5 import checksummed, verified
 from multiscale.storage.serialisation import stored_numbers
@@ -105,6 +105,18 @@ def read_laws(path: Path | BinaryIO) -> LawTable:
         raise error.located(file=name) from None
     except Exception as error:  # h5py raises errors of many families
         raise InputError(f"is not a readable law file: {error}", file=name) from None
+
+
+def repaired_law(law: PatchLaw) -> PatchLaw:
+    """Return a law whose pressure rises; the same one where it does.
+
+    Args:
+        law: The law of a patch alone, as a table from elsewhere may have it.
+    """
+    if np.all(np.diff(law.rows.pressure) >= 0.0):
+        return law
+    rows, change = law.rows.with_rising_pressure()
+    return replace(law, rows=rows, repaired=max(change, law.repaired))
 
 
 def _table(file: Any) -> LawTable:

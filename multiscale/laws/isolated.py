@@ -15,7 +15,6 @@ from micro.closed_forms.love import love_centre, love_mean
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.refinement import MOST_ROWS, refined
-from multiscale.laws.repair import rising_rows
 from multiscale.laws.rows import SolvedRows
 
 Array = NDArray[np.float64]
@@ -104,7 +103,7 @@ class IsolatedPatch:
             ]
 
         def make(rows: SolvedRows) -> list[PatchLaw]:
-            kept, change = rising_rows(rows[:, 0])
+            kept, change = rows[:, 0].rising()
             return [replace(self._law(kept), repaired=change)]
 
         laws, _ = refined(

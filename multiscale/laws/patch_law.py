@@ -60,7 +60,7 @@ class PatchLaw:
         stiffness_error: The same of the stiffness; NaN where it was not estimated.
         warning_pressure: Mean pressure from which on the micro model warned that it is outside
             its range of validity [MPa]; infinite when it never did.
-        repaired: Largest change that made falling rows rise, see `multiscale.laws.repair`.
+        repaired: Largest change that made falling rows rise, see `LawRows.rising`.
 
     Raises:
         InputError: When the rows are no law.

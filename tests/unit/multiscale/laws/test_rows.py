@@ -7,10 +7,9 @@ import pytest
 from scipy.optimize import minimize
 
 from geometry.patches import PatchGrid
-from multiscale.laws.files import read_laws, write_laws
+from multiscale.laws.files import read_laws, repaired_law, write_laws
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
-from multiscale.laws.repair import repaired_law, rising_rows, with_rising_pressure
 from multiscale.laws.rows import LawRows
 
 APPROACH = np.linspace(0.0, 8e-3, 9)
@@ -44,7 +43,7 @@ def law(pressure, **changes):
 @pytest.mark.parametrize("seed", range(1, 6))
 def test_is_the_nearest_rising_law(seed):
     given = noisy(seed)
-    found, change = with_rising_pressure(rows(given))
+    found, change = rows(given).with_rising_pressure()
 
     # an independent minimiser over rises ≥ 0
     def distance(rises):
@@ -70,7 +69,7 @@ def pairs(one, other):
 
 def test_rows_that_rise_are_left_alone():
     given = rows(4e5 * APPROACH**1.5)
-    found, change = rising_rows(given)
+    found, change = given.rising()
     assert change == 0.0
     assert all(np.array_equal(*pair) for pair in pairs(found, given))
     plain = law(4e5 * APPROACH**1.5)
@@ -82,7 +81,7 @@ def test_a_closure_a_little_below_is_left_out_and_said():
     closure = given.closure.copy()
     closure[4] = closure[3] - 4e-4 * np.ptp(closure)
     given = replace(given, closure=closure)
-    found, change = rising_rows(given)
+    found, change = given.rising()
     assert all(np.array_equal(one, np.delete(other, 4)) for one, other in pairs(found, given))
     assert change == pytest.approx(4e-4, rel=1e-9)
 
