@@ -37,8 +37,8 @@ OnBody = Callable[[HalfSpaceModel, int], HalfSpaceModel]
 SLOPES = 2
 """Order of finite slopes where they are taken into account."""
 
-_SIDE_REACH = 0.25
-"""Distance from a free side up to which the micro model sees it, relative to the shortest side of
+_DECAY_LENGTH = 0.25
+"""Decay length of the effect of free sides in the micro model, relative to the shortest side of
 the block."""
 
 _RESIDUAL = 1e-10
@@ -106,14 +106,16 @@ def on_body(
         # With finite slopes heights count from the highest point, near the loads, where slopes add
         # least. The flat body then ends at it, while the block's height is that of the mean plane.
         higher = surface.highest - surface.mean_height if order else 0.0
-        beside: list[SurfaceStress] = []
+        edge_stresses: list[SurfaceStress] = []
         if body is not None and face is not None:
             model = replace(model, sides=body.side_term, body=body.term(face, higher=higher))
-            beside = _stresses(body, face, surface) if order else []
+            edge_stresses = _stresses(body, face, surface) if order else []
         if not order:
             return model
-        plane = surface.highest if beside else None
-        slopes = FiniteSlopes(surface, material, order=order, plane=plane, beside=beside)
+        plane = surface.highest if edge_stresses else None
+        slopes = FiniteSlopes(
+            surface, material, order=order, plane=plane, edge_stresses=edge_stresses
+        )
         return replace(model, slopes=slopes)
 
     return put
@@ -154,7 +156,7 @@ def free_sides(setup: ProblemSetup) -> FreeSides | None:
     return FreeSides(
         lengths=setup.surface.lengths,
         poisson_ratio=setup.scene.block.poisson_ratio,
-        reach=_SIDE_REACH * min(*setup.surface.lengths, setup.shape.height),
+        decay_length=_DECAY_LENGTH * min(*setup.surface.lengths, setup.shape.height),
     )
 
 

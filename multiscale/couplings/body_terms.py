@@ -24,7 +24,6 @@ from micro import (
     half_space_stress_modes,
     influence_matrix,
     side_modes,
-    side_patches,
     side_stress_modes,
 )
 
@@ -193,7 +192,7 @@ class Body:
         modulus, count = self.material.contact_modulus, self.modes
         half_space = influence_matrix(patches) / (np.pi * modulus)
         if self.side_term is not None:
-            half_space += side_patches(self.side_term, patches) / modulus
+            half_space += self.side_term.patch_compliance(patches) / modulus
             count = max(count, min(max(patches.shape), _MODES_OF_CORNERS))
         else:
             count = max(count, min(_MODES_PER_PATCH * max(patches.shape), _MOST_MODES))

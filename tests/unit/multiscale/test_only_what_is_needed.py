@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import micro.pairs.interaction
+import micro.interaction.hertz_pairs
 import multiscale.output.results
 from geometry import Asperities, PatchGrid
 from micro import HalfSpaceModel, asperity_model
@@ -146,14 +146,14 @@ def summits(below: int) -> Asperities:
 def evaluations(monkeypatch, below: int) -> int:
     """Return how many pairs of summits a load takes."""
     counted = [0]
-    field = micro.pairs.interaction.circular_field
+    field = micro.interaction.hertz_pairs.circular_field
 
     def watched(*given, **options):
         counted[0] += int(np.prod(np.broadcast_shapes(*(np.shape(part) for part in given))))
         return field(*given, **options)
 
     with monkeypatch.context() as patch:
-        patch.setattr(micro.pairs.interaction, "circular_field", watched)
+        patch.setattr(micro.interaction.hertz_pairs, "circular_field", watched)
         model = asperity_model("circular", summits(below), contact_modulus=1.0)
         whole = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
         model.respond([0.002, 0.004], patches=whole, mean_heights=[-0.1])
