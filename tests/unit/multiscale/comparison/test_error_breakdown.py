@@ -1,32 +1,25 @@
-"""Causes of errors: the shares add up, and each is what was put in."""
+"""Errors by cause: the shares add up, and each is what was put in."""
 
 import itertools
 
 import pytest
 
-from multiscale.comparison.causes import Best, Value, causes
+from multiscale.comparison.error_breakdown import Response, error_breakdown
 
 ROUNDING = 1e-12  # sums of five doubles of order one
 FIRST, WHOLE = -0.025, -0.03
 TOPS = {
-    "analytic": Value(value=3.4, slopes=FIRST),
-    "concurrent": Value(value=3.1, slopes=FIRST),
-    "reference": Value(value=3.0, slopes=WHOLE),
+    "analytic": Response(value=3.4, slope_effect=FIRST),
+    "concurrent": Response(value=3.1, slope_effect=FIRST),
+    "reference": Response(value=3.0, slope_effect=WHOLE),
 }
-BEST = Best(
-    half_space=TOPS["analytic"],
-    block=TOPS["concurrent"],
-    rough=TOPS["reference"],
-    slopes=FIRST,
-)
 KINDS = ("analytic", "isolated", "consistent", "concurrent", "reference")
-TWIN = Value(value=3.2)
+ALONE = Response(value=3.2)
 
 
-def split(value, kind, against, *, twin=TWIN, cells=False, best=BEST):
-    return causes(
-        value, kind, against=TOPS[against], against_kind=against, best=best, twin=twin, cells=cells
-    )
+def split(response, kind, measure, **changes):
+    others = {"best": TOPS, "slope_effect": FIRST, "alone": ALONE, "is_half_space": False}
+    return error_breakdown(response, kind, measure=measure, **(others | changes))
 
 
 def total(found):
@@ -39,16 +32,16 @@ def total(found):
 @pytest.mark.parametrize("known", [True, False])
 @pytest.mark.parametrize("slopes", [0.0, FIRST, WHOLE])
 def test_shares_add_up(kind, against, cells, known, slopes):
-    best = BEST if known else Best(half_space=None, block=None, rough=None)
-    value = Value(value=3.7, slopes=slopes)
-    twin = value if kind == "analytic" else TWIN
-    found = split(value, kind, against, twin=twin, cells=cells, best=best)
+    some = {} if known else {"best": {against: TOPS[against]}, "slope_effect": None}
+    response = Response(value=3.7, slope_effect=slopes)
+    alone = response if kind == "analytic" else ALONE
+    found = split(response, kind, against, alone=alone, is_half_space=cells, **some)
     right = TOPS[against].value
     assert total(found) == pytest.approx(3.7 / right - 1.0, abs=ROUNDING)
 
 
 def test_micro_model_of_small_slopes_against_the_meshed_roughness():
-    found = split(TWIN, "analytic", "reference")
+    found = split(ALONE, "analytic", "reference")
     assert found.micro == pytest.approx((3.2 * (1.0 + FIRST) - 3.4) / 3.0, rel=ROUNDING)
     assert found.block == pytest.approx((3.4 - 3.1) / 3.0, rel=ROUNDING)
     assert found.slopes == pytest.approx(-3.2 * WHOLE / 3.0, rel=ROUNDING)
@@ -56,7 +49,7 @@ def test_micro_model_of_small_slopes_against_the_meshed_roughness():
 
 
 def test_slopes_in_the_first_order_alone():
-    found = split(TOPS["concurrent"], "concurrent", "reference", cells=True)
+    found = split(TOPS["concurrent"], "concurrent", "reference", is_half_space=True)
     lost = 1.0 - (1.0 + WHOLE) / (1.0 + FIRST)
     assert found.slopes == pytest.approx(3.1 * lost / 3.0, rel=1e-11)  # a difference
     assert found.discretisation == pytest.approx(3.1 / 3.0 - 1.0 - found.slopes, rel=1e-11)
@@ -64,7 +57,7 @@ def test_slopes_in_the_first_order_alone():
 
 
 def test_laws_against_the_block():
-    found = split(Value(value=2.5), "isolated", "concurrent")
+    found = split(Response(value=2.5), "isolated", "concurrent")
     micro = (3.2 * (1.0 + FIRST) - 3.4) / 3.1
     assert found.micro == pytest.approx(micro, rel=ROUNDING)
     coupling = (2.5 * (1.0 + FIRST) - 3.1) / 3.1 - micro
@@ -75,22 +68,22 @@ def test_laws_against_the_block():
 
 
 def test_cells_of_the_half_space_are_discretisation():
-    coarse = Value(value=3.38, slopes=FIRST)
-    found = split(coarse, "analytic", "analytic", twin=coarse, cells=True)
+    coarse = Response(value=3.38, slope_effect=FIRST)
+    found = split(coarse, "analytic", "analytic", alone=coarse, is_half_space=True)
     assert (found.micro, found.slopes) == (0.0, 0.0)
     assert found.discretisation == pytest.approx(-0.02 / 3.4, rel=1e-9)  # a difference
 
 
 def test_the_other_way_round():
-    found = split(TOPS["reference"], "reference", "analytic", twin=None)
+    found = split(TOPS["reference"], "reference", "analytic", alone=None)
     assert found.block == pytest.approx(-(3.4 - 3.1) / 3.4, rel=ROUNDING)
     lost = 1.0 - (1.0 + FIRST) / (1.0 + WHOLE)
     assert found.slopes == pytest.approx(3.0 * lost / 3.4, rel=1e-11)  # a difference
 
 
 def test_what_was_not_reached_cannot_be_told():
-    best = Best(half_space=TOPS["analytic"], block=None, rough=TOPS["reference"])
-    found = split(TWIN, "analytic", "reference", best=best)
+    some = {"best": {kind: TOPS[kind] for kind in ("analytic", "reference")}, "slope_effect": None}
+    found = split(ALONE, "analytic", "reference", **some)
     assert found.block is None
     assert found.slopes is None
-    assert split(TOPS["concurrent"], "consistent", "reference", best=best).coupling is None
+    assert split(TOPS["concurrent"], "consistent", "reference", **some).coupling is None

@@ -6,7 +6,7 @@ from scipy.stats import wasserstein_distance
 
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
-from multiscale.comparison.measures import Curves, measures, on_grid, uncertainty
+from multiscale.comparison.error_measures import Curves, error_measures, on_grid, uncertainty
 
 ROUNDING = 1e-12  # sums of a few dozen doubles
 
@@ -29,7 +29,7 @@ def curves(force, patch_pressure=None, grid=(2, 2), **columns):
 def test_relative_to_the_largest_or_the_same_step():
     right = curves([1.0, 4.0, 2.0], separation=[10.0, 5.0, 8.0])
     run = curves([1.5, 4.0, 1.8], separation=[10.0, 6.0, 8.4])
-    found = measures(run, right, right.patches)
+    found = error_measures(run, right, right.patches)
     assert found.force_max == pytest.approx(0.5 / 4.0, rel=ROUNDING)
     assert found.force_last == pytest.approx(-0.2 / 2.0, rel=ROUNDING)
     assert found.separation_max == pytest.approx(1.0 / 5.0, rel=ROUNDING)
@@ -39,31 +39,31 @@ def test_relative_to_the_largest_or_the_same_step():
 
 def test_partial_run_is_measured_where_it_is():
     right, run = curves([1.0, 2.0, 40.0]), curves([1.0, 2.5])
-    found = measures(run, right, right.patches)
+    found = error_measures(run, right, right.patches)
     assert found.force_max == pytest.approx(0.25, rel=ROUNDING)  # of 2 N, not of 40 N
     assert np.isnan([found.force_last, found.pressure_l1, found.distribution]).all()
 
 
 def test_no_step_and_no_load_leave_everything_unknown():
     right = curves([0.0, 0.0])
-    assert np.isnan(measures(curves([]), right, right.patches).force_max)
-    found = measures(curves([1.0, 1.0]), right, right.patches)
+    assert np.isnan(error_measures(curves([]), right, right.patches).force_max)
+    found = error_measures(curves([1.0, 1.0]), right, right.patches)
     assert np.isnan([found.force_max, found.force_last, found.pressure_l1]).all()
 
 
 def test_unloading_to_nothing_has_no_relative_error_at_the_end():
     right, run = curves([4.0, 1e-12]), curves([4.0, 1e-11])
-    assert np.isnan(measures(run, right, right.patches).force_last)
+    assert np.isnan(error_measures(run, right, right.patches).force_last)
 
 
 def test_distances_of_pressures():
     right = curves([1.0], [[1.0, 0.0, 3.0, 0.0]])
     moved = curves([1.0], [[0.0, 1.0, 0.0, 3.0]])
-    found = measures(moved, right, right.patches)
+    found = error_measures(moved, right, right.patches)
     assert found.pressure_l1 == pytest.approx(2.0, rel=ROUNDING)  # nothing in common
     assert found.distribution == 0.0  # blind to where
     double = curves([2.0], [[2.0, 0.0, 6.0, 0.0]])
-    found = measures(double, right, right.patches)
+    found = error_measures(double, right, right.patches)
     assert found.pressure_l1 == pytest.approx(1.0, rel=ROUNDING)
     assert found.distribution == pytest.approx(0.0, abs=ROUNDING)  # blind to the force
 
@@ -72,7 +72,7 @@ def test_distribution_is_the_wasserstein_distance_of_scipy():
     rng = np.random.default_rng(4)
     p, r = rng.exponential(size=(2, 48))
     grid = (6, 8)
-    found = measures(
+    found = error_measures(
         curves([1.0], [p], grid), curves([1.0], [r], grid), curves([1.0], [r], grid).patches
     )
     oracle = wasserstein_distance(p / p.mean(), r / r.mean())

@@ -1,4 +1,4 @@
-"""How far two runs of the same load programme lie apart: every error measure, defined once.
+"""How far two runs with the same load history lie apart: every error measure, defined once.
 
 With R the run that is compared against and k the load steps that both have,
 
@@ -14,14 +14,14 @@ With R the run that is compared against and k the load steps that both have,
 * of their distribution there, the Wasserstein distance of p / <p> and r / <r>, which is the area
   between the two distribution functions: blind to where pressures are and to the force.
 
-What R's last step asks of a run that stopped before it is unknown (NaN). A measure of R's own
-uncertainty is defined by the same formulas.
+Errors at R's last step are unknown (NaN) for a run that stopped before it. The uncertainty of R
+itself is defined by the same formulas.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,13 +31,15 @@ from geometry.patches import PatchGrid, interval_overlaps
 
 Array = NDArray[np.float64]
 
+ZERO = 1e-9
+"""A force or an area below this share of the largest counts as zero: nothing is relative to it."""
+
 _UNKNOWN = float("nan")
-_NOTHING = 1e-9  # of the largest: a force or area below it is none to divide by
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Curves:
-    """What is compared of a run: m load steps, N patches.
+    """The results of a run that are compared: m load steps, N patches.
 
     Attributes:
         patches: The partition of the interface.
@@ -47,8 +49,8 @@ class Curves:
         separation: Mean separation, shape (m,) [mm].
         patch_pressure: Mean pressure of each patch, shape (m, N) [MPa].
         approach_error: The run's own error bar of the approach, shape (m,) [mm]; NaN where unknown.
-        force_error: That of the force, shape (m,) [N].
-        area_error: That of the area fraction, shape (m,).
+        force_error: Error bar of the force, shape (m,) [N].
+        area_error: Error bar of the area fraction, shape (m,).
     """
 
     patches: PatchGrid
@@ -73,16 +75,16 @@ class Curves:
         return self.force.size
 
     def divided(self, scale: float) -> Curves:
-        """Return the curves of a load and heights that are larger by 1 / scale, slopes small."""
-        if scale == 1.0:
-            return self
-        forces = ("force", "force_error", "patch_pressure")
-        names = (*forces, "approach", "approach_error", "separation")
+        """Return the curves for heights and a load that are larger by 1 / scale, at small slopes.
+
+        Areas stay as they are; forces, pressures and lengths normal to the surface are divided.
+        """
+        names = {field.name for field in fields(self)} - {"patches", "area", "area_error"}
         return replace(self, **{name: getattr(self, name) / scale for name in names})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Measures:
+class ErrorMeasures:
     """Errors of a run against another; relative, NaN where unknown.
 
     Attributes:
@@ -111,61 +113,63 @@ class Measures:
     distribution: float = _UNKNOWN
 
 
-def measures(run: Curves, against: Curves, grid: PatchGrid) -> Measures:
+def error_measures(run: Curves, against: Curves, grid: PatchGrid) -> ErrorMeasures:
     """Measure how far a run lies from another.
 
     Args:
         run: The run.
-        against: The run that counts as right.
+        against: The run that it is compared against.
         grid: Patches on which pressures are compared.
     """
     common = min(len(run), len(against))
     if not common:
-        return Measures()
-    found: dict[str, float] = {}
+        return ErrorMeasures()
+    whole, last = common == len(against), common - 1
+    errors: dict[str, float] = {}
     for name in ("force", "approach", "area", "separation"):
         mine, right = getattr(run, name), getattr(against, name)
         scale = np.abs(right[:common])
         if name != "separation":
             scale[:] = scale.max()
-        found[f"{name}_max"] = largest(mine[:common] - right[:common], scale)
-        if common == len(against):
-            floor = _NOTHING * float(np.abs(right).max())
-            found[f"{name}_last"] = ratio(mine[common - 1] - right[-1], right[-1], floor)
-    if common == len(against):
-        mine = on_grid(run.patch_pressure[common - 1], run.patches, grid)
-        right = on_grid(against.patch_pressure[-1], against.patches, grid)
-        found["pressure_l1"] = l1_distance(mine, right)
-        found["distribution"] = distribution_distance(mine, right)
-    return Measures(**found)
+        errors[f"{name}_max"] = _largest(mine[:common] - right[:common], scale)
+        if whole:
+            floor = ZERO * float(np.abs(right).max())
+            errors[f"{name}_last"] = _ratio(mine[last] - right[last], right[last], floor)
+    if whole:
+        p = on_grid(run.patch_pressure[last], run.patches, grid)
+        r = on_grid(against.patch_pressure[last], against.patches, grid)
+        errors["pressure_l1"] = _ratio(float(np.abs(p - r).sum()), float(r.sum()))
+        errors["distribution"] = _distribution_distance(p, r)
+    return ErrorMeasures(**errors)
 
 
 def uncertainty(
     against: Curves, pairs: Sequence[tuple[Curves, Curves]], grid: PatchGrid
-) -> Measures:
-    """Measure the uncertainty of the run that others are compared against; all values positive.
+) -> ErrorMeasures:
+    """Measure the uncertainty of the run that others are compared against; no value is negative.
 
-    Force, approach and area take the run's own error bars where it has them. The rest is the sum of
-    the distances between runs that differ by one refinement each: with an error that at least
-    halves by it, that of the finer run is no larger.
+    Force, approach and area take the run's own error bars where it has them. All else is the sum of
+    the distances between runs that differ by one refinement each. If a refinement at least halves
+    the error, the error of the finer run is no larger than this distance.
 
     Args:
         against: The run.
         pairs: A coarser and a finer run for each refinement; without any, nothing is known.
         grid: Patches on which pressures are compared.
     """
-    apart = [measures(coarser, finer, grid) for coarser, finer in pairs] or [Measures()]
+    distances = [error_measures(*pair, grid) for pair in pairs] or [ErrorMeasures()]
     found = {
-        name: float(sum(abs(getattr(one, name)) for one in apart)) for name in Measures.__slots__
+        field.name: float(sum(abs(getattr(one, field.name)) for one in distances))
+        for field in fields(ErrorMeasures)
     }
     for name in ("force", "approach", "area"):
         value, error = getattr(against, name), getattr(against, f"{name}_error")
-        known = np.isfinite(error)  # not before meshes find the first contact
+        known = np.isfinite(error)  # An error bar is unknown before meshes find the first contact.
         if known[-1]:
             top = float(np.abs(value).max())
-            found[f"{name}_max"] = largest(error[known], np.full(np.count_nonzero(known), top))
-            found[f"{name}_last"] = ratio(error[-1], value[-1], _NOTHING * top)
-    return Measures(**found)
+            found[f"{name}_max"] = _largest(error[known], np.full(np.count_nonzero(known), top))
+            found[f"{name}_last"] = _ratio(error[-1], value[-1], ZERO * top)
+    return ErrorMeasures(**found)
 
 
 def on_grid(pressure: Array, patches: PatchGrid, grid: PatchGrid) -> Array:
@@ -176,7 +180,7 @@ def on_grid(pressure: Array, patches: PatchGrid, grid: PatchGrid) -> Array:
     Args:
         pressure: Mean pressures, shape (N,) [MPa].
         patches: Their patches.
-        grid: The patches wanted, of the same rectangle.
+        grid: The new patches, of the same rectangle.
 
     Returns:
         Mean pressures, shape (grid.count,) [MPa].
@@ -186,16 +190,11 @@ def on_grid(pressure: Array, patches: PatchGrid, grid: PatchGrid) -> Array:
     return np.asarray((x @ pressure.reshape(patches.grid) @ y.T).ravel())
 
 
-def l1_distance(pressure: Array, right: Array) -> float:
-    """Return Σ |p − r| / Σ r over patches of equal area; NaN when r carries nothing."""
-    return ratio(float(np.abs(pressure - right).sum()), float(right.sum()))
-
-
-def distribution_distance(pressure: Array, right: Array) -> float:
+def _distribution_distance(pressure: Array, right: Array) -> float:
     """Return the Wasserstein distance of p / <p> and r / <r> over equal numbers of patches.
 
-    Of two samples of the same size it is the mean distance of their values in order (Villani 2009,
-    doi 10.1007/978-3-540-71050-9, remark 2.19). NaN when either carries nothing.
+    Of two samples of the same size it is the mean distance of their sorted values (Villani 2009,
+    doi 10.1007/978-3-540-71050-9, remark 2.19). NaN when either carries no load.
     """
     means = float(pressure.mean()), float(right.mean())
     if min(means) <= 0.0:
@@ -203,12 +202,12 @@ def distribution_distance(pressure: Array, right: Array) -> float:
     return float(np.abs(np.sort(pressure) / means[0] - np.sort(right) / means[1]).mean())
 
 
-def largest(error: Array, scale: Array) -> float:
+def _largest(error: Array, scale: Array) -> float:
     """Return the largest |error| / scale; NaN where every scale is zero."""
     usable = scale > 0.0
     return float(np.max(np.abs(error[usable]) / scale[usable])) if usable.any() else _UNKNOWN
 
 
-def ratio(error: float, right: float, floor: float = 0.0) -> float:
-    """Return error / right; NaN when that is not above a floor in size."""
+def _ratio(error: float, right: float, floor: float = 0.0) -> float:
+    """Return error / right; NaN when |right| is not above a floor."""
     return float(error / right) if abs(right) > floor else _UNKNOWN
