@@ -13,7 +13,7 @@ from geometry.collective import on_root
 from geometry.errors import InputError, NotConverged, PatchlawError
 from geometry.statistics import roughness
 from multiscale.costs.prediction import Cost, predicted_cost
-from multiscale.couplings.blocks import load_together
+from multiscale.couplings.blocks import load_finite_elements
 from multiscale.laws.files import write_laws
 from multiscale.machine.mpi_job import large_object_comm, refuse_detached_processes
 from multiscale.machine.nodes import ClusterNodes, cluster_nodes
@@ -127,7 +127,7 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
         comm: MPI communicator; None for a process on its own.
     """
     scene, _ = scene_and_folder(choice, comm, writes=False)
-    load_together(scene, comm)
+    load_finite_elements(scene, comm)
     nodes = cluster_nodes(comm)
     setup, made = on_root(large_object_comm(comm), lambda: _planned(scene, nodes))
     terminal.show_plan(comm, setup, made, list(memory_warnings(setup, nodes)))

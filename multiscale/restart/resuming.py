@@ -137,7 +137,7 @@ def checkpoint_of(run: Run, name: str, state: Arrays) -> Checkpoint:
     return Checkpoint(
         run=name,
         scene=run.given.model_dump(by_alias=True, mode="json"),
-        settled=run.settled,
+        settled=run.resolved,
         heights=run.heights,
         laws=run.law_bytes,
         steps=tuple(run.steps),

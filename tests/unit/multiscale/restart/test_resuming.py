@@ -511,7 +511,7 @@ def test_a_plan_stands_though_another_machine_would_choose_otherwise(tmp_path, m
     ticks, predicted = iter(range(1, 1000)), accuracy.predicted_cost
     monkeypatch.setattr(accuracy, "predicted_cost", reversed_costs)
     assert Run(left_open).scene != whole.scene  # the plan would be another one here
-    again = Run(left_open, settled=kept.settled)
+    again = Run(left_open, resolved=kept.settled)
     assert again.scene == whole.scene
     assert again.setup.micro.surface.grid == whole.setup.micro.surface.grid
     again.resume(kept.steps, kept.position, kept.state, kept.laws)
