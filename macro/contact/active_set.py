@@ -40,9 +40,6 @@ _LOOSE, _CLOSER = 0.1, 1e-2
 _FEW = 200
 """The set changes little when at most one active node in this many changes."""
 
-MOST_SOLVES = 100
-"""Linear solves of a load step before it fails."""
-
 _PATIENCE = 10
 """Solves without progress before nodes change one by one."""
 
@@ -83,22 +80,18 @@ class PrimalDualActiveSet:
         block: The block.
         top: Nodes of its top.
         plane: The plane over the nodes of the top.
+
+    Attributes:
         most_solves: Linear solves of a load step before it fails.
 
     Note:
         Everything here is collective.
     """
 
-    def __init__(
-        self,
-        block: Block,
-        top: TopNodes,
-        plane: PlaneOverNodes,
-        *,
-        most_solves: int = MOST_SOLVES,
-    ) -> None:
+    most_solves = 100
+
+    def __init__(self, block: Block, top: TopNodes, plane: PlaneOverNodes) -> None:
         self._block, self._top, self._plane = block, top, plane
-        self.most_solves = most_solves
         # one layer of quadratic elements reaches as far as two of linear ones
         self._solver = ConstrainedSolver(block.stiffness, block.solver.pc, layers=3 - block.degree)
         self._tolerance = contact_tolerance()
@@ -115,8 +108,7 @@ class PrimalDualActiveSet:
             NotConverged: When the active set does not converge, nothing can hold the plane, or a
                 linear solve fails; earlier solutions stay what they were.
         """
-        guess = self._history.guess(control)
-        displacement = self._block.stiffness.createVecRight()
+        guess, displacement = self._history.guess(control), self._block.stiffness.createVecRight()
         displacement.array[:] = guess.displacement
         placed = self._plane.placed(control, guess.plane)
         now = _Iterate(control, placed, displacement, guess.contact > 0.0)
@@ -135,7 +127,7 @@ class PrimalDualActiveSet:
                 self._put_on_plane(now)
             iterations, allowed = self._solve_active(now, motions, tolerance)
             spent += iterations
-            forces, depth = self._forces, self._depth(now)
+            forces, depth = self._residual.array_r[self._top.dofs], self._depth(now)
             largest = self._largest(forces[now.active])
             pulled = now.active & (forces < -self._tolerance * largest)
             beyond = depth > self._tolerance * self._largest(displacement.array_r)
@@ -207,15 +199,15 @@ class PrimalDualActiveSet:
     def _converged(self, now: _Iterate, sets: int, spent: int) -> ContactSolution:
         """Remove the last penetrations, and remember the solution for later guesses."""
         depth = self._depth(now)
-        now.displacement.array[self._top.dofs] -= np.where(
-            now.active, depth, np.maximum(depth, 0.0)
-        )
+        removed = np.where(now.active, depth, np.maximum(depth, 0.0))
+        now.displacement.array[self._top.dofs] -= removed
         self._update_residual(now.displacement)
+        forces = np.maximum(self._residual.array_r[self._top.dofs], 0.0)
         largest = self._largest(now.displacement.array_r)
         found = ContactSolution(
             plane=now.plane,
             displacement=now.displacement.array_r.copy(),
-            nodal_force=np.where(now.active, np.maximum(self._forces, 0.0), 0.0),
+            nodal_force=np.where(now.active, forces, 0.0),
             # vertices of quadratic triangles touch without a force
             touching=now.active | (depth > -_CLOSED * largest),
             active_sets=sets,
@@ -230,12 +222,6 @@ class PrimalDualActiveSet:
         """Set the residual −K u of a displacement; on the top it is the contact forces."""
         self._block.stiffness.mult(displacement, self._residual)
         self._residual.scale(-1.0)
-
-    @property
-    def _forces(self) -> Array:
-        """Contact forces of this rank's nodes of the top at the residual's displacement [N]."""
-        forces: Array = self._residual.array_r[self._top.dofs]
-        return forces
 
     def _depth(self, now: _Iterate) -> Array:
         return self._plane.penetration(now.plane, -now.displacement.array_r[self._top.dofs])
