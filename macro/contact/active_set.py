@@ -92,6 +92,7 @@ class PrimalDualActiveSet:
 
     def __init__(self, block: Block, top: TopNodes, plane: PlaneOverNodes) -> None:
         self._block, self._top, self._plane = block, top, plane
+        self._comm = block.mesh.comm
         # one layer of quadratic elements reaches as far as two of linear ones
         self._solver = ConstrainedSolver(block.stiffness, block.solver.pc, layers=3 - block.degree)
         self._tolerance = contact_tolerance()
@@ -157,18 +158,17 @@ class PrimalDualActiveSet:
         None when a load acts along a motion that they do not resist.
         """
         motions = self._plane.supported_motions(now.control.free, now.active)
-        loads = _prescribed_loads(now.control)
+        loads = now.control.loads[now.control.free]
         borne = motions @ np.linalg.lstsq(motions, loads, rcond=None)[0]
         lost = np.abs(loads - borne).max(initial=0.0)
         return None if lost > self._tolerance * (now.control.force or 0.0) else motions
 
     def _put_on_plane(self, now: _Iterate) -> None:
         """Move active nodes onto the plane; without any, the block is at rest."""
-        if self._count(now.active):
-            depth = self._depth(now)
-            now.displacement.array[self._top.dofs[now.active]] -= depth[now.active]
-        else:
+        if not self._count(now.active):
             now.displacement.set(0.0)
+        depth = self._depth(now)[now.active]
+        now.displacement.array[self._top.dofs[now.active]] -= depth
         self._update_residual(now.displacement)
 
     def _solve_active(self, now: _Iterate, supported: Array, tolerance: float) -> tuple[int, float]:
@@ -180,7 +180,7 @@ class PrimalDualActiveSet:
         if not self._count(now.active):
             return 0, 0.0
         free, levers = now.control.free, self._plane.levers
-        dofs, loads = self._top.dofs[now.active], supported.T @ _prescribed_loads(now.control)
+        dofs, loads = self._top.dofs[now.active], supported.T @ now.control.loads[free]
         motions = levers.scaled(free)[now.active] @ supported
         before = now.displacement.array_r[dofs].copy()
         residual = self._residual.copy()
@@ -231,7 +231,7 @@ class PrimalDualActiveSet:
 
     def _first(self, moved: Flags) -> Flags:
         """Keep the first of the flags, over all ranks (Murty 1974: such changes cannot cycle)."""
-        comm = self._block.mesh.comm
+        comm = self._comm
         lowest = comm.allreduce(comm.rank if moved.any() else comm.size, op=MPI.MIN)
         alone = np.zeros_like(moved)
         if comm.rank == lowest:
@@ -239,8 +239,7 @@ class PrimalDualActiveSet:
         return alone
 
     def _largest(self, values: Array) -> float:
-        comm = self._block.mesh.comm
-        return float(comm.allreduce(float(np.abs(values).max(initial=0.0)), op=MPI.MAX))
+        return float(self._comm.allreduce(float(np.abs(values).max(initial=0.0)), op=MPI.MAX))
 
     def _norm(self, values: Array) -> float:
         return float(np.sqrt(self._sum(float(values @ values))))
@@ -249,9 +248,4 @@ class PrimalDualActiveSet:
         return int(self._sum(int(np.count_nonzero(flags))))
 
     def _sum(self, values: Any) -> Any:
-        return self._block.mesh.comm.allreduce(values, op=MPI.SUM)
-
-
-def _prescribed_loads(control: Control) -> Array:
-    """Return the prescribed loads along the free motions of the plane, shape (k,) [N]."""
-    return control.loads[control.free]
+        return self._comm.allreduce(values, op=MPI.SUM)

@@ -79,7 +79,7 @@ class AugmentedLagrangian:
         whole = PatchGrid(grid=(1, 1), lengths=block.mesh.shape.interface)
         self._interface = interface = Interface(block, whole, degree=2 * block.degree)
         self._sampling = sampling = interface.pointwise
-        (distance,) = top.spread(plane.distance)
+        (distance,) = top.with_ghosts(plane.distance)
         points = interface.quadrature
         unit = block.material.contact_modulus / _facet_sizes(points.cell, points.weight)
         self._stiff = _HARD * unit if penalty is None else np.full_like(unit, penalty)
@@ -113,18 +113,19 @@ class AugmentedLagrangian:
             closure = self._equilibrium.closure(displacement)
             # penetration of points without pressure, penetration or gap of points under pressure
             depth = self._largest((law.pressure(closure) - law.multiplier) / law.slope)
-            missed = depth / max(self._penetration * self._largest(displacement.array_r), _TINY)
+            allowed = self._penetration * self._largest(displacement.array_r)
+            ratio = depth / max(allowed, _TINY)
             hard = bool(np.all(law.slope >= self._stiff))
             hard = bool(self._block.mesh.comm.allreduce(hard, op=MPI.LAND))
-            if hard and tolerance <= self._tolerance and (missed <= 1.0 or not self._exact):
+            if hard and tolerance <= self._tolerance and (ratio <= 1.0 or not self._exact):
                 return self._converged(displacement, steps, spent)
             if self._exact:
                 law.multiplier = law.pressure(closure)
-            if self._exact and hard and missed > _FALL * before:
+            if self._exact and hard and ratio > _FALL * before:
                 hardest = np.minimum(_HARDER * hardest, _HARDEST * self._stiff)
-            before = missed
+            before = ratio
             law.slope = np.minimum(_HARDER * law.slope, hardest)
-            near = min(0.1 * tolerance, SPARE * self._penetration * missed) if self._exact else 0.0
+            near = min(0.1 * tolerance, SPARE * self._penetration * ratio) if self._exact else 0.0
             tolerance = max(self._tolerance, near) if hard or not self._exact else tolerance
         raise not_found(control, "MULTIPLIERS", _MOST_UPDATES)
 

@@ -1,4 +1,4 @@
-"""LawContact laws under a rigid plane, which is given or follows from its force and moment."""
+"""Contact laws under a rigid plane that is prescribed or in equilibrium with its loads."""
 
 from __future__ import annotations
 
