@@ -30,8 +30,7 @@ parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
 parser.add_argument("--out", type=Path, default=Path("results/paper_figures"))
 choice = parser.parse_args()
-page = Page(choice.out)
-GRID = 64 if choice.quick else 256
+page, grid = Page(choice.out), 2 * (64 if choice.quick else 256,)
 MODULUS = Material(young_modulus=4000.0, poisson_ratio=0.15).contact_modulus
 BLUE, RED, GREEN = "#0b3c5d", "#d1495b", "#1b998b"
 
@@ -61,8 +60,7 @@ found = f"at R'/R'' = 10: F1 = {f[ten]:.3f}, A1 = {a[ten]:.3f}; the approximate 
 found += f"eq. 2 changes them by {f2[ten] / f[ten] - 1:+.2%} and {a2[ten] / a[ten] - 1:+.2%}."
 claim = "circles overestimate the area and underestimate the force where e is high."
 page.add("Figure 3", "factors of an elliptic contact", figure, claim, found)
-thin = 1e-6
-log = np.log(4.0 / thin)
+thin, log = 1e-6, np.log(4.0 / 1e-6)
 slender = np.pi / np.sqrt(2.0 * thin) * (log - 1.0) ** 0.25 * log**-1.5
 assert abs(force_factor(np.sqrt(1 - thin**2)) / slender - 1) < 1e-3
 assert abs(f[0] - 1) + abs(a[0] - 1) < 1e-12 and f[ten] > 1.0 > a[ten]
@@ -111,7 +109,7 @@ assert abs(along[-1] / (ellipse.force / (np.pi * MODULUS * r[-1])) - 1) < 0.03  
 
 # %%
 spectrum = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1)
-surface = synthesise(spectrum, grid=(GRID, GRID), lengths=(1.0, 1.0))
+surface = synthesise(spectrum, grid=grid, lengths=(1.0, 1.0))
 density = power_spectrum(surface)
 band = (density.wavenumber > 5 * np.pi) & (density.wavenumber < 19 * np.pi)  # whole rings
 q, S = density.wavenumber[band], density.density[band]
@@ -125,8 +123,8 @@ summits = find_asperities(surface, periodic=False)
 draw_surface(figure, heights, surface, summits, PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)))
 spectral.grid(alpha=0.3)
 spectral.legend(frameon=False)
-found = f"slope {slope:.2f}, rms height {1e3 * density.variance**0.5:.1f} µm, "
-found += f"{len(summits)} summits."
+height = 1e3 * density.variance**0.5
+found = f"slope {slope:.2f}, rms height {height:.1f} µm, {len(summits)} summits."
 claim = "S ∝ |k|^(−2(H + 1)) = |k|^(−3.9) between 2 and 10 waves per side."
 page.add("Figure 6", "spectrum and surface", figure, claim, found)
 assert abs(slope + 3.9) < 0.1

@@ -1,17 +1,22 @@
 """Geometry of rough contact.
 
-A spectrum or a file gives a surface; the surface gives its statistics, its asperities and its
-means over patches; a block shape gives the mesh of the body that carries it.
+A spectrum or a file yields a surface. From the surface follow its statistics, its asperities and
+its means over patches. A rigid plane presses on it, as a load step prescribes. Materials tell the
+contact modulus, and block shapes the mesh of the body under the surface.
 """
 
 from geometry.asperities import Asperities, find_asperities
 from geometry.errors import InputError, NotConverged, PatchlawError
 from geometry.files import read_surface
 from geometry.materials import Material, MaterialPair
-from geometry.meshes.block import Alignment, BlockShape, alignment, flat_block
-from geometry.meshes.families import characteristic_size, reference_shapes
+from geometry.meshes.block import Alignment, BlockShape, alignment
+from geometry.meshes.families import (
+    characteristic_size,
+    places_in_reach,
+    reference_shapes,
+    suggested_fine,
+)
 from geometry.meshes.refined_block import RefinedShape
-from geometry.meshes.refinement import places_in_reach, suggested_fine
 from geometry.patches import Partition, PatchGrid, UnevenPartition, overlaps, patch_means
 from geometry.rigid_plane import Control, RigidPlane
 from geometry.spectrum import Spectrum, synthesise
@@ -40,7 +45,6 @@ __all__ = [
     "alignment",
     "characteristic_size",
     "find_asperities",
-    "flat_block",
     "overlaps",
     "patch_means",
     "places_in_reach",

@@ -17,7 +17,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _NEWTON_STEPS = 8
-_ROUNDING = 64.0 * np.finfo(float).eps  # of the largest height, in a second difference
+_ROUNDING = 64.0 * np.finfo(float).eps
+"""Second difference that is only rounding, relative to the largest height."""
 _SUMMIT_ARRAYS = ("x", "y", "z", "radius_major", "radius_minor", "angle")
 _BORDER_ARRAYS = ("border_x", "border_y", "border_z")
 
@@ -28,7 +29,7 @@ def _none() -> Array:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Asperities:
-    """Summits of a surface, each an elliptic paraboloid, and what was left out.
+    """Summits of a surface, each an elliptic paraboloid, and counts of the maxima that are none.
 
     Args:
         x: Abscissae of the summits, shape (n,) [mm].
@@ -45,9 +46,9 @@ class Asperities:
             among 8 neighbours cannot confirm them, so they are not asperities.
         border_y: Their ordinates, shape (m,) [mm].
         border_z: Their heights, shape (m,) [mm].
-        rejected: Number of maxima without two positive radii, such as the flat ones of heights
-            measured in steps, or on the flank of another or of the border; not asperities either.
-        flat: Number of those that are flat.
+        rejected: Number of further maxima of the samples that are no asperities: they have no two
+            positive radii, or climb to another summit or to the border.
+        flat: Number of those that are flat, as steps of the measured heights leave them.
 
     Raises:
         InputError: When the arrays differ in length, a number is not finite, or not R' ≥ R'' > 0
@@ -113,7 +114,7 @@ class Asperities:
         return plane.at(self.x, self.y) - (self.highest - self.z)
 
     def subset(self, mask: ArrayLike) -> Asperities:
-        """Return some of the asperities, with the border maxima and the surface's numbers kept.
+        """Return some of the asperities; border maxima and counts remain those of the surface.
 
         Args:
             mask: Anything that indexes an array of length n: booleans or indices.
@@ -125,12 +126,12 @@ class Asperities:
 def find_asperities(surface: Surface, *, periodic: bool | None = None) -> Asperities:
     """Find the summits of a surface and the paraboloids that osculate it there.
 
-    A cell that is not lower than its 8 neighbours starts Newton's iteration on the smooth
-    interpolant, which gives the summit between the samples. Central differences of the
-    interpolant with a step of one cell around it give the Hessian; as the slope vanishes there,
-    its eigenvalues are the principal curvatures. A run of equal heights counts once, and so does
-    a ridge oblique to the grid, where several cells are higher than their neighbours but climb to
-    one summit; one whose climb ends on the border is none.
+    Newton's iteration on the smooth interpolant starts at every cell that is not lower than its 8
+    neighbours, and finds the summit between the samples. Central differences of the interpolant
+    with a step of one cell around the summit form its Hessian. As the slope vanishes there, the
+    eigenvalues are the principal curvatures. Neighbouring cells of equal height count once. So do
+    several cells of a ridge oblique to the grid that climb to one summit. A climb that ends on the
+    border finds no asperity.
 
     Args:
         surface: The surface.
@@ -153,17 +154,17 @@ def find_asperities(surface: Surface, *, periodic: bool | None = None) -> Asperi
     cell = np.array(surface.spacing)
     start = (maxima.position + 0.5) * cell
     edge, inside = start[maxima.on_border], start[~maxima.on_border]
-    summit, strayed = _refined(surface, inside)
+    summit, failed = _refined(surface, inside)
     none = -_ROUNDING * np.abs(surface.heights).max() / cell.min() ** 2
     most = np.linalg.eigvalsh(_hessians(surface, summit))[:, 1]
     concave = most < none
-    summit = _distinct(surface, summit[concave], strayed[concave], bounded=not periodic)
+    summit = _distinct(surface, summit[concave], failed[concave], bounded=not periodic)
     curvature, direction = np.linalg.eigh(_hessians(surface, summit))
     valid = curvature[:, 1] < none
     summit, curvature, direction = summit[valid], curvature[valid], direction[valid]
     if surface.periodic:
         summit = np.mod(summit, surface.lengths)
-        summit[summit >= surface.lengths] = 0.0  # what lies below zero by rounding alone
+        summit[summit >= surface.lengths] = 0.0  # by rounding of coordinates just below zero
     return Asperities(
         x=summit[:, 0],
         y=summit[:, 1],
@@ -182,12 +183,12 @@ def find_asperities(surface: Surface, *, periodic: bool | None = None) -> Asperi
     )
 
 
-def _distinct(surface: Surface, point: Array, strayed: Mask, *, bounded: bool) -> Array:
-    """Return every summit once that points are, or climb to where Newton's method has left them."""
+def _distinct(surface: Surface, point: Array, failed: Mask, *, bounded: bool) -> Array:
+    """Return every summit once; points where Newton's method failed climb to theirs first."""
     point = point.copy()
-    point[strayed] = constrained_summits(surface, point[strayed], bounded=bounded)
+    point[failed] = constrained_summits(surface, point[failed], bounded=bounded)
     size = np.array(surface.lengths)
-    outside = strayed & bounded & np.any((point <= 0.0) | (point >= size), axis=1)
+    outside = failed & bounded & np.any((point <= 0.0) | (point >= size), axis=1)
     _, first = np.unique(
         coincident(surface, point if bounded else np.mod(point, size)), return_index=True
     )
@@ -197,15 +198,15 @@ def _distinct(surface: Surface, point: Array, strayed: Mask, *, bounded: bool) -
 
 
 def _refined(surface: Surface, start: Array) -> tuple[Array, Mask]:
-    """Return the summits next to ``start``; itself, and so marked, where Newton leaves ±1 cell."""
+    """Return the summits next to ``start``, and where Newton's method leaves ±1 cell."""
     h, cell, point = surface.interpolant, np.array(surface.spacing), start.copy()
-    strayed = np.zeros(len(start), dtype=bool)
+    failed = np.zeros(len(start), dtype=bool)
     for _ in range(_NEWTON_STEPS):
         gradient = surface.gradient_at(*point.T)
         xx, xy, yy = h(*point.T, dx=2), h(*point.T, dx=1, dy=1), h(*point.T, dy=2)
         det = xx * yy - xy**2
-        strayed |= ~((det > 0.0) & (xx < 0.0))
-        safe = np.where(strayed, 1.0, det)
+        failed |= ~((det > 0.0) & (xx < 0.0))
+        safe = np.where(failed, 1.0, det)
         step = np.stack(
             [
                 yy * gradient[:, 0] - xy * gradient[:, 1],
@@ -213,10 +214,10 @@ def _refined(surface: Surface, start: Array) -> tuple[Array, Mask]:
             ],
             axis=1,
         )
-        moved = point - np.where(strayed[:, None], 0.0, step / safe[:, None])
-        strayed |= np.any(np.abs(moved - start) > cell, axis=1)
-        point = np.where(strayed[:, None], start, moved)
-    return point, strayed
+        moved = point - np.where(failed[:, None], 0.0, step / safe[:, None])
+        failed |= np.any(np.abs(moved - start) > cell, axis=1)
+        point = np.where(failed[:, None], start, moved)
+    return point, failed
 
 
 def _hessians(surface: Surface, point: Array) -> Array:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from geometry.errors import InputError
 
 SMALLEST, LARGEST = 1e-15, 1e15
-"""Lengths that double precision leaves sense to when they are squared and multiplied [mm]."""
+"""Range of lengths whose squares and products stay within double precision [mm]."""
 
 PROGRAM = 1.0e9
 """Address space of the program with all its libraries; 0.88 GB were measured on two cores [B]."""
@@ -28,7 +28,7 @@ def positive_lengths(value: Any, what: str) -> tuple[float, float]:
         what: What the lengths belong to, such as ``"the surface"``.
 
     Raises:
-        InputError: When there are not two of them, or one is not positive, or of no sensible scale.
+        InputError: When there are not two of them, or one is not positive or out of range.
     """
     problem, allowed = f"the lengths of {what} do not fit", "two positive numbers (Lx, Ly) in mm"
     pair = finite_pair(value, problem, allowed=allowed)
@@ -38,7 +38,7 @@ def positive_lengths(value: Any, what: str) -> tuple[float, float]:
 
 
 def is_level(heights: NDArray[np.float64], among: NDArray[np.float64] | None = None) -> bool:
-    """Tell whether heights differ by no more than what rounding makes of equal ones.
+    """Tell whether heights differ by rounding alone.
 
     Args:
         heights: Heights [mm]; those that are not finite do not count.
@@ -48,7 +48,7 @@ def is_level(heights: NDArray[np.float64], among: NDArray[np.float64] | None = N
     if not finite.size:
         return False
     size = float(np.abs(finite if among is None else among).max())
-    # halves: the range of heights near the largest number would overflow
+    # halves, as the range of heights near the largest number would overflow
     return float(np.ptp(0.5 * finite)) <= 32.0 * float(np.finfo(float).eps) * size
 
 
@@ -56,7 +56,7 @@ def check_scale(heights: NDArray[np.float64]) -> None:
     """Refuse roughness so fine that squares of its curvatures leave double precision.
 
     Args:
-        heights: Heights [mm]; those that are not finite are none of this function's business.
+        heights: Heights [mm]; those that are not finite are ignored.
 
     Raises:
         InputError: When they are not level, but differ by less than `SMALLEST`.

@@ -1,6 +1,6 @@
-"""Lets all ranks of a communicator succeed or fail together.
+"""Work on the ranks of a communicator that succeeds or fails on all of them together.
 
-The communicator is only ever asked for mpi4py's lower-case methods, so nothing here imports MPI;
+Only mpi4py's lower-case methods of the communicator are used, so that nothing here imports MPI.
 ``None`` stands for a single process.
 """
 
@@ -13,7 +13,7 @@ T = TypeVar("T")
 
 
 def on_root(comm: Any, work: Callable[[], T]) -> T:
-    """Do work on rank 0 and give its result, or its error, to every rank.
+    """Do work on rank 0 and broadcast its result, or its error, to every rank.
 
     Args:
         comm: MPI communicator (mpi4py), or None.

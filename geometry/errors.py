@@ -10,9 +10,9 @@ _LONGEST = 200  # characters of a value in a message
 
 
 class _Value(Enum):
-    """Stands for a value that is not told; an enum stays itself when it is sent between ranks."""
+    """Marks an error without a value; members of an enum stay identical when they are pickled."""
 
-    UNTOLD = "untold"
+    NONE = "none"
 
 
 class PatchlawError(Exception):
@@ -40,7 +40,7 @@ class InputError(PatchlawError, ValueError):
         self,
         problem: str,
         *,
-        value: Any = _Value.UNTOLD,
+        value: Any = _Value.NONE,
         allowed: str | None = None,
         key: str | None = None,
         file: str | None = None,
@@ -60,7 +60,7 @@ class InputError(PatchlawError, ValueError):
         )
 
     def __str__(self) -> str:
-        shown = None if self.value is _Value.UNTOLD else _shortened(self.value)
+        shown = None if self.value is _Value.NONE else _shortened(self.value)
         key = self.key and (self.key if len(self.key) <= _LONGEST else f"{self.key[:_LONGEST]}…")
         subject = " = ".join(part for part in (key, shown) if part)
         text = ": ".join(part for part in (self.file, subject, self.problem) if part)
@@ -68,7 +68,7 @@ class InputError(PatchlawError, ValueError):
 
 
 class NotConverged(PatchlawError, RuntimeError):
-    """An iteration ended without its answer; what was accepted before it is kept.
+    """An iteration ended without a solution; accepted load steps before it remain.
 
     Args:
         what: Which iteration, and at which load.

@@ -32,8 +32,10 @@ Content = tuple[Array, tuple[float, float] | None]
 BYTES_PER_HEIGHT = 100
 """Memory that surface, spline and spectrum take per height, roughly [B]."""
 
-_BYTES_PER_CHARACTER = 8  # likewise of a text while it is read
-_PLACE_TOLERANCE = 0.01  # of a cell: a point further from its place is not on a regular grid
+_BYTES_PER_CHARACTER = 8
+"""Memory that a text takes per character while it is read, roughly [B]."""
+_PLACE_TOLERANCE = 0.01
+"""Distance of a point from its place on a regular grid that is accepted [cells]."""
 
 
 def read_surface(
@@ -44,7 +46,7 @@ def read_surface(
     periodic: bool = False,
     missing: Literal["refuse", "fill"] = "refuse",
 ) -> Surface:
-    """Read heights at cell centres from a file, told by its suffix.
+    """Read heights at cell centres from a file, whose suffix tells its format.
 
     * ``.npy``: an array with index [ix, iy];
     * ``.txt``, ``.dat``, ``.csv``: a matrix whose row index is ix, columns separated by white
@@ -69,7 +71,7 @@ def read_surface(
     """
     file = Path(path)
     try:
-        if not _is_file(file):  # nor a pipe or a device, which may never end
+        if not _is_file(file):  # pipes and devices are refused too: they may never end
             raise InputError("there is no such file")
         heights, found = _READERS.get(file.suffix.lower(), read_instrument)(file)
         sides = lengths if lengths is not None else found
@@ -123,7 +125,7 @@ def _is_file(file: Path) -> bool:
 
 
 def _read_array(file: Path) -> Content:
-    """Return the array of a ``.npy`` file, whose header is believed in nothing unchecked."""
+    """Return the array of a ``.npy`` file, after all that its header states has been checked."""
     with file.open("rb") as stream:
         shape, transposed, dtype = _array_header(stream)
         count = math.prod(shape)
@@ -131,10 +133,10 @@ def _read_array(file: Path) -> Content:
             raise InputError("the heights are not an array of real numbers", value=str(dtype))
         if len(shape) != 2 or min(shape) < 0:
             raise InputError("not a two-dimensional array", value=shape, allowed="(nx, ny)")
-        held = os.fstat(stream.fileno()).st_size - stream.tell()
-        if held < count * dtype.itemsize:
+        size = os.fstat(stream.fileno()).st_size - stream.tell()
+        if size < count * dtype.itemsize:
             raise InputError(
-                f"not a whole numpy array: it has {held} bytes of the {count * dtype.itemsize} "
+                f"not a whole numpy array: it has {size} bytes of the {count * dtype.itemsize} "
                 "that its header promises"
             )
         _check_memory(count * BYTES_PER_HEIGHT)

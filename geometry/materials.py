@@ -44,10 +44,15 @@ class Material:
         return MaterialPair(first=self).contact_modulus
 
     @property
+    def shear_modulus(self) -> float:
+        """G = E / (2 (1 + ν)) [MPa]."""
+        return self.young_modulus / (2.0 * (1.0 + self.poisson_ratio))
+
+    @property
     def lame(self) -> tuple[float, float]:
         """Lamé's constants (λ, μ) [MPa]."""
         e, nu = self.young_modulus, self.poisson_ratio
-        return e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), e / (2.0 * (1.0 + nu))
+        return e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), self.shear_modulus
 
     @property
     def confined_modulus(self) -> float:

@@ -1,4 +1,4 @@
-"""Fills heights that are missing by the smoothest membrane through those around them."""
+"""Missing heights, filled by the membrane that hangs between the measured ones."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ Array = NDArray[np.float64]
 def filled(heights: ArrayLike, spacing: tuple[float, float]) -> tuple[Array, float]:
     """Replace missing heights by a membrane that hangs between the others.
 
-    What is filled minimises ∫ |∇h|² (Laplace's equation, five-point differences), free on the
-    border of the grid. It lies between the lowest and the highest of the heights around it: no
-    summit is invented, and a summit that was not measured stays unknown.
+    The filled heights minimise ∫ |∇h|² (Laplace's equation, five-point differences), free on the
+    border of the grid. They lie between the lowest and the highest of the heights around them, so
+    that no summit is invented; a summit that was not measured stays unknown.
 
     Args:
         heights: Heights, shape (nx, ny) [mm]; missing where not a number.

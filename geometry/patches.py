@@ -58,15 +58,6 @@ class Partition:
         x, y = self.borders_x, self.borders_y
         return np.array([0.5 * (x[0] + x[-1]), 0.5 * (y[0] + y[-1])])
 
-    def mean_approaches(self, approach: float, tilt: tuple[float, float]) -> Array:
-        """Return the mean approach of a rigid plane over every patch, shape (N,) [mm].
-
-        Args:
-            approach: Approach at the middle of the rectangle [mm].
-            tilt: Slopes of the approach along x and y, about the middle.
-        """
-        return approach + (self.centres - self.middle) @ np.asarray(tilt)
-
     @property
     def half_sides(self) -> Array:
         """Half-sides (a, b) in flat order, shape (N, 2) [mm]."""
@@ -262,12 +253,20 @@ def overlaps(borders: Array, length: float, cells: int) -> Array:
         length: Side that equal cells divide [mm].
         cells: Their number.
     """
-    edges = np.linspace(0.0, length, cells + 1)
-    inner = borders[1:-1, None]
-    lower = np.concatenate([np.full((1, 1), -np.inf), inner])
-    upper = np.concatenate([inner, np.full((1, 1), np.inf)])
-    overlap = np.minimum(upper, edges[1:]) - np.maximum(lower, edges[:-1])
-    return np.clip(overlap, 0.0, None)
+    endless = np.concatenate([[-np.inf], borders[1:-1], [np.inf]])
+    return interval_overlaps(endless, np.linspace(0.0, length, cells + 1))
+
+
+def interval_overlaps(first: Array, second: Array) -> Array:
+    """Return the length that intervals of two divisions have in common, shape (n, m) [mm].
+
+    Args:
+        first: Ends of n adjoining intervals, ascending, shape (n + 1,) [mm].
+        second: Ends of m others, shape (m + 1,) [mm].
+    """
+    upper = np.minimum(first[1:, None], second[1:])
+    lower = np.maximum(first[:-1, None], second[:-1])
+    return np.clip(upper - lower, 0.0, None)
 
 
 def _shares(borders: Array, length: float, cells: int, axis: str) -> Array:
@@ -279,8 +278,5 @@ def _shares(borders: Array, length: float, cells: int, axis: str) -> Array:
             value=(float(borders[0]), float(borders[-1])),
             allowed=f"0 … {length} mm",
         )
-    edges = np.linspace(0.0, length, cells + 1)
-    upper = np.minimum(borders[1:, None], edges[None, 1:])
-    lower = np.maximum(borders[:-1, None], edges[None, :-1])
-    overlap = np.clip(upper - lower, 0.0, None)
+    overlap = interval_overlaps(borders, np.linspace(0.0, length, cells + 1))
     return overlap / overlap.sum(axis=1, keepdims=True)

@@ -154,7 +154,7 @@ def find_equilibrium(
     missed = float(np.abs(now.residual).max())
     if missed <= max(aim, TOLERANCE) * max(now.force, control.force or 0.0):
         return now.plane, now.response.state
-    raise plane_failure(control, "NO_BALANCE")
+    raise plane_failure(control, "NO_EQUILIBRIUM")
 
 
 def slope_search(slope_after: Callable[[float], float], slope: float, share: float) -> float | None:

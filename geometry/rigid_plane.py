@@ -217,6 +217,16 @@ class PlaneLevers:
         """
         return self.summed(self.matrix.T @ (rates[:, None] * self.matrix))
 
+    def first_touch(self, depth: Array, tilt: ArrayLike) -> float:
+        """Return the approach at which a tilted plane first touches the points [mm].
+
+        Args:
+            depth: Depths below the height that approaches count from, shape (n,) [mm].
+            tilt: Slopes (tx, ty).
+        """
+        least = float(np.min(depth - self.matrix[:, 1:] @ np.asarray(tilt), initial=np.inf))
+        return least if self.comm is None else float(min(self.comm.allgather(least)))
+
     def summed(self, values: Array) -> Array:
         """Return the sum over all ranks."""
         return values if self.comm is None else self.comm.allreduce(values)

@@ -17,11 +17,12 @@ from geometry.surface import Surface
 Array = NDArray[np.float64]
 
 LARGEST_SEED = 2**128 - 1
-"""What numpy draws from the system when it needs a seed has as many bits."""
+"""Seeds have at most 128 bits, as many as numpy draws from the system for a seed."""
 
 _BANDS = ("waves", "waves_x", "waves_y")
 _AMPLITUDES = ("rms_slope", "rms_height", "s0")
-_ROUNDING = 1.0 + 1e-12  # waves that lie on the border of a band belong to it
+_ROUNDING = 1.0 + 1e-12
+"""Factor by which a band is widened, so that waves on its border belong to it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,7 +132,7 @@ def random_waves(spectrum: Spectrum, lengths: tuple[float, float]) -> Waves:
     Raises:
         InputError: When no wave lies in the band.
     """
-    kx, ky = _half_plane(_reach(spectrum, lengths))
+    kx, ky = _half_plane(_largest_waves(spectrum, lengths))
     phase = np.random.Generator(np.random.PCG64(spectrum.seed)).uniform(0.0, 2.0 * np.pi, len(kx))
     inside = _in_band(spectrum, lengths, kx, ky)
     if not inside.any():
@@ -160,7 +161,9 @@ def synthesise(
     """
     nx, ny = cell_counts(grid, "the grid of the surface", smallest=4)
     lengths = positive_lengths(lengths, "the surface")
-    _check_resolved((nx, ny), _reach(spectrum, lengths), per_wave=1)  # before waves are listed
+    _check_resolved(
+        (nx, ny), _largest_waves(spectrum, lengths), per_wave=1
+    )  # before waves are listed
     waves = random_waves(spectrum, lengths)
     largest = int(np.abs(waves.kx).max()), int(np.abs(waves.ky).max())
     _check_resolved((nx, ny), largest, per_wave=2)
@@ -195,7 +198,7 @@ def _check_resolved(grid: tuple[int, int], largest: tuple[int, int], *, per_wave
         )
 
 
-def _reach(spectrum: Spectrum, lengths: tuple[float, float]) -> tuple[int, int]:
+def _largest_waves(spectrum: Spectrum, lengths: tuple[float, float]) -> tuple[int, int]:
     """Return the largest |kx| and |ky| that the band can hold."""
     if spectrum.waves is not None:
         hi = spectrum.waves[1] * _ROUNDING
@@ -209,9 +212,9 @@ def _whole(waves: float) -> int:
     return int(min(waves, 1e18))
 
 
-def _half_plane(reach: tuple[int, int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return one wave of each pair ±k ≠ 0 of a disc around the box ``reach``, in order."""
-    radius = math.isqrt(reach[0] ** 2 + reach[1] ** 2) + 1
+def _half_plane(largest: tuple[int, int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return one wave of each pair ±k ≠ 0 of a disc around the box ``largest``, in order."""
+    radius = math.isqrt(largest[0] ** 2 + largest[1] ** 2) + 1
     kx, ky = (k.ravel() for k in np.mgrid[0 : radius + 1, -radius : radius + 1])
     squared = kx**2 + ky**2
     kept = ((kx > 0) | (ky > 0)) & (squared <= radius**2)

@@ -19,9 +19,12 @@ Mask = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 
 _MOST_STEPS = 200
-_SHORTEST = 1e-10  # step that ends a climb, in cells
-_ROUNDING = 4.0 * np.finfo(float).eps  # of the largest height: what is no gain
-_COINCIDENT = 1e-3  # cells
+_SHORTEST = 1e-10
+"""Step that ends a climb [cells]."""
+_COINCIDENT = 1e-3
+"""Distance of summits that are taken for one [cells]."""
+_ROUNDING = 4.0 * np.finfo(float).eps
+"""Gain of height that is only rounding, relative to the largest height."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,9 +54,9 @@ def grid_maxima(heights: Array, *, periodic: bool) -> GridMaxima:
     candidate = heights == maximum_filter(heights, size=3, mode=mode)
     cells = np.argwhere(candidate)
     label = _plateaus(candidate, cells, periodic=periodic)
-    # A plateau that goes on over an equal cell which is no candidate has a higher neighbour there.
-    beside = maximum_filter(np.where(candidate, -np.inf, heights), size=3, mode=mode)
-    shoulder = np.bincount(label, weights=(beside == heights)[candidate]) > 0
+    # a plateau is no maximum where an equal cell beside it has a higher neighbour
+    others = maximum_filter(np.where(candidate, -np.inf, heights), size=3, mode=mode)
+    shoulder = np.bincount(label, weights=(others == heights)[candidate]) > 0
     outer = np.any((cells == 0) | (cells == np.array(heights.shape) - 1), axis=1)
     on_border = np.bincount(label, weights=outer & (not periodic)) > 0
     _, first = np.unique(label, return_index=True)
@@ -72,9 +75,9 @@ def _plateaus(
     number[candidate] = np.arange(len(cells))
     pairs = []
     for offset in ((0, 1), (1, -1), (1, 0), (1, 1)):
-        beside = cells + offset
-        inside = np.all((beside >= 0) & (beside < candidate.shape), axis=1) | periodic
-        other = number[tuple((beside[inside] % candidate.shape).T)]
+        neighbour = cells + offset
+        inside = np.all((neighbour >= 0) & (neighbour < candidate.shape), axis=1) | periodic
+        other = number[tuple((neighbour[inside] % candidate.shape).T)]
         pairs.append(np.stack([np.flatnonzero(inside)[other >= 0], other[other >= 0]]))
     row, column = np.concatenate(pairs, axis=1)
     graph = coo_array((np.ones(len(row)), (row, column)), shape=2 * (len(cells),))
@@ -95,27 +98,28 @@ def _centroids(
 
 
 def constrained_summits(
-    surface: Surface, start: Array, lean: Surface | None = None, *, bounded: bool = True
+    surface: Surface, start: Array, offset: Surface | None = None, *, bounded: bool = True
 ) -> Array:
     """Return the summits of the closed rectangle that the surface rises to from given points.
 
-    Newton's method on the smooth interpolant in steps of at most a cell, uphill also where the
-    surface is not concave, none of which loses height. A coordinate that lies on the border with
-    the slope pointing outward stays there, so that the result is a summit, a maximum along an
-    edge, or a corner. Samples on a ridge that is oblique to the grid are higher than their
-    neighbours without being summits: from there the climb follows the ridge, many cells if need
-    be. A point that gains no height stays where it was.
+    Newton's method climbs the smooth interpolant in steps of at most a cell, uphill also where the
+    surface is not concave; steps that lose height are shortened. A coordinate that lies on the
+    border with the slope pointing outward stays there, so that the result is a summit, a maximum
+    along an edge, or a corner. Samples on a ridge that is oblique to the grid are higher than their
+    neighbours without being summits. From there the climb follows the ridge, over many cells if
+    necessary. A point that gains no height stays where it was.
 
     Args:
         surface: The surface; its border counts also when it is periodic.
         start: Points near the maxima, shape (n, 2) [mm].
-        lean: Surface on the same rectangle whose heights add to those of the first.
-        bounded: Whether the border ends the surface; a periodic one goes on otherwise.
+        offset: Surface on the same rectangle whose heights are added to those of the first, such
+            as those of a tilted plane.
+        bounded: Whether climbs end at the border; otherwise the surface continues periodically.
 
     Returns:
         The maxima, shape (n, 2) [mm].
     """
-    climb = _Climb([surface] if lean is None else [surface, lean], bounded)
+    climb = _Climb([surface] if offset is None else [surface, offset], bounded)
     point = np.array(start, float)
     on, longest = np.arange(len(point)), np.ones(len(point))
     for _ in range(_MOST_STEPS):
@@ -139,7 +143,7 @@ def coincident(surface: Surface, point: Array) -> Indices:
     """Return a number for each point, the same for points at one place, shape (n,).
 
     Args:
-        surface: The surface, whose cells tell what is one place.
+        surface: The surface; points less than a thousandth of its cells apart are at one place.
         point: Points, shape (n, 2) [mm].
     """
     pairs = cKDTree(point / surface.spacing).query_pairs(_COINCIDENT, output_type="ndarray")
@@ -169,9 +173,9 @@ class _Climb:
         curvature = curvature * np.multiply.outer(self.cell, self.cell)
         if self._bounded:
             low, high = point <= 0.0, point >= self._limit
-            held = (low & (slope < 0.0)) | (high & (slope > 0.0))
-            slope = np.where(held, 0.0, slope)
-            curvature = np.where(held[:, :, None] | held[:, None, :], 0.0, curvature)
+            fixed = (low & (slope < 0.0)) | (high & (slope > 0.0))
+            slope = np.where(fixed, 0.0, slope)
+            curvature = np.where(fixed[:, :, None] | fixed[:, None, :], 0.0, curvature)
         step = _ascent(slope, curvature)
         size = np.abs(step).max(axis=1, initial=0.0)
         step *= np.divide(longest, size, out=np.ones_like(size), where=size > longest)[:, None]
@@ -183,6 +187,7 @@ def _ascent(slope: Array, curvature: Array) -> Array:
     """Return Newton's steps where the surface is concave; uphill along convex directions."""
     bend, axes = np.linalg.eigh(curvature)
     along = np.einsum("nij,ni->nj", axes, slope)
-    flat = np.abs(bend) < np.abs(along)  # a step of more than a cell: as long as it may be
+    # Newton's step would be longer than a cell there
+    flat = np.abs(bend) < np.abs(along)
     step = np.where(flat, np.sign(along), along / np.where(flat, 1.0, np.abs(bend) + (bend == 0.0)))
     return np.asarray(np.einsum("nij,nj->ni", axes, step))

@@ -15,9 +15,12 @@ from geometry.interpolant import Interpolant
 
 Array = NDArray[np.float64]
 
-_FEWEST = 4  # heights along a side
-_WHOLE = 1e-6  # of a cell: a rectangle that reaches no further into it does by rounding
-_SLACK = 1e-9  # of a side: rounding of coordinates that were computed from an origin
+_FEWEST = 4
+"""Smallest number of heights along a side."""
+_WHOLE = 1e-6
+"""Share of a cell by which a rectangle may extend into it by rounding alone."""
+_SLACK = 1e-9
+"""Share of a side that coordinates may miss by rounding when computed from an origin."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -130,7 +133,7 @@ class Surface:
         """Subtract the least-squares polynomial of total degree ``order``.
 
         A plane or a quadratic does not continue periodically, so the result is periodic only for
-        order 0. What is left of such a surface itself is rounding, and taken for level.
+        order 0. Where only rounding remains, the result is exactly level.
 
         Args:
             order: 0 mean, 1 mean plane, 2 mean quadratic.
@@ -173,9 +176,9 @@ class Surface:
     def piece(self, x: tuple[float, float], y: tuple[float, float]) -> Surface:
         """Return what lies in a rectangle, with the interpolant of the whole.
 
-        It ends at the very coordinates, and rises nowhere above the whole, which the spline of a
-        surface that is `cropped` may do by micrometres. Its cells are those of the whole where
-        they fill the rectangle, else a little smaller; there are at least 4 × 4.
+        It ends exactly at these coordinates and rises nowhere above the whole, whereas the spline
+        of a `cropped` surface may do so by micrometres. Its cells are those of the whole where they
+        fill the rectangle, otherwise a little smaller; there are at least 4 × 4.
 
         Args:
             x: Interval (lo, hi) along x [mm].
@@ -205,7 +208,7 @@ class Surface:
             lengths=(lengths[0], lengths[1]),
             periodic=False,
         )
-        # no field: a surface that `replace` makes of this one has heights of its own
+        # not a field: `replace` must not pass the interpolant on with other heights
         vars(part)["interpolant"] = interpolant
         return part
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.errors import InputError
-from geometry.meshes.lattice import sigint_untouched
+from geometry.meshes.gmsh_session import sigint_untouched
 from macro.form_cache import TIMEOUT, explained
 
 _JIT = {"timeout": TIMEOUT}  # for a slow machine on which another process compiles the same form

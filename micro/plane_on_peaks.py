@@ -50,7 +50,7 @@ class Peaks:
 
     def first_touch(self, tilt: tuple[float, float]) -> float:
         """Return the approach at which a plane of given slopes touches first [mm]."""
-        return float((self.depth - self.lever[:, 1:] @ np.asarray(tilt)).min(initial=np.inf))
+        return self.levers.first_touch(self.depth, tilt)
 
     def first_plane(self, control: Control, near: RigidPlane | None) -> Array:
         """Return a plane to start from: one near, or one that suits contacts that stand alone.
@@ -113,7 +113,7 @@ class Peaks:
             method="highs",
         )
         if found.status != 0:  # the centre lies outside of the peaks' hull
-            raise plane_failure(control, "NO_BALANCE")
+            raise plane_failure(control, "NO_EQUILIBRIUM")
         slopes = found.x[1:] * (scale / self.levers.half)
         return float(slopes[0]), float(slopes[1])
 

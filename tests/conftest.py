@@ -41,7 +41,7 @@ def mpirun(root):
         return subprocess.run(
             command,
             cwd=root,
-            env=os.environ | MPI_ENVIRONMENT,
+            env=os.environ | MPI_ENVIRONMENT | {"PYTHONPATH": str(root)},
             capture_output=True,
             text=True,
             timeout=timeout,  # a hang is a failure, not a wait

@@ -1,19 +1,16 @@
-"""The flat block under the contact interface: its shape, grid lines and gmsh mesh."""
+"""The flat block under the contact interface: its shape and grid lines."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.checks import cell_counts, positive_lengths
 from geometry.errors import InputError
-from geometry.meshes.lattice import Axes, Segment, gmsh_session, mesh_lattice
+from geometry.meshes.lattice import Segment
 from geometry.patches import PatchGrid
 
 Array = NDArray[np.float64]
@@ -25,7 +22,7 @@ LEAST_MARGIN = 1e-3
 20 × 20 × 12 cells: at 1e-5 solves take five times as long, at 1e-7 they are 2 % wrong or fail."""
 
 LEAST_MARGIN_CELL = 1e-5
-"""Narrowest cell of a margin, relative to the same: gmsh places nodes to 1e-9 of the block."""
+"""Narrowest cell of a margin, relative to the same."""
 
 _MOST_COUNTED = 10**9  # cells that can be divided by; whole numbers may be beyond any float
 
@@ -91,29 +88,17 @@ class BlockShape:
         return int(self.element[1])
 
     @property
-    def axes(self) -> Axes:
-        """Graded pieces of the grid lines along x, y and z."""
-        depth = Segment(start=-self.height, end=0.0, cells=self.cells[2], growth=1.0 / self.grading)
-        return self._across(0), self._across(1), (depth,)
-
-    @property
     def ticks(self) -> tuple[Array, Array, Array]:
         """Coordinates of the grid planes along x, y and z, ascending [mm]."""
-        x, y, z = (
-            np.concatenate([axis[0].ticks[:1], *(segment.ticks[1:] for segment in axis)])
-            for axis in self.axes
-        )
-        return x, y, z
+        growth = 1.0 / self.grading
+        depth = Segment(start=-self.height, end=0.0, cells=self.cells[2], growth=growth)
+        return self._across(0), self._across(1), depth.ticks
 
     @property
     def cell_count(self) -> int:
         """Number of hexahedra or tetrahedra."""
         boxes = math.prod(len(ticks) - 1 for ticks in self.ticks)
         return boxes if self.hexahedral else 6 * boxes
-
-    def meshed(self) -> AbstractContextManager[Any]:
-        """Mesh the block in gmsh for as long as the context lasts; see `flat_block`."""
-        return flat_block(self)
 
     def _check_margin(self) -> None:
         side = min(self.interface)
@@ -135,17 +120,15 @@ class BlockShape:
                 "a smaller margin_grading or a wider margin",
             )
 
-    def _across(self, axis: int) -> tuple[Segment, ...]:
-        length = self.interface[axis]
-        inner = Segment(start=0.0, end=length, cells=self.cells[axis])
+    def _across(self, axis: int) -> Array:
+        """Return the grid planes along x or y, margins included [mm]."""
+        length, count, growth = self.interface[axis], self.margin_cells, self.margin_grading
+        inner = Segment(start=0.0, end=length, cells=self.cells[axis]).ticks
         if not self.margin:
-            return (inner,)
-        count, growth = self.margin_cells, self.margin_grading
-        return (
-            Segment(start=-self.margin, end=0.0, cells=count, growth=1.0 / growth),
-            inner,
-            Segment(start=length, end=length + self.margin, cells=count, growth=growth),
-        )
+            return inner
+        before = Segment(start=-self.margin, end=0.0, cells=count, growth=1.0 / growth)
+        after = Segment(start=length, end=length + self.margin, cells=count, growth=growth)
+        return np.concatenate([before.ticks[:-1], inner, after.ticks[1:]])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -196,35 +179,6 @@ def alignment(shape: BlockShape, patches: PatchGrid) -> Alignment:
         "a multiple of the number of patches would align them"
     )
     return Alignment(x=fits[0], y=fits[1], sentence=sentence)
-
-
-@contextmanager
-def flat_block(shape: BlockShape) -> Iterator[Any]:
-    """Mesh the block in gmsh for as long as the context lasts.
-
-    The cells form the physical volume ``block`` (1); the physical surfaces are ``bottom`` (1),
-    ``top`` (2, the margin included) and ``sides`` (3). The geometry is of first order whatever
-    the element. A gmsh session of the caller goes on afterwards, with its model and options.
-
-    Args:
-        shape: The block.
-
-    Yields:
-        ``gmsh.model`` with the mesh of the block as the current model.
-    """
-    with gmsh_session("patchlaw block") as gmsh:
-        tags = mesh_lattice(gmsh, shape.axes, hexahedra=shape.hexahedral)
-        sides = [tag for side in ("x-", "x+", "y-", "y+") for tag in tags[side]]
-        groups = [
-            (3, tags["volumes"], 1, "block"),
-            (2, tags["z-"], 1, "bottom"),
-            (2, tags["z+"], 2, "top"),
-            (2, sides, 3, "sides"),
-        ]
-        for dimension, members, tag, name in groups:
-            gmsh.model.addPhysicalGroup(dimension, members, tag)
-            gmsh.model.setPhysicalName(dimension, tag, name)
-        yield gmsh.model
 
 
 def _require_at_least(what: str, value: float, least: float, *, strict: bool = False) -> None:

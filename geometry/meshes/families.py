@@ -1,7 +1,9 @@
 """Families of meshes of a rough block, coarse to fine, whose results can be extrapolated.
 
 All sizes of a family fall together. Where contact can occur the finest tetrahedra have a stated
-number of edges along the radius of a typical contact, see `typical_contact`.
+number of edges along the radius of a typical contact. That radius is estimated from the surface
+alone: of a cap that the plane can touch, Hertz's contact takes half the area, whatever its
+curvature.
 
 The force converges from above. Curved quadratic tetrahedra with n edges along a contact's radius
 err like 1/n³: by 1.4 and 2.0 % with n = 1.5 and by 0.2 and 0.3 % with n = 3, on two surfaces of
@@ -17,15 +19,23 @@ import math
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
 
 from geometry.errors import InputError
 from geometry.meshes.block import BlockShape
 from geometry.meshes.refined_block import RefinedShape
-from geometry.meshes.refinement import EDGES, contact_radius, places_in_reach
 from geometry.surface import Surface
 
+Array = NDArray[np.float64]
 Shape: TypeAlias = BlockShape | RefinedShape
 Cells: TypeAlias = Literal["tetrahedra", "hexahedra"]
+
+EDGES = 3.0
+"""Edges along the radius of a typical contact in the finest tetrahedra, by default."""
+
+_MERGING = 0.05
+"""Share of the surface behind the plane above which contacts merge instead of growing wider."""
 
 _SPAN = 2.0
 """Ratio of the coarsest size of a family to the finest."""
@@ -102,6 +112,120 @@ def characteristic_size(shape: Shape) -> float:
         return shape.fine
     x, y, z = shape.ticks
     return float(np.cbrt(np.diff(x).min() * np.diff(y).min() * np.diff(z).min()))
+
+
+def places_in_reach(
+    surface: Surface,
+    approach: float,
+    *,
+    spacing: float,
+    tilt: tuple[float, float] = (0.0, 0.0),
+) -> Array:
+    """Return the places that the plane can touch: where the undeformed surface penetrates it.
+
+    Under pressure a half-space only moves away from the plane, so that contact occurs nowhere else.
+
+    Args:
+        surface: The rough surface.
+        approach: Largest approach at the middle of the surface [mm].
+        spacing: Distance between places [mm].
+        tilt: Slopes of the approach along x and y.
+
+    Returns:
+        Points of a square lattice, shape (n, 2) [mm]; at least that of the largest depth.
+    """
+    x, y = (
+        np.linspace(0.0, length, max(2, math.ceil(length / spacing) + 1))
+        for length in surface.lengths
+    )
+    lattice = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    grid = np.vstack([lattice, surface.highest_point])
+    depth = depth_below_plane(surface, grid, approach, tilt)
+    return grid[depth >= min(0.0, float(depth.max()))]
+
+
+def depth_below_plane(
+    surface: Surface, points: Array, approach: float, tilt: tuple[float, float] = (0.0, 0.0)
+) -> Array:
+    """Return the interference of the undeformed surface and the rigid plane [mm].
+
+    Args:
+        surface: The rough surface.
+        points: Places on it, shape (…, 2) [mm].
+        approach: Approach at the middle of the surface, from first touch of a level plane [mm].
+        tilt: Slopes of the approach along x and y.
+
+    Returns:
+        Interference, shape (…); negative where there is a gap.
+    """
+    offset = (points - 0.5 * np.array(surface.lengths)) @ np.array(tilt)
+    return surface.height_at(points[..., 0], points[..., 1]) - surface.highest + approach + offset
+
+
+def suggested_fine(
+    surface: Surface,
+    approach: float,
+    *,
+    tilt: tuple[float, float] = (0.0, 0.0),
+    edges: float = EDGES,
+) -> float:
+    """Return an edge length that resolves typical contacts [mm].
+
+    Args:
+        surface: The rough surface.
+        approach: Largest approach [mm].
+        tilt: Slopes of the approach along x and y.
+        edges: Edges along the radius of a typical contact.
+
+    Raises:
+        InputError: When the number of edges is not positive.
+    """
+    if not 0.0 < edges < math.inf:
+        raise InputError("edges along a contact's radius", value=edges, allowed="> 0")
+    return contact_radius(surface, approach, tilt=tilt) / edges
+
+
+def contact_radius(
+    surface: Surface, approach: float, *, tilt: tuple[float, float] = (0.0, 0.0)
+) -> float:
+    """Estimate the radius of a typical contact from the surface alone [mm].
+
+    The surface behind the undeformed plane consists of caps. In a disc of radius r the mean
+    distance from the edge is r / 3, which is used for caps of any form. The contact of a cap has
+    1/√2 of the cap's radius (Hertz). Where more than a twentieth of the surface lies behind the
+    plane, contacts merge and bear the plane together: only the highest twentieth counts then.
+
+    Args:
+        surface: The rough surface.
+        approach: Approach at the middle of the surface [mm].
+        tilt: Slopes of the approach along x and y.
+
+    Returns:
+        The radius, at least the distance of the surface's samples.
+
+    Raises:
+        InputError: When a value is not finite.
+    """
+    if not np.isfinite([approach, *tilt]).all():
+        raise InputError("approach and tilt must be finite", value=(approach, *tilt))
+    x, y = (
+        np.linspace(0.0, length, min(max(256, 2 * n), 1024) + 1)
+        for length, n in zip(surface.lengths, surface.grid, strict=True)
+    )
+    plane = tilt[0] * (x[:, None] - 0.5 * x[-1]) + tilt[1] * (y - 0.5 * y[-1])
+    heights = surface.height_at(x[:, None], y[None, :])
+    depth = heights - surface.highest + approach + plane
+    level = float(np.quantile(depth, 1.0 - _MERGING))
+    inside = depth >= level if level > 0.0 else depth > 0.0
+    least = max(surface.spacing)
+    if not inside.any():
+        return least
+    if inside.all():
+        return 0.5 * min(surface.lengths)
+    step = (x[1], y[1])
+    # a point lies on average half a step further inside than its distance from those outside
+    distance = distance_transform_edt(inside, sampling=step)[inside] - 0.5 * min(step)
+    return max(3.0 * float(distance.mean()) / math.sqrt(2.0), least)
 
 
 def _tetrahedra(

@@ -1,38 +1,31 @@
-"""Transfinite gmsh meshes of a rectangular lattice of boxes with graded lines."""
+"""Lattices of boxes between graded grid lines, made by all ranks at once.
+
+A rank makes the cells of its own part of the lattice, and an even share of the nodes, without
+asking another. Node numbers are those of the whole lattice.
+"""
 
 from __future__ import annotations
 
-import ctypes
-import itertools
 import math
-import signal
-import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
-from types import ModuleType
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-# Settings that a caller's own gmsh session may have changed; they are put back afterwards.
-_OPTIONS = {
-    "General.AbortOnError": 2,  # errors raise exceptions; 4 would end the process
-    "General.Verbosity": 0,
-    "General.Terminal": 0,
-    "Mesh.Algorithm": 6,
-    "Mesh.ElementOrder": 1,
-    "Mesh.RecombineAll": 0,
-    "Mesh.SubdivisionAlgorithm": 0,
-    "Mesh.SaveAll": 0,
-    "Mesh.MeshSizeFactor": 1,
-    "Mesh.MeshSizeMin": 0,
-    "Mesh.MeshSizeMax": 1e22,
-    "Mesh.MeshSizeFromPoints": 0,
-    "Mesh.MeshSizeFromCurvature": 0,
-    "Mesh.MeshSizeExtendFromBoundary": 0,
-}
+Array = NDArray[np.float64]
+Numbers = NDArray[np.int64]
+Counts: TypeAlias = tuple[int, int, int]
+Part: TypeAlias = tuple[range, range, range]
+
+_CORNERS = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)])
+"""Vertices of a box in the order of dolfinx: x runs first."""
+
+_TETRAHEDRA = np.array(
+    [(0, 1, 2, 4), (1, 3, 2, 4), (2, 3, 6, 4), (1, 5, 3, 4), (3, 5, 6, 4), (3, 5, 7, 6)]
+)
+"""Six positively oriented tetrahedra in a box, cut as gmsh cuts transfinite volumes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,179 +67,135 @@ class Segment:
         return self.start + (self.end - self.start) * share
 
 
-Axes = tuple[Sequence[Segment], Sequence[Segment], Sequence[Segment]]
+def lattice_part(cells: Counts, ranks: int, rank: int) -> Part:
+    """Return the box of cells that is a rank's part of a lattice.
 
-
-@contextmanager
-def sigint_untouched() -> Iterator[None]:
-    """Import or call gmsh without its replacing the process's handler of SIGINT.
-
-    gmsh does so when a session begins and ends, and release 4.8 already when it is imported. Inside
-    this context gmsh has a copy of the module ``signal`` whose function ``signal`` ignores SIGINT.
-    Restoring the handler afterwards would leave a moment in which SIGINT ends the process, and
-    would fail outside the main thread.
-    """
-
-    def ignoring_sigint(number: int, handler: Any) -> Any:
-        if number == signal.SIGINT:
-            return signal.getsignal(number)
-        return signal.signal(number, handler)
-
-    copy: Any = ModuleType("signal")
-    vars(copy).update(vars(signal) | {"signal": ignoring_sigint})
-    if "gmsh" in sys.modules:
-        sys.modules["gmsh"].signal = copy  # type: ignore[attr-defined]
-    else:
-        sys.modules["signal"] = copy  # for gmsh's own import of it
-    try:
-        yield
-    finally:
-        sys.modules["signal"] = signal
-        if "gmsh" in sys.modules:
-            sys.modules["gmsh"].signal = signal  # type: ignore[attr-defined]
-
-
-@contextmanager
-def gmsh_session(name: str) -> Iterator[Any]:
-    """Give a silent gmsh with a new current model, and leave a caller's session as it was.
+    The ranks are halved again and again, and the lattice with them, in proportion, across the axis
+    with the most cells, which cuts the fewest of them. Parts differ by rounding to whole layers;
+    they are empty only where layers are fewer than ranks.
 
     Args:
-        name: Name of the new model, which is removed at the end.
+        cells: Cells of the lattice along x, y and z.
+        ranks: Number of parts.
+        rank: Which part.
 
-    Yields:
-        The gmsh module.
+    Returns:
+        Which cells along x, y and z.
+
+    Source:
+        Recursive bisection: Berger, Bokhari, IEEE Transactions on Computers C-36 (1987) 570,
+        doi 10.1109/TC.1987.1676942.
     """
-    with sigint_untouched():
-        import gmsh  # here, so that everything without a mesh works without gmsh
-
-        owned = not is_initialised(gmsh)
-        if owned:
-            gmsh.initialize(["", "-v", "0"], readConfigFiles=False)
-    current = gmsh.model.getCurrent()
-    kept = {option: gmsh.option.getNumber(option) for option in _OPTIONS}
-    try:
-        for option, value in _OPTIONS.items():
-            gmsh.option.setNumber(option, value)
-        gmsh.model.add(name)
-        yield gmsh
-    finally:
-        if owned:
-            with sigint_untouched():
-                gmsh.finalize()
+    part = _whole(cells)
+    while ranks > 1:
+        lower, upper, few = _halves(part, ranks)
+        if rank < few:
+            part, ranks = lower, few
         else:
-            gmsh.model.setCurrent(name)
-            gmsh.model.remove()
-            gmsh.model.setCurrent(current)
-            for option, value in kept.items():
-                gmsh.option.setNumber(option, value)
+            part, ranks, rank = upper, ranks - few, rank - few
+    return part
 
 
-def mesh_lattice(gmsh: Any, axes: Axes, *, hexahedra: bool) -> dict[str, list[int]]:
-    """Mesh the boxes between the segments of three axes conformingly.
+def cells_beyond(cells: Counts, ranks: int, part: Part) -> tuple[Numbers, Numbers]:
+    """Return which of a part's cells share faces with those of other ranks.
 
     Args:
-        gmsh: The module, inside a session.
-        axes: Adjoining segments along x, y and z.
+        cells: Cells of the lattice along x, y and z.
+        ranks: Number of parts.
+        part: The part of one of them.
+
+    Returns:
+        Numbers of cells in the part, in the order of `lattice_cells`, and the ranks beyond their
+        faces, shapes (n,); cells at edges of the part come more than once, with different ranks.
+    """
+    size = [len(of) for of in part]
+    numbers = np.arange(np.prod(size)).reshape(size)
+    found, others = [numbers[:0].ravel()], [numbers[:0].ravel()]
+    for axis, of in enumerate(part):
+        for last, beyond in ((0, of.start - 1), (-1, of.stop)):
+            if numbers.size and 0 <= beyond < cells[axis]:
+                layer = [np.array(each) for each in part]
+                layer[axis] = np.array([beyond])
+                places = np.stack(np.meshgrid(*layer, indexing="ij"), axis=-1).reshape(-1, 3)
+                found.append(numbers.take([last], axis=axis).ravel())
+                others.append(_ranks_at(_whole(cells), 0, ranks, places))
+    return np.concatenate(found), np.concatenate(others)
+
+
+def _whole(cells: Counts) -> Part:
+    return range(cells[0]), range(cells[1]), range(cells[2])
+
+
+def _halves(part: Part, ranks: int) -> tuple[Part, Part, int]:
+    """Return two parts of a part for half the ranks each, and the number of the lower ones."""
+    few = ranks // 2
+    axis = max(range(3), key=lambda k: len(part[k]))
+    cut = (2 * len(part[axis]) * few + ranks) // (2 * ranks)  # to the nearest layer
+    lower, upper = list(part), list(part)
+    lower[axis], upper[axis] = part[axis][:cut], part[axis][cut:]
+    return (lower[0], lower[1], lower[2]), (upper[0], upper[1], upper[2]), few
+
+
+def _ranks_at(part: Part, first: int, ranks: int, places: Numbers) -> Numbers:
+    """Return who of some ranks, who share a part, has the cells at some places (n, 3)."""
+    found = np.full(len(places), first)
+    if ranks > 1 and len(places):
+        lower, upper, few = _halves(part, ranks)
+        below = np.all([places[:, k] < of.stop for k, of in enumerate(lower)], axis=0)
+        found[below] = _ranks_at(lower, first, few, places[below])
+        found[~below] = _ranks_at(upper, first + few, ranks - few, places[~below])
+    return found
+
+
+def lattice_cells(cells: Counts, part: Part, *, hexahedra: bool) -> Numbers:
+    """Return the nodes of the cells of a part, by their numbers in the whole lattice.
+
+    The node where the planes i, j, k meet has the number (i (ny + 1) + j) (nz + 1) + k.
+
+    Args:
+        cells: Cells of the lattice along x, y and z.
+        part: Which of them, along x, y and z.
         hexahedra: Hexahedra, or six tetrahedra in the place of each.
 
     Returns:
-        Tags of the volumes under ``"volumes"`` and of the outer faces under ``"x-"``, ``"x+"``,
-        ``"y-"`` … ``"z+"``.
+        Numbers in the order of dolfinx, shape (cells of the part, 8), or (6 times as many, 4).
     """
-    geo = gmsh.model.geo
-    corners = [[axis[0].start, *(segment.end for segment in axis)] for axis in axes]
-    shape = [len(axis) for axis in axes]
-    points = {
-        place: geo.addPoint(*(corners[k][place[k]] for k in range(3)))
-        for place in itertools.product(*(range(n + 1) for n in shape))
-    }
-    lines = _add_lines(geo, axes, points)
-    faces = _add_faces(geo, shape, points, lines, recombine=hexahedra)
-    volumes = []
-    for place in itertools.product(*(range(n) for n in shape)):
-        shell = [faces[k, _next(place, k, side)] for k in range(3) for side in (0, 1)]
-        volumes.append(geo.addVolume([geo.addSurfaceLoop(shell)]))
-        geo.mesh.setTransfiniteVolume(volumes[-1])
-    geo.synchronize()
-    gmsh.model.mesh.generate(3)
-    return {"volumes": volumes, **_outer_faces(shape, faces)}
+    strides = np.array([(cells[1] + 1) * (cells[2] + 1), cells[2] + 1, 1])
+    along = [
+        stride * np.arange(of.start, of.stop) for stride, of in zip(strides, part, strict=True)
+    ]
+    first = (along[0][:, None, None] + along[1][:, None] + along[2]).ravel()
+    corners = _CORNERS @ strides
+    offsets = corners if hexahedra else corners[_TETRAHEDRA].ravel()
+    return (first[:, None] + offsets).reshape(-1, 8 if hexahedra else 4)
 
 
-Place = tuple[int, ...]
+def node_planes(cells: Counts, numbers: Numbers) -> NDArray[np.intp]:
+    """Return which planes across x, y and z meet at nodes.
 
+    Args:
+        cells: Cells of the lattice along x, y and z.
+        numbers: Numbers of the nodes, shape (n,).
 
-def _next(place: Place, axis: int, step: int = 1) -> Place:
-    return tuple(index + step * (k == axis) for k, index in enumerate(place))
-
-
-def _add_lines(geo: Any, axes: Axes, points: dict[Place, int]) -> dict[tuple[int, Place], int]:
-    """Add the edges of all boxes, keyed by direction and first point."""
-    lines = {}
-    for place, k in itertools.product(points, range(3)):
-        if place[k] < len(axes[k]):
-            segment = axes[k][place[k]]
-            tag = geo.addLine(points[place], points[_next(place, k)])
-            geo.mesh.setTransfiniteCurve(tag, segment.cells + 1, "Progression", segment.ratio)
-            lines[k, place] = tag
-    return lines
-
-
-def _add_faces(
-    geo: Any,
-    shape: Sequence[int],
-    points: dict[Place, int],
-    lines: dict[tuple[int, Place], int],
-    *,
-    recombine: bool,
-) -> dict[tuple[int, Place], int]:
-    """Add the faces of all boxes, keyed by normal and lowest corner."""
-    faces = {}
-    for place, k in itertools.product(points, range(3)):
-        first, second = (axis for axis in range(3) if axis != k)
-        if place[first] == shape[first] or place[second] == shape[second]:
-            continue
-        right, above = _next(place, first), _next(place, second)
-        loop = [lines[first, place], lines[second, right], -lines[first, above]]
-        tag = geo.addPlaneSurface([geo.addCurveLoop([*loop, -lines[second, place]])])
-        corner = [points[at] for at in (place, right, _next(right, second), above)]
-        geo.mesh.setTransfiniteSurface(tag, "Left", corner)
-        if recombine:
-            geo.mesh.setRecombine(2, tag)
-        faces[k, place] = tag
-    return faces
-
-
-def _outer_faces(shape: Sequence[int], faces: dict[tuple[int, Place], int]) -> dict[str, list[int]]:
-    outer: dict[str, list[int]] = {}
-    for (k, place), tag in faces.items():
-        if place[k] in (0, shape[k]):
-            outer.setdefault("xyz"[k] + ("-" if place[k] == 0 else "+"), []).append(tag)
-    return outer
-
-
-def is_initialised(gmsh: Any) -> bool:
-    """Tell whether gmsh has a session, calling nothing that may end the process.
-
-    A call before the first session makes gmsh 4.8 report an error. It then reads how to treat
-    errors from memory that nothing has set, and where that holds a 4 it exits without a word.
+    Returns:
+        Indices of the planes, shape (n, 3).
     """
-    if hasattr(gmsh, "isInitialized"):
-        return bool(gmsh.isInitialized())
-    if not _has_context(gmsh):
-        return False
-    try:  # gmsh 4.8 answers 0, or raises, between two sessions
-        return bool(gmsh.option.getNumber("Mesh.ElementOrder") >= 1.0)
-    except Exception:
-        return False
+    planes = np.unravel_index(numbers, [count + 1 for count in cells])
+    return np.stack(planes, axis=1)
 
 
-def _has_context(gmsh: Any) -> bool:
-    """Tell whether gmsh has had a session, which leaves its options' singleton behind.
+def node_share(ticks: Sequence[Array], ranks: int, rank: int) -> Array:
+    """Return the places of an even share of a lattice's nodes, consecutive in number.
 
-    Where the library hides that (no release that we know does so and lacks ``isInitialized``),
-    the answer is no, and a caller's session, if there is one, ends with ours.
+    Args:
+        ticks: Coordinates of the planes across x, y and z [mm].
+        ranks: Number of shares.
+        rank: Which share.
+
+    Returns:
+        Points, shape (n, 3) [mm].
     """
-    try:
-        return ctypes.c_void_p.in_dll(gmsh.lib, "_ZN3CTX9_instanceE").value is not None
-    except ValueError:
-        return False
+    cells = (len(ticks[0]) - 1, len(ticks[1]) - 1, len(ticks[2]) - 1)
+    count = len(ticks[0]) * len(ticks[1]) * len(ticks[2])
+    planes = node_planes(cells, np.arange(count * rank // ranks, count * (rank + 1) // ranks))
+    return np.stack([of[planes[:, k]] for k, of in enumerate(ticks)], axis=1)

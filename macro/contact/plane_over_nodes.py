@@ -51,14 +51,8 @@ class PlaneOverNodes:
         """
         plane = control.prescribed(plane)
         if control.force == 0.0:
-            plane[0] = self.first_touch(plane[1:])
+            plane[0] = self.levers.first_touch(self.distance, plane[1:])
         return plane
-
-    def first_touch(self, tilt: Array) -> float:
-        """Return the approach at which a tilted plane first touches the undeformed top [mm]."""
-        levers = self.levers
-        least = float(np.min(self.distance - levers.matrix[:, 1:] @ tilt, initial=np.inf))
-        return float(min(levers.comm.allgather(least)))
 
     def penetration(self, plane: Array, displacement: Array) -> Array:
         """Return how far the plane is below the nodes, negative where it is above, (n,) [mm].

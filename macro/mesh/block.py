@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias, get_args
+from typing import Any
 
 import numpy as np
 from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
 
 from geometry.collective import on_root
-from geometry.errors import InputError
 from geometry.meshes.block import BlockShape
-from geometry.meshes.lattice_parts import (
+from geometry.meshes.lattice import (
     cells_beyond,
     lattice_cells,
     lattice_part,
@@ -25,11 +24,6 @@ from macro import compat
 
 BOTTOM, TOP, SIDES = 1, 2, 3
 """Markers of the block's faces: z = −height, z = 0, and the four planes between them."""
-
-Builder: TypeAlias = Literal["auto", "gmsh", "lattice"]
-
-GMSH_CELLS = 20_000
-"""Largest number of cells of a flat block that gmsh meshes by default; it takes 0.1 s longer."""
 
 _FACES = np.array([1, 2, 4, 8, 16, 32], dtype=np.uint8).reshape(3, 2)
 """Bits of a lattice's faces: the first and the last plane across x, y and z."""
@@ -58,67 +52,34 @@ class BlockMesh:
         return self.mesh.comm
 
 
-def block_mesh(shape: BlockShape | RefinedShape, comm: Any, builder: Builder = "auto") -> BlockMesh:
+def block_mesh(shape: BlockShape | RefinedShape, comm: Any) -> BlockMesh:
     """Mesh a block, distributed over all ranks.
 
-    gmsh meshes the whole block on rank 0, and dolfinx distributes it, so that time and memory of
-    rank 0 grow with the whole mesh. Flat blocks can also be made as a lattice, with exactly the
-    same cells, faces and nodes: every rank makes a box of cells of its own.
+    A flat block is a lattice, of which every rank makes a box of cells of its own. A refined block
+    is meshed whole by gmsh on rank 0 and distributed by dolfinx, so that time and memory of rank 0
+    grow with the whole mesh.
 
     Args:
         shape: Size, cells and element of the block.
         comm: MPI communicator that the mesh will live on.
-        builder: ``"gmsh"``, ``"lattice"``, or ``"auto"``: gmsh up to `GMSH_CELLS` cells and for
-            refined blocks, the lattice for larger flat ones.
 
     Raises:
-        InputError: When the builder is unknown or cannot make the shape. Errors of gmsh on rank 0
-            are raised on every rank.
+        InputError: When gmsh cannot make the shape. Errors of gmsh on rank 0 are raised on every
+            rank.
 
     Note:
-        Collective. By gmsh rank 0 spends 1 s and 0.11 GB on 10⁵ hexahedra and 11 s and 1.1 GB on
-        10⁶; a fiftieth of that is spent in gmsh, the rest on the transfer to dolfinx. A lattice
-        takes 0.3 s and 0.07 GB, and 2.7 s and 0.7 GB; 3·10⁶ hexahedra on two ranks take 5 s and
-        1.1 GB each. Four fifths are spent on dolfinx' topology and geometry, a sixth on facets.
+        Collective. A lattice of 10⁵ hexahedra takes 0.3 s and 0.07 GB, one of 10⁶ 2.7 s and 0.7 GB;
+        3·10⁶ hexahedra on two ranks take 5 s and 1.1 GB each. Four fifths are spent on dolfinx'
+        topology and geometry, a sixth on facets.
     """
-    if builder not in get_args(Builder):
-        raise InputError(
-            "this builder of meshes is unknown",
-            value=builder,
-            allowed=", ".join(get_args(Builder)),
-        )
     if isinstance(shape, BlockShape):
-        if builder == "lattice" or (builder == "auto" and shape.cell_count > GMSH_CELLS):
-            return _from_lattice(shape, comm)
-    elif builder == "lattice":
-        raise InputError("only flat blocks are lattices", value=builder, allowed="auto, gmsh")
-    return _from_gmsh(shape, comm)
-
-
-def _from_gmsh(shape: BlockShape | RefinedShape, comm: Any) -> BlockMesh:
+        return _from_lattice(shape, comm)
     with ExitStack() as gmsh_session:
         models: list[Any] = []
         on_root(comm, lambda: models.append(gmsh_session.enter_context(shape.meshed())))
         mesh, facet_tags = compat.mesh_from_gmsh(models[0] if models else None, comm)
-    planes = None
-    if isinstance(shape, BlockShape):
-        planes = _onto_planes(shape, mesh.geometry.x)
-    else:
-        mesh.geometry.x[:] *= shape.unit
-    return BlockMesh(mesh=mesh, facet_tags=facet_tags, shape=shape, planes=planes)
-
-
-def _onto_planes(shape: BlockShape, points: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Move points of a flat block, which gmsh places to 1e-9, onto the nearest grid planes.
-
-    Returns:
-        Indices of these planes, shape (n, 3).
-    """
-    planes = np.empty(points.shape, dtype=np.intp)
-    for axis, ticks in enumerate(shape.ticks):
-        planes[:, axis] = np.searchsorted(0.5 * (ticks[1:] + ticks[:-1]), points[:, axis])
-        points[:, axis] = ticks[planes[:, axis]]
-    return planes
+    mesh.geometry.x[:] *= shape.unit
+    return BlockMesh(mesh=mesh, facet_tags=facet_tags, shape=shape)
 
 
 def _from_lattice(shape: BlockShape, comm: Any) -> BlockMesh:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry import Partition
+from geometry import Material, Partition
 from geometry.errors import InputError
 
 Array = NDArray[np.float64]
@@ -24,35 +24,14 @@ Array = NDArray[np.float64]
 _TINY = 1e-290
 
 
-@dataclass(frozen=True, slots=True)
-class HalfSpace:
+class HalfSpace(Material):
     """An elastic half-space below the plane that carries the pressures.
-
-    Args:
-        young_modulus: E [MPa].
-        poisson_ratio: ν, −1 < ν < 0.5.
-
-    Raises:
-        InputError: When a constant is out of its range.
 
     Source:
         Love 1929, doi 10.1098/rsta.1929.0009.
     """
 
-    young_modulus: float
-    poisson_ratio: float
-
-    def __post_init__(self) -> None:
-        e, nu = self.young_modulus, self.poisson_ratio
-        if not (np.isfinite(e) and e > 0.0 and -1.0 < nu < 0.5):
-            raise InputError(
-                "the elastic constants are out of range", value=(e, nu), allowed="E > 0, -1 < ν < ½"
-            )
-
-    @property
-    def shear_modulus(self) -> float:
-        """G [MPa]."""
-        return self.young_modulus / (2.0 * (1.0 + self.poisson_ratio))
+    __slots__ = ()
 
     def displacements(
         self, x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: Partition

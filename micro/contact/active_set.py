@@ -78,8 +78,8 @@ class ContactSearch:
         highest = self.required
         if self.limits.motions is not None:
             if pressure.any():
-                self.motion = self.limits.motions.best(self._closing(pressure), gap)
-            nearer = self.limits.motions.nearer(self.motion)
+                self.motion = self.limits.motions.closing(self._closing(pressure), gap)
+            nearer = self.limits.motions.displacement(self.motion)
             gap -= nearer
             highest = self.required + nearer
         self.gap = gap  # within the memory of the displacement
@@ -205,7 +205,7 @@ class ContactSearch:
         cells = Cells.of(flat, self.required.shape)
         levers = np.empty((0, flat.size))
         if self.limits.motions is not None:
-            levers = self.limits.motions.among(flat)
+            levers = self.limits.motions.levers_of(flat)
         return ContactCells.among(self.grid, cells, levers)
 
     def _moved(self, old: Array, cells: Indices, change: Array) -> Array | None:

@@ -49,5 +49,5 @@ class Limits:
             return pressure if self.upper == np.inf else np.minimum(pressure, self.upper)
         found = None
         if fixed is not None:
-            found = self.motions.balanced(pressure, self.upper, fixed)
-        return self.motions.balanced(pressure, self.upper) if found is None else found
+            found = self.motions.scaled_to_loads(pressure, self.upper, fixed)
+        return self.motions.scaled_to_loads(pressure, self.upper) if found is None else found

@@ -61,7 +61,7 @@ def _unloaded(
     pressure = limits.met(start)
     if pressure is None or float(np.vdot(pressure, required)) <= 0.0:
         found = clearance(required, limits.motions)
-        if found.overlap <= 0.0:
+        if found.interference <= 0.0:
             return np.zeros(start.shape), found.motion
         pressure = found.support
     work = float(np.vdot(pressure, grid.displacement(pressure)))

@@ -142,7 +142,7 @@ class Pressing:
         """Solve on a box, and on a larger one while the body lifts cells outside into contact."""
         found = self._on(box, required, start, motions, tolerance)
         while self.grids.body is not None and box.shape != required.shape:
-            nearer = required if motions is None else required + motions.nearer(found.motion)
+            nearer = required if motions is None else required + motions.displacement(found.motion)
             lifted = self._lifted(box, nearer, found)
             if lifted is None:
                 break

@@ -1,7 +1,14 @@
-"""Free rigid motions of the body that presses, and the loads that they are to meet.
+"""Free rigid motions of the body that presses on the cells of a half-space, and their loads.
 
-A motion q moves the body nearer by Σ_i q_i ℓ_i(x, y): the approach by ℓ = 1, slopes by the distance
-from the middle. Motions that are free add unknowns q and as many conditions Σ p ℓ_i = f_i.
+A motion q moves the body towards the surface by Σ_i q_i ℓ_i(x, y): the approach by ℓ = 1, slopes by
+the distance from the centre over half the diagonal. Free motions add the unknowns q to a contact
+problem, and as many conditions Σ p ℓ_i = f_i on its pressures.
+
+The plane is that of `geometry.rigid_plane`. What differs is how its equilibrium is found. Contacts
+here are cells, whose pressures the active set and conjugate gradients are still looking for. So no
+Newton's method of its own moves the plane: every iterate keeps the loads exactly, by a projection
+of search directions and a scaling of pressures, and the motion is read off the gaps. Levers are
+products of a factor along x and one along y, as a full matrix would be as large as many fields.
 """
 
 from __future__ import annotations
@@ -19,15 +26,18 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Flags = NDArray[np.bool_]
 
-_MOST_STEPS = 100
-_LONGEST = 1.5  # change of an exponent in one step
-_FARTHEST = 60.0  # largest exponent: pressures do not come into balance on these cells
-_MOST_HALVINGS = 8
-_AT_BOUND = 1e-13  # of the bound: pressures no further below it are taken for it
-_BEYOND = 0.9  # part of its first slope that the function may have beyond its lowest point
+_MOST_STEPS, _MOST_HALVINGS = 100, 8
+_LONGEST = 1.5
+"""Largest change of an exponent in one step."""
+_FARTHEST = 60.0
+"""Largest exponent; loads that need more cannot be met by pressures on these cells."""
+_AT_BOUND = 1e-13
+"""Share of the bound: pressures no further below it lie on it."""
+_DECREASE = 0.9
+"""Share of its first slope that the function may have beyond its lowest point."""
 _ROUNDING, _ENOUGH = 1e-14, 1e-12
-"""What pressures may miss of the loads, of what they could do on the longest lever; the second
-where steps gain no more."""
+"""What pressures may miss of the loads, relative to what they could do on the longest lever: aim,
+and what will do where steps gain no more."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -47,7 +57,11 @@ class Motions:
     @classmethod
     def approach(cls, grid: tuple[int, ...], total: float) -> Self:
         """Return the approach alone, under a given sum of pressures / E*."""
-        return cls(along_x=np.ones((1, grid[0])), along_y=np.ones((1, grid[1])), loads=_row(total))
+        return cls(
+            along_x=np.ones((1, grid[0])),
+            along_y=np.ones((1, grid[1])),
+            loads=np.array([float(total)]),
+        )
 
     @classmethod
     def turning(cls, x: Array, y: Array, total: float | None) -> Self:
@@ -71,20 +85,25 @@ class Motions:
         """Whether slopes are free."""
         return len(self.loads) > 1
 
-    def nearer(self, motion: Array) -> Array:
-        """Return how much nearer a motion brings the body, shape (nx, ny) [mm]."""
+    def displacement(self, motion: Array) -> Array:
+        """Return how far a motion moves the body towards the surface, shape (nx, ny) [mm]."""
         return np.asarray((self.along_x * motion[:, None]).T @ self.along_y)
 
-    def among(self, cells: Indices) -> Array:
+    def levers_of(self, cells: Indices) -> Array:
         """Return the levers of some cells by their flat indices, shape (k, n)."""
         row, column = np.divmod(cells, self.along_y.shape[1])
         return np.asarray(self.along_x[:, row] * self.along_y[:, column])
 
-    def best(self, pressure: Array, gap: Array) -> Array:
-        """Return the motion that closes gaps best, weighted with the pressures, shape (k,) [mm]."""
+    def closing(self, pressure: Array, gap: Array) -> Array:
+        """Return the motion that closes gaps best in the least-squares sense, shape (k,) [mm].
+
+        Args:
+            pressure: Pressures, by which cells are weighted, shape (nx, ny).
+            gap: Gaps, shape (nx, ny) [mm].
+        """
         cells = np.flatnonzero(pressure)
         root = np.sqrt(pressure.ravel()[cells] / pressure.max())
-        levers, left = self.among(cells), gap.ravel()[cells]
+        levers, left = self.levers_of(cells), gap.ravel()[cells]
         found = np.zeros(len(self.loads))
         for _ in range(2 if self.turns else 1):  # again for what rounding leaves of light cells
             change = np.linalg.lstsq((levers * root).T, left * root, rcond=1e-10)[0]
@@ -100,19 +119,19 @@ class Motions:
         )
 
     def coarsened(self, factors: Sequence[int]) -> Motions:
-        """Return the motions on blocks of cells; see `coarse_start.coarsened`."""
+        """Return the motions on blocks of cells; see `micro.contact.nested_grids.coarsened`."""
         return Motions(
             along_x=_blocks(self.along_x, factors[0]),
             along_y=_blocks(self.along_y, factors[1]),
             loads=self.loads / np.prod(factors),
         )
 
-    def balanced(
+    def scaled_to_loads(
         self, pressure: Array, upper: float = np.inf, fixed: Flags | None = None
     ) -> Array | None:
-        """Return pressures that meet the loads, p exp(Σ μ_i ℓ_i) and at most the upper bound.
+        """Return pressures p exp(Σ μ_i ℓ_i), at most the upper bound, that meet the loads.
 
-        The multipliers μ minimise a convex function, by Newton steps.
+        The multipliers μ minimise a convex function, which Newton's method does.
 
         Args:
             pressure: Pressures / E* ≥ 0, shape (nx, ny).
@@ -122,22 +141,20 @@ class Motions:
         Returns:
             The pressures, zero where they were; None where no such pressures meet the loads.
         """
-        if len(self.loads) == 1 and upper == np.inf:
+        if not self.turns and upper == np.inf:
             total = float(pressure.sum())
             return pressure * (self.loads[0] / total) if total > 0.0 else None
         cells, loads, acting = np.flatnonzero(pressure), self.loads, 0.0
         if fixed is not None:
             cells = np.flatnonzero(np.where(fixed, 0.0, pressure))
             stay = np.flatnonzero(fixed)
-            loads = loads - self.among(stay) @ pressure.ravel()[stay]
+            loads = loads - self.levers_of(stay) @ pressure.ravel()[stay]
             acting = float(pressure.ravel()[stay].sum())
         if not cells.size and loads.any():
             return None
         longest = np.abs(self.along_x).max(axis=1) * np.abs(self.along_y).max(axis=1)
-        scaled = _Scaled(
-            np.minimum(pressure.ravel()[cells], upper), self.among(cells), loads, upper
-        )
-        values = scaled.solution(longest, acting)
+        start = np.minimum(pressure.ravel()[cells], upper)
+        values = _Scaled(start, self.levers_of(cells), loads, upper).solution(longest, acting)
         if values is None:
             return None
         found = np.zeros(pressure.shape) if fixed is None else np.where(fixed, pressure, 0.0)
@@ -161,7 +178,7 @@ class _Scaled(NamedTuple):
 
         Args:
             longest: Longest lever of each motion, shape (k,).
-            acting: Sum of pressures that act beside these.
+            acting: Sum of the pressures that stay as they are.
         """
         exponents, values = np.zeros(len(self.loads)), self.start
         for _ in range(_MOST_STEPS):
@@ -193,14 +210,10 @@ class _Scaled(NamedTuple):
         step *= min(1.0, _LONGEST / change) if change > 0.0 else 1.0
         for _ in range(_MOST_HALVINGS):
             left = self.levers @ self.at(exponents + step) - self.loads
-            if float(left @ step) <= -_BEYOND * float(off @ step):
+            if float(left @ step) <= -_DECREASE * float(off @ step):
                 return exponents + step
             step = 0.5 * step
         return None
-
-
-def _row(value: float) -> Array:
-    return np.array([value], dtype=np.float64)
 
 
 def _blocks(values: Array, factor: int) -> Array:

@@ -65,7 +65,7 @@ def with_slopes(
         if not touching.any():
             return found
         change = grids.by_slopes(found.pressure) - lag
-        nearer = required if motions is None else required + motions.nearer(found.motion)
+        nearer = required if motions is None else required + motions.displacement(found.motion)
         left = float(np.abs(change[touching]).max()) / float(nearer[touching].max())
         if left <= last and rough <= tolerance:
             residual = max(found.residual, left)

@@ -55,7 +55,7 @@ def _slopes(model: HalfSpaceModel, poisson_ratio: float) -> FiniteSlopes:
     if sides is not None:
         cx, cy = coarse_grid(surface)
         beside = [side_stresses(sides, (surface.lengths[0] / cx, surface.lengths[1] / cy))]
-    half_space = HalfSpace(modulus, poisson_ratio)
+    half_space = HalfSpace(young_modulus=modulus, poisson_ratio=poisson_ratio)
     return FiniteSlopes(surface, half_space, periodic=model.periodic, beside=beside)
 
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Any
 
 from geometry.errors import InputError, NotConverged
-from geometry.meshes.refinement import suggested_fine
+from geometry.meshes.families import suggested_fine
 from micro import MODEL_NAMES
 from multiscale.comparison.level import (
     OWN,

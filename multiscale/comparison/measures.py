@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import InputError
-from geometry.patches import PatchGrid
+from geometry.patches import PatchGrid, interval_overlaps
 
 Array = NDArray[np.float64]
 
@@ -181,18 +181,9 @@ def on_grid(pressure: Array, patches: PatchGrid, grid: PatchGrid) -> Array:
     Returns:
         Mean pressures, shape (grid.count,) [MPa].
     """
-    shares = [
-        _shares(patches.borders_x, grid.borders_x),
-        _shares(patches.borders_y, grid.borders_y),
-    ]
-    return np.asarray((shares[0] @ pressure.reshape(patches.grid) @ shares[1].T).ravel())
-
-
-def _shares(old: Array, new: Array) -> Array:
-    """Return the share of every old interval in every new one's mean, shape (new, old)."""
-    upper = np.minimum(new[1:, None], old[None, 1:])
-    lower = np.maximum(new[:-1, None], old[None, :-1])
-    return np.asarray(np.clip(upper - lower, 0.0, None) / np.diff(new)[:, None])
+    x = interval_overlaps(grid.borders_x, patches.borders_x) / grid.size[0]
+    y = interval_overlaps(grid.borders_y, patches.borders_y) / grid.size[1]
+    return np.asarray((x @ pressure.reshape(patches.grid) @ y.T).ravel())
 
 
 def l1_distance(pressure: Array, right: Array) -> float:

@@ -25,7 +25,7 @@ from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import FaceCompliance, Interface, Material
+    from macro import FaceCompliance, Interface
 
 Array = NDArray[np.float64]
 
@@ -92,8 +92,8 @@ def on_body(
     body = None if half_space else scene_body(setup)
     if body is not None and face is None:
         face = body.face(comm, modes=modes, coarse=coarse)
-    section = setup.scene.block
-    material = HalfSpace(section.young_modulus, section.poisson_ratio)
+    block = setup.scene.block
+    material = HalfSpace(young_modulus=block.young_modulus, poisson_ratio=block.poisson_ratio)
 
     def put(model: HalfSpaceModel, order: int) -> HalfSpaceModel:
         surface, model = model.surface, replace(model, tolerance=_SHARP)
@@ -131,7 +131,7 @@ def scene_body(setup: ProblemSetup) -> Body:
     """
     return Body(
         shape=setup.shape,
-        material=block_material(setup),
+        material=setup.scene.block.material,
         sides=setup.scene.block.sides,
         known=free_sides(setup),
     )
@@ -207,7 +207,7 @@ def patch_compliance(setup: ProblemSetup, comm: Any) -> Array:
         return {"compliance": patch_compliance_matrix(embedding(setup, comm))}
 
     sides = setup.scene.block.sides
-    key = (setup.shape, block_material(setup), sides, setup.patches, users_options())
+    key = (setup.shape, setup.scene.block.material, sides, setup.patches, users_options())
     return cached("plain", key, compute, comm or MPI.COMM_SELF)["compliance"]
 
 
@@ -227,7 +227,7 @@ def embedding(setup: ProblemSetup, comm: Any) -> Interface:
 
     section = setup.scene.block
     mesh = block_mesh(setup.shape, comm or MPI.COMM_SELF)
-    return Interface(Block(mesh, block_material(setup), sides=section.sides), setup.patches)
+    return Interface(Block(mesh, setup.scene.block.material, sides=section.sides), setup.patches)
 
 
 def load_together(scene: Scene, comm: Any) -> None:
@@ -244,14 +244,6 @@ def load_together(scene: Scene, comm: Any) -> None:
     """
     if comm is not None and scene.coupling.kind != "analytic":
         import macro  # noqa: F401
-
-
-def block_material(setup: ProblemSetup) -> Material:
-    """Return the elastic constants of a scene's block."""
-    from macro import Material
-
-    section = setup.scene.block
-    return Material(young_modulus=section.young_modulus, poisson_ratio=section.poisson_ratio)
 
 
 def final_field(setup: ProblemSetup, pressure: Array, comm: Any) -> tuple[Interface, Array]:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import NotConverged
-from geometry.rigid_plane import Control
+from geometry.rigid_plane import Control, RigidPlane
 from multiscale.couplings.load_steps import beyond_law, embedded_step
 from multiscale.laws.files import LawTable
 from multiscale.laws.packed import PatchLaws
@@ -73,7 +73,7 @@ class TurningCoupling:
     def _step(self, control: Control, approach: float, steps: int) -> LoadStep:
         along, tilt = self._along(approach), self._path.tilt_at(approach)
         point = self._laws.along(along)
-        local = self._patches.mean_approaches(approach, tilt)
+        local = RigidPlane.above(self._patches, approach, tilt).means(self._patches)
         closure = local - self._displacements(point.pressure[None])[0]
         touched = point.pressure > 0.0
         missed = np.abs(np.where(touched, closure - point.closure, 0.0)).max()

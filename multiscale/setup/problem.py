@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from geometry.asperities import Asperities
 from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid
+from geometry.rigid_plane import RigidPlane
 from geometry.surface import Surface
 from micro import AsperityModel, Choice, HalfSpaceModel, MicroModel, ScaledModel
 from multiscale.laws.refinement import MOST_ROWS
@@ -139,7 +140,7 @@ class ProblemSetup:
         carry a force, for under the tilted plane its contacts may lie at a corner.
         """
         approach, tilt = self.plane_at_largest_load
-        ends = self.patches.mean_approaches(approach, tilt)
+        ends = RigidPlane.above(self.patches, approach, tilt).means(self.patches)
         coupling, loading = self.scene.coupling, self.scene.loading
         alone_by_force = coupling.kind == "isolated" and loading.force is not None
         if coupling.interface == "pointwise" or alone_by_force:

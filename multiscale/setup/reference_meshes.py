@@ -13,9 +13,8 @@ from scipy.ndimage import distance_transform_edt
 
 from geometry.errors import InputError
 from geometry.meshes.block import BlockShape
-from geometry.meshes.families import characteristic_size, reference_shapes
+from geometry.meshes.families import characteristic_size, contact_radius, reference_shapes
 from geometry.meshes.refined_block import RefinedShape
-from geometry.meshes.refinement import contact_radius
 from geometry.surface import Surface
 from multiscale.machine.nodes import ClusterNodes, MemoryRequest
 from multiscale.scene.scene import Scene

@@ -1,4 +1,4 @@
-"""Meshes of flat blocks from gmsh and from all ranks: time, memory, what ranks share, products.
+"""Meshes of flat blocks: time, memory, what ranks share, products.
 
 Run by hand on an idle machine: ``.venv/bin/python tests/benchmarks/block_meshes.py``; every line in
 clean processes, the least time of a few. Memory is the growth of rank 0's peak while the mesh is
@@ -29,7 +29,7 @@ PRODUCTS = 20
 REPEATS = 3
 
 
-def measure(cells: list[int], element: str, builder: str, product: bool) -> None:
+def measure(cells: list[int], element: str, product: bool) -> None:
     """Make a mesh on this job's ranks; rank 0 prints what it took as JSON."""
     from mpi4py import MPI
     from petsc4py import PETSc
@@ -53,12 +53,12 @@ def measure(cells: list[int], element: str, builder: str, product: bool) -> None
         return result, largest(time.perf_counter() - began[0]), time.process_time() - began[1]
 
     small = BlockShape(interface=(1.0, 1.0), height=0.5, cells=(1, 1, 1), element=element)
-    block_mesh(small, comm, builder)  # imports
+    block_mesh(small, comm)  # imports
     shape = BlockShape(
         interface=(1.0, 1.0), height=0.5, cells=tuple(cells), element=element, grading=4.0
     )
     before = peak()
-    mesh, seconds, busy = timed(lambda: block_mesh(shape, comm, builder))
+    mesh, seconds, busy = timed(lambda: block_mesh(shape, comm))
     facts = {"seconds": seconds, "busy": busy, "memory": peak() - before}
     own = mesh.mesh.topology.index_map(3)
     facts |= {
@@ -92,15 +92,15 @@ def on(ranks: int, *words: object) -> dict:
 
 
 def show(title: str, rows: list[tuple[object, ...]], product: bool) -> None:
-    """Measure and print a table; rows are (ranks, element, builder, cells along x, y, z)."""
-    head = "ranks element builder      cells  wall [s]  rank 0: CPU [s]       MB  imbalance"
+    """Measure and print a table; rows are (ranks, element, cells along x, y, z)."""
+    head = "ranks element      cells  wall [s]  rank 0: CPU [s]       MB  imbalance"
     print(f"\n{title}\n{head}{'  product [ms]  messages      kB' if product else ''}")
-    for ranks, element, builder, *cells in rows:
-        words = ["--be", *cells, element, builder, *(["--product"] if product else [])]
+    for ranks, element, *cells in rows:
+        words = ["--be", *cells, element, *(["--product"] if product else [])]
         facts = [on(int(str(ranks)), *words) for _ in range(REPEATS)]
         least = {name: min(fact[name] for fact in facts) for name in facts[0]}
         print(
-            f"{ranks!s:>5s} {element!s:>7s} {builder!s:>7s} {least['cells']:10d} "
+            f"{ranks!s:>5s} {element!s:>7s} {least['cells']:10d} "
             f"{least['seconds']:9.2f} {least['busy']:16.2f} {least['memory'] / 1e6:8.0f} "
             f"{least['imbalance']:10.3f}",
             end="" if product else "\n",
@@ -116,21 +116,20 @@ def main() -> None:
     """Measure and print all tables, or be one of the ranks measured."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--quick", action="store_true", help="up to 10⁵ cells only")
-    parser.add_argument("--be", nargs=5, help="be one rank of a measurement: cells, element, maker")
+    parser.add_argument("--be", nargs=4, help="be one rank of a measurement: cells, element")
     parser.add_argument("--product", action="store_true", help="measure products as well")
     choice = parser.parse_args()
     if choice.be:
-        *cells, element, builder = choice.be
-        return measure([int(count) for count in cells], element, builder, choice.product)
+        *cells, element = choice.be
+        return measure([int(count) for count in cells], element, choice.product)
     sizes = [(20, 20, 15), (28, 28, 25), (40, 40, 25), (64, 64, 24)]
     if not choice.quick:
         sizes += [(158, 158, 40), (250, 250, 48)]
-    builders = ("gmsh", "lattice")
-    rows = [(n, "Q1", maker, *size) for size in sizes for n in (1, 2) for maker in builders]
+    rows: list[tuple[object, ...]] = [(n, "Q1", *size) for size in sizes for n in (1, 2)]
     show("hexahedra", rows, product=False)
-    rows = [(n, "P1", maker, 30, 30, 20) for n in (1, 2) for maker in builders]
+    rows = [(n, "P1", 30, 30, 20) for n in (1, 2)]
     show("tetrahedra", rows, product=False)
-    rows = [(n, "Q1", maker, 40, 40, 25) for n in (1, 2, 4, 8) for maker in builders]
+    rows = [(n, "Q1", 40, 40, 25) for n in (1, 2, 4, 8)]
     show("what a product of the stiffness costs", rows, product=True)
     return None
 

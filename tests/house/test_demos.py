@@ -9,7 +9,17 @@ import pytest
 DEMOS = sorted((Path(__file__).parents[2] / "demos").glob("*.py"))
 
 
-@pytest.mark.parametrize("demo", DEMOS, ids=lambda path: path.stem)
+QUICK = {"four_models", "kappa", "paper_block", "paper_figures", "tilt"}
+"""Demos that take seconds; the others are among the long tests."""
+
+
+@pytest.mark.parametrize(
+    "demo",
+    [
+        pytest.param(demo, marks=[] if demo.stem in QUICK else pytest.mark.long, id=demo.stem)
+        for demo in DEMOS
+    ],
+)
 def test_demo_runs(demo, tmp_path):
     done = subprocess.run(
         [sys.executable, demo, "--quick", "--out", tmp_path],

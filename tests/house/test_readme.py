@@ -15,16 +15,33 @@ DEMOS = ROOT / "demos"
 PAGES = sorted(DEMOS.rglob("*.md"))
 
 
-def test_example_runs():
-    (example,) = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
+EXAMPLES = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
+
+
+def shown_by(example):
+    """Return the lines that an example prints."""
     assert len(example.splitlines()) <= 25
     shown = subprocess.run(
         [sys.executable, "-c", example], cwd=ROOT, capture_output=True, text=True, check=False
     )
     assert shown.returncode == 0, shown.stderr
-    lines = shown.stdout.splitlines()
+    return shown.stdout.splitlines()
+
+
+def test_example_of_a_run():
+    lines = shown_by(EXAMPLES[0])
     assert [line.split()[0] for line in lines[:4]] == ["2", "4", "6", "8"]
     assert lines[4].startswith("largest patch pressure")
+
+
+def test_example_of_a_part():
+    (line,) = shown_by(EXAMPLES[1])
+    force, area = map(float, re.findall(r"\d+\.\d+", line))
+    assert 0.1 < force < 10.0 and 0.0 < area < 0.1  # a few per cent of 1 mm² touch
+
+
+def test_readme_is_short():
+    assert len(TEXT.splitlines()) <= 200
 
 
 def test_ci_runs_the_test_command():
@@ -60,20 +77,27 @@ def test_every_demo_page_and_picture_is_shown():
     assert {*PAGES, *DEMOS.glob("pictures/*")} <= linked
 
 
-def test_every_name_in_the_floor_plan_is_a_module():
+def test_every_name_in_the_floor_plan_is_a_folder_or_a_module():
     block = TEXT[TEXT.index("\nmultiscale/ ") :].partition("```")[0]
-    lines = [
-        re.match(r"(\w+/)? {2,}(?:(\w+)/ +)?(.*)", line) for line in block.strip().splitlines()
-    ]
     package, packages = "", []
-    for line in lines:
-        assert line is not None
-        if line[1]:
-            package = line[1]
+    for line in block.strip().splitlines():
+        named = re.match(r"(\w+/)? {2,}(.*)", line)
+        assert named is not None
+        if named[1]:
+            package = named[1]
             packages.append(package)
-        for name in line[3].split(" · "):
-            assert (ROOT / package / (line[2] or "") / f"{name.strip()}.py").is_file(), name
+        for name in named[2].split(" · "):
+            place = ROOT / package / name.strip()
+            assert place.is_dir() or place.with_suffix(".py").is_file(), name
     assert packages == ["multiscale/", "micro/", "macro/", "geometry/"]
+
+
+def test_every_folder_is_in_the_floor_plan():
+    block = TEXT[TEXT.index("\nmultiscale/ ") :].partition("```")[0]
+    for package in ("multiscale", "micro", "macro"):
+        for path in (ROOT / package).glob("*/__init__.py"):
+            if path.parent.name not in ("storage", "machine", "pairs", "complementarity"):
+                assert re.search(rf"\b{path.parent.name}\b", block), path.parent
 
 
 def test_packages_are_found():

@@ -2,7 +2,6 @@
 
 import json
 import sys
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +11,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "verification"))
 
 from block_cases import PowerLaw, block_of, interface_of, uneven_laws
 
-import geometry.meshes.block
 from geometry.errors import InputError, NotConverged
-from geometry.meshes.block import BlockShape
+from geometry.meshes.refined_block import RefinedShape
 from geometry.rigid_plane import Control
 from macro import LawContactProblem, block_mesh
 
@@ -59,16 +57,19 @@ def run(case, mode):
     }
 
 
+class Unmeshable(RefinedShape):
+    """A block that gmsh gives up on."""
+
+    def meshed(self):
+        """Raise instead of meshing."""
+        raise InputError("gmsh gave up", value=3, allowed="better luck")
+
+
 def fail_in_gmsh():
     """Return the error that every rank meets when meshing fails on rank 0."""
-
-    @contextmanager
-    def broken(_shape):
-        raise InputError("gmsh gave up", value=3, allowed="better luck")
-        yield
-
-    geometry.meshes.block.flat_block = broken
-    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(2, 2, 2))
+    shape = Unmeshable(
+        interface=(1.0, 1.0), height=1.0, places=np.array([[0.5, 0.5]]), fine=0.5, coarse=0.5
+    )
     return error_of(lambda: block_mesh(shape, COMM))
 
 

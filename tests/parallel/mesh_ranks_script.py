@@ -1,4 +1,4 @@
-"""Make blocks with both builders on all ranks and print facts as JSON; for test_mesh_ranks.py."""
+"""Make blocks on all ranks and print facts as JSON; for test_mesh_ranks.py."""
 
 import hashlib
 import json
@@ -29,9 +29,9 @@ SHAPES = {
 }
 
 
-def facts(shape, builder):
-    """Return what must not depend on builder and ranks, and how the cells are spread."""
-    block = block_mesh(BlockShape(interface=(1.0, 2.0), height=0.7, **shape), COMM, builder)
+def facts(shape):
+    """Return what must not depend on the ranks, and how the cells are spread."""
+    block = block_mesh(BlockShape(interface=(1.0, 2.0), height=0.7, **shape), COMM)
     exact = [cells_of(block), *(faces_of(block, marker) for marker in (BOTTOM, TOP, SIDES))]
     cells = block.mesh.topology.index_map(3)
     return {
@@ -54,7 +54,7 @@ def dealt(order):
 
     compat.mesh_from_cells = deal
     shape = BlockShape(interface=(1.0, 2.0), height=0.7, **SHAPES["box"])
-    block = block_mesh(shape, COMM, "lattice")
+    block = block_mesh(shape, COMM)
     compat.mesh_from_cells = made
     return measures_of(block)
 
@@ -62,7 +62,7 @@ def dealt(order):
 def regions(patterns):
     """Return in how many regions nodes of a top are in contact, for patterns (9, 8) of contact."""
     shape = BlockShape(interface=(8.0, 7.0), height=1.0, cells=(8, 7, 1))
-    mesh = block_mesh(shape, COMM, "lattice")
+    mesh = block_mesh(shape, COMM)
     block = Block(mesh, Material(young_modulus=1.0, poisson_ratio=0.3))
     top = TopNodes(block, PatchGrid(grid=(1, 1), lengths=(8.0, 7.0)))
     at = np.rint(top.x).astype(int), np.rint(top.y).astype(int)
@@ -70,10 +70,7 @@ def regions(patterns):
 
 
 if __name__ == "__main__":
-    result = {
-        name: {builder: facts(shape, builder) for builder in ("gmsh", "lattice")}
-        for name, shape in SHAPES.items()
-    }
+    result = {name: facts(shape) for name, shape in SHAPES.items()}
     orders = np.random.default_rng(2).permuted(np.tile(np.arange(6), (10, 1)), axis=1)
     result["dealt"] = [dealt(order) for order in orders]
     # sparse to dense, from single nodes to one region that winds through all ranks

@@ -6,8 +6,7 @@ from pathlib import Path
 SCRIPT = Path(__file__).with_name("body_ranks_script.py")
 
 
-def test_compliance_in_modes_is_the_same_on_any_ranks(mpirun, monkeypatch, tmp_path, root):
-    monkeypatch.setenv("PYTHONPATH", str(root))
+def test_compliance_in_modes_is_the_same_on_any_ranks(mpirun, monkeypatch, tmp_path):
     results = {}
     for ranks in (1, 2, 3):
         monkeypatch.setenv("PATCHLAW_CACHE", str(tmp_path / str(ranks)))

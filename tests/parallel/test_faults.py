@@ -22,13 +22,13 @@ WORDS = (
 @pytest.mark.parametrize(
     ("rank", "place"),
     [
-        (1, "surface"),
-        (1, "plan"),
+        pytest.param(1, "surface", marks=pytest.mark.long),
+        pytest.param(1, "plan", marks=pytest.mark.long),
         (1, "laws"),
-        (1, "block"),
+        pytest.param(1, "block", marks=pytest.mark.long),
         (1, "load step"),
-        (1, "checkpoint"),
-        (1, "output"),
+        pytest.param(1, "checkpoint", marks=pytest.mark.long),
+        pytest.param(1, "output", marks=pytest.mark.long),
         (0, "writing on rank 0"),
     ],
 )

@@ -1,10 +1,12 @@
 """Every coupling gives the same on one rank and on four, some of which own nothing."""
 
 import numpy as np
+import pytest
 
 SCRIPT = "tests/parallel/four_ranks_script.py"
 
 
+@pytest.mark.long
 def test_four_ranks_give_what_one_gives(mpirun, tmp_path):
     found = {}
     for ranks in (1, 4):

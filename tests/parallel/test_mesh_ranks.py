@@ -1,13 +1,10 @@
-"""gmsh's flat blocks and those that all ranks make are the same meshes on any number of ranks."""
-
-import json
-from pathlib import Path
+"""Flat blocks are the same meshes on any number of ranks."""
 
 import numpy as np
 import pytest
+from on_ranks import OnRanks
 from scipy import ndimage
 
-SCRIPT = Path(__file__).with_name("mesh_ranks_script.py")
 CASES = {  # volume, bottom, sides; areas of the top and the patches follow
     "wide hexahedra": (0.7 * 1.8 * 2.8, 1.8 * 2.8, 0.7 * 2.0 * (1.8 + 2.8)),
     "quadratic hexahedra": (1.4, 2.0, 4.2),
@@ -16,25 +13,19 @@ CASES = {  # volume, bottom, sides; areas of the top and the patches follow
     "rod": (1.4, 2.0, 4.2),
     "box": (1.4, 2.0, 4.2),
 }
-RANKS = (1, 2, 3, 4)
+MORE = [2, *(pytest.param(ranks, marks=pytest.mark.long) for ranks in (3, 4))]
 
 
 @pytest.fixture(scope="module")
-def found(mpirun, root):
+def found(mpirun):
     """Return what was found on every number of ranks."""
-    results = {}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PYTHONPATH", str(root))
-        for ranks in RANKS:
-            done = mpirun(ranks, SCRIPT)
-            assert done.returncode == 0, done.stdout + done.stderr
-            results[ranks] = json.loads(done.stdout.splitlines()[-1])
-    return results
+    return OnRanks(mpirun, "mesh_ranks_script.py")
 
 
+@pytest.mark.parametrize("ranks", MORE)
 @pytest.mark.parametrize("case", CASES)
-def test_meshes_are_the_same(found, case):
-    meshes = [found[ranks][case][builder] for ranks in RANKS for builder in ("gmsh", "lattice")]
+def test_meshes_are_the_same(found, case, ranks):
+    meshes = [found[n][case] for n in (1, ranks)]
     assert all(mesh["exact"] == meshes[0]["exact"] for mesh in meshes)
     volume, bottom, sides = CASES[case]
     for mesh in meshes:
@@ -46,41 +37,42 @@ def test_meshes_are_the_same(found, case):
         assert measures["unknowns"] == meshes[0]["measures"]["unknowns"]
 
 
+@pytest.mark.parametrize("ranks", MORE)
 @pytest.mark.parametrize("case", CASES)
-def test_solutions_are_the_same(found, case):
-    work = [
-        found[ranks][case][builder]["measures"]["work"]
-        for ranks in RANKS
-        for builder in ("gmsh", "lattice")
-    ]
+def test_solutions_are_the_same(found, case, ranks):
+    work = [found[n][case]["measures"]["work"] for n in (1, ranks)]
     # the same matrix but for the order of sums; the solver leaves 1e-10, the work its square
     np.testing.assert_allclose(work, work[0], rtol=1e-12)
     assert work[0] > 0.0
 
 
-def test_supports_hold_nodes_on_every_rank(found):
+@pytest.mark.parametrize("ranks", MORE)
+def test_supports_hold_nodes_on_every_rank(found, ranks):
     # dealt out, a rank can meet a support in a node alone, whose facets all belong to others
-    whole = found[1]["box"]["gmsh"]["measures"]
-    for ranks in RANKS:
-        for measures in found[ranks]["dealt"]:
-            assert measures["unknowns"] == whole["unknowns"]
-            assert measures["work"] == pytest.approx(whole["work"], rel=1e-12)  # as above
+    whole = found[1]["box"]["measures"]
+    for measures in found[ranks]["dealt"]:
+        assert measures["unknowns"] == whole["unknowns"]
+        assert measures["work"] == pytest.approx(whole["work"], rel=1e-12)  # as above
 
 
-def test_cells_are_spread_without_ghosts(found):
-    for ranks in RANKS:
-        for case in CASES:
-            lattice = found[ranks][case]["lattice"]
-            assert lattice["ghosts"] == 0 and len(lattice["cells_of_ranks"]) == ranks
-    assert found[2]["quadratic hexahedra"]["lattice"]["cells_of_ranks"] == [8, 4]
-    assert sorted(found[4]["rod"]["lattice"]["cells_of_ranks"]) == [0, 0, 1, 1]
-    assert sorted(found[4]["box"]["lattice"]["cells_of_ranks"]) == [0, 0, 0, 6]
+@pytest.mark.parametrize("ranks", MORE)
+@pytest.mark.parametrize("case", CASES)
+def test_cells_are_spread_without_ghosts(found, case, ranks):
+    lattice = found[ranks][case]
+    assert lattice["ghosts"] == 0 and len(lattice["cells_of_ranks"]) == ranks
 
 
-def test_regions_of_contact_go_on_across_ranks(found):
-    for ranks in RANKS:
-        result = found[ranks]["regions"]
-        # facets connect all of their four nodes: each node to the eight around it
-        expected = [ndimage.label(pattern, np.ones((3, 3)))[1] for pattern in result["patterns"]]
-        assert result["found"] == expected
-        assert max(expected) > 5 and min(expected) == 1
+@pytest.mark.long
+def test_cells_are_spread_in_boxes(found):
+    assert found[2]["quadratic hexahedra"]["cells_of_ranks"] == [8, 4]
+    assert sorted(found[4]["rod"]["cells_of_ranks"]) == [0, 0, 1, 1]
+    assert sorted(found[4]["box"]["cells_of_ranks"]) == [0, 0, 0, 6]
+
+
+@pytest.mark.parametrize("ranks", [1, *MORE])
+def test_regions_of_contact_go_on_across_ranks(found, ranks):
+    result = found[ranks]["regions"]
+    # facets connect all of their four nodes: each node to the eight around it
+    expected = [ndimage.label(pattern, np.ones((3, 3)))[1] for pattern in result["patterns"]]
+    assert result["found"] == expected
+    assert max(expected) > 5 and min(expected) == 1

@@ -1,24 +1,13 @@
 """The solvers of blocks are the same methods on 1, 2 and 3 ranks."""
 
-import json
-from pathlib import Path
-
 import pytest
-
-SCRIPT = Path(__file__).with_name("multigrid_ranks_script.py")
+from on_ranks import RANKS, OnRanks
 
 
 @pytest.fixture(scope="module")
-def found(mpirun, root):
+def found(mpirun):
     """Return what was found on every number of ranks."""
-    results = {}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PYTHONPATH", str(root))
-        for ranks in (1, 2, 3):
-            done = mpirun(ranks, SCRIPT)
-            assert done.returncode == 0, done.stdout + done.stderr
-            results[ranks] = json.loads(done.stdout.splitlines()[-1])
-    return results
+    return OnRanks(mpirun, "multigrid_ranks_script.py")
 
 
 KINDS = {
@@ -28,7 +17,7 @@ KINDS = {
 }
 
 
-@pytest.mark.parametrize("ranks", [2, 3])
+@pytest.mark.parametrize("ranks", RANKS)
 @pytest.mark.parametrize("case", KINDS)
 def test_solves_do_not_depend_on_the_ranks(found, case, ranks):
     serial, parallel = (found[n][case] for n in (1, ranks))
@@ -39,7 +28,7 @@ def test_solves_do_not_depend_on_the_ranks(found, case, ranks):
     assert abs(parallel["iterations"] - serial["iterations"]) <= (4 if "refined" in case else 2)
 
 
-@pytest.mark.parametrize("ranks", [1, 2, 3])
+@pytest.mark.parametrize("ranks", [1, *RANKS])
 @pytest.mark.parametrize("case", [case for case in KINDS if "refined" not in case])
 def test_coarser_matrices_are_galerkin_products(found, case, ranks):
     assert found[ranks][case]["missed"] < 1e-13  # rounding of a few hundred terms

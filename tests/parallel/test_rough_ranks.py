@@ -1,28 +1,17 @@
 """The meshed rough block gives the same contact, and the same errors, on 1, 2 and 3 ranks."""
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
-
-SCRIPT = Path(__file__).with_name("rough_ranks_script.py")
+from on_ranks import RANKS, OnRanks
 
 
 @pytest.fixture(scope="module")
-def found(mpirun, root):
+def found(mpirun):
     """Return what was found on every number of ranks."""
-    results = {}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PYTHONPATH", str(root))
-        for ranks in (1, 2, 3):
-            done = mpirun(ranks, SCRIPT)
-            assert done.returncode == 0, done.stdout + done.stderr
-            results[ranks] = json.loads(done.stdout.splitlines()[-1])
-    return results
+    return OnRanks(mpirun, "rough_ranks_script.py")
 
 
-@pytest.mark.parametrize("ranks", [2, 3])
+@pytest.mark.parametrize("ranks", RANKS)
 @pytest.mark.parametrize(
     "case", ["hexahedra", "one facet", "linear", "quadratic", "free plane", "points"]
 )
@@ -39,7 +28,7 @@ def test_contact_does_not_depend_on_the_ranks(found, case, ranks):
     assert parallel["reaction"] == pytest.approx(parallel["numbers"]["force"], rel=1e-9)
 
 
-@pytest.mark.parametrize("ranks", [2, 3])
+@pytest.mark.parametrize("ranks", RANKS)
 def test_iterations_hardly_depend_on_the_ranks(found, ranks):
     cases = found[1].keys() - {"too steep"}
     ratios = {
@@ -49,12 +38,13 @@ def test_iterations_hardly_depend_on_the_ranks(found, ranks):
     assert max(ratios.values()) <= 2.5, ratios
 
 
+@pytest.mark.long
 def test_the_cases_are_what_they_claim(found):
     assert sorted(found[3]["one facet"]["top_nodes_of_ranks"]) == [0, 0, 4]
     assert min(found[3]["linear"]["top_nodes_of_ranks"]) > 0
 
 
-@pytest.mark.parametrize("ranks", [2, 3])
+@pytest.mark.parametrize("ranks", RANKS)
 def test_refusal_reaches_every_rank(found, ranks):
     texts = found[ranks]["too steep"]
     assert texts == found[1]["too steep"] * ranks

@@ -1,9 +1,13 @@
 """The whole chain on 1, 2 and 3 ranks: same numbers, same refusals, no hang."""
 
 import csv
+from functools import cache
 
 import numpy as np
 import pytest
+from on_ranks import RANKS
+
+from multiscale.cli import main
 
 PAPER = "demos/scenes/paper.toml"
 SMALL = ["surface.grid=[64, 64]", "load.steps=3", "output.figures=false", "output.report=false"]
@@ -70,24 +74,38 @@ def table(path, names):
         return np.array([[float(row[name] or 0.0) for name in names] for row in rows])
 
 
-@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
-def test_same_numbers_on_any_number_of_ranks(mpirun, tmp_path, scene):
-    results = {}
-    for ranks in (1, 2, 3):
-        out = tmp_path / str(ranks)
-        words = ("-m", "multiscale", "run", PAPER, "--out", out, "--set", *SMALL, *scene)
-        done = mpirun(ranks, *words)
-        assert done.returncode == 0, done.stderr
-        results[ranks] = (
-            table(out / "history.csv", NUMBERS),
-            table(out / "patches.csv", ("closure_mm", "pressure_MPa", "contact_area_fraction")),
-        )
-    for ranks in (2, 3):
-        for one, more in zip(results[1], results[ranks], strict=True):
-            # residuals are driven to 1e-9 of the load; closures and pressures follow linearly
-            assert np.all(np.abs(more - one) <= 1e-8 * np.abs(one).max(axis=0))
+def numbers(out):
+    """Return the columns of a run's tables that are compared."""
+    patches = ("closure_mm", "pressure_MPa", "contact_area_fraction")
+    return table(out / "history.csv", NUMBERS), table(out / "patches.csv", patches)
 
 
+@pytest.fixture(scope="module")
+def alone(root, tmp_path_factory):
+    """Return a function that runs a scene in this process, once, and returns its numbers."""
+
+    @cache
+    def found(name):
+        out = tmp_path_factory.mktemp("alone")
+        words = ["run", str(root / PAPER), "--out", str(out), "--set", *SMALL, *SCENES[name]]
+        assert main(words) == 0
+        return numbers(out)
+
+    return found
+
+
+@pytest.mark.parametrize("ranks", RANKS)
+@pytest.mark.parametrize("scene", SCENES)
+def test_same_numbers_on_any_number_of_ranks(mpirun, alone, tmp_path, scene, ranks):
+    words = ("-m", "multiscale", "run", PAPER, "--out", tmp_path, "--set", *SMALL, *SCENES[scene])
+    done = mpirun(ranks, *words)
+    assert done.returncode == 0, done.stderr
+    for one, more in zip(alone(scene), numbers(tmp_path), strict=True):
+        # residuals are driven to 1e-9 of the load; closures and pressures follow linearly
+        assert np.all(np.abs(more - one) <= 1e-8 * np.abs(one).max(axis=0))
+
+
+@pytest.mark.long
 def test_ranks_draw_the_figures_of_one(mpirun, tmp_path):
     drawn = []
     for ranks in (1, 3):
@@ -102,6 +120,7 @@ def test_ranks_draw_the_figures_of_one(mpirun, tmp_path):
     assert drawn[0] == drawn[1]
 
 
+@pytest.mark.long
 def test_a_rank_may_own_nothing_of_the_interface(mpirun):
     """The premise of the wide block above: see that it holds."""
     code = (

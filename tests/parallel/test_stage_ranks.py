@@ -6,8 +6,7 @@ from pathlib import Path
 SCRIPT = Path(__file__).with_name("stage_ranks_script.py")
 
 
-def test_every_rank_gets_the_stage_of_one(mpirun, monkeypatch, root):
-    monkeypatch.setenv("PYTHONPATH", str(root))
+def test_every_rank_gets_the_stage_of_one(mpirun):
     shown = [mpirun(ranks, SCRIPT) for ranks in (1, 3)]
     assert all(done.returncode == 0 for done in shown), shown[-1].stderr
     alone, many = (done.stdout.splitlines() for done in shown)

@@ -23,7 +23,7 @@ from multiscale.results.extrapolation import extrapolated
 
 SQUARE = (1.0, 1.0)
 SIDES = FreeSides(lengths=SQUARE, poisson_ratio=MATERIAL.poisson_ratio, reach=0.25)
-HALF_SPACE = HalfSpace(MATERIAL.young_modulus, MATERIAL.poisson_ratio)
+HALF_SPACE = HalfSpace(young_modulus=MATERIAL.young_modulus, poisson_ratio=MATERIAL.poisson_ratio)
 APPROACH, FLAT = 3e-3, 0.01
 
 

@@ -22,7 +22,7 @@ def slopes(evaluate):
 
 @pytest.mark.parametrize("nu", [0.0, 0.15, 0.45])
 def test_stresses_follow_from_displacements_by_hooke(nu):
-    field = HalfSpace(3.0, nu)
+    field = HalfSpace(young_modulus=3.0, poisson_ratio=nu)
     gradient = slopes(field.displacements)
     strain = 0.5 * (gradient + np.swapaxes(gradient, 0, 1))
     lame = 3.0 * nu / ((1 + nu) * (1 - 2 * nu))
@@ -34,7 +34,7 @@ def test_stresses_follow_from_displacements_by_hooke(nu):
 
 
 def test_stresses_are_in_equilibrium():
-    slope = slopes(HalfSpace(3.0, 0.3).stresses)
+    slope = slopes(HalfSpace(young_modulus=3.0, poisson_ratio=0.3).stresses)
     for row in ((0, 5, 4), (5, 1, 3), (4, 3, 2)):
         # the terms are up to 10 / mm; differences as above
         total = sum(slope[axis, part] for axis, part in enumerate(row))
@@ -42,7 +42,7 @@ def test_stresses_are_in_equilibrium():
 
 
 def test_surface_sinks_by_love_and_carries_the_pressure_alone():
-    field, x, y = HalfSpace(3.0, 0.3), *POINTS[:2]
+    field, x, y = HalfSpace(young_modulus=3.0, poisson_ratio=0.3), *POINTS[:2]
     down = field.displacements(x, y, 0.0 * x, LOADS)[2]
     away = np.stack([x, y])[:, :, None] - LOADS.centres.T[:, None]
     love = love_integral(*away, *LOADS.half_sizes) / (np.pi * 3.0 / (1 - 0.3**2))
@@ -55,7 +55,7 @@ def test_surface_sinks_by_love_and_carries_the_pressure_alone():
 
 
 def test_far_away_it_is_boussinesqs_point_force():
-    nu, field = 0.3, HalfSpace(3.0, 0.3)
+    nu, field = 0.3, HalfSpace(young_modulus=3.0, poisson_ratio=0.3)
     load = PatchGrid(grid=(1, 1), lengths=(0.02, 0.02), origin=(-0.01, -0.01))
     x, y, z = 10.0 * POINTS
     r = np.sqrt(x**2 + y**2 + z**2)
@@ -72,4 +72,4 @@ def test_far_away_it_is_boussinesqs_point_force():
 
 def test_points_above_the_surface_are_refused():
     with pytest.raises(InputError, match="depths are not negative"):
-        HalfSpace(1.0, 0.3).stresses([0.0], [0.0], [-0.1], LOADS)
+        HalfSpace(young_modulus=1.0, poisson_ratio=0.3).stresses([0.0], [0.0], [-0.1], LOADS)

@@ -92,6 +92,7 @@ def test_patches_with_nothing_in_them(tmp_path):
     assert laws.force_N[-1] == pytest.approx(forces[0], rel=1e-3)
 
 
+@pytest.mark.long
 def test_four_thousand_patches():
     # hard: 4096² matrices; only loaded patches enter them
     coarse = {"surface__grid": [128, 128], "micro__finite_slopes": False}

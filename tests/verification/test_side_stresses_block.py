@@ -86,7 +86,7 @@ def test_stresses_beside_a_side_are_those_of_a_meshed_block(nu):
     centres, areas, meshed = meshed_stresses(nu)
     spacing = (1.0 / CELLS,) * 2
     pressure = np.exp(hill(TICKS[:, None], TICKS)[0])
-    half_space = love_stresses(HalfSpace(1.0, nu), pressure, spacing)
+    half_space = love_stresses(HalfSpace(young_modulus=1.0, poisson_ratio=nu), pressure, spacing)
     sides = FreeSides(lengths=(1.0, 1.0), poisson_ratio=nu, reach=0.25)
     both = half_space + SideStresses(sides, spacing).stresses(pressure)
     places = np.clip(centres, TICKS[0], TICKS[-1]).T

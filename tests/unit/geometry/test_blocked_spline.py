@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import RectBivariateSpline
 
-from geometry import Surface
-from geometry.blocked_spline import MOST_KNOTS, BlockedSpline
+from geometry.interpolant import MOST_KNOTS, BlockedSpline
 
 
 @pytest.fixture(scope="module", params=[(5, 3000), (3000, 6), (2100, 2100)])
@@ -32,19 +31,13 @@ def test_values_are_those_of_the_whole(whole, order):
     np.testing.assert_array_equal(again(px[0], 0.7, grid=False), spline(px[0], 0.7, grid=False))
 
 
-def test_points_are_looked_for_among_few_knots(monkeypatch):
+def test_points_are_looked_for_among_few_knots():
     """A long flat surface took minutes: each of its points was looked for from the first knot."""
-    longest = []
-    local = BlockedSpline._local
-
-    def counted(self, i, j):
-        longest.append(max(map(len, local(self, i, j).get_knots())))
-        return local(self, i, j)
-
-    monkeypatch.setattr(BlockedSpline, "_local", counted)
-    surface = Surface(heights=np.zeros((4, 5 * MOST_KNOTS)), lengths=(1.0, 1.0))
-    assert surface.highest == 0.0
-    assert longest and max(longest) < MOST_KNOTS / 3
+    spline = RectBivariateSpline(np.arange(4), np.arange(5 * MOST_KNOTS), np.zeros((4, 10_000)))
+    blocked = BlockedSpline(spline)
+    assert not blocked(1.0, np.linspace(0.0, 5 * MOST_KNOTS - 1.0, 50), grid=False).any()
+    longest = [max(map(len, block.get_knots())) for block in blocked.blocks.values()]
+    assert len(longest) == 20 and max(longest) < MOST_KNOTS / 3
 
 
 def test_no_points_at_all(whole):

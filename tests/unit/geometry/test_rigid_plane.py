@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geometry import Control, InputError, Surface
+from geometry import Control, InputError, PatchGrid, Surface
 from geometry.rigid_plane import PlaneLevers, RigidPlane
 
 SQUARE = Surface(heights=np.zeros((4, 4)), lengths=(1.0, 1.0))
@@ -46,6 +46,8 @@ def test_tilt_turns_about_the_centre():
     assert PlaneLevers.at(x, y, SQUARE.lengths).matrix @ plane.motion == pytest.approx(
         plane.at(x, y)
     )
+    patches = PatchGrid(grid=(2, 1), lengths=SQUARE.lengths)
+    assert plane.means(patches) == pytest.approx([1e-3 - 2.5e-3, 1e-3 + 2.5e-3])
     assert RigidPlane.moved(SQUARE, plane.motion) == plane
 
 

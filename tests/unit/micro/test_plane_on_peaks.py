@@ -140,5 +140,5 @@ def test_force_that_nothing_bears_is_refused():
 
 
 def test_plane_on_one_spring_beside_the_middle_is_refused():
-    with pytest.raises(NotConverged, match="NO_BALANCE"):
+    with pytest.raises(NotConverged, match="NO_EQUILIBRIUM"):
         Springs(X[:1], Y[:1], TOUCH[:1]).balance(Control(force=1.0, tilt=None))

@@ -1,24 +1,100 @@
-import ctypes
-import subprocess
-import sys
-import time
-from types import SimpleNamespace
+"""The closed division of a lattice's cells among ranks."""
 
-import gmsh
+import itertools
+
 import numpy as np
 import pytest
 
-from geometry import BlockShape, flat_block
-from geometry.meshes.lattice import Segment, gmsh_session, is_initialised
+from geometry.meshes.lattice import (
+    Segment,
+    cells_beyond,
+    lattice_cells,
+    lattice_part,
+    node_planes,
+    node_share,
+)
 
-SHAPE = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(2, 2, 2))
+LATTICES = [(7, 5, 3), (1, 1, 1), (1, 2, 9), (40, 3, 2)]
+CASES = list(itertools.product(LATTICES, (1, 2, 3, 4, 7, 12)))
 
 
-@pytest.fixture
-def session():
-    gmsh.initialize(["", "-v", "0"], readConfigFiles=False)
-    yield
-    gmsh.finalize()
+def owners_of(cells, ranks):
+    """Return who has every cell, filled in part by part; a cell twice is a cell too many."""
+    owners = np.full(cells, -1)
+    for rank in range(ranks):
+        box = np.ix_(*lattice_part(cells, ranks, rank))
+        assert (owners[box] == -1).all()
+        owners[box] = rank
+    return owners
+
+
+@pytest.mark.parametrize(("cells", "ranks"), CASES)
+def test_every_cell_belongs_to_one_rank(cells, ranks):
+    owners = owners_of(cells, ranks)
+    assert (owners >= 0).all()
+
+
+@pytest.mark.parametrize("ranks", [2, 3, 5, 8, 16, 37])
+def test_parts_are_even(ranks):
+    counts = np.bincount(owners_of((60, 60, 40), ranks).ravel())
+    # each of at most six halvings rounds to whole layers, the last of ten and more
+    assert counts.max() * ranks <= 1.1 * counts.sum()
+
+
+def test_few_faces_are_cut():
+    owners = owners_of((24, 24, 24), 8)
+    cut = sum((np.diff(owners, axis=axis) != 0).sum() for axis in range(3))
+    assert cut == 3 * 24**2  # of a cube in eight cubes
+    flat = owners_of((24, 24, 4), 4)
+    assert sum((np.diff(flat, axis=axis) != 0).sum() for axis in range(3)) == 2 * 24 * 4
+
+
+@pytest.mark.parametrize(("cells", "ranks"), CASES)
+def test_ranks_beyond_faces(cells, ranks):
+    owners = owners_of(cells, ranks)
+    for rank in range(ranks):
+        part = lattice_part(cells, ranks, rank)
+        expected = set()
+        for number, place in enumerate(itertools.product(*part)):
+            for axis, step in itertools.product(range(3), (-1, 1)):
+                beside = [at + step * (k == axis) for k, at in enumerate(place)]
+                if 0 <= beside[axis] < cells[axis] and owners[tuple(beside)] != rank:
+                    expected.add((number, owners[tuple(beside)]))
+        pairs = list(zip(*cells_beyond(cells, ranks, part), strict=True))
+        assert set(pairs) == expected and len(pairs) == len(expected)
+
+
+def test_hexahedra_have_the_vertices_of_their_box():
+    cells = (3, 4, 5)
+    part = lattice_part(cells, 3, 1)
+    corners = node_planes(cells, lattice_cells(cells, part, hexahedra=True).ravel())
+    corners = corners.reshape(-1, 8, 3)
+    np.testing.assert_array_equal(corners[:, 0], list(itertools.product(*part)))
+    # x runs first, then y, then z
+    steps = [(v % 2, v // 2 % 2, v // 4) for v in range(8)]
+    np.testing.assert_array_equal(corners - corners[:, :1], np.broadcast_to(steps, corners.shape))
+
+
+def test_tetrahedra_fill_their_boxes_and_meet_face_to_face():
+    cells = (2, 3, 2)
+    table = lattice_cells(cells, lattice_part(cells, 1, 0), hexahedra=False)
+    corners = node_planes(cells, table.ravel()).reshape(-1, 4, 3)
+    volumes = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6.0
+    np.testing.assert_allclose(volumes, 1.0 / 6.0, rtol=1e-12)  # round-off of a determinant
+    boxes = corners.min(axis=1)
+    assert (np.unique(boxes, axis=0, return_counts=True)[1] == 6).all()
+    faces = np.concatenate([np.delete(np.sort(table, axis=1), k, axis=1) for k in range(4)])
+    counts = np.unique(faces, axis=0, return_counts=True)[1]
+    outer = 2 * 2 * (2 * 3 + 3 * 2 + 2 * 2)
+    assert set(counts) == {1, 2} and (counts == 1).sum() == outer
+
+
+@pytest.mark.parametrize("ranks", [1, 3, 100])
+def test_shares_of_the_nodes_are_all_nodes_in_order(ranks):
+    ticks = np.array([0.0, 0.1, 0.7]), np.array([-1.0, 2.0]), np.array([-3.0, -1.0, 0.0])
+    shares = [node_share(ticks, ranks, rank) for rank in range(ranks)]
+    assert max(map(len, shares)) - min(map(len, shares)) <= 1
+    np.testing.assert_array_equal(np.concatenate(shares), list(itertools.product(*ticks)))
 
 
 @pytest.mark.parametrize("cells, growth", [(1, 5.0), (4, 1.0), (4, 8.0), (3, 0.1)])
@@ -29,136 +105,3 @@ def test_segments_grow_geometrically(cells, growth):
     assert sizes[-1] / sizes[0] == pytest.approx(growth if cells > 1 else 1.0, rel=1e-12)
     np.testing.assert_allclose(sizes[1:] / sizes[:-1], segment.ratio, rtol=1e-12)
     assert segment.narrowest == pytest.approx(sizes.min(), rel=1e-12)
-
-
-def test_own_session_ends_with_the_context():
-    assert not is_initialised(gmsh)
-    with flat_block(SHAPE) as model:
-        assert is_initialised(gmsh) and len(model.mesh.getNodes()[0]) == 27
-    assert not is_initialised(gmsh)
-
-
-def test_a_callers_session_is_seen(session):
-    assert is_initialised(gmsh) and gmsh.option.getNumber("Mesh.ElementOrder") == 1.0
-    gmsh.finalize()
-    assert not is_initialised(gmsh)
-    gmsh.initialize(["", "-v", "0"], readConfigFiles=False)
-    assert is_initialised(gmsh)
-
-
-RECYCLED = """
-import numpy as np
-from geometry import BlockShape, flat_block
-
-arrays = [np.full(n // 4, {}, dtype=np.int32) for n in range(64, 60_000, 16) for _ in range(3)]
-del arrays
-with flat_block(BlockShape(interface=(1.0, 1.0), height=1.0, cells=(1, 1, 1))) as model:
-    print(len(model.mesh.getNodes()[0]), "nodes")
-"""
-
-
-@pytest.mark.parametrize("value", [4, 1])
-def test_recycled_memory_does_not_end_the_process(root, value):
-    """gmsh 4.8, asked before its first session, ended silently where its memory had held a 4."""
-    done = subprocess.run(
-        [sys.executable, "-c", RECYCLED.format(value)],
-        cwd=root,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert (done.returncode, done.stdout) == (0, "8 nodes\n"), done.stderr
-
-
-class NeverAsked:
-    """A gmsh without ``isInitialized`` that must not be called before its first session."""
-
-    lib = ctypes.CDLL(None)  # has no context of gmsh
-
-    def __getattr__(self, name):
-        if name == "isInitialized":
-            raise AttributeError(name)
-        raise AssertionError(f"gmsh.{name} was asked for")
-
-
-def test_gmsh_is_not_called_before_its_first_session():
-    assert not is_initialised(NeverAsked())
-
-
-@pytest.mark.parametrize("open_", [0, 1])
-def test_newer_releases_are_asked(open_):
-    assert is_initialised(SimpleNamespace(isInitialized=lambda: open_)) == bool(open_)
-
-
-def test_errors_of_gmsh_are_exceptions_whatever_the_caller_chose(session):
-    gmsh.option.setNumber("General.AbortOnError", 4)
-    with flat_block(SHAPE), pytest.raises(Exception, match=r"\S"):
-        gmsh.option.getNumber("Mesh.NoSuchOption")
-    assert gmsh.option.getNumber("General.AbortOnError") == 4.0
-    gmsh.option.setNumber("General.AbortOnError", 2)
-
-
-def test_own_session_ends_after_an_error():
-    with pytest.raises(ZeroDivisionError), flat_block(SHAPE):
-        1 / 0  # noqa: B018
-    assert not is_initialised(gmsh)
-
-
-TAKEN = (
-    "import signal; seen = lambda number, frame: None; signal.signal(signal.SIGINT, seen);"
-    "from geometry import BlockShape, flat_block;"
-    "shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(1, 1, 1));"
-    "session = flat_block(shape); session.__enter__();"
-    "inside = signal.getsignal(signal.SIGINT); session.__exit__(None, None, None);"
-    "import macro; assert inside is signal.getsignal(signal.SIGINT) is seen"
-)
-
-
-def test_gmsh_leaves_sigint_to_who_has_it(root):
-    """Already its import takes it, so that this needs a process of its own."""
-    done = subprocess.run(
-        [sys.executable, "-c", TAKEN], cwd=root, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-
-
-def test_meshes_can_be_built_again_and_again():
-    for _ in range(3):
-        with flat_block(SHAPE) as model:
-            assert len(model.mesh.getNodes()[0]) == 27
-
-
-def test_a_callers_session_goes_on(session):
-    gmsh.model.add("mine")
-    gmsh.model.geo.addPoint(0.0, 0.0, 0.0)
-    gmsh.model.geo.synchronize()
-    gmsh.option.setNumber("Mesh.ElementOrder", 2)
-    gmsh.option.setNumber("Mesh.SubdivisionAlgorithm", 2)
-    models = gmsh.model.list()
-    with flat_block(SHAPE) as model:
-        types, cells, _ = model.mesh.getElements(3)
-        assert list(types) == [5] and len(cells[0]) == 8  # hexahedra of first order
-    assert gmsh.model.getCurrent() == "mine" and gmsh.model.list() == models
-    assert gmsh.model.getEntities() == [(0, 1)]
-    assert gmsh.option.getNumber("Mesh.ElementOrder") == 2.0
-
-
-def test_a_callers_session_survives_an_error(session):
-    gmsh.model.add("mine")
-    with pytest.raises(ZeroDivisionError), gmsh_session("other"):
-        1 / 0  # noqa: B018
-    assert gmsh.model.getCurrent() == "mine" and is_initialised(gmsh)
-
-
-def test_gmsh_stays_silent(capfd):
-    with flat_block(SHAPE):
-        pass
-    assert capfd.readouterr() == ("", "")
-
-
-def test_the_largest_usual_block_takes_about_a_second():
-    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(40, 40, 25), grading=4.0)
-    start = time.perf_counter()
-    with flat_block(shape) as model:
-        assert len(model.mesh.getElements(3)[1][0]) == 40_000
-    assert time.perf_counter() - start < 3.0  # 0.1 s measured; wide for a busy machine

@@ -1,42 +1,21 @@
 import numpy as np
 import pytest
 
-from geometry import BlockShape, InputError, PatchGrid, alignment, flat_block
+from geometry import BlockShape, InputError, PatchGrid, alignment
+from geometry.meshes.lattice import lattice_cells, lattice_part, node_share
 
 SHAPE = {"interface": (1.0, 2.0), "height": 1.5, "cells": (4, 6, 3)}
 MARGIN = {"margin": 0.7, "margin_cells": 2, "margin_grading": 3.0}
-NODES = {4: 4, 5: 8, 2: 3, 3: 4}  # gmsh's element types: tetrahedron, hexahedron, triangle, square
-
-
-class Mesh:
-    """The contents of a gmsh model as arrays with nodes counted from 0."""
-
-    def __init__(self, model):
-        tags, points, _ = model.mesh.getNodes()
-        assert sorted(tags) == list(range(1, len(tags) + 1))  # dolfinx relies on it
-        self.points = np.empty((len(tags), 3))
-        self.points[np.asarray(tags) - 1] = np.reshape(points, (-1, 3))
-        self.names = {
-            (dim, tag): model.getPhysicalName(dim, tag) for dim, tag in model.getPhysicalGroups()
-        }
-        self.groups, self.owners = {}, {}
-        for dim, tag in self.names:
-            entities = model.getEntitiesForPhysicalGroup(dim, tag)
-            kinds, parts, owners = set(), [], []
-            for entity in entities:
-                types, elements, nodes = model.mesh.getElements(dim, entity)
-                kinds.update(types)
-                parts += [np.reshape(n, (-1, NODES[t])) for t, n in zip(types, nodes, strict=True)]
-                owners += [number for numbers in elements for number in numbers]
-            assert len(kinds) == 1
-            self.groups[dim, tag] = np.concatenate(parts).astype(int) - 1
-            self.owners[dim, tag] = owners
 
 
 def mesh_of(**change):
+    """Return a shape, its nodes and its cells, in gmsh's order of vertices."""
     shape = BlockShape(**{**SHAPE, **change})
-    with flat_block(shape) as model:
-        return shape, Mesh(model)
+    counts = tuple(len(ticks) - 1 for ticks in shape.ticks)
+    cells = lattice_cells(counts, lattice_part(counts, 1, 0), hexahedra=shape.hexahedral)
+    if shape.hexahedral:
+        cells = cells[:, [0, 1, 3, 2, 4, 5, 7, 6]]
+    return shape, node_share(shape.ticks, 1, 0), cells
 
 
 def volumes(points, cells):
@@ -45,12 +24,6 @@ def volumes(points, cells):
     if cells.shape[1] == 4:
         return np.linalg.det(p[:, 1:] - p[:, :1]) / 6.0
     return np.linalg.det(p[:, [1, 3, 4]] - p[:, :1])
-
-
-def areas(points, faces):
-    p = points[faces]
-    area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
-    return area if faces.shape[1] == 4 else 0.5 * area
 
 
 CASES = [
@@ -66,50 +39,20 @@ CASES = [
 
 @pytest.mark.parametrize("change", CASES)
 def test_cells_fill_the_block_once(change):
-    shape, mesh = mesh_of(**change)
-    cells = mesh.groups[3, 1]
-    assert len(cells) == shape.cell_count
-    assert len(set(mesh.owners[3, 1])) == len(cells)  # each cell in the group once
-    assert cells.shape[1] == (8 if shape.hexahedral else 4)
-    assert len(mesh.points) == np.prod([len(ticks) for ticks in shape.ticks])
+    shape, points, cells = mesh_of(**change)
+    assert cells.shape == (shape.cell_count, 8 if shape.hexahedral else 4)
+    assert len(points) == np.prod([len(ticks) for ticks in shape.ticks])
     size = np.prod([ticks[-1] - ticks[0] for ticks in shape.ticks])
-    # gmsh places graded lines to 1e-8
-    assert volumes(mesh.points, cells).min() > 0.0
-    assert volumes(mesh.points, cells).sum() == pytest.approx(size, rel=1e-7)
-
-
-@pytest.mark.parametrize("change", CASES)
-def test_nodes_lie_on_the_grid_planes(change):
-    shape, mesh = mesh_of(**change)
-    for axis, ticks in enumerate(shape.ticks):
-        nearest = np.abs(mesh.points[:, axis, None] - ticks)
-        # gmsh integrates the grading numerically: 1e-8 of the block, exact enough for borders
-        assert nearest.min(axis=1).max() < 2e-8
-        assert nearest.min(axis=0).max() < 2e-8
-    flat = np.isclose(mesh.points[:, 2], 0.0, atol=1e-3)
-    assert np.all(mesh.points[flat, 2] == 0.0)
-
-
-@pytest.mark.parametrize("change", CASES)
-def test_named_faces_are_faces_of_cells(change):
-    shape, mesh = mesh_of(**change)
-    assert mesh.names == {(3, 1): "block", (2, 1): "bottom", (2, 2): "top", (2, 3): "sides"}
-    x, y, z = shape.ticks
-    wide, deep = x[-1] - x[0], y[-1] - y[0]
-    around = 2.0 * (wide + deep) * shape.height
-    expected = {1: wide * deep, 2: wide * deep, 3: around}
-    for tag, area in expected.items():
-        assert areas(mesh.points, mesh.groups[2, tag]).sum() == pytest.approx(area, rel=1e-7)
-    # outer planes are exact to the rounding of gmsh's transfinite interpolation, the top exact
-    np.testing.assert_allclose(mesh.points[mesh.groups[2, 1], 2], z[0], rtol=1e-14)
-    assert np.all(mesh.points[mesh.groups[2, 2], 2] == 0.0)
-    sides = mesh.points[mesh.groups[2, 3]]
-    planes = [(0, x[0]), (0, x[-1]), (1, y[0]), (1, y[-1])]
-    on_plane = [np.all(np.abs(sides[..., k] - at) < 1e-14, axis=1) for k, at in planes]
+    assert volumes(points, cells).min() > 0.0
+    assert volumes(points, cells).sum() == pytest.approx(size, rel=1e-13)
+    # the faces of one cell alone cover the outside and nothing else
+    outer = np.array(sorted(boundary(cells)))
+    on_plane = [
+        np.all(points[outer][..., axis] == end, axis=1)
+        for axis, ticks in enumerate(shape.ticks)
+        for end in (ticks[0], ticks[-1])
+    ]
     assert np.all(np.sum(on_plane, axis=0) == 1)
-    assert boundary(mesh.groups[3, 1]) == {
-        tuple(sorted(face)) for tag in expected for face in mesh.groups[2, tag].tolist()
-    }
 
 
 def boundary(cells):
@@ -137,14 +80,6 @@ def test_layers_are_graded_towards_the_interface():
     np.testing.assert_allclose(widths, widths[::-1], rtol=1e-12)  # alike on both sides
     np.testing.assert_allclose(x[2:7], np.linspace(0.0, 1.0, 5), atol=1e-15)
     assert y[-1] == pytest.approx(2.7, abs=1e-15)
-
-
-def test_interface_nodes_are_even_to_rounding():
-    _, mesh = mesh_of(cells=(40, 40, 2))
-    top = mesh.points[np.unique(mesh.groups[2, 2])]
-    even = np.round(top[:, :2] * (40, 20)) / (40, 20)
-    # gmsh's own accuracy on even lines; patch borders are compared with 1e-6 of a cell
-    assert np.abs(top[:, :2] - even).max() < 1e-11
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from geometry import InputError, Surface
+from geometry.meshes.families import depth_below_plane, places_in_reach
 from geometry.meshes.refined_block import RefinedShape
-from geometry.meshes.refinement import depth_below_plane, places_in_reach
 
 
 def shape(**changes):

@@ -11,17 +11,14 @@ from geometry.meshes.block import BlockShape
 from geometry.meshes.refined_block import RefinedShape
 from macro import BOTTOM, SIDES, TOP, Block, Material, block_mesh, compat
 
-BUILDERS = ["gmsh", "lattice"]
 
-
-@pytest.mark.parametrize("builder", BUILDERS)
 @pytest.mark.parametrize("element", ["Q1", "P2"])
-def test_faces_are_marked_and_complete(element, builder):
+def test_faces_are_marked_and_complete(element):
     shape = BlockShape(
         interface=(1.0, 2.0), height=0.5, cells=(2, 3, 2), element=element,
         margin=0.3, margin_cells=1,
     )  # fmt: skip
-    block = block_mesh(shape, MPI.COMM_SELF, builder)
+    block = block_mesh(shape, MPI.COMM_SELF)
     assert block.mesh.topology.index_map(3).size_global == shape.cell_count
     per_quad = 1 if element == "Q1" else 2
     counts = {BOTTOM: 4 * 5, TOP: 4 * 5, SIDES: 2 * 2 * (4 + 5)}
@@ -35,65 +32,41 @@ def test_faces_are_marked_and_complete(element, builder):
     np.testing.assert_allclose(across.max(axis=1), 0.0, atol=1e-14)  # round-off of midpoints
 
 
-def test_error_of_gmsh_is_passed_on(monkeypatch):
-    def broken(_shape):
+class Unmeshable(RefinedShape):
+    """A block that gmsh gives up on."""
+
+    def meshed(self):
         raise InputError("gmsh gave up")
 
-    monkeypatch.setattr("geometry.meshes.block.flat_block", broken)
-    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(1, 1, 1))
+
+def test_error_of_gmsh_is_passed_on():
+    shape = Unmeshable(
+        interface=(1.0, 1.0), height=1.0, places=np.array([[0.5, 0.5]]), fine=0.5, coarse=0.5
+    )
     with pytest.raises(InputError, match="gmsh gave up"):
         block_mesh(shape, MPI.COMM_SELF)
 
 
-@pytest.mark.parametrize("builder", BUILDERS)
 @pytest.mark.parametrize("element", ["Q1", "P1"])
-def test_planes_say_where_nodes_are(element, builder):
+def test_planes_say_where_nodes_are(element):
     shape = BlockShape(
         interface=(1.0, 2.0), height=0.5, cells=(3, 2, 4), element=element, grading=7.0,
         margin=0.3, margin_cells=2, margin_grading=3.0,
     )  # fmt: skip
-    block = block_mesh(shape, MPI.COMM_SELF, builder)
+    block = block_mesh(shape, MPI.COMM_SELF)
     places = [ticks[block.planes[:, k]] for k, ticks in enumerate(shape.ticks)]
     np.testing.assert_array_equal(block.mesh.geometry.x, np.stack(places, axis=1))
 
 
-@pytest.mark.parametrize("element", ["Q1", "P2"])
-def test_compiled_forms_serve_both_builders(element):
-    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(1, 1, 1), element=element)
-    gmsh, lattice = (
-        Block(
-            block_mesh(shape, MPI.COMM_SELF, builder),
-            Material(young_modulus=1.0, poisson_ratio=0.3),
-        )
-        for builder in BUILDERS
+def test_compiled_forms_serve_lattices_and_meshes_of_gmsh():
+    square = {"interface": (1.0, 1.0), "height": 1.0, "element": "P1"}
+    shapes = (
+        BlockShape(cells=(1, 1, 1), **square),
+        RefinedShape(places=np.zeros((1, 2)), fine=0.5, coarse=0.5, growth=1.0, **square),
     )
-    assert gmsh._form.signature() == lattice._form.signature()
-
-
-def test_large_flat_blocks_do_without_gmsh(monkeypatch):
-    def broken(_shape):
-        raise InputError("gmsh was asked")
-
-    monkeypatch.setattr("geometry.meshes.block.flat_block", broken)
-    monkeypatch.setattr("macro.mesh.block.GMSH_CELLS", 8)
-    cubes = {"interface": (1.0, 1.0), "height": 1.0}
-    large = BlockShape(cells=(3, 3, 1), **cubes)
-    assert block_mesh(large, MPI.COMM_SELF).mesh.topology.index_map(3).size_global == 9
-    for shape, builder in ((BlockShape(cells=(2, 2, 2), **cubes), "auto"), (large, "gmsh")):
-        with pytest.raises(InputError, match="gmsh was asked"):
-            block_mesh(shape, MPI.COMM_SELF, builder)
-
-
-def test_builders_that_do_not_fit_are_refused():
-    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(1, 1, 1))
-    with pytest.raises(InputError, match=r"this builder of meshes is unknown.*auto, gmsh, lattice"):
-        block_mesh(shape, MPI.COMM_SELF, "netgen")
-    refined = RefinedShape(
-        interface=(1.0, 1.0), height=1.0, element="P1", fine=0.5, coarse=0.5, growth=1.0,
-        places=np.zeros((1, 2)),
-    )  # fmt: skip
-    with pytest.raises(InputError, match="only flat blocks are lattices"):
-        block_mesh(refined, MPI.COMM_SELF, "lattice")
+    material = Material(young_modulus=1.0, poisson_ratio=0.3)
+    lattice, refined = (Block(block_mesh(shape, MPI.COMM_SELF), material) for shape in shapes)
+    assert lattice._form.signature() == refined._form.signature()
 
 
 @pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2"])

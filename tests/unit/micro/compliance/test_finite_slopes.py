@@ -12,7 +12,7 @@ from micro.compliance import finite_slopes
 from micro.compliance.finite_slopes import FiniteSlopes, coarse_grid
 from micro.compliance.side_stresses import SideStresses
 
-HALF_SPACE = HalfSpace(4000.0, 0.3)
+HALF_SPACE = HalfSpace(young_modulus=4000.0, poisson_ratio=0.3)
 DICE = np.random.default_rng(7)
 
 

@@ -50,7 +50,10 @@ def test_traction_on_the_side_is_that_of_the_half_space(nu):
     loads = UnevenPartition(ticks_x=(place - half, place + half), ticks_y=(-half, half))
     y, step = np.linspace(-200.0, 200.0, 80001, retstep=True)
     point = np.zeros_like(y), y, np.full_like(y, depth)
-    stress = -HalfSpace(1.0, nu).stresses(*point, loads)[0, :, 0] / (2.0 * half) ** 2
+    stress = (
+        -HalfSpace(young_modulus=1.0, poisson_ratio=nu).stresses(*point, loads)[0, :, 0]
+        / (2.0 * half) ** 2
+    )
     expected = 2.0 * step * float(stress @ np.cos(y))  # of both loads
     row, column = np.searchsorted(logs, np.log([depth, place]) - 1e-12)
     # 4e-4 at most, of the spline between 200 distances and the sum that ends at 200

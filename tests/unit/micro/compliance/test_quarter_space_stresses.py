@@ -55,7 +55,10 @@ def test_stresses_by_pressure_on_the_side_are_those_of_the_half_space(nu):
     y, step = np.linspace(-200.0, 200.0, 80001, retstep=True)
     points = np.zeros_like(y), y, np.full_like(y, depth)
     # xx, yy, zz, yz, zx, xy about the side's surface: its z is the top's x
-    stress = HalfSpace(1.0, nu).stresses(*points, loads)[:, :, 0] / (2.0 * half) ** 2
+    stress = (
+        HalfSpace(young_modulus=1.0, poisson_ratio=nu).stresses(*points, loads)[:, :, 0]
+        / (2.0 * half) ** 2
+    )
     cosine, sine = (2.0 * step * wave(y) for wave in (np.cos, np.sin))
     expected = stress[2] @ cosine, stress[1] @ cosine, stress[3] @ sine
     # 4e-4 at most, of the spline between 200 distances and the sum that ends at 200

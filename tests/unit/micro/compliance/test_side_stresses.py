@@ -68,7 +68,7 @@ def at_the_side(nu, n):
     spacing = 1.0 / n, 1.0 / n
     x = (np.arange(n) + 0.5) / n
     pressure = np.exp(-((x[:, None] - 0.05) ** 2 + (x - 0.5) ** 2) / 0.1**2)
-    alone = love_stresses(HalfSpace(1.0, nu), pressure, spacing)
+    alone = love_stresses(HalfSpace(young_modulus=1.0, poisson_ratio=nu), pressure, spacing)
     fields = alone, alone + SideStresses(sides, spacing).stresses(pressure)
     near = np.abs(x - 0.5) < 0.2
     return [

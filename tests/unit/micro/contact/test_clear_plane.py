@@ -31,14 +31,16 @@ def test_is_that_of_all_cells(seed, scale):
         np.linspace(-0.7, 0.7, grid[0]), np.linspace(-0.6, 0.6, grid[1]), None
     )
     found = clearance(required, motions)
-    levers = motions.among(np.arange(required.size))
+    levers = motions.levers_of(np.arange(required.size))
     best = scale * brute_force(required / scale, levers)
-    assert found.overlap == pytest.approx(best, abs=1e-9 * scale)  # HiGHS's tolerance is 1e-7
-    assert (required + motions.nearer(found.motion)).max() == pytest.approx(found.overlap)
+    assert found.interference == pytest.approx(best, abs=1e-9 * scale)  # HiGHS's tolerance is 1e-7
+    assert (required + motions.displacement(found.motion)).max() == pytest.approx(
+        found.interference
+    )
     # what holds the body is in balance and, by duality, proves that no motion is better
     assert found.support.min() >= 0.0 and found.support.sum() == pytest.approx(1.0)
     assert levers @ found.support.ravel() == pytest.approx([0.0, 0.0], abs=1e-9)
-    assert np.vdot(found.support, required) == pytest.approx(found.overlap, abs=1e-9 * scale)
+    assert np.vdot(found.support, required) == pytest.approx(found.interference, abs=1e-9 * scale)
 
 
 def test_turns_clear_of_a_corner():
@@ -47,7 +49,7 @@ def test_turns_clear_of_a_corner():
     required[0, 0] = 1e-2
     found = clearance(required, Motions.turning(x, x, None))
     # the corner opposite comes as much nearer: they meet halfway
-    assert found.overlap == pytest.approx(-5e-4, rel=1e-9)
+    assert found.interference == pytest.approx(-5e-4, rel=1e-9)
     assert found.motion.sum() == pytest.approx(1.05e-2 / 0.7, rel=1e-9)
 
 
@@ -55,4 +57,4 @@ def test_a_contact_in_the_middle_cannot_be_turned_away():
     x = np.linspace(-0.7, 0.7, 11)
     required = np.full((11, 11), -1.0)
     required[5, 5] = 3e-3
-    assert clearance(required, Motions.turning(x, x, None)).overlap == pytest.approx(3e-3)
+    assert clearance(required, Motions.turning(x, x, None)).interference == pytest.approx(3e-3)

@@ -41,7 +41,7 @@ def test_dense_programme_finds_the_same(name, given, bounded, seed):
     total = None if given == "approach" else dense_contact(matrix, below + approach).pressure.sum()
     motions = Motions.turning(x, y, total)
     required = below + approach if total is None else below
-    held = {"levers": motions.among(np.arange(below.size)), "loads": motions.loads}
+    held = {"levers": motions.levers_of(np.arange(below.size)), "loads": motions.loads}
     expected = dense_contact(matrix, required, **held)
     upper = np.inf
     if bounded:
@@ -67,7 +67,7 @@ def test_a_tie_at_the_bound_leaves_the_plane_between():
     motions = Motions.turning(x, y, None)
     found = pressing.by_turning(below + 0.8, motions, None)
     grid = ElasticGrid(HalfSpaceGrid(below.shape, (0.7, 0.2), periodic=False))
-    gap = grid.displacement(found.pressure) - below - 0.8 - motions.nearer(found.motion)
+    gap = grid.displacement(found.pressure) - below - 0.8 - motions.displacement(found.motion)
     assert gap[found.pressure < 0.267].min() > -1e-10
     assert gap[found.pressure > 0.0].max() < 1e-10
     assert found.pressure.max() == 0.267
@@ -79,7 +79,7 @@ def test_turns_clear_when_nothing_holds_it():
     motions = Motions.turning(x, y, None)
     found = pressing.by_turning(below + 0.8, motions, None)
     assert not found.pressure.any()
-    assert (below + 0.8 + motions.nearer(found.motion)).max() < 0.0 < (below + 0.8).max()
+    assert (below + 0.8 + motions.displacement(found.motion)).max() < 0.0 < (below + 0.8).max()
 
 
 def rough(seed=3, grid=(40, 32), lengths=(1.0, 0.8)):
@@ -180,7 +180,7 @@ def test_what_motions_take_up_leaves_no_gap():
     grid = ElasticGrid(HalfSpaceGrid((20, 20), (0.05, 0.05), periodic=False))
     flat = np.array([43, 310])
     levers = Motions.turning(np.linspace(-0.7, 0.7, 20), np.linspace(-0.6, 0.6, 20), None)
-    contact = ContactCells.among(grid, Cells.of(flat, (20, 20)), levers.among(flat))
+    contact = ContactCells.among(grid, Cells.of(flat, (20, 20)), levers.levers_of(flat))
     assert contact.balanced(np.array([1.0, -0.3])) == pytest.approx(0.0, abs=1e-13)
 
 

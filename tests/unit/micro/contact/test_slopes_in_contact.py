@@ -17,7 +17,7 @@ E_STAR = MODULUS / (1.0 - NU**2)
 SURFACE = synthesise(
     Spectrum(hurst=0.9, waves=(2, 6), rms_slope=0.2, seed=3), grid=(64, 48), lengths=(1.0, 0.75)
 )
-SLOPES = FiniteSlopes(SURFACE, HalfSpace(MODULUS, NU))
+SLOPES = FiniteSlopes(SURFACE, HalfSpace(young_modulus=MODULUS, poisson_ratio=NU))
 MODEL = HalfSpaceModel(
     surface=SURFACE, contact_modulus=E_STAR, slopes=SLOPES, highest=SURFACE.highest, tolerance=1e-10
 )

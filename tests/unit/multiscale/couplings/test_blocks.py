@@ -5,13 +5,22 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from geometry.errors import InputError
 from micro import BodyModes, FiniteSlopes, FreeSides
 from multiscale import Scene, make_setup
 from multiscale.costs.contact_work import press_work
 from multiscale.couplings.blocks import contact_model, free_sides, patch_displacements
 
 
-def setup(kind="concurrent", model="half-space", patches=4, coupling=None, slopes=None, **block):
+def setup(
+    kind="concurrent",
+    model="half-space",
+    patches=4,
+    coupling=None,
+    slopes=None,
+    approach=0.008,
+    **block,
+):
     spectrum = {"hurst": 0.95, "waves": [2, 8], "rms_slope": 0.215, "seed": 1}
     material = {"height": 0.8, "young_modulus": 4000.0, "poisson_ratio": 0.15, "cells": [8, 8, 5]}
     micro = {"model": model} | ({} if slopes is None else {"finite_slopes": slopes})
@@ -23,7 +32,7 @@ def setup(kind="concurrent", model="half-space", patches=4, coupling=None, slope
                 "patches": {"grid": [patches, patches]},
                 "micro": micro,
                 "coupling": {"kind": kind} | (coupling or {}),
-                "load": {"approach": 0.008},
+                "load": {"approach": approach},
             }
         )
     )
@@ -94,3 +103,15 @@ def test_displacements_of_patches_are_those_of_the_macro_model(way):
         # the linear solver's tolerance
         solved = patch_displacements(found, None, dense=False)(pressures)
         np.testing.assert_allclose(solved, sunk, rtol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("key", "block"),
+    [("block.height", {"height": 1e-5}), ("block.margin", {"margin": 6e5, "margin_cells": 2})],
+)
+def test_blocks_too_flat_for_their_modes_are_refused(key, block):
+    with pytest.raises(
+        InputError, match=r"so flat a block, in \d+ modes a side, needs about"
+    ) as told:
+        contact_model(setup(approach=1e-6, **block), None)
+    assert told.value.key == key

@@ -91,9 +91,3 @@ def test_remedy_beyond_a_consistent_law_fits_what_is_wrong(falls, remedy):
     table = LawTable(patches=PATCHES, laws=(law(), bent), made_by={"coupling": "consistent"})
     with pytest.raises(BeyondLaws, match=f"LAW_RANGE: .*: take coupling.{remedy}"):
         EmbeddedCoupling(EasyBlock(), table).press(Control(approach=0.8))
-
-
-def test_tilt_turns_about_the_middle():
-    approaches = PATCHES.mean_approaches(0.01, (0.004, 0.1))
-    # patch centres lie a quarter of a millimetre beside the middle, along x only
-    np.testing.assert_allclose(approaches, [0.009, 0.011], rtol=1e-12)

@@ -1,0 +1,28 @@
+"""Scripts that print one line of JSON, run on any number of ranks when a test first asks for it."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+RANKS = [2, pytest.param(3, marks=pytest.mark.long)]
+"""Numbers of ranks that are compared with one; three only among the long tests."""
+
+
+class OnRanks(dict):
+    """What a script found, by the number of ranks.
+
+    Args:
+        mpirun: Starts words on a number of ranks.
+        script: Name of a script beside this module.
+    """
+
+    def __init__(self, mpirun, script):
+        super().__init__()
+        self._mpirun, self._script = mpirun, Path(__file__).with_name(script)
+
+    def __missing__(self, ranks):
+        done = self._mpirun(ranks, self._script)
+        assert done.returncode == 0, done.stdout + done.stderr
+        self[ranks] = json.loads(done.stdout.splitlines()[-1])
+        return self[ranks]
