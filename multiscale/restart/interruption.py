@@ -7,7 +7,7 @@ import signal
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType, TracebackType
 from typing import Any
 
@@ -156,4 +156,5 @@ class Interruption:
         if number != signal.SIGUSR1:
             signal.signal(number, signal.SIG_DFL)
             # not through Python's buffers, which the interrupted code may be using
-            os.write(2, b"\npatchlaw: stops after this load step; once more ends it at once\n")
+            with suppress(OSError):  # standard error may be full
+                os.write(2, b"\npatchlaw: stops after this load step; once more ends it at once\n")

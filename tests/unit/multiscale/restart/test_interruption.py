@@ -191,3 +191,19 @@ def test_petsc_does_not_take_the_signals(root):
         [sys.executable, "-c", HUNG_UP], cwd=root, capture_output=True, text=True, check=False
     )
     assert (done.returncode, done.stdout, done.stderr) == (129, "", "")
+
+
+def test_a_signal_is_seen_though_standard_error_is_full():
+    code = (
+        "import os, signal\n"
+        "from multiscale.restart.interruption import Interruption, Stopped\n"
+        "with Interruption(None) as watch:\n"
+        "    os.kill(os.getpid(), signal.SIGTERM)\n"
+        "    try: watch.check('after load step 1')\n"
+        "    except Stopped as told: os._exit(told.exit_code)\n"
+    )
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-c", code], stderr=full, cwd=Path(__file__).parents[4], check=False
+        )
+    assert done.returncode == 143
