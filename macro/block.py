@@ -1,4 +1,7 @@
-"""The elastic block: displacement space, supports, assembled stiffness and its solver."""
+"""The elastic block: displacement space, supports, assembled stiffness and its solver.
+
+Theory: section 11 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 

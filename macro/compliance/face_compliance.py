@@ -1,4 +1,7 @@
-"""Compliance of a block's top, and the stresses in it, in Legendre modes."""
+"""Compliance of a block's top, and the stresses in it, in Legendre modes.
+
+Theory: section 6 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 

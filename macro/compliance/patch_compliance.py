@@ -1,4 +1,7 @@
-"""The compliance of a block at its patches, from one linear solve per patch."""
+"""The compliance of a block at its patches, from one linear solve per patch.
+
+Theory: section 11 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 

@@ -12,6 +12,8 @@ active set, removes the nodes in tension and adds those that penetrate (Hinterm√
 end. Free motions of the plane are unknowns of the same linear solves, in which the active nodes
 move with the plane. Conjugate gradients are preconditioned by the multigrid of the block without
 contact, corrected near the active nodes.
+
+Theory: section 12 of ``demos/theory.md``.
 """
 
 from __future__ import annotations

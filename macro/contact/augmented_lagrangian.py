@@ -8,6 +8,8 @@ Without multipliers p₀ this is the penalty method, p = k ⟨d⟩. The augmente
 pressures of one solve as the multipliers of the next, until no point in contact penetrates
 (Alart & Curnier 1991, doi 10.1016/0045-7825(91)90022-X). For every p₀ a generalised Newton's method
 with line search finds the equilibrium.
+
+Theory: section 12 of ``demos/theory.md``.
 """
 
 from __future__ import annotations

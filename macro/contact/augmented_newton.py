@@ -1,4 +1,7 @@
-"""Equilibrium of a block whose top stands on unilateral springs, by generalised Newton's method."""
+"""Equilibrium of a block whose top stands on unilateral springs, by generalised Newton's method.
+
+Theory: section 12 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 

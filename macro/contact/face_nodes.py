@@ -1,4 +1,7 @@
-"""The nodes of a block's top, the triangles between them, and their shares of the patches."""
+"""The nodes of a block's top, the triangles between them, and their shares of the patches.
+
+Theory: section 12 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Contact area within the facets of a block's top, from pressures and gaps of its nodes."""
+"""Contact area within the facets of a block's top, from pressures and gaps of its nodes.
+
+Theory: section 12 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 

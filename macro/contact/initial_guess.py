@@ -4,6 +4,8 @@ Two kinds of guesses are needed. A rough top has no smooth energy in a basis of 
 and its guess is extrapolated. Laws on patches have one, and minimising it takes fewer linear
 iterations: over eight load steps extrapolation took 1.8 to 3.2 times as many with 4 patches and one
 closure for each, and 3 to 18 % more with 16 and 64 patches or laws at points.
+
+Theory: sections 11 and 12 of ``demos/theory.md``.
 """
 
 from __future__ import annotations

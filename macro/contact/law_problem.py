@@ -1,4 +1,7 @@
-"""A block with contact laws on its top, under a rigid plane: one load step at a time."""
+"""A block with contact laws on its top, under a rigid plane: one load step at a time.
+
+Theory: section 11 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 

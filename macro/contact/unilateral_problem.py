@@ -1,4 +1,7 @@
-"""A block whose rough top is meshed, under a rigid plane: one load step at a time."""
+"""A block whose rough top is meshed, under a rigid plane: one load step at a time.
+
+Theory: section 12 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 

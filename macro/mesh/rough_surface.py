@@ -1,4 +1,7 @@
-"""Meshes of a block whose top is the rough surface itself."""
+"""Meshes of a block whose top is the rough surface itself.
+
+Theory: section 12 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 
