@@ -37,7 +37,7 @@ _CELLS = {"hexahedron": basix.CellType.hexahedron, "tetrahedron": basix.CellType
 
 
 @contextmanager
-def _quiet_compiler() -> Iterator[None]:
+def quiet_compiler() -> Iterator[None]:
     """Suppress the compiler's command lines, which older releases log."""
     root = logging.getLogger()
     level, disabled = root.level, root.manager.disable
@@ -69,11 +69,11 @@ def form_cache() -> Path:
 @contextmanager
 def _compiling() -> Iterator[None]:
     """Compile without log messages, and explain errors of the compiler."""
-    with _quiet_compiler(), explained(form_cache()):
+    with quiet_compiler(), explained(form_cache()):
         yield
 
 
-@_quiet_compiler()
+@quiet_compiler()
 def mesh_from_gmsh(model: Any, comm: Any) -> tuple[Any, Any]:
     """Distribute the gmsh model of rank 0 as (mesh, facet tags).
 
@@ -93,7 +93,7 @@ def mesh_from_gmsh(model: Any, comm: Any) -> tuple[Any, Any]:
     return (data.mesh, data.facet_tags) if hasattr(data, "mesh") else (data[0], data[2])
 
 
-@_quiet_compiler()
+@quiet_compiler()
 def mesh_from_cells(
     cells: NDArray[np.int64],
     points: NDArray[np.float64],

@@ -64,6 +64,10 @@ class AugmentedLagrangian:
         penalty: The stiffness k [MPa/mm]; None: 1000 E* over the size of each facet.
         exact: Whether multipliers remove the penetration; otherwise it is the penalty method.
 
+    Attributes:
+        law: Law of the quadrature points.
+        equilibrium: Equations of the block with this law.
+
     Note:
         Everything here is collective.
     """
@@ -88,10 +92,10 @@ class AugmentedLagrangian:
         self._soft = np.minimum(_SOFT * unit, self._stiff)
         self._tolerance = contact_tolerance()
         self._penetration = PENETRATION[block.degree]
-        self._law = AugmentedLaw(np.sum(points.values * distance[points.nodes], axis=1))
-        self._contact = LawContact(interface, sampling, [self._law])
-        self._equilibrium = Equilibrium(block, sampling, self._contact)
-        self._newton = FacetNewton(self._equilibrium, self._law, interface, top, plane)
+        self.law = AugmentedLaw(np.sum(points.values * distance[points.nodes], axis=1))
+        self._contact = LawContact(interface, sampling, [self.law])
+        self.equilibrium = Equilibrium(block, sampling, self._contact)
+        self._newton = FacetNewton(self.equilibrium, self.law, interface, top, plane)
         self._history = Extrapolation(block.owned_dofs, len(points.x))
 
     def solve(self, control: Control) -> ContactSolution:
@@ -102,7 +106,7 @@ class AugmentedLagrangian:
                 stay what they were.
         """
         guess = self._history.guess(control)
-        contact, law = self._contact, self._law
+        contact, law = self._contact, self.law
         contact.control, contact.plane = control, self._plane.placed(control, guess.plane)
         law.multiplier = np.maximum(guess.contact, 0.0) if self._exact else 0.0 * guess.contact
         displacement = self._block.stiffness.createVecRight()
@@ -112,7 +116,7 @@ class AugmentedLagrangian:
         for _ in range(_MOST_UPDATES):
             more, cycles = self._newton.solve(displacement, tolerance, control)
             steps, spent = steps + more, spent + cycles
-            closure = self._equilibrium.closure(displacement)
+            closure = self.equilibrium.closure(displacement)
             # penetration of points without pressure, penetration or gap of points under pressure
             depth = self._largest((law.pressure(closure) - law.multiplier) / law.slope)
             allowed = self._penetration * self._largest(displacement.array_r)
@@ -132,8 +136,8 @@ class AugmentedLagrangian:
         raise not_found(control, "MULTIPLIERS", _MOST_UPDATES)
 
     def _converged(self, displacement: PETSc.Vec, steps: int, spent: int) -> ContactSolution:
-        closure, plane = self._equilibrium.closure(displacement), self._contact.plane.copy()
-        pressure, load = self._law.pressure(closure), displacement.duplicate()
+        closure, plane = self.equilibrium.closure(displacement), self._contact.plane.copy()
+        pressure, load = self.law.pressure(closure), displacement.duplicate()
         samples = self._sampling.operator.createVecRight()
         samples.array[:] = pressure
         self._sampling.operator.mult(samples, load)
