@@ -131,8 +131,8 @@ def _triangles(corners: Array) -> tuple[Array, NDArray[np.intp]]:
     facet = np.arange(len(corners))
     if corners.shape[1] == 3:
         return corners, facet
-    # Tensor order: vertices 0 and 3 of a square are opposite. The orientation decides which diagonal
-    # divides the rest of a triangle that a border cuts, on which the quadrature error depends.
+    # Tensor order: vertices 0 and 3 of a square are opposite. The orientation decides the diagonal
+    # of what is left of a triangle cut by a border, on which the quadrature error depends.
     return np.concatenate([corners[:, [0, 2, 1]], corners[:, [3, 1, 2]]]), np.tile(facet, 2)
 
 
