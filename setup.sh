@@ -42,7 +42,7 @@ if [ ! -x .venv/bin/patchlaw ] || [ "$(cat "$stamp" 2>/dev/null)" != "$wanted" ]
   "$python" -m venv --clear --system-site-packages .venv || fail "could not make .venv with $python"
   .venv/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[test]' ||
     fail "pip could not install patchlaw and its pure-Python requirements (is a package index reachable?)"
-  .venv/bin/python -c 'import dolfinx, petsc4py, mpi4py, gmsh, h5py, scipy, matplotlib, pydantic, pint, rich' ||
+  .venv/bin/python -c 'import dolfinx, petsc4py, mpi4py, gmsh, h5py, scipy, matplotlib, pydantic, pint, rich, jinja2' ||
     fail "the installed packages cannot be imported together; see the message above"
   printf '%s\n' "$wanted" >"$stamp"
 fi

@@ -31,13 +31,17 @@ TOLERANCE = 1e-10
 UNSUPPORTED = 1e-11
 """Stiffness against a motion of the plane, relative to the largest, that counts as none."""
 
-_AIM = 1e-13  # what force and moments miss where the rounding of displacements allows it
-_DECREASE = 0.9  # share of the energy's slope that may remain after a step
-_CLEAR = 1e-6  # of the largest force: the plane may be about to leave the surface
-_FIRST = 1e-6  # of half the diagonal: first trial of a motion that nothing resists
-_FARTHEST = 1e3  # halves of the diagonal up to which a support is looked for
+_AIM = 1e-13
+"""What force and moments miss where the rounding of displacements allows it."""
+_DECREASE = 0.9
+"""Share of the energy's slope that may remain after a step."""
+_CLEAR = 1e-6
+"""Force, relative to the largest so far, below which the plane may be about to lift off."""
+_FIRST, _FARTHEST = 1e-6, 1e3
+"""First trial of a motion that nothing resists and the last, in halves of the diagonal."""
+_ROUNDING = 64.0 * float(np.finfo(float).eps)
+"""Step, relative to the motions of the plane, that is only rounding."""
 _MOST_STEPS, _MOST_TRIALS, _MOST_RETREATS = 100, 100, 6
-_ROUNDING = 64.0 * float(np.finfo(float).eps)  # of the plane's motions
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -96,65 +100,115 @@ def find_equilibrium(
         NotConverged: When nothing can hold the plane, no equilibrium is found, or loads are not
             numbers.
     """
-    free, scale = control.free, motion_units(half)
-    unit = scale[free]
-
-    def trial(plane: Array) -> _Trial[T]:
-        response = respond(plane)
-        loads = response.loads * scale
-        if not np.isfinite(loads).all():
-            raise plane_failure(control, "NOT_A_NUMBER")
-        return _Trial(plane, (loads - control.loads)[free], float(loads[0]), response)
-
-    now = found = _begun(trial, control, np.array(start, dtype=np.float64), first_touch)
-    step, change, largest = np.zeros(len(unit)), np.zeros(len(unit)), 0.0
-
-    def moved(motion: Array) -> Array:
-        plane = now.plane.copy()
-        plane[free] += unit * motion
-        return plane
-
-    def slope_after(share: float) -> float:
-        nonlocal found
-        plane = moved(share * step)
-        if np.abs(plane[free] / unit).max() > _FARTHEST * half:
-            raise plane_failure(control, "NO_SUPPORT" if now.force else "NO_CONTACT")
-        try:
-            found = trial(plane)
-        except NotConverged:
-            if first_touch is None:
-                raise
-            return np.inf
-        lost = bool(control.force) and now.force > 0.0 and found.force == 0.0
-        return np.inf if lost else float(found.residual @ step)
-
+    motions = _FreeMotions(respond, control, half, final=first_touch is None)
+    now = motions.begun(np.array(start, dtype=np.float64), first_touch)
+    step = change = np.zeros(len(motions.unit))
+    largest = 0.0
     for _ in range(_MOST_STEPS):
-        missed = float(np.abs(now.residual).max(initial=0.0))
         measure = max(now.force, control.force or 0.0)
-        if missed <= aim * measure:
+        if np.abs(now.residual).max(initial=0.0) <= aim * measure:
             return now.plane, now.response.state
         largest = max(largest, measure)
-        stiffness = now.response.stiffness()[np.ix_(free, free)] * np.outer(unit, unit)
+        stiffness = motions.stiffness(now)
         if nearly:
             stiffness = _corrected(stiffness, step, change)
         step, resisted = _direction(stiffness, now.residual, aim * measure, _FIRST * half)
-        if resisted and np.abs(step).max() <= _ROUNDING * float(np.abs(now.plane) @ (1.0 / scale)):
-            now = trial(moved(step))  # rounding of displacements allows no more
+        if resisted and np.abs(step).max() <= _ROUNDING * motions.size(now.plane):
+            now = motions.trial(motions.moved(now, step))  # displacements allow no more
             return now.plane, now.response.state
         if control.force is None and measure <= _CLEAR * largest:
             # Newton's steps alone come ever closer to a plane that is clear, and never there
-            clear = trial(moved(3.0 * step))
+            clear = motions.trial(motions.moved(now, 3.0 * step))
             if clear.force == 0.0:
                 return clear.plane, clear.response.state
-        longest = half / float(np.abs(step).max())
-        share = slope_search(slope_after, float(now.residual @ step), min(1.0, longest))
-        if share is None:
+        share, found = motions.searched(now, step)
+        if found is None:
             break
         step, change, now = share * step, found.residual - now.residual, found
-    missed = float(np.abs(now.residual).max())
-    if missed <= max(aim, TOLERANCE) * max(now.force, control.force or 0.0):
+    measure = max(now.force, control.force or 0.0)
+    if np.abs(now.residual).max() <= max(aim, TOLERANCE) * measure:
         return now.plane, now.response.state
     raise plane_failure(control, "NO_EQUILIBRIUM")
+
+
+class _FreeMotions(Generic[T]):
+    """The motions of a plane that follow from its loads, each a displacement of its corner [mm].
+
+    Args:
+        respond: As in `find_equilibrium`.
+        control: As there.
+        half: As there.
+        final: Whether a refusal of the contacts ends the search.
+    """
+
+    def __init__(
+        self,
+        respond: Callable[[Array], PlaneResponse[T]],
+        control: Control,
+        half: float,
+        *,
+        final: bool,
+    ) -> None:
+        self._respond, self._control, self._half, self._final = respond, control, half, final
+        self._free, self._scale = control.free, motion_units(half)
+        self.unit = self._scale[self._free]
+
+    def trial(self, plane: Array) -> _Trial[T]:
+        """Evaluate the contacts under a plane (3,)."""
+        response = self._respond(plane)
+        loads = response.loads * self._scale
+        if not np.isfinite(loads).all():
+            raise plane_failure(self._control, "NOT_A_NUMBER")
+        residual = (loads - self._control.loads)[self._free]
+        return _Trial(plane, residual, float(loads[0]), response)
+
+    def begun(self, plane: Array, first_touch: float | None) -> _Trial[T]:
+        """Evaluate a start, or nearer to first touch where the contacts cannot bear so much."""
+        for _ in range(_MOST_RETREATS):
+            try:
+                return self.trial(plane)
+            except NotConverged:
+                if first_touch is None or not self._control.force or plane[0] <= first_touch:
+                    raise
+                plane = np.array([0.5 * (plane[0] + first_touch), *plane[1:]])
+        return self.trial(plane)
+
+    def stiffness(self, now: _Trial[T]) -> Array:
+        """Return the derivative of the residual by the motions, shape (k, k) [N/mm]."""
+        stiffness = now.response.stiffness()[np.ix_(self._free, self._free)]
+        return stiffness * np.outer(self.unit, self.unit)
+
+    def size(self, plane: Array) -> float:
+        """Return the size of the numbers whose differences displacements are [mm]."""
+        return float(np.abs(plane) @ (1.0 / self._scale))
+
+    def moved(self, now: _Trial[T], motion: Array) -> Array:
+        """Return the plane (3,) after a motion."""
+        plane = now.plane.copy()
+        plane[self._free] += self.unit * motion
+        return plane
+
+    def searched(self, now: _Trial[T], step: Array) -> tuple[float, _Trial[T] | None]:
+        """Search along a step, and return the share that was taken and where it leads."""
+        found = now
+
+        def slope_after(share: float) -> float:
+            nonlocal found
+            plane = self.moved(now, share * step)
+            if np.abs(plane[self._free] / self.unit).max() > _FARTHEST * self._half:
+                raise plane_failure(self._control, "NO_SUPPORT" if now.force else "NO_CONTACT")
+            try:
+                found = self.trial(plane)
+            except NotConverged:
+                if self._final:
+                    raise
+                return np.inf
+            lost = bool(self._control.force) and now.force > 0.0 and found.force == 0.0
+            return np.inf if lost else float(found.residual @ step)
+
+        longest = self._half / float(np.abs(step).max())
+        share = slope_search(slope_after, float(now.residual @ step), min(1.0, longest))
+        return (0.0, None) if share is None else (share, found)
 
 
 def slope_search(slope_after: Callable[[float], float], slope: float, share: float) -> float | None:
@@ -196,42 +250,25 @@ def plane_failure(control: Control, reason: str, iterations: int = 0) -> NotConv
     )
 
 
-def _begun(
-    trial: Callable[[Array], _Trial[T]],
-    control: Control,
-    plane: Array,
-    first_touch: float | None,
-) -> _Trial[T]:
-    """Evaluate a start, or nearer to first touch where the contacts cannot bear so much."""
-    for _ in range(_MOST_RETREATS):
-        try:
-            return trial(plane)
-        except NotConverged:
-            if first_touch is None or not control.force or plane[0] <= first_touch:
-                raise
-            plane = np.array([0.5 * (plane[0] + first_touch), *plane[1:]])
-    return trial(plane)
-
-
 def _direction(
     stiffness: Array, residual: Array, nothing: float, first: float
 ) -> tuple[Array, bool]:
     """Return Newton's step, or a first trial where nothing resists, and whether it is Newton's."""
     values, vectors = np.linalg.eigh(stiffness)
-    wanted = -vectors.T @ residual
+    loads = -vectors.T @ residual
     loose = values <= UNSUPPORTED * max(values[-1], 0.0)
-    falling = loose & (np.abs(wanted) > nothing)
+    falling = loose & (np.abs(loads) > nothing)
     if falling.any():
-        step = vectors @ np.where(falling, wanted, 0.0)
+        step = vectors @ np.where(falling, loads, 0.0)
         return first * step / np.abs(step).max(), False
-    return vectors @ np.divide(wanted, values, out=np.zeros_like(wanted), where=~loose), True
+    return vectors @ np.divide(loads, values, out=np.zeros_like(loads), where=~loose), True
 
 
 def _corrected(stiffness: Array, step: Array, change: Array) -> Array:
-    """Return a stiffness that tells the change of the residual in the last step (BFGS)."""
-    curvature, pushed = float(step @ change), stiffness @ step
-    told = float(step @ pushed)
-    if told <= 0.0 or curvature <= 1e-8 * told:
+    """Return a stiffness that reproduces the change of the residual in the last step (BFGS)."""
+    pushed = stiffness @ step
+    curvature, predicted = float(step @ change), float(step @ pushed)
+    if predicted <= 0.0 or curvature <= 1e-8 * predicted:
         return stiffness
-    update = np.outer(change, change) / curvature - np.outer(pushed, pushed) / told
+    update = np.outer(change, change) / curvature - np.outer(pushed, pushed) / predicted
     return np.asarray(stiffness + update)

@@ -5,18 +5,18 @@ from __future__ import annotations
 from geometry import Surface, find_asperities
 from geometry.errors import InputError
 from geometry.rigid_plane import RigidPlane
-from micro.asperities.model import MODELS, Balanced, asperity_model
+from micro.asperities.model import MODELS, Equilibrium, asperity_model
 from micro.asperities.scaled_model import ScaledModel
-from micro.complementarity.contact_problem import Solution
 from micro.half_space.model import HalfSpaceModel
+from micro.interaction.contact_problem import Solution
 from micro.islands.model import IslandModel
 from micro.model import MicroModel
 
 MODEL_NAMES = (*MODELS, "islands", "half-space")
 """Names of all micro models, the cheapest kinds first."""
 
-START_KINDS: tuple[type, ...] = (RigidPlane, Balanced, Solution)
-"""Kinds of records that starts of `MicroModel.press` consist of, beside arrays and tuples."""
+START_KINDS: tuple[type, ...] = (RigidPlane, Equilibrium, Solution)
+"""Records that `Pressed.start` may consist of, besides arrays and tuples."""
 
 
 def micro_model(
@@ -28,7 +28,7 @@ def micro_model(
     curvature: str = "summit",
     border: str = "ignore",
 ) -> MicroModel:
-    """Make a micro model of a surface whose border is free, as that of a block's top is.
+    """Return the micro model of a surface whose border is free, as that of a block's top is.
 
     Args:
         name: A name in `MODEL_NAMES`.
@@ -36,7 +36,7 @@ def micro_model(
         contact_modulus: E* [MPa].
         solver: Solver of the interacting asperity models.
         curvature: Where asperity models take the curvature, a name in `CURVATURES`.
-        border: What they make of maxima on the border, a name in `BORDERS`.
+        border: How asperity models treat maxima on the border, a name in `BORDERS`.
 
     Raises:
         InputError: When there is no such model, option or solver, or the modulus is not positive.

@@ -18,13 +18,12 @@ Counts = NDArray[np.int64]
 
 
 class Pressed(NamedTuple):
-    """What pressing a plane once gives.
+    """The result of one load step.
 
     Attributes:
         response: The response, of one row.
         plane: The plane in equilibrium.
-        start: What the same model starts the next plane from, when that lies nearby: an array, or
-            None of a model that starts from nothing.
+        start: Initial guess of the same model for a load step nearby.
     """
 
     response: Response
@@ -36,11 +35,10 @@ class Pressed(NamedTuple):
 class Response:
     """Results at n approaches on N patches.
 
-    The separation is the average gap between the plane and the *displaced* surface:
-    g_i = z_M − mean height − mean approach + mean displacement, per patch; for the models without
-    interaction too, as their forces move the surface all the same. The paper's eq. 9 leaves the
-    displacement out. Means over patches and over all of them are those of the models' pressures, to
-    the errors stated in `micro.patch_displacement`.
+    The separation of a patch is the average gap between the plane and the *displaced* surface,
+    g_i = z_M − mean height − mean approach + mean displacement. The paper's eq. 9 leaves the
+    displacement out. It is the displacement by the model's pressures, to the errors stated in
+    `micro.patch_sums`, also for the models without interaction.
 
     Args:
         model: Name of the micro model.
@@ -54,8 +52,8 @@ class Response:
         contacts: Number of asperities in contact, shape (n,).
         mean_separation: Average gap, shape (n,) [mm].
         iterations: Iterations of the solver, shape (n,).
-        residual: Complementarity error relative to the largest required displacement, shape (n,).
-        engulfed: Pairs of merged asperities, shape (n,).
+        residual: Complementarity error relative to the largest interference, shape (n,).
+        overlapping_contacts: Number of pairs of contacts that have grown into each other, (n,).
         patch_force: Force on the patch, contacts across its border shared, shape (n, N) [N].
         patch_contact_area: Real contact area in the patch, shared likewise, shape (n, N) [mm²].
         patch_contacts: Number of contacts with their summit in the patch, shape (n, N).
@@ -79,7 +77,7 @@ class Response:
     mean_separation: Array
     iterations: Counts
     residual: Array
-    engulfed: Counts
+    overlapping_contacts: Counts
     patch_force: Array
     patch_contact_area: Array
     patch_contacts: Counts

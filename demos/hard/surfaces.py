@@ -91,8 +91,8 @@ def merging() -> tuple[Any, ...]:
     return state.residual, state
 
 
-@case(4, "a summit 1e-9 mm off and 1e-9 mm lower, engulfed", "both carry what one does", 1e-6)
-def engulfed() -> tuple[Any, ...]:
+@case(4, "a summit 1e-9 mm off and 1e-9 mm lower, overlapping", "both carry what one does", 1e-6)
+def twin_beside_a_summit() -> tuple[Any, ...]:
     pair, one = pressed(0.02, 1.0, [0.5, 0.5 + 1e-9], 1e-9), pressed(0.02, 1.0, [0.5])
     return off(pair.force.sum(), one.force[0]), pair
 

@@ -1,16 +1,16 @@
-"""The four discrete models: asperities, elliptic or circular, with or without interaction.
+"""The four asperity models: elliptic or circular contacts, with or without interaction.
 
-A rigid plane that has approached by δ asks every summit for the displacement
-d_k = <δ(x_k) − (z_M − z_k)>. Without interaction each contact makes it alone, w_k = d_k; with
-interaction the displacements by all contacts add up to w_k
-(`micro.complementarity.contact_problem`).
+A rigid plane that has approached by δ interferes with every summit by d_k = <δ(x_k) − (z_M − z_k)>.
+Without interaction each contact makes this displacement alone, w_k = d_k. With interaction the
+displacements by all contacts add up to w_k (`micro.interaction.contact_problem`).
+
+Theory: demos/theory.md, section 8.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from types import MappingProxyType
 from typing import Any, NamedTuple, Self
 
@@ -21,22 +21,24 @@ from geometry import Asperities, Control, Partition, PatchGrid
 from geometry.errors import InputError
 from geometry.plane_equilibrium import PlaneResponse
 from geometry.rigid_plane import PlaneLevers, RigidPlane
-from micro.asperities.contacts import SOLVERS, SummitContacts
-from micro.asperities.many_summits import PAIR_SUMS
-from micro.asperities.patch_sums import PatchSums
-from micro.asperities.state import AsperityState
-from micro.checks import checked_approaches, checked_means
-from micro.complementarity.contact_problem import Solution
+from micro.asperities.contacts import AsperityContacts, AsperityState, checked_name
+from micro.asperities.patch_shares import shares
 from micro.compliance.body_modes import BodyModes
+from micro.interaction.contact_problem import Solution
+from micro.model import checked_approaches, checked_patches
+from micro.patch_sums import EllipticContacts, PatchSums
 from micro.plane_on_peaks import Peaks
 from micro.response import Pressed, Response
 
 Array = NDArray[np.float64]
 
+LARGEST_AREA_FRACTION = 0.1
+"""Contact area fraction up to which summits count as separate; errors may be large before."""
+
 _LEVEL = (0.0, 0.0)
 
 
-class Balanced(NamedTuple):
+class Equilibrium(NamedTuple):
     """Contacts in equilibrium with a plane.
 
     Attributes:
@@ -72,46 +74,12 @@ MODELS: Mapping[str, ModelKind] = MappingProxyType(
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class AsperityModel:
-    """One of the four discrete models on given asperities.
-
-    How the interaction is summed over pairs follows from the number of summits in reach
-    (`micro.asperities.many_summits`): exactly up to 2000, through a mesh above. The truncated
-    Newton method sums every pair directly; its time and memory grow with the square of their
-    number.
-
-    Args:
-        asperities: The n summits, with the highest point z_M that the approach counts from.
-        contact_modulus: E* [MPa].
-        elliptic: Whether contacts are ellipses; circles of radius sqrt(R' R'') otherwise.
-        interacting: Whether contacts displace each other's summits.
-        solver: Solver of the models with interaction, a name in `SOLVERS`.
-        pairs: How to sum over pairs, a name in `PAIR_SUMS`, or ``"auto"`` by their number.
-        body: What a finite body with its sides adds to the half-space, between all contacts, also
-            those of the models without interaction; a half-space when not given. On thin blocks it
-            takes away from the interaction: models without any may then have no solution.
-
-    Raises:
-        InputError: When the modulus is not positive, the solver or the sum unknown, or the
-            truncated Newton method shall use another sum than the direct one.
+class AsperityModel(AsperityContacts):
+    """One of the four asperity models on given asperities; see `AsperityContacts` for its fields.
 
     Source:
         Waddad et al. 2016, section 1.2, doi 10.1016/j.triboint.2015.12.023.
     """
-
-    asperities: Asperities
-    contact_modulus: float
-    elliptic: bool
-    interacting: bool
-    solver: str = "active-set"
-    pairs: str = "auto"
-    body: BodyModes | None = None
-
-    def __post_init__(self) -> None:
-        _known(self.solver, SOLVERS, "solver")
-        allowed = ("auto", *PAIR_SUMS) if self.solver == "active-set" else ("auto", "direct")
-        _known(self.pairs, allowed, f"sum over pairs with the solver {self.solver}")
-        _ = self.contacts.hertz  # checks the modulus
 
     @property
     def name(self) -> str:
@@ -136,19 +104,6 @@ class AsperityModel:
         alone = replace(self, asperities=self.asperities.subset(own), body=None)
         return alone, patches.single(index)
 
-    @cached_property
-    def contacts(self) -> SummitContacts:
-        """The contacts that the summits can make."""
-        return SummitContacts(
-            asperities=self.asperities,
-            contact_modulus=self.contact_modulus,
-            elliptic=self.elliptic,
-            interacting=self.interacting,
-            solver=self.solver,
-            pairs=self.pairs,
-            body=self.body,
-        )
-
     def solve(
         self,
         approach: float,
@@ -164,26 +119,27 @@ class AsperityModel:
             start: A solution nearby to start from.
 
         Raises:
-            InputError: When the approach or the tilt is not finite.
+            InputError: When the approach or the tilt is not finite, or the interaction of all
+                contacts does not fit into the memory.
             NotConverged: When the contact conditions cannot be met to 1e-10.
         """
         plane = RigidPlane.above(self.asperities, approach, tilt)
         first = np.zeros(len(self.asperities)) if start is None else start.indentation
-        return self.state(plane, self.contacts.solution(self.asperities.interference(plane), first))
+        return self.state(plane, self.solution(self.asperities.interference(plane), first))
 
     def state(self, plane: RigidPlane, solution: Solution) -> AsperityState:
         """Return the contacts of a solution under a plane."""
-        own, hertz = solution.indentation, self.contacts.hertz
+        own, hertz = solution.indentation, self.hertz
         return AsperityState(
             approach=plane.approach,
-            required=np.maximum(self.asperities.interference(plane), 0.0),
-            displacement=own + self.contacts.lift(own),
+            interference=np.maximum(self.asperities.interference(plane), 0.0),
+            displacement=self.displacement(own),
             indentation=own,
             semi_axes=hertz.semi_axes * np.sqrt(own)[:, None],
             contact_area=hertz.area * own,
             force=hertz.force * own**1.5,
             peak_pressure=hertz.peak_pressure * np.sqrt(own),
-            engulfed=solution.engulfed,
+            overlapping_contacts=solution.overlapping_contacts,
             iterations=solution.iterations,
             residual=solution.residual,
         )
@@ -192,43 +148,46 @@ class AsperityModel:
         self,
         approaches: ArrayLike,
         *,
-        patches: Partition,
-        mean_heights: ArrayLike,
+        patches: Partition | None = None,
+        mean_heights: ArrayLike | None = None,
         tilt: tuple[float, float] = _LEVEL,
     ) -> Response:
         """Solve along approaches, each from the solution before it; see `MicroModel.respond`."""
         given = checked_approaches(approaches)
-        sums = self.sums(patches, mean_heights)
+        sums = PatchSums(self, *checked_patches(self.asperities, patches, mean_heights))
+        owner = sums.patches.index_of(self.asperities.x, self.asperities.y)
         rows: dict[int, dict[str, Any]] = {}
         own: Array = np.zeros(len(self.asperities))
         before = own
         for index in np.argsort(given, kind="stable"):
             plane = RigidPlane.above(self.asperities, given[index], tilt)
-            # Going on as before is right to second order when the steps are equal.
+            # With equal steps, linear extrapolation is right to second order.
             start = np.maximum(2.0 * own - before, 0.0)
-            found = self.contacts.solution(self.asperities.interference(plane), start)
-            own, before = found.indentation, own
-            rows[int(index)] = sums.row(plane, found)
-        return sums.response(self.name, [rows[index] for index in range(len(given))])
+            solution = self.solution(self.asperities.interference(plane), start)
+            own, before = solution.indentation, own
+            rows[int(index)] = self.row(Equilibrium(plane, solution), sums, owner)
+        return sums.response([rows[index] for index in range(len(given))])
 
     def press(
         self,
         control: Control,
         *,
-        patches: Partition,
-        mean_heights: ArrayLike,
+        patches: Partition | None = None,
+        mean_heights: ArrayLike | None = None,
         start: Any = None,
     ) -> Pressed:
         """Solve one load step; see `MicroModel.press`."""
-        sums = self.sums(patches, mean_heights)
+        sums = PatchSums(self, *checked_patches(self.asperities, patches, mean_heights))
+        owner = sums.patches.index_of(self.asperities.x, self.asperities.y)
         found = self.equilibrium(control, start)
-        response = sums.response(self.name, [sums.row(found.plane, found.solution)])
+        response = sums.response([self.row(found, sums, owner)])
         return Pressed(response, found.plane, found)
 
-    def equilibrium(self, control: Control, start: Balanced | None = None) -> Balanced:
+    def equilibrium(self, control: Control, start: Equilibrium | None = None) -> Equilibrium:
         """Solve the contacts, and the motions of the plane that are free.
 
-        Without force the plane touches first, under the slopes of the start where they are free.
+        Without force the plane is that of first touch; where its slopes are free they are those
+        of the start.
 
         Args:
             control: What is prescribed of the plane.
@@ -237,7 +196,7 @@ class AsperityModel:
         Raises:
             InputError: When the start is of other asperities.
             NotConverged: When the contact conditions cannot be met to 1e-10, or no plane is in
-                balance.
+                equilibrium.
         """
         own, spent = np.zeros(len(self.asperities)), 0
         if start is not None:
@@ -250,30 +209,30 @@ class AsperityModel:
             )
         peaks, first = self._peaks, self.first_plane(control, start)
 
-        def evaluate(motion: Array) -> PlaneResponse[Balanced]:
+        def respond(motion: Array) -> PlaneResponse[Equilibrium]:
             nonlocal own, spent
             plane = RigidPlane.moved(self.asperities, motion)
-            found = self.contacts.solution(self.asperities.interference(plane), own)
+            found = self.solution(self.asperities.interference(plane), own)
             own, spent = found.indentation, spent + found.iterations
-            loads = peaks.levers.loads(self.contacts.hertz.force * own**1.5)
-            known = Balanced(plane, found._replace(iterations=spent))
+            known = Equilibrium(plane, found._replace(iterations=spent))
             return PlaneResponse(
-                loads=loads,
-                stiffness=lambda: self.contacts.stiffness(known.solution.indentation, peaks.lever),
+                loads=peaks.levers.loads(self.hertz.force * own**1.5),
+                stiffness=lambda: self.stiffness(known.solution.indentation, peaks.lever),
                 state=known,
             )
 
-        return peaks.equilibrium(evaluate, control, first.motion)[1]
+        return peaks.equilibrium(respond, control, first.motion)[1]
 
-    def first_plane(self, control: Control, start: Balanced | None = None) -> RigidPlane:
-        """Return the plane that an equilibrium is looked for from.
+    def first_plane(self, control: Control, start: Equilibrium | None = None) -> RigidPlane:
+        """Return the plane that the search for an equilibrium starts from.
 
         Args:
             control: What is prescribed of the plane.
-            start: A solution nearby; without, contacts that do not see each other tell.
+            start: A solution nearby; without it the plane is that of contacts that do not
+                displace each other's summits.
 
         Raises:
-            NotConverged: When no plane can be in balance.
+            NotConverged: When no plane can be in equilibrium.
         """
         near = None
         if start is not None and (start.solution.indentation.any() or control.force == 0.0):
@@ -282,14 +241,13 @@ class AsperityModel:
 
     @property
     def _peaks(self) -> Peaks:
-        """The summits as the plane sees them; not kept, for models are sent between processes."""
-        a, force = self.asperities, self.contacts.hertz.force
-
-        def alone(overlap: Array) -> float:
-            return float(force @ np.maximum(overlap, 0.0) ** 1.5)
-
-        levers = PlaneLevers.at(a.x, a.y, a.lengths)
-        return Peaks(levers=levers, depth=a.highest - a.z, force=alone)
+        """The summits under the plane; not cached, because models are sent between processes."""
+        a, force = self.asperities, self.hertz.force
+        return Peaks(
+            levers=PlaneLevers.at(a.x, a.y, a.lengths),
+            depth=a.highest - a.z,
+            force=lambda interference: float(force @ np.maximum(interference, 0.0) ** 1.5),
+        )
 
     def surface_displacement(self, state: AsperityState, x: ArrayLike, y: ArrayLike) -> Array:
         """Return the normal displacement of the surface at points, by all contacts [mm].
@@ -304,33 +262,59 @@ class AsperityModel:
         total = np.zeros(np.broadcast_shapes(np.shape(x), np.shape(y)))
         a = self.asperities
         for k in np.flatnonzero(state.in_contact):  # one field at a time bounds the memory
-            contact = self.contacts.contact(state.indentation[k], int(k))
+            contact = self.contact(state.indentation[k], int(k))
             dx, dy = np.asarray(x, float) - a.x[k], np.asarray(y, float) - a.y[k]
             cos, sin = np.cos(a.angle[k]), np.sin(a.angle[k])
             total += contact.displacement(cos * dx + sin * dy, cos * dy - sin * dx)
         return total
 
-    def sums(
-        self, patches: Partition, mean_heights: ArrayLike, home: Asperities | None = None
-    ) -> PatchSums:
-        """Return what sums the results of this model over patches.
+    def row(
+        self,
+        found: Equilibrium,
+        sums: PatchSums,
+        owner: NDArray[np.intp],
+    ) -> dict[str, Any]:
+        """Return the fields of a response for one plane.
+
+        A contact that straddles borders is shared among patches by the integral of its pressure
+        (`micro.asperities.patch_shares`); as a contact it counts for the patch that holds its
+        summit. The paper assigns it whole.
 
         Args:
-            patches: Patches; every asperity lies in one.
-            mean_heights: Mean heights of the surface on the patches, shape (N,) [mm].
-            home: The summits, where they are not the centres of the contacts.
-
-        Raises:
-            InputError: When a summit lies outside the patches, or the mean heights do not fit.
+            found: The plane and the contacts under it.
+            sums: The sums over patches, of this model or of one that fits its asperities anew.
+            owner: Flat index of the patch that holds each summit, shape (n,).
         """
-        return PatchSums(
-            asperities=self.asperities,
-            home=self.asperities if home is None else home,
-            patches=patches,
-            mean_heights=checked_means(mean_heights, patches),
-            hertz=self.contacts.hertz,
-            contact_modulus=self.contact_modulus,
-            body=self.contacts.points,
+        (plane, solution), a, hertz = found, self.asperities, self.hertz
+        on = np.flatnonzero(solution.indentation > 0.0)
+        t = solution.indentation[on]
+        contacts = EllipticContacts(
+            position=np.stack([a.x[on], a.y[on]], axis=1),
+            angle=a.angle[on],
+            semi_axes=hertz.semi_axes[on] * np.sqrt(t)[:, None],
+            area=hertz.area[on] * t,
+            force=hertz.force[on] * t**1.5,
+        )
+        share = shares(sums.patches, contacts.position, contacts.semi_axes, contacts.angle)
+        fraction = contacts.area.sum() / np.prod(sums.patches.sides)
+        warning = ""
+        # A single contact, in a small patch say, is Hertz's at any area.
+        if fraction > LARGEST_AREA_FRACTION and len(on) + solution.overlapping_contacts > 1:
+            warning = (
+                f"at an approach of {plane.approach:.4g} mm the contacts cover {fraction:.1%} of"
+                f" the surface: the model {sums.model.name} of separate summits stands for up to"
+                f" {LARGEST_AREA_FRACTION:.0%}"
+            )
+        return sums.row(
+            plane,
+            contacts,
+            owner[on],
+            patch_force=share.sums(share.force, contacts.force, sums.patches),
+            patch_contact_area=share.sums(share.area, contacts.area, sums.patches),
+            iterations=solution.iterations,
+            residual=solution.residual,
+            overlapping_contacts=solution.overlapping_contacts,
+            warning=warning,
         )
 
 
@@ -340,7 +324,6 @@ def asperity_model(
     *,
     contact_modulus: float,
     solver: str = "active-set",
-    pairs: str = "auto",
     body: BodyModes | None = None,
 ) -> AsperityModel:
     """Return the model of a given name on some asperities.
@@ -350,23 +333,16 @@ def asperity_model(
         asperities: The summits.
         contact_modulus: E* [MPa].
         solver: A name in `SOLVERS`, for the models with interaction.
-        pairs: A name in `PAIR_SUMS` or ``"auto"``, for the models with interaction.
         body: What a finite body adds to the half-space.
 
     Raises:
         InputError: When a name is unknown or the modulus not positive.
     """
-    _known(name, MODELS, "micro model")
+    checked_name(name, MODELS, "micro model")
     return AsperityModel(
         asperities=asperities,
         contact_modulus=contact_modulus,
         solver=solver,
-        pairs=pairs,
         body=body,
         **MODELS[name]._asdict(),
     )
-
-
-def _known(name: str, table: Collection[str], what: str) -> None:
-    if name not in table:
-        raise InputError(f"this {what} is unknown", value=name, allowed=", ".join(table))

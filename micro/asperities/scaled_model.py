@@ -1,32 +1,35 @@
-"""The four discrete models with curvature at the scale of the contact and border asperities.
+"""The four asperity models with curvature at the scale of the contact and border asperities.
 
-The options repair what makes the paper's models 6 to 11 % low in force and 10 to 23 % low in area
-between 1 and 10 % of contact area. Against half-space solutions on 20 surfaces of Sets 1 and 2 the
-elliptic, interacting model with both is within 1 to 2.5 % in force (root mean square; 6 % at most)
-from 0.3 to 10 % of contact area, and within 7 % in area; with the fitted curvature alone it is
-3 to 7 % low in force, with the border's asperities alone 4 to 8 %.
+The paper's models are 6 to 11 % low in force and 10 to 23 % low in area between 1 and 10 % of
+contact area. The two options remove most of that. Against half-space solutions on 20 surfaces of
+Sets 1 and 2 the elliptic, interacting model with both is within 1 to 2.5 % in force (root mean
+square; 6 % at most) from 0.3 to 10 % of contact area, and within 7 % in area. Its force is
+3 to 7 % low without border asperities and 4 to 8 % low without fitted curvature.
+
+Theory: demos/theory.md, section 8.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geometry import Asperities, Control, Partition, PatchGrid, Surface
-from geometry.errors import InputError, NotConverged
+from geometry.errors import NotConverged
 from geometry.rigid_plane import RigidPlane
 from micro.asperities.contact_scale import ScaledAsperities
-from micro.asperities.model import MODELS, AsperityModel, Balanced, asperity_model
-from micro.asperities.state import AsperityState
-from micro.checks import checked_approaches, checked_means
-from micro.complementarity.contact_problem import Solution
+from micro.asperities.contacts import SOLVERS, AsperityState, checked_name
+from micro.asperities.model import MODELS, AsperityModel, Equilibrium, asperity_model
+from micro.closed_forms.hertz import checked_modulus
 from micro.compliance.body_modes import BodyModes
-from micro.relaxation import Relaxation
+from micro.interaction.contact_problem import Solution
+from micro.islands.equilibrium import Relaxation
+from micro.model import checked_approaches, checked_patches
+from micro.patch_sums import PatchSums
 from micro.response import Pressed, Response
 
 Array = NDArray[np.float64]
@@ -40,21 +43,13 @@ BORDERS = ("ignore", "include")
 _LEVEL = (0.0, 0.0)
 _TOLERANCE = 1e-9  # so that a load comes back on the way down as it was on the way up
 _ROUNDING = 64.0 * np.finfo(float).eps
-_MOST_PASSES = 100
-_MOST_KEPT = 2**20
-_MARGIN = 1.2
-_FURTHER = 1.1  # than the last plane, so that the next one need not be found twice
-
-
-class _Fitted(NamedTuple):
-    model: AsperityModel
-    plane: RigidPlane
-    solution: Solution
+_MARGIN = 1.2  # depth of the watersheds that are found, in units of the approach
+_FURTHER = 1.1  # margin beyond the plane that was found, so that the next one lies within
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ScaledModel:
-    """One of the four discrete models on the asperities of a surface, fitted to the load.
+    """One of the four asperity models on the asperities of a surface, fitted to the load.
 
     Args:
         kind: Name in `MODELS`.
@@ -63,10 +58,13 @@ class ScaledModel:
         curvature: A name in `CURVATURES`.
         border: A name in `BORDERS`. The radii of border asperities are always fitted.
         solver: Solver of the models with interaction.
-        pairs: How to sum over pairs.
         body: What a finite body adds to the half-space, as for `AsperityModel`.
-        within: Patches and the flat index of the one whose summits alone there are; all when not
-            given.
+        within: Patches, and the flat index of the one whose summits the model consists of; all
+            summits when not given.
+        most_cached: Largest number of cells of a surface whose watersheds are found once and
+            cached. Those of a larger surface are found again for every plane, only as deep as
+            needed.
+        most_iterations: Number of times that the curvatures may be fitted to the contacts.
 
     Raises:
         InputError: When a name is unknown or the modulus not positive.
@@ -78,19 +76,17 @@ class ScaledModel:
     curvature: str = "contact"
     border: str = "include"
     solver: str = "active-set"
-    pairs: str = "auto"
     body: BodyModes | None = None
     within: tuple[PatchGrid, int] | None = None
+    most_cached: int = 2**20
+    most_iterations: int = 100
 
     def __post_init__(self) -> None:
-        for what, value, table in (
-            ("micro model", self.kind, tuple(MODELS)),
-            ("scale of the curvature", self.curvature, CURVATURES),
-            ("treatment of the border", self.border, BORDERS),
-        ):
-            if value not in table:
-                raise InputError(f"this {what} is unknown", value=value, allowed=", ".join(table))
-        _ = self._model(self._nothing)  # checks the others
+        checked_name(self.kind, MODELS, "micro model")
+        checked_name(self.curvature, CURVATURES, "scale of the curvature")
+        checked_name(self.border, BORDERS, "treatment of the border")
+        checked_name(self.solver, SOLVERS, "solver")
+        checked_modulus(self.contact_modulus)
 
     @property
     def name(self) -> str:
@@ -134,98 +130,98 @@ class ScaledModel:
             start: A solution nearby to start from.
 
         Raises:
-            InputError: When the approach or the tilt is not finite.
-            NotConverged: When contacts and curvatures do not agree to 1e-9 of the largest required
-                displacement, or the contact conditions cannot be met.
+            InputError: When the approach or the tilt is not finite, or the interaction of all
+                contacts does not fit into the memory.
+            NotConverged: When contacts and curvatures do not agree to 1e-9 of the largest
+                interference, or the contact conditions cannot be met.
         """
         plane = RigidPlane.above(self.surface, approach, tilt)
-        scaled = self._scaled(_highest_approach([plane], self.surface))
-        given, own = Control(approach=approach, tilt=tilt), None
-        if start is not None:
-            own = start.indentation
-        fitted = self._fitted(scaled, given, plane, own=own)
-        return fitted.model.state(plane, fitted.solution)
+        scaled = self._scaled(self._highest_approach(plane))
+        own = None if start is None else start.indentation
+        given = Control(approach=approach, tilt=tilt)
+        model, found = self._fitted(scaled, given, plane, own=own)
+        return model.state(*found)
 
     def respond(
         self,
         approaches: ArrayLike,
         *,
-        patches: Partition,
-        mean_heights: ArrayLike,
+        patches: Partition | None = None,
+        mean_heights: ArrayLike | None = None,
         tilt: tuple[float, float] = _LEVEL,
     ) -> Response:
         """Solve along approaches, each from the solution before it; see `MicroModel.respond`."""
-        means = checked_means(mean_heights, patches)
+        sums = PatchSums(self, *checked_patches(self.surface, patches, mean_heights))
         planes = [
             RigidPlane.above(self.surface, approach, tilt)
             for approach in checked_approaches(approaches)
         ]
-        scaled = self._scaled(_highest_approach(planes, self.surface))
+        scaled = self._scaled(max(map(self._highest_approach, planes)))
+        owner = sums.patches.index_of(scaled.summits.x, scaled.summits.y)
         rows: dict[int, dict[str, Any]] = {}
         own: Array | None = None
         for index in np.argsort([plane.approach for plane in planes], kind="stable"):
             plane = planes[index]
             given = Control(approach=plane.approach, tilt=tilt)
-            fitted = self._fitted(scaled, given, plane, own=own)
-            own = fitted.solution.indentation
-            sums = fitted.model.sums(patches, means, home=scaled.summits)
-            rows[int(index)] = sums.row(plane, fitted.solution)
-        return sums.response(self.name, [rows[index] for index in range(len(planes))])
+            model, found = self._fitted(scaled, given, plane, own=own)
+            own = found.solution.indentation
+            rows[int(index)] = model.row(found, sums, owner)
+        return sums.response([rows[index] for index in range(len(planes))])
 
     def press(
         self,
         control: Control,
         *,
-        patches: Partition,
-        mean_heights: ArrayLike,
+        patches: Partition | None = None,
+        mean_heights: ArrayLike | None = None,
         start: Any = None,
     ) -> Pressed:
         """Solve one load step; see `MicroModel.press`."""
-        means = checked_means(mean_heights, patches)
-        reach = None
+        sums = PatchSums(self, *checked_patches(self.surface, patches, mean_heights))
+        depth: float | None = None
         while True:
-            scaled = self._scaled(reach or 0.0)
+            scaled = self._scaled(depth or 0.0)
             known = start is not None and len(start.solution.indentation) == len(scaled.summits)
             near = start if known else None
             plane = self._model(scaled.summits).first_plane(control, near)
-            # what a large surface keeps follows from the plane, which is not known before
-            before, reach = reach, _highest_approach([plane], self.surface)
-            if before is None and not self._is_kept:
+            # The plane determines how deep the watersheds of a large surface must be.
+            before, depth = depth, self._highest_approach(plane)
+            if before is None and not self._is_cached:
                 continue
-            fitted = self._fitted(scaled, control, plane, near)
-            reach = _highest_approach([fitted.plane], self.surface)
-            if self._is_kept or reach <= (before or 0.0):
+            model, found = self._fitted(scaled, control, plane, near)
+            depth = self._highest_approach(found.plane)
+            if self._is_cached or depth <= (before or 0.0):
                 break
-            reach *= _FURTHER
-        sums = fitted.model.sums(patches, means, home=scaled.summits)
-        response = sums.response(self.name, [sums.row(fitted.plane, fitted.solution)])
-        return Pressed(response, fitted.plane, Balanced(fitted.plane, fitted.solution))
+            depth *= _FURTHER
+        owner = sums.patches.index_of(scaled.summits.x, scaled.summits.y)
+        response = sums.response([model.row(found, sums, owner)])
+        return Pressed(response, found.plane, found)
 
     def _fitted(
         self,
         scaled: ScaledAsperities,
         control: Control,
         plane: RigidPlane,
-        near: Balanced | None = None,
+        near: Equilibrium | None = None,
         own: Array | None = None,
-    ) -> _Fitted:
+    ) -> tuple[AsperityModel, Equilibrium]:
         """Fit the curvatures to the contacts and solve for the contacts until both agree."""
-        required = np.maximum(scaled.summits.interference(plane), 0.0)
-        nothing = np.zeros_like(required)
-        found = near or Balanced(plane, Solution(nothing, nothing, 0, 0.0, 0))
+        interference = np.maximum(scaled.summits.interference(plane), 0.0)
+        nothing = np.zeros_like(interference)
+        found = near or Equilibrium(plane, Solution(nothing, nothing, 0, 0.0, 0))
         own = found.solution.indentation if own is None else own
-        own = own if own.any() else required
+        own = own if own.any() else interference
         rounding = _ROUNDING * float(np.abs(scaled.summits.z).max(initial=0.0))
         relaxed, spent = Relaxation(), 0
-        for _ in range(_MOST_PASSES):
+        for _ in range(self.most_iterations):
             model = self._model(scaled.at(own))
             found = model.equilibrium(control, found)
-            first = found.solution.indentation
             spent += max(found.solution.iterations, 1)
-            change = first - own
+            change = found.solution.indentation - own
             scale = float(scaled.summits.interference(found.plane).max(initial=0.0)) or 1.0
             if np.abs(change).max(initial=0.0) <= max(_TOLERANCE * scale, rounding):
-                return _Fitted(model, found.plane, found.solution._replace(iterations=spent))
+                solution = found.solution._replace(iterations=spent)
+                return model, Equilibrium(found.plane, solution)
             own = np.maximum(relaxed.next(own, change), 0.0)
         raise NotConverged(
             f"the fit of curvatures to contacts at an approach of {found.plane.approach:.4g} mm",
@@ -240,18 +236,18 @@ class ScaledModel:
             asperities,
             contact_modulus=self.contact_modulus,
             solver=self.solver,
-            pairs=self.pairs,
             body=self.body,
         )
 
     def _scaled(self, approach: float) -> ScaledAsperities:
-        if self._is_kept:
+        """Return the asperities with watersheds as deep as a plane at some approach needs."""
+        if self._is_cached:
             return self._whole
         return self._found(self.surface.highest - _MARGIN * max(approach, 0.0))
 
     @property
-    def _is_kept(self) -> bool:
-        return self.surface.heights.size <= _MOST_KEPT
+    def _is_cached(self) -> bool:
+        return self.surface.heights.size <= self.most_cached
 
     @cached_property
     def _whole(self) -> ScaledAsperities:
@@ -266,24 +262,7 @@ class ScaledModel:
         patches, index = self.within
         return found.subset(patches.index_of(found.summits.x, found.summits.y) == index)
 
-    @property
-    def _nothing(self) -> Asperities:
-        none: Array = np.empty(0)
-        return Asperities(
-            x=none,
-            y=none,
-            z=none,
-            radius_major=none,
-            radius_minor=none,
-            angle=none,
-            lengths=self.surface.lengths,
-            highest=0.0,
-            mean_height=0.0,
-        )
-
-
-def _highest_approach(planes: Sequence[RigidPlane], surface: Surface) -> float:
-    """Return the largest approach at the corners and on a few lines of the surface [mm]."""
-    x, y = (np.linspace(0.0, length, 9) for length in surface.lengths)
-    grid = np.meshgrid(x, y, indexing="ij")
-    return max((float(plane.at(*grid).max()) for plane in planes), default=0.0)
+    def _highest_approach(self, plane: RigidPlane) -> float:
+        """Return the largest approach over the surface, that of a corner [mm]."""
+        x, y = np.meshgrid(*[(0.0, length) for length in self.surface.lengths])
+        return float(plane.at(x, y).max())

@@ -10,24 +10,18 @@ import numpy as np
 
 from geometry import PatchGrid, Surface
 from micro.asperities.model import MODELS
-from micro.choice.expected_errors import contact_error, grid_error
-from micro.choice.measures import ContactMeasures
+from micro.choice.expected_errors import ContactMeasures, contact_error, grid_error
 from micro.factory import micro_model
 from micro.half_space.model import HalfSpaceModel
 from micro.model import MicroModel
 
 FACTORS = (0.25, 0.375, 0.5, 0.75, 1.0, 1.5, 2.0)
 """Cells of half-space grids along a side, relative to the surface's own."""
-
-_LEAST_CELLS = 8
-"""Cells along a patch that a grid needs at least."""
-
+_LEAST_CELLS, _FEWEST_CELLS = 8, 16
+"""Cells along a patch, and along a side, that a grid needs at least."""
 _MOST_CELLS = 2**22
 """Cells of the largest grid that is offered."""
-
-_SCALED = {"curvature": "contact", "border": "include"}
-_SCALED_LABEL = "elliptic with curvature at the contact's scale and border summits"
-
+_SCALED = "elliptic with curvature at the contact's scale and border summits"
 _COSTS = {
     "elliptic": (2e-3, 1.8e-7, 1e-3, 0.0),
     "circular": (2e-3, 1.8e-7, 1e-3, 0.0),
@@ -38,7 +32,6 @@ _COSTS = {
     "half-space": (0.0, 2e-7, 3e-3, 4e-7),
 }
 """Seconds to set up, and per cell; seconds per approach, and per cell: minima on one core."""
-
 
 Cost = Callable[[str, int], float]
 """Time of all solutions of a kind of model on so many cells [s]."""
@@ -102,14 +95,23 @@ def options(
     """
     seconds = cost or partial(_cost, solutions=solutions)
     parts = patches.grid if patches else (1, 1)
+    named = partial(micro_model, surface=surface, contact_modulus=contact_modulus)
+    by_contacts: list[tuple[str, str, Callable[[], MicroModel]]] = []
     if not periodic:
-        for kind, label, made in _by_contacts(surface, contact_modulus, parts):
-            error = max(contact_error(kind, at) for at in measures)
-            spent = seconds(kind, surface.heights.size)
-            yield Option(
-                candidate=Candidate(label=label, expected_error=error, cost=spent), make=made
-            )
-    for factor, cells in _grids(surface, parts):
+        scaled = partial(named, "elliptic", curvature="contact", border="include")
+        by_contacts = [(kind, kind, partial(named, kind)) for kind in MODELS]
+        by_contacts.append(("scaled", _SCALED, scaled))
+        if _fits(surface.grid, parts):
+            by_contacts.append(("islands", "islands", partial(named, "islands")))
+    for kind, label, make in by_contacts:
+        error = max(contact_error(kind, at) for at in measures)
+        spent = seconds(kind, surface.heights.size)
+        yield Option(candidate=Candidate(label=label, expected_error=error, cost=spent), make=make)
+    for factor in FACTORS:
+        cells = grid_of(surface, factor)
+        small = cells[0] * cells[1] <= _MOST_CELLS
+        if factor != 1.0 and not (small and (factor > 1.0 or _fits(cells, parts))):
+            continue
         yield Option(
             candidate=Candidate(
                 label=f"half-space on {cells[0]} × {cells[1]} cells",
@@ -121,12 +123,17 @@ def options(
         )
 
 
+def grid_of(surface: Surface, factor: float) -> tuple[int, int]:
+    """Return the cells of a grid so many times as fine as a surface's own."""
+    return round(factor * surface.grid[0]), round(factor * surface.grid[1])
+
+
 def half_space(
     surface: Surface, cells: tuple[int, int], contact_modulus: float, periodic: bool
 ) -> HalfSpaceModel:
     """Return the half-space model on a grid, its approach counted from the surface's summit."""
     return HalfSpaceModel(
-        surface=resampled(surface, cells),
+        resampled(surface, cells),
         contact_modulus=contact_modulus,
         periodic=periodic,
         highest=surface.highest,
@@ -152,30 +159,10 @@ def resampled(surface: Surface, grid: tuple[int, int]) -> Surface:
     return replace(surface, heights=surface.height_at(*points))
 
 
-def _by_contacts(
-    surface: Surface, modulus: float, parts: tuple[int, int]
-) -> Iterator[tuple[str, str, Callable[[], MicroModel]]]:
-    named = partial(micro_model, surface=surface, contact_modulus=modulus)
-    for kind in MODELS:
-        yield kind, kind, partial(named, kind)
-    yield "scaled", _SCALED_LABEL, partial(named, "elliptic", **_SCALED)
-    if _fits(surface.grid, parts):
-        yield "islands", "islands", partial(named, "islands")
-
-
-def _grids(surface: Surface, parts: tuple[int, int]) -> Iterator[tuple[float, tuple[int, int]]]:
-    """Yield the grids that hold the patches and are not too large, the surface's own always."""
-    for factor in FACTORS:
-        cells = round(factor * surface.grid[0]), round(factor * surface.grid[1])
-        fits = factor >= 1.0 or _fits(cells, parts)
-        if factor == 1.0 or (fits and cells[0] * cells[1] <= _MOST_CELLS):
-            yield factor, cells
-
-
 def _cost(kind: str, cells: int, solutions: int) -> float:
     set_up, per_cell, each, each_per_cell = _COSTS[kind]
     return set_up + per_cell * cells + solutions * (each + each_per_cell * cells)
 
 
 def _fits(cells: tuple[int, int], parts: tuple[int, int]) -> bool:
-    return all(n >= max(_LEAST_CELLS * m, 16) for n, m in zip(cells, parts, strict=True))
+    return all(n >= max(_LEAST_CELLS * m, _FEWEST_CELLS) for n, m in zip(cells, parts, strict=True))

@@ -18,11 +18,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from geometry import PatchGrid, Surface
-from geometry.errors import InputError
-from micro.choice.candidates import Candidate, Cost, Option, options
-from micro.choice.check import Check
-from micro.choice.measures import contact_measures
+from geometry.errors import InputError, NotConverged
+from micro.choice.candidates import Candidate, Cost, Option, grid_of, half_space, options
+from micro.choice.expected_errors import ContactMeasures, contact_measures, grid_error
 from micro.model import MicroModel
+
+_FINER = (1.0, 1.5, 2.0, 3.0)
+"""Grids that checks are made against, relative to the surface's own."""
+_SURER = 3.0
+"""How many times smaller than the tolerance the expected error of a check should be."""
+_MOST_CHECKED = 2**21
+"""Cells of the largest grid, finer than the surface's own, that a check is made on."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -62,10 +68,11 @@ def choose(
     """Choose a micro model of a surface.
 
     Errors are promised for the largest approach and half of it. The check is made at half, where
-    contacts are smallest, against the half-space model on the surface's own grid, or on a finer
-    one where that is not expected to be three times as good as the tolerance or is the candidate
-    itself. When nothing promises and keeps the tolerance, the model with the least expected error
-    is taken. Periodic surfaces get half-space models, with the bounds found for free borders.
+    contacts are smallest, against the half-space model on the surface's own grid. It is made on a
+    finer grid where the own one is not expected to be three times as good as the tolerance, or is
+    the candidate itself. When nothing promises and keeps the tolerance, the model with the least
+    expected error is taken. Periodic surfaces get half-space models, with the bounds found for free
+    borders.
 
     Args:
         surface: The surface.
@@ -83,18 +90,21 @@ def choose(
         InputError: When approach, tolerance or number of solutions is out of range, or a surface
             that is not periodic shall be, or no candidate has the label.
     """
-    _refuse(surface, approach, tolerance, solutions, periodic)
-    check = Check(
-        surface,
-        contact_modulus=contact_modulus,
-        approach=0.5 * approach,
-        tolerance=tolerance,
-        periodic=periodic,
+    for what, value, good, allowed in (
+        ("largest approach", approach, np.isfinite(approach) and approach > 0.0, "mm, > 0"),
+        ("tolerance", tolerance, 0.0 < tolerance < 0.5, "0 to 0.5"),
+        ("number of solutions", solutions, solutions >= 1, "≥ 1"),
+        ("surface to continue", surface.source, surface.periodic or not periodic, "periodic"),
+    ):
+        if not good:
+            raise InputError(f"the {what} is out of range", value=value, allowed=allowed)
+    half, whole = (
+        contact_measures(surface, at, periodic=periodic) for at in (0.5 * approach, approach)
     )
     found = list(
         options(
             surface,
-            [check.measures, contact_measures(surface, approach, periodic=periodic)],
+            [half, whole],
             contact_modulus=contact_modulus,
             solutions=solutions,
             patches=patches,
@@ -107,76 +117,115 @@ def choose(
         found = [option for option in found if option.candidate.label == label]
         if not found:
             raise InputError("is no micro model here", value=label, allowed=", ".join(labels))
-    return _Search(sorted(found, key=lambda o: o.candidate.cost), tolerance, check).choice()
+    found.sort(key=lambda option: option.candidate.cost)
+    check = _Check(surface, contact_modulus, periodic, 0.5 * approach, tolerance, half)
+    return _first_good(found, tolerance, check)
 
 
-def _refuse(
-    surface: Surface, approach: float, tolerance: float, solutions: int, periodic: bool
-) -> None:
-    for what, value, good, allowed in (
-        ("largest approach", approach, np.isfinite(approach) and approach > 0.0, "mm, > 0"),
-        ("tolerance", tolerance, 0.0 < tolerance < 0.5, "0 to 0.5"),
-        ("number of solutions", solutions, solutions >= 1, "≥ 1"),
-        ("surface to continue", surface.source, surface.periodic or not periodic, "periodic"),
-    ):
-        if not good:
-            raise InputError(f"the {what} is out of range", value=value, allowed=allowed)
+def _first_good(found: list[Option], tolerance: float, check: _Check) -> Choice:
+    """Return the first that keeps the tolerance, or the one with the least expected error."""
+    candidates, failed = [option.candidate for option in found], list[str]()
+    left = list(range(len(found)))
 
-
-class _Search:
-    """Goes through the candidates, the cheapest first."""
-
-    def __init__(self, found: list[Option], tolerance: float, check: Check) -> None:
-        self._options, self._tolerance, self._check = found, tolerance, check
-        self._candidates = [option.candidate for option in found]
-        self._failed: list[str] = []
-
-    def choice(self) -> Choice:
-        """Return the first that keeps the tolerance, or the one with the least expected error."""
-        left = dict(enumerate(self._candidates))
-        for k, candidate in enumerate(self._candidates):
-            if candidate.expected_error > self._tolerance:
-                continue
-            model, against = self._made(k)
-            error = self._candidates[k].checked_error
-            if error is None or error <= self._tolerance:
-                return self._chosen(k, model, against, "the cheapest that promises")
-            said = "has no solution" if np.isinf(error) else f"differs by {100 * error:.2g} %"
-            self._failed.append(f"{candidate.label} {said} when checked")
-            del left[k]
-        best = min(left or dict(enumerate(self._candidates)), key=self._expected)
-        why = "the least expected error, for none promises"
-        if self._failed:
-            why = "the least expected error of the rest, for none that was checked keeps"
-        return self._chosen(best, *self._made(best), why)
-
-    def _expected(self, k: int) -> float:
-        return self._candidates[k].expected_error
-
-    def _made(self, k: int) -> tuple[MicroModel, str]:
-        model = self._options[k].make()
-        error, against = self._check.difference(self._options[k], model)
-        self._candidates[k] = replace(self._candidates[k], checked_error=error)
+    def made(k: int) -> tuple[MicroModel, str]:
+        model = found[k].make()
+        error, against = check.difference(found[k], model)
+        candidates[k] = replace(candidates[k], checked_error=error)
         return model, against
 
-    def _chosen(self, k: int, model: MicroModel, against: str, why: str) -> Choice:
-        taken = self._candidates[k]
-        checked = "not checked, for a finer grid would be too large, at half the largest approach"
-        if taken.checked_error is not None:
-            checked = (
-                f"{100 * taken.checked_error:.2g} % from {against} at half the largest approach"
-            )
-        at = self._check.measures
-        sentence = (
-            f"{taken.label}: {why} the tolerance of {100 * self._tolerance:.3g} %; expected error "
-            f"of the force {100 * taken.expected_error:.2g} %, {checked}, where contacts cover "
-            f"about {at.contact_fraction:.2g} of the surface in {at.regions or 'no'} "
-            f"region{'s' * (at.regions != 1)} above the plane, with {at.cells_per_radius:.2g} of "
-            f"its cells per radius; predicted {taken.cost:.2g} s for all solutions"
-        )
-        return Choice(
-            model=model,
-            taken=taken,
-            candidates=tuple(self._candidates),
-            sentence="; ".join([sentence, *self._failed]),
-        )
+    why = "the cheapest that promises"
+    for k, candidate in enumerate(candidates):
+        if candidate.expected_error > tolerance:
+            continue
+        model, against = made(k)
+        error = candidates[k].checked_error
+        if error is None or error <= tolerance:
+            break
+        said = "has no solution" if np.isinf(error) else f"differs by {100 * error:.2g} %"
+        failed.append(f"{candidate.label} {said} when checked")
+        left.remove(k)
+    else:
+        k = min(left or range(len(found)), key=lambda k: candidates[k].expected_error)
+        model, against = made(k)
+        why = "the least expected error, for none promises"
+        if failed:
+            why = "the least expected error of the rest, for none that was checked keeps"
+    reasons = [_sentence(candidates[k], check, against, why, tolerance), *failed]
+    return Choice(
+        model=model,
+        taken=candidates[k],
+        candidates=tuple(candidates),
+        sentence="; ".join(reasons),
+    )
+
+
+def _sentence(taken: Candidate, check: _Check, against: str, why: str, tolerance: float) -> str:
+    checked = "not checked, for a finer grid would be too large, at half the largest approach"
+    if taken.checked_error is not None:
+        checked = f"{100 * taken.checked_error:.2g} % from {against} at half the largest approach"
+    at = check.measures
+    return (
+        f"{taken.label}: {why} the tolerance of {100 * tolerance:.3g} %; expected error "
+        f"of the force {100 * taken.expected_error:.2g} %, {checked}, where contacts cover "
+        f"about {at.contact_fraction:.2g} of the surface in {at.regions or 'no'} "
+        f"region{'s' * (at.regions != 1)} above the plane, with {at.cells_per_radius:.2g} of "
+        f"its cells per radius; predicted {taken.cost:.2g} s for all solutions"
+    )
+
+
+class _Check:
+    """Compares forces at one load with those of half-space models on grids of the surface.
+
+    Args:
+        surface: The surface.
+        modulus: E* [MPa].
+        periodic: Whether surface and pressures continue periodically.
+        approach: Approach of the plane [mm].
+        tolerance: Relative error that models shall keep.
+        measures: Contacts at this load.
+    """
+
+    def __init__(
+        self,
+        surface: Surface,
+        modulus: float,
+        periodic: bool,
+        approach: float,
+        tolerance: float,
+        measures: ContactMeasures,
+    ) -> None:
+        self._surface, self._modulus, self._periodic = surface, modulus, periodic
+        self._approach, self.measures = approach, measures
+        good = [grid_error(measures, factor) <= tolerance / _SURER for factor in _FINER]
+        least = good.index(True) if any(good) else len(good) - 1
+        self._grids = [grid_of(surface, factor) for factor in _FINER]
+        self._fine_enough = self._grids[least:]
+        self._forces: dict[tuple[int, int], float] = {}
+
+    def difference(self, option: Option, model: MicroModel) -> tuple[float | None, str]:
+        """Return the relative difference of a model's force, and what it differs from."""
+        cells = self._grid(option.cells)
+        if cells is None:
+            return None, ""
+        if cells not in self._forces:
+            fine = half_space(self._surface, cells, self._modulus, self._periodic)
+            self._forces[cells] = self._force(fine)
+        truth = self._forces[cells]
+        try:
+            force = self._force(model)
+        except NotConverged:
+            force = np.inf
+        error = abs(force / truth - 1.0) if truth else float(force > 0.0)
+        return float(error), f"the half-space solution on {cells[0]} × {cells[1]} cells"
+
+    def _grid(self, taken: tuple[int, int] | None) -> tuple[int, int] | None:
+        """Return the coarsest grid that is fine enough, finer than the one taken, if any."""
+        finer = [g for g in self._grids if taken is None or min(g) > min(taken)]
+        able = [g for g in finer if g == self._surface.grid or np.prod(g) <= _MOST_CHECKED]
+        enough = [g for g in able if g in self._fine_enough]
+        return enough[0] if enough else able[-1] if able else None
+
+    def _force(self, model: MicroModel) -> float:
+        whole = PatchGrid(grid=(1, 1), lengths=self._surface.lengths)
+        response = model.respond([self._approach], patches=whole, mean_heights=[0.0])
+        return float(response.force[0])

@@ -7,11 +7,11 @@ With V the integral of p/r and χ that of p ln(r + z) over the loaded area, z th
 and the stresses follow from second derivatives of both (Love 1929). For rectangles every term is
 a second difference over the four corners of a function in closed form. Loads that form a grid
 share their corners: each is evaluated once for all loads around it.
+
+Theory: demos/theory.md, section 4.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -47,14 +47,14 @@ class HalfSpace(Material):
         Returns:
             Displacements along x, y and into the depth, shape (3, n, M) [mm/MPa].
         """
-        corner = _Corners.of(x, y, depth, loads)
-        nu, z = self.poisson_ratio, corner.z
-        side = 1.0 - 2.0 * nu
-        parts = (
-            -side * corner.chi_x - z * corner.v_x,
-            -side * corner.chi_y - z * corner.v_y,
-            2.0 * (1.0 - nu) * corner.v - z * corner.v_z,
-        )
+        dx, dy, z, r = _corners(x, y, depth, loads)
+        nu, side = self.poisson_ratio, 1.0 - 2.0 * self.poisson_ratio
+        v_x, v_y, v_z = _gradient(dx, dy, z, r)
+        log = np.log(np.maximum(r + z, _TINY))
+        chi_x = dy * log + z * v_x + dx * _angle(dx, dy, z, r)
+        chi_y = dx * log + z * v_y + dy * _angle(dy, dx, z, r)
+        v = dx * v_x + dy * v_y + z * v_z
+        parts = -side * chi_x - z * v_x, -side * chi_y - z * v_y, 2.0 * (1.0 - nu) * v - z * v_z
         return _differences(parts, loads, 4.0 * np.pi * self.shear_modulus)
 
     def stresses(self, x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: Partition) -> Array:
@@ -69,112 +69,59 @@ class HalfSpace(Material):
         Returns:
             σ_xx, σ_yy, σ_zz, σ_yz, σ_xz, σ_xy with z into the depth, shape (6, n, M) [-].
         """
-        corner = _Corners.of(x, y, depth, loads)
-        nu, z = self.poisson_ratio, corner.z
-        side = 1.0 - 2.0 * nu
-        v_z, v_xx, v_yy = corner.v_z, corner.v_xx, corner.v_yy
+        dx, dy, z, r = _corners(x, y, depth, loads)
+        nu, side = self.poisson_ratio, 1.0 - 2.0 * self.poisson_ratio
+        _, _, v_z = _gradient(dx, dy, z, r)
+        x_part = _over(r - dy, r * (dx**2 + z**2))
+        y_part = _over(r - dx, r * (dy**2 + z**2))
+        v_xx, v_yy, v_xy = dx * x_part, dy * y_part, _over(1.0, r)
+        chi_xy = np.log(np.maximum(r + z, _TINY))
         parts = (
-            2.0 * nu * v_z - side * corner.chi_xx - z * v_xx,
-            2.0 * nu * v_z - side * corner.chi_yy - z * v_yy,
+            2.0 * nu * v_z - side * _angle(dx, dy, z, r) - z * v_xx,
+            2.0 * nu * v_z - side * _angle(dy, dx, z, r) - z * v_yy,
             v_z + z * (v_xx + v_yy),  # V is harmonic
-            -z * corner.v_yz,
-            -z * corner.v_xz,
-            -side * corner.chi_xy - z * corner.v_xy,
+            -z * z * y_part,
+            -z * z * x_part,
+            -side * chi_xy - z * v_xy,
         )
         return _differences(parts, loads, 2.0 * np.pi)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Corners:
-    """Corner terms of V and χ and of their derivatives for every point and corner.
+def _corners(
+    x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: Partition
+) -> tuple[Array, Array, Array, Array]:
+    """Measure from the crossings of the loads' borders to points.
 
-    What does not depend on dx or not on dy is left out: it cancels from the second difference.
+    Terms of V and χ that do not depend on dx or not on dy may be left out at the corners: they
+    cancel from the second difference.
 
-    Args:
-        dx: Distances along x from the corners to the points, shape (n, Nx + 1, Ny + 1) [mm].
-        dy: Distances along y, of the same shape [mm].
-        z: Depths, shape (n, 1, 1) [mm].
-        r: Distances, shape (n, Nx + 1, Ny + 1) [mm].
+    Returns:
+        Distances dx and dy along x and y, depths z, shape (n, 1, 1), and distances r, all others of
+        shape (n, Nx + 1, Ny + 1) [mm].
     """
+    z = np.asarray(depth, float)[:, None, None]
+    if np.any(z < 0.0):
+        raise InputError("depths are not negative", value=float(z.min()), allowed="≥ 0 mm")
+    dx, dy = np.broadcast_arrays(
+        np.asarray(x, float)[:, None, None] - loads.borders_x[:, None],
+        np.asarray(y, float)[:, None, None] - loads.borders_y,
+    )
+    return dx, dy, z, np.sqrt(dx * dx + dy * dy + z * z)
 
-    dx: Array
-    dy: Array
-    z: Array
-    r: Array
 
-    @classmethod
-    def of(cls, x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: Partition) -> _Corners:
-        """Measure from the crossings of the loads' borders to points."""
-        z = np.asarray(depth, float)[:, None, None]
-        if np.any(z < 0.0):
-            raise InputError("depths are not negative", value=float(z.min()), allowed="≥ 0 mm")
-        dx, dy = np.broadcast_arrays(
-            np.asarray(x, float)[:, None, None] - loads.borders_x[:, None],
-            np.asarray(y, float)[:, None, None] - loads.borders_y,
-        )
-        return cls(dx, dy, z, np.sqrt(dx * dx + dy * dy + z * z))
+def _gradient(dx: Array, dy: Array, z: Array, r: Array) -> tuple[Array, Array, Array]:
+    """Return ∂V/∂x, ∂V/∂y and ∂V/∂z at the corners."""
+    return (
+        np.arcsinh(dy / np.maximum(np.hypot(dx, z), _TINY)),
+        np.arcsinh(dx / np.maximum(np.hypot(dy, z), _TINY)),
+        -np.arctan2(dx * dy, z * r),
+    )
 
-    @property
-    def v(self) -> Array:
-        return self.dx * self.v_x + self.dy * self.v_y + self.z * self.v_z
 
-    @property
-    def v_x(self) -> Array:
-        return _asinh_ratio(self.dy, np.hypot(self.dx, self.z))
-
-    @property
-    def v_y(self) -> Array:
-        return _asinh_ratio(self.dx, np.hypot(self.dy, self.z))
-
-    @property
-    def v_z(self) -> Array:
-        return -np.arctan2(self.dx * self.dy, self.z * self.r)
-
-    @property
-    def v_xx(self) -> Array:
-        return _over(self.dx * (self.r - self.dy), self.r * (self.dx**2 + self.z**2))
-
-    @property
-    def v_yy(self) -> Array:
-        return _over(self.dy * (self.r - self.dx), self.r * (self.dy**2 + self.z**2))
-
-    @property
-    def v_xy(self) -> Array:
-        return _over(1.0, self.r)
-
-    @property
-    def v_xz(self) -> Array:
-        return _over(self.z * (self.r - self.dy), self.r * (self.dx**2 + self.z**2))
-
-    @property
-    def v_yz(self) -> Array:
-        return _over(self.z * (self.r - self.dx), self.r * (self.dy**2 + self.z**2))
-
-    @property
-    def chi_x(self) -> Array:
-        return self.dy * self._log + self.z * self.v_x + self.dx * self.chi_xx
-
-    @property
-    def chi_y(self) -> Array:
-        return self.dx * self._log + self.z * self.v_y + self.dy * self.chi_yy
-
-    @property
-    def chi_xx(self) -> Array:
-        dx, dy, z, r = self.dx, self.dy, self.z, self.r
-        return np.arctan2(dx * dy * (r - z), dx * dx * r + dy * dy * z)
-
-    @property
-    def chi_yy(self) -> Array:
-        dx, dy, z, r = self.dx, self.dy, self.z, self.r
-        return np.arctan2(dx * dy * (r - z), dy * dy * r + dx * dx * z)
-
-    @property
-    def chi_xy(self) -> Array:
-        return self._log
-
-    @property
-    def _log(self) -> Array:
-        return np.log(np.maximum(self.r + self.z, _TINY))
+def _angle(along: Array, across: Array, z: Array, r: Array) -> Array:
+    """Return the second derivative of χ in one direction at the corners."""
+    both = along * across * (r - z)
+    return np.asarray(np.arctan2(both, along * along * r + across * across * z))
 
 
 def _differences(parts: tuple[Array, ...], loads: Partition, divisor: float) -> Array:
@@ -186,10 +133,6 @@ def _differences(parts: tuple[Array, ...], loads: Partition, divisor: float) -> 
     rectangles: Array = np.diff(np.diff(corners, axis=2), axis=3)
     rectangles /= divisor
     return rectangles.reshape(*corners.shape[:2], loads.count)
-
-
-def _asinh_ratio(numerator: Array, denominator: Array) -> Array:
-    return np.arcsinh(numerator / np.maximum(denominator, _TINY))
 
 
 def _over(numerator: ArrayLike, denominator: Array) -> Array:

@@ -1,4 +1,7 @@
-"""Shape of an elliptic Hertz contact: axis ratio from the radii and the factors F1, A1."""
+"""Shape of an elliptic Hertz contact: axis ratio from the radii and the factors F1, A1.
+
+Theory: demos/theory.md, section 8.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Hertz contact of one asperity with a rigid plane: force, area, pressure and displacement."""
+"""Hertz contact of one asperity with a rigid plane: force, area, pressure and displacement.
+
+Theory: demos/theory.md, section 8.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,12 @@
-"""Displacement by a uniform pressure on a rectangle of the half-space (Love 1929).
+"""Displacements of the half-space by uniform pressures on rectangles (Love 1929).
 
 Pressure p on a rectangle with half-sides a, b moves the surface point (x, y) by L p/(π E*), where
-L(x, y) is the integral of 1/distance over the rectangle [mm].
+L(x, y) is the integral of 1/distance over the rectangle [mm]. Pressure on rectangle j displaces
+rectangle i by Λ_ij p/(π E*) in the mean, where Λ_ij is the mean of L over rectangle i. Near by it
+is a closed form, second differences of the fourfold antiderivative of 1/ρ. These cancel far away,
+where Gauss' rule takes their place.
+
+Theory: demos/theory.md, section 4.
 """
 
 from __future__ import annotations
@@ -9,11 +14,19 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
+from numpy.polynomial import legendre
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import toeplitz
 
 from geometry.errors import InputError
+from geometry.patches import Partition, PatchGrid
 
 Array = NDArray[np.float64]
+
+_FAR = 6.0
+"""Distance over the longer side from which on Gauss' rule is the better of the two."""
+_POINTS = 6
+"""Points of Gauss' rule on a side; at the distance `_FAR` their error is rounding."""
 
 
 def love_integral(x: ArrayLike, y: ArrayLike, a: ArrayLike, b: ArrayLike) -> Array:
@@ -72,7 +85,7 @@ def love_mutual(dx: ArrayLike, dy: ArrayLike, a: ArrayLike, b: ArrayLike) -> Arr
 
     It is the second difference, in x and in y, of the fourfold antiderivative of 1/ρ,
     ½ u² v asinh(v/u) + ½ u v² asinh(u/v) − ρ³/6. Rounding grows as 1e-16 (distance/side)⁴;
-    `micro.closed_forms.influence` goes on from there.
+    `mutual_influence` goes on from there.
 
     Args:
         dx: Distance of the centres along x [mm]; all arguments broadcast.
@@ -88,6 +101,74 @@ def love_mutual(dx: ArrayLike, dy: ArrayLike, a: ArrayLike, b: ArrayLike) -> Arr
     for (i, p), (j, q) in product(((-1, 1.0), (0, -2.0), (1, 1.0)), repeat=2):
         total += p * q * fourfold_integral(dx + 2 * i * a, dy + 2 * j * b)
     return total / (4.0 * a * b)
+
+
+def influence_matrix(patches: Partition) -> Array:
+    """Return the mean displacements Λ_ij of all patches by pressure on each, shape (N, N) [mm].
+
+    Pressures p displace the patches by Λ p / (π E*). For equal patches symmetric and exact to 1e-12
+    if they are squares, to 2e-11 for sides of 5 to 1 and to 1e-10 for 10 to 1. Of unequal ones
+    A_i Λ_ij is symmetric; entries lose 1e-16 (distance / shortest side)⁴ to rounding.
+
+    Args:
+        patches: The N patches.
+
+    Source:
+        Love 1929, doi 10.1098/rsta.1929.0009; Waddad et al. 2016, eq. 29-30 for one point.
+    """
+    if not isinstance(patches, PatchGrid):
+        return _unequal(patches)
+    (nx, ny), (sx, sy), (a, b) = patches.grid, patches.size, patches.half_sizes
+    table = mutual_influence(np.arange(nx)[:, None] * sx, np.arange(ny) * sy, a, b)
+    steps_x = toeplitz(np.arange(nx))
+    steps_y = toeplitz(np.arange(ny))
+    whole = table[steps_x[:, None, :, None], steps_y[None, :, None, :]]
+    return np.asarray(whole.reshape(patches.count, patches.count))
+
+
+def _unequal(patches: Partition) -> Array:
+    """Difference the fourfold antiderivative over the borders of both rectangles."""
+    x, y = patches.borders_x, patches.borders_y
+    table = fourfold_integral(
+        np.subtract.outer(x, x)[:, :, None, None], np.subtract.outer(y, y)[None, None]
+    )
+    for axis in range(4):
+        table = np.diff(table, axis=axis)
+    whole = table.transpose(0, 2, 1, 3).reshape(patches.count, patches.count)
+    return np.asarray(whole / patches.areas[:, None])
+
+
+def mutual_influence(dx: ArrayLike, dy: ArrayLike, a: float, b: float) -> Array:
+    """Return the mean of L over an equal rectangle (dx, dy) away, at any distance [mm].
+
+    Args:
+        dx: Distance of the centres along x [mm]; broadcast against ``dy``.
+        dy: Distance along y [mm].
+        a: Half-side along x [mm].
+        b: Half-side along y [mm].
+
+    Raises:
+        InputError: When a half-side is not positive.
+    """
+    dx, dy = np.broadcast_arrays(np.asarray(dx, float), np.asarray(dy, float))
+    result = np.asarray(love_mutual(dx, dy, a, b))
+    far = np.hypot(dx, dy) > _FAR * 2.0 * max(a, b)
+    result[far] = _far_influence(dx[far], dy[far], a, b)
+    return result
+
+
+def _far_influence(dx: Array, dy: Array, a: float, b: float) -> Array:
+    """Return the mean from Gauss' rule over the shifts between points of the two rectangles.
+
+    The shifts along x have the density 1 − |t| at 2 a t, those along y at 2 b t.
+    """
+    nodes, weights = legendre.leggauss(_POINTS)
+    t, weights = 0.5 * (1.0 + nodes), 0.25 * weights * (1.0 - nodes)
+    t, weights = np.concatenate([-t, t]), np.concatenate([weights, weights])
+    total = np.zeros(np.shape(dx))
+    for (s, one), (u, other) in product(zip(t, weights, strict=True), repeat=2):
+        total += one * other / np.hypot(dx + 2.0 * a * s, dy + 2.0 * b * u)
+    return 4.0 * a * b * total
 
 
 def corner_integral(u: ArrayLike, v: ArrayLike) -> Array:

@@ -1,8 +1,10 @@
-"""What a finite body adds to the half-space: a smooth compliance in few modes of its top.
+"""What a finite body adds to the half-space: smooth displacements and stresses, in modes.
 
-Pressures p have the moments b_n = ∫ p φ_n dA with the modes φ_n, and displace by Σ φ_m D_mn b_n.
-Modes are products of Legendre modes along x and y (`geometry.legendre_modes`): all evaluations are
-thin products along the axes.
+Pressures p have the moments b_n = ∫ p φ_n dA with the modes φ_n. They displace by Σ φ_m D_mn b_n,
+and add the stresses Σ φ_m S_mn b_n in the surface. Modes are products of Legendre modes along x and
+y (`geometry.legendre_modes`), so that all evaluations are thin products along the axes.
+
+Theory: demos/theory.md, section 6.
 """
 
 from __future__ import annotations
@@ -42,18 +44,16 @@ class BodyModes:
     def __post_init__(self) -> None:
         matrix = np.asarray(self.matrix, float)
         object.__setattr__(self, "matrix", matrix)
+        shape, largest = matrix.shape, np.abs(matrix).max(initial=0.0)
         if not (np.all(np.isfinite(self.lengths)) and min(self.lengths) > 0.0):
             raise InputError("lengths must be positive", value=self.lengths, allowed="> 0 mm")
-        if matrix.ndim != 2 or not len(matrix) or matrix.shape != 2 * (self.count**2,):
-            raise InputError(
-                "the compliance is not one of K × K modes",
-                value=matrix.shape,
-                allowed="(K², K²), K ≥ 1",
-            )
-        if not np.all(np.isfinite(matrix)):
+        if matrix.ndim != 2 or not len(matrix) or shape != 2 * (self.count**2,):
+            problem = "the compliance is not one of K × K modes"
+            raise InputError(problem, value=shape, allowed="(K², K²), K ≥ 1")
+        if not np.isfinite(largest):
             raise InputError("the compliance is not finite", value=matrix[0, 0], allowed="numbers")
         apart = float(np.abs(matrix - matrix.T).max())
-        if apart > 1e-9 * np.abs(matrix).max():
+        if apart > 1e-9 * largest:
             raise InputError("the compliance is not symmetric", value=apart, allowed="D = Dᵀ")
 
     @property
@@ -61,21 +61,22 @@ class BodyModes:
         """Modes K along a side."""
         return int(np.sqrt(len(self.matrix)) + 0.5)
 
-    def on(self, borders_x: ArrayLike, borders_y: ArrayLike) -> ModesOnCells:
+    def on(
+        self, borders_x: ArrayLike, borders_y: ArrayLike, *, modulus: float = 1.0
+    ) -> ModesOnCells:
         """Return the compliance of cells of pressure, by means over the cells.
 
         Args:
             borders_x: Borders of the cells along x, ascending within the top, (nx + 1,) [mm].
             borders_y: Borders along y, shape (ny + 1,) [mm].
+            modulus: Unit of the pressures [MPa].
         """
         x, y = self._placed(borders_x, borders_y)
-        return ModesOnCells(
-            self.matrix,
-            mode_means(x, self.lengths[0], self.count),
-            mode_means(y, self.lengths[1], self.count),
-            np.diff(x),
-            np.diff(y),
+        means_x, means_y = (
+            mode_means(at, length, self.count)
+            for at, length in zip((x, y), self.lengths, strict=True)
         )
+        return ModesOnCells(self.matrix, means_x, means_y, modulus * np.diff(x), np.diff(y))
 
     def between(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Return displacements of points by unit forces at points, shape (n, n) [mm/N].
@@ -102,15 +103,14 @@ class BodyModes:
         return np.asarray(modes.T @ self.matrix @ modes * patches.areas)
 
     def fewer(self, count: int) -> BodyModes:
-        """Return the first modes alone; what they lack tells how well K modes resolve the face.
+        """Return the compliance of the first modes alone, which shows how well K modes resolve it.
 
         Args:
             count: Modes along a side, at most K.
         """
         if not 1 <= count <= self.count:
-            raise InputError(
-                "so many modes are not there", value=count, allowed=f"1 … {self.count}"
-            )
+            allowed = f"1 … {self.count}"
+            raise InputError("so many modes are not there", value=count, allowed=allowed)
         some = self.matrix.reshape(4 * (self.count,))[:count, :count, :count, :count]
         return BodyModes(self.lengths, some.reshape(count**2, count**2), self.origin)
 
@@ -129,7 +129,7 @@ class ModesOnCells:
         matrix: D [mm/N].
         means_x: Means of the modes along x over the cells, shape (K, nx).
         means_y: Means along y, shape (K, ny).
-        widths_x: Widths of the cells along x, shape (nx,) [mm].
+        widths_x: Widths of the cells along x, times the unit of the pressures, shape (nx,) [N/mm].
         widths_y: Widths along y, shape (ny,) [mm].
     """
 
@@ -143,7 +143,7 @@ class ModesOnCells:
         """Return the displacements of all cells by pressures on them.
 
         Args:
-            pressure: Shape (nx, ny) [MPa].
+            pressure: In the unit chosen, shape (nx, ny).
 
         Returns:
             Shape (nx, ny) [mm].
@@ -159,10 +159,64 @@ class ModesOnCells:
             rows: Indices of the rows, shape (r,).
             columns: Indices of the columns, shape (c,).
         """
-        return ModesOnCells(
-            self.matrix,
-            self.means_x[:, rows],
-            self.means_y[:, columns],
-            self.widths_x[rows],
-            self.widths_y[columns],
+        x, y = self.means_x[:, rows], self.means_y[:, columns]
+        return ModesOnCells(self.matrix, x, y, self.widths_x[rows], self.widths_y[columns])
+
+
+class BodyStresses:
+    """Stresses in its top that a finite body adds to those of the half-space, as means over cells.
+
+    Args:
+        lengths: Sides (Lx, Ly) of the top [mm].
+        grid: Cells (nx, ny), which fill the top but a margin all around.
+        matrix: S of σ_xx, σ_yy and σ_xy; mode k K + l varies as mode k along x and l along y, shape
+            (3, K², K²) [1/mm²].
+        margin: Width of the margin [mm].
+
+    Raises:
+        InputError: When the matrix is not one of K² modes, or not finite.
+    """
+
+    def __init__(
+        self,
+        lengths: tuple[float, float],
+        grid: tuple[int, int],
+        matrix: ArrayLike,
+        margin: float = 0.0,
+    ) -> None:
+        self._matrix = np.asarray(matrix, float)
+        count = int(np.sqrt(self._matrix.shape[-1]) + 0.5)
+        if not count or self._matrix.shape != (3, count**2, count**2):
+            problem = "the stresses are not those of K × K modes"
+            raise InputError(problem, value=self._matrix.shape, allowed="(3, K², K²), K ≥ 1")
+        if not np.all(np.isfinite(self._matrix)):
+            raise InputError("the stresses are not finite", value="nan or inf", allowed="numbers")
+        sizes = [length - 2.0 * margin for length in lengths]
+        self._x, self._y = (
+            mode_means(np.linspace(margin, margin + size, cells + 1), length, count)
+            for size, length, cells in zip(sizes, lengths, grid, strict=True)
         )
+        self._cell = float(np.prod(sizes) / np.prod(grid))
+
+    def stresses(self, pressure: Array) -> Array:
+        """Return σ_xx, σ_yy and σ_xy on the cells, shape (3, nx, ny) [MPa].
+
+        Args:
+            pressure: On all cells, shape (nx, ny) [MPa].
+        """
+        moments = self._x @ pressure @ self._y.T * self._cell
+        amplitudes = (self._matrix @ moments.ravel()).reshape(3, *moments.shape)
+        return np.asarray(self._x.T @ amplitudes @ self._y)
+
+    def adjoint(self, fields: Array) -> Array:
+        """Apply the transpose of `stresses`.
+
+        Args:
+            fields: Weights of σ_xx, σ_yy and σ_xy on the cells, shape (3, nx, ny).
+
+        Returns:
+            Weights of the pressures, shape (nx, ny).
+        """
+        amplitudes = self._x @ fields @ self._y.T
+        moments = np.tensordot(amplitudes.reshape(3, -1), self._matrix, axes=2)
+        return np.asarray(self._x.T @ moments.reshape(amplitudes.shape[1:]) @ self._y * self._cell)

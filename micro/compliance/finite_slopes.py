@@ -27,11 +27,14 @@ the forms at the pressures. On caps and rough surfaces (rms gradient 0.215) that
 the compliance from the series to sixth order; two orders alone are within 0.5 %.
 
 Sources: Johnson 1985, ch. 3; Eshelby 1975, doi 10.1007/BF00126994.
+
+Theory: demos/theory.md, section 7.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,25 +43,46 @@ from scipy import fft
 from geometry import Surface
 from geometry.errors import InputError
 from micro.closed_forms.boussinesq import HalfSpace
-from micro.compliance.surface_stress import SurfaceStress
 from micro.compliance.waves import Around, Spectrum, Waves
 
 Array = NDArray[np.float64]
 
-_RATIOS = 4, 2, 1
-_FEWEST = 64
-_GRADIENT = 0.9
+_RATIOS, _FEWEST, _GRADIENT = (4, 2, 1), 64, 0.9
 """Cells per coarse cell along an axis: the first ratio that leaves 64 coarse cells a side and 0.9
 of the mean square gradient. Against ratio 1, forces of rough surfaces of 128² … 1024² cells change
 by up to 0.1 %, in a tenth of the time."""
 
 
+class SurfaceStress(Protocol):
+    """Stresses in a flat surface, or a part of them, under pressures on a grid of cells."""
+
+    def stresses(self, pressure: Array) -> Array:
+        """Return the stresses in the surface, positive in tension.
+
+        Args:
+            pressure: Pressures on the cells, shape (nx, ny) [MPa].
+
+        Returns:
+            σ_xx, σ_yy and σ_xy at the centres of the cells, shape (3, nx, ny) [MPa].
+        """
+
+    def adjoint(self, fields: Array) -> Array:
+        """Apply the transpose of `stresses`.
+
+        Args:
+            fields: What σ_xx, σ_yy and σ_xy are multiplied by, shape (3, nx, ny).
+
+        Returns:
+            What the pressures are multiplied by, with the same sum, shape (nx, ny).
+        """
+
+
 class FiniteSlopes:
     """The compliance that finite slopes add to a surface on a half-space.
 
-    Stresses fall off as 1/r² around contacts: the term acts on the whole surface. A half-space
-    goes on around it with mirrored heights; where stresses beside the half-space's are given,
-    which are those of a body that ends there, nothing is around it.
+    Stresses fall off as 1/r² around contacts, so that the term acts on the whole surface. A
+    half-space continues around the surface with mirrored heights. Where edge stresses are given,
+    the body ends at the edges of the surface, and nothing is around it.
 
     Args:
         surface: The surface.
@@ -66,13 +90,14 @@ class FiniteSlopes:
         order: Highest power of the heights, 1 or 2.
         periodic: Whether surface and pressures continue periodically; displacements then count
             from their mean, as those of the periodic half-space do.
-        plane: Height of the surface of the flat body that has the stresses ``beside`` [mm]; that
+        plane: Height of the surface of the flat body whose edge stresses are given [mm]; that
             of the mean plane when not given. On the half-space alone it hardly matters.
-        beside: Stresses in the surface beyond those of the half-space, on the cells of
-            `coarse_grid`.
+        edge_stresses: Stresses in the surface beyond those of the half-space, on the cells of
+            ``grid``.
+        grid: Cells that the term works on, the surface's or coarser; `coarse_grid` when not given.
 
     Attributes:
-        grid: Cells that the term works on, the surface's or coarser: `coarse_grid`.
+        grid: Cells that the term works on.
         spacing: Sides of these cells [mm].
 
     Raises:
@@ -87,23 +112,24 @@ class FiniteSlopes:
         order: int = 2,
         periodic: bool = False,
         plane: float | None = None,
-        beside: Sequence[SurfaceStress] = (),
+        edge_stresses: Sequence[SurfaceStress] = (),
+        grid: tuple[int, int] | None = None,
     ) -> None:
         if order not in (1, 2):
             raise InputError("this order of slopes is unknown", value=order, allowed="1 or 2")
         if periodic and not surface.periodic:
             raise InputError("periodic slopes need a periodic surface", value=surface.source)
-        self.half_space, self.order, self.beside = half_space, order, tuple(beside)
+        self.half_space, self.order, self.edge_stresses = half_space, order, tuple(edge_stresses)
         self._periodic = periodic
-        self.grid = coarse_grid(surface)
-        around: Around = "copies" if periodic else "nothing" if beside else "mirrored"
+        self.grid = grid or coarse_grid(surface)
+        around: Around = "copies" if periodic else "nothing" if edge_stresses else "mirrored"
         self._waves = Waves(surface.grid, surface.spacing, coarse=self.grid, around=around)
         self.spacing = self._waves.spacing
         top = float(surface.heights.max())
         below = self._waves.coarsened(surface.heights - top)
         self._below = self._waves.continued(below)
         plane = surface.mean_height if plane is None else plane
-        self._heights = self._below + np.float64(top - plane)
+        self._heights = self._below + (top - plane)
 
     def displacement(self, pressure: Array) -> Array:
         """Return the displacement that is added to the half-space's, positive into the body.
@@ -122,53 +148,57 @@ class FiniteSlopes:
         along, across = waves.fields(np.stack([xx * loads, xy * loads]))
         stresses = self._stresses(loaded, along, across)
         strains = self._strains(stresses)
-        pulls = -heights * strains
+        weights = -heights * strains
         total = waves.of(heights * loaded) / modulus
         if self.order == 2:
-            value, pulls_again, moved = self._second(loads, stresses)
+            value, more, bent = self._second(loads, stresses)
             energy = loaded**2 / modulus - _product(stresses, strains)
             share = _share(float(np.sum(self._below * energy)), value)
-            pulls = pulls + share * pulls_again
-            total = total + share * moved
-        total = total + self._adjoint(pulls)
+            weights = weights + share * more
+            total = total + share * bent
+        total = total + self._adjoint(weights)
         if self._periodic:
             total[0, 0] = 0.0
         cx, cy = self.grid
         return waves.refined(waves.fields(total)[:cx, :cy])
 
     def _second(self, loads: Spectrum, stresses: Array) -> tuple[float, Array, Spectrum]:
-        """Return of the second order its form's value, and the two parts of its displacement.
+        """Return the value of the second-order form and the two parts of its displacement.
 
-        One is what the adjoint of the stresses is to be applied to, the other in waves.
+        Returns:
+            The value at the pressures; the weights of stresses, whose adjoint gives the first part;
+            the waves of the second part.
         """
         waves, heights = self._waves, self._below
         nu, shear = self.half_space.poisson_ratio, self.half_space.shear_modulus
         bending = (1.0 - nu) / shear * waves.wave_number
         strains = waves.fields(self._strains_by_traction(waves.of(heights * stresses)))
         curvatures = waves.fields(bending * loads * waves.directions)
-        pulls = heights * (0.5 * heights * curvatures - strains)
+        weights = heights * (0.5 * heights * curvatures - strains)
         value = float(np.sum(_product(stresses, heights * (heights * curvatures - strains))))
-        return value, pulls, 0.5 * bending * self._lengthwise(waves.of(heights**2 * stresses))
+        return value, weights, 0.5 * bending * self._lengthwise(waves.of(heights**2 * stresses))
 
     def _stresses(self, pressure: Array, along: Array, across: Array) -> Array:
         """Return σ_xx, σ_yy, σ_xy by pressures and their k_x²/k² and k_x k_y/k² transforms."""
         nu = self.half_space.poisson_ratio
         side = 1.0 - 2.0 * nu
-        own = np.stack(
+        found = np.stack(
             [-2.0 * nu * pressure - side * along, side * along - pressure, -side * across]
         )
-        return np.asarray(sum((term.stresses(pressure) for term in self.beside), own), np.float64)
+        for term in self.edge_stresses:
+            found += term.stresses(pressure)
+        return found
 
-    def _adjoint(self, pulls: Array) -> Spectrum:
+    def _adjoint(self, weights: Array) -> Spectrum:
         """Return the waves of the displacement that does the work of the stresses on a tensor."""
         nu = self.half_space.poisson_ratio
-        waves = self._waves.of(pulls)
+        waves = self._waves.of(weights)
         found = -2.0 * nu * (waves[0] + waves[1]) - (1.0 - 2.0 * nu) * self._lengthwise(waves)
-        if not self.beside:
-            return np.asarray(found)
-        both = pulls.astype(np.float64) * np.array([1.0, 1.0, 2.0])[:, None, None]  # xy and yx
-        added = np.sum([term.adjoint(both) for term in self.beside], axis=0)
-        return np.asarray(found + self._waves.of(added.astype(np.float64)))
+        if self.edge_stresses:
+            both = weights * np.array([1.0, 1.0, 2.0])[:, None, None]  # xy and yx
+            edges = np.sum([term.adjoint(both) for term in self.edge_stresses], axis=0)
+            found = found + self._waves.of(edges)
+        return np.asarray(found)
 
     def _strains(self, stresses: Array) -> Array:
         """Return the strains xx, yy, xy by stresses in the plane alone."""
@@ -202,16 +232,12 @@ def coarse_grid(surface: Surface) -> tuple[int, int]:
     squared = fft.dctn(surface.heights, norm="ortho") ** 2
     squared *= (np.arange(nx)[:, None] / (nx * dx)) ** 2 + (np.arange(ny) / (ny * dy)) ** 2
     for ratio in _RATIOS:
-        coarse = _cells(nx, ratio), _cells(ny, ratio)
+        cx, cy = (min(n, int(fft.next_fast_len(-(-n // ratio), real=True))) for n in (nx, ny))
+        coarse = cx, cy
         kept = squared[: coarse[0], : coarse[1]].sum() >= _GRADIENT * squared.sum()
         if kept and min(coarse) >= _FEWEST:
             return coarse
     return nx, ny
-
-
-def _cells(count: int, ratio: int) -> int:
-    """Return a number of coarse cells with a fast transform."""
-    return min(count, int(fft.next_fast_len(-(-count // ratio), real=True)))
 
 
 def _product(one: Array, other: Array) -> Array:

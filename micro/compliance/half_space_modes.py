@@ -7,6 +7,8 @@ s and smooth functions of v, to which Gauss' rules converge at once.
 
 The stresses in the surface are σ_αβ = −2ν p δ_αβ − (1 − 2ν) ∂_α ∂_β φ, with φ the convolution of p
 with ln ρ/2π. Integrated by parts once, the moments of ∂_α ∂_β φ are −∫∫ A' B ∂_β ln ρ/2π.
+
+Theory: demos/theory.md, section 4.
 """
 
 from __future__ import annotations
@@ -37,7 +39,8 @@ def half_space_modes(lengths: tuple[float, float], count: int) -> Array:
     Returns:
         (1/A²) ∫∫ φ_m(x) φ_n(x') / (π |x − x'|) dA dA', symmetric, shape (K², K²) [1/mm].
     """
-    matrix = 4.0 / np.pi * _integrated(lengths, count, (_even, _even), lambda x, _: np.ones_like(x))
+    parts = _products, _products
+    matrix = 4.0 / np.pi * _integrated(lengths, count, parts, 1.0, lambda x, _: np.ones_like(x))
     return np.asarray(0.5 * (matrix + matrix.T))
 
 
@@ -55,8 +58,9 @@ def half_space_stress_modes(
         (1/A²) ∫ φ_m σ_αβ[φ_n] dA of xx, yy and xy, shape (3, K², K²) [1/mm²].
     """
     side = 1.0 - 2.0 * poisson_ratio
-    xx = _integrated(lengths, count, (_even_slopes, _even), lambda x, _: x) * (-2.0 / np.pi)
-    xy = _integrated(lengths, count, (_odd_slopes, _odd), lambda _, y: y) * (-2.0 / np.pi)
+    parts = _product_slopes, _products
+    xx = -2.0 / np.pi * _integrated(lengths, count, parts, 1.0, lambda x, _: x)
+    xy = -2.0 / np.pi * _integrated(lengths, count, parts, -1.0, lambda _, y: y)
     pressure = np.eye(count**2) / (lengths[0] * lengths[1])
     straight = -2.0 * poisson_ratio * pressure - side * xx
     return np.stack([straight, -(1.0 + 2.0 * poisson_ratio) * pressure - straight, -side * xy])
@@ -66,6 +70,7 @@ def _integrated(
     lengths: tuple[float, float],
     count: int,
     parts: tuple[Part, Part],
+    sign: float,
     weight: Callable[[Array, Array], Array],
 ) -> Array:
     """Integrate over a quarter of all shifts between two points of the rectangle.
@@ -74,6 +79,8 @@ def _integrated(
         lengths: Sides of the rectangle [mm].
         count: Modes along a side.
         parts: Factors that depend on the shift along x, and along y.
+        sign: 1 for the parts of both that keep their value with the sign of the shift, −1 for those
+            that change theirs.
         weight: Function of the shift's direction (cos, sin), times 1/ρ.
 
     Returns:
@@ -87,9 +94,9 @@ def _integrated(
         w, others = _gauss(steep, count + _MORE)
         direction = 1.0 / np.cosh(w), np.tanh(w)
         others = others * weight(*(reversed(direction) if flip else direction))
-        first = parts[along](s, lengths[along], count) * weights[:, None, None]
+        first = _part(parts[along](s, lengths[along], count), sign) * weights[:, None, None]
         t = np.multiply.outer(s, np.sinh(w))
-        second = parts[across](t.ravel(), lengths[across], count)
+        second = _part(parts[across](t.ravel(), lengths[across], count), sign)
         second = np.einsum("w,swkl->skl", others, second.reshape(*t.shape, count, count))
         part = np.tensordot(first, second, axes=(0, 0))  # k, k', l, l'
         total += part.transpose(2, 0, 3, 1) if flip else part.transpose(0, 2, 1, 3)
@@ -97,28 +104,9 @@ def _integrated(
     return np.asarray(total.reshape(count**2, count**2) / area**2)
 
 
-def _even(shifts: Array, length: float, count: int) -> Array:
-    """Return the part of the products that keeps its value with the shift's sign."""
-    products = _products(shifts, length, count)
-    return np.asarray(0.5 * (products + products.transpose(0, 2, 1)))
-
-
-def _odd(shifts: Array, length: float, count: int) -> Array:
-    """Return the part of the products that changes its sign with the shift's."""
-    products = _products(shifts, length, count)
-    return np.asarray(0.5 * (products - products.transpose(0, 2, 1)))
-
-
-def _even_slopes(shifts: Array, length: float, count: int) -> Array:
-    """Return the derivative of `_even` to the shift."""
-    slopes = _product_slopes(shifts, length, count)
-    return np.asarray(0.5 * (slopes + slopes.transpose(0, 2, 1)))
-
-
-def _odd_slopes(shifts: Array, length: float, count: int) -> Array:
-    """Return the derivative of `_odd` to the shift."""
-    slopes = _product_slopes(shifts, length, count)
-    return np.asarray(0.5 * (slopes - slopes.transpose(0, 2, 1)))
+def _part(products: Array, sign: float) -> Array:
+    """Return the even part of products with the sign of the shift, or the odd one with −1."""
+    return np.asarray(0.5 * (products + sign * products.transpose(0, 2, 1)))
 
 
 def _products(shifts: Array, length: float, count: int) -> Array:

@@ -1,4 +1,7 @@
-"""Compliance and stresses that free sides add to the half-space, in modes of the rectangle."""
+"""Compliance and stresses that free sides add to the half-space, in modes of the rectangle.
+
+Theory: demos/theory.md, section 5.
+"""
 
 from __future__ import annotations
 
@@ -29,10 +32,7 @@ def side_modes(sides: FreeSides, count: int) -> Array:
     Returns:
         (1/A²) ∫∫ φ_m S φ_n dA dA', symmetric, shape (K², K²) [1/mm].
     """
-    total = _by_two(sides, 0, count).transpose(0, 2, 1, 3)
-    total += _by_two(sides, 1, count).transpose(2, 0, 3, 1)
-    area = sides.lengths[0] * sides.lengths[1]
-    matrix = total.reshape(count**2, count**2) / area**2
+    matrix = _sum(sides, count, stress=False)[0]
     return np.asarray(0.5 * (matrix + matrix.T))
 
 
@@ -46,37 +46,35 @@ def side_stress_modes(sides: FreeSides, count: int) -> Array:
     Returns:
         (1/A²) ∫ φ_m σ_αβ[φ_n] dA of xx, yy and xy, shape (3, K², K²) [1/mm²].
     """
-    normal, parallel, shear = (part.transpose(0, 2, 1, 3) for part in _stresses(sides, 0, count))
-    total = np.stack([normal, parallel, shear])
-    normal, parallel, shear = (part.transpose(2, 0, 3, 1) for part in _stresses(sides, 1, count))
-    total += np.stack([parallel, normal, shear])
+    return _sum(sides, count, stress=True)
+
+
+def _sum(sides: FreeSides, count: int, *, stress: bool) -> Array:
+    """Return the displacements, or the stresses xx, yy and xy, by all sides in modes."""
+    across_x = _by_two(sides, 0, count, stress=stress).transpose(0, 1, 3, 2, 4)
+    across_y = _by_two(sides, 1, count, stress=stress).transpose(0, 3, 1, 4, 2)
+    total = across_x + (across_y[[1, 0, 2]] if stress else across_y)
     area = sides.lengths[0] * sides.lengths[1]
-    return np.asarray(total.reshape(3, count**2, count**2) / area**2)
+    return np.asarray(total.reshape(len(total), count**2, count**2) / area**2)
 
 
-def _by_two(sides: FreeSides, axis: int, count: int) -> Array:
-    """Return what two opposite sides add, by modes across them and along, shape (k, k', l, l')."""
-    nodes, waves, loads = _lines(sides, axis, count)
-    lines = loads @ sides.compliance(axis, nodes, waves) @ loads.T
-    return _along(sides, axis, lines, far=1.0)
+def _by_two(sides: FreeSides, axis: int, count: int, *, stress: bool) -> Array:
+    """Return what two opposite sides add, by modes across them and along.
 
-
-def _stresses(sides: FreeSides, axis: int, count: int) -> tuple[Array, Array, Array]:
-    """Return stresses normal to two opposite sides, along them and in shear, as `_by_two`."""
-    nodes, waves, loads = _lines(sides, axis, count)
-    normal, parallel, shear = loads @ sides.stresses(axis, nodes, waves) @ loads.T
-    return (
-        _along(sides, axis, normal, far=1.0),
-        _along(sides, axis, parallel, far=1.0),
-        _along(sides, axis, shear, far=-1.0),
-    )
-
-
-def _lines(sides: FreeSides, axis: int, count: int) -> tuple[Array, NDArray[np.intp], Array]:
-    """Return nodes of the distance from a side, waves along it, and modes' integrals at nodes."""
-    length = sides.lengths[axis]
+    Returns:
+        Displacements, or the stresses normal to the sides, along them and in shear, in front; shape
+        (1 or 3, k, k', l, l').
+    """
+    length, waves = sides.lengths[axis], np.arange(_WAVES * count)
     nodes = distance_nodes(_NEAREST * length / count**2, length)
-    return nodes, np.arange(_WAVES * count), _integrals(nodes, length, count)
+    loads = _integrals(nodes, length, count)
+    if not stress:
+        lines = loads @ sides.compliance(axis, nodes, waves) @ loads.T
+        return _along(sides, axis, lines, far=1.0)[None]
+    lines = loads @ sides.stresses(axis, nodes, waves) @ loads.T
+    signs = 1.0, 1.0, -1.0
+    parts = [_along(sides, axis, part, far=far) for part, far in zip(lines, signs, strict=True)]
+    return np.stack(parts)
 
 
 def _along(sides: FreeSides, axis: int, lines: Array, *, far: float) -> Array:

@@ -1,9 +1,11 @@
 """Fields on the cells of a surface as waves, on a grid as coarse as products of them allow.
 
-Heights times stresses make waves shorter than either. Cells hold waves of two cells and longer;
-products that fall below come back as others, which makes the powers of heights in an expansion
-unstable. Waves shorter than about three of the coarse cells are therefore left out on the way in,
-and on the way out, so that the map as a whole stays symmetric.
+Heights times stresses make waves shorter than either. Cells hold waves of two cells and longer.
+Shorter products alias to longer waves, which makes the powers of heights in an expansion unstable.
+Waves shorter than about three of the coarse cells are therefore left out on the way in and on the
+way out, so that the map as a whole stays symmetric.
+
+Theory: demos/theory.md, section 7.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-Array = NDArray[np.floating]
+Array = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]
 Around = Literal["copies", "mirrored", "nothing"]
 
@@ -57,10 +59,11 @@ class Waves:
         self._scale = float(np.sqrt(np.prod(coarse) / np.prod(grid)))  # of orthonormal cosines
         self.padded = coarse if around == "copies" else (2 * coarse[0], 2 * coarse[1])
         self.shown = coarse if around == "nothing" else self.padded
+        self._beyond = [(0, more - own) for more, own in zip(self.shown, coarse, strict=True)]
         kx = 2.0 * np.pi * fft.fftfreq(self.padded[0], self.spacing[0])[:, None]
         ky = 2.0 * np.pi * fft.rfftfreq(self.padded[1], self.spacing[1])
-        self.wave_number = np.hypot(kx, ky).astype(np.float64)
-        self.directions = _directions(kx, ky).astype(np.float64)
+        self.wave_number = np.hypot(kx, ky)
+        self.directions = _directions(kx, ky)
         for axis, count in enumerate(self.padded):
             if count % 2 == 0:  # waves of two cells run either way
                 self.directions[2].swapaxes(0, axis)[count // 2] = 0.0
@@ -77,7 +80,7 @@ class Waves:
         Returns:
             Shape (cx, cy).
         """
-        rows = fft.dct(field.astype(np.float64), axis=1, norm="ortho")[:, : self.coarse[1]]
+        rows = fft.dct(field, axis=1, norm="ortho")[:, : self.coarse[1]]
         cosines = fft.dct(rows, axis=0, norm="ortho")[: self.coarse[0]] * self._filter
         return np.asarray(fft.idctn(cosines * self._scale, norm="ortho"))
 
@@ -86,20 +89,17 @@ class Waves:
 
         It is the transpose of `coarsened`, times the number of cells per coarse cell.
         """
-        cosines = fft.dctn(field.astype(np.float64), norm="ortho") * (self._filter / self._scale)
+        cosines = fft.dctn(field, norm="ortho") * (self._filter / self._scale)
         columns = fft.idct(cosines, n=self.grid[0], axis=0, norm="ortho")
-        rows = fft.idct(columns, n=self.grid[1], axis=1, norm="ortho")
-        return np.asarray(rows, np.float64)
+        return np.asarray(fft.idct(columns, n=self.grid[1], axis=1, norm="ortho"))
 
     def continued(self, field: Array) -> Array:
         """Return a field on the coarse cells as it is continued around them, shape (sx, sy)."""
-        beyond = [(0, more - own) for more, own in zip(self.shown, self.coarse, strict=True)]
-        return np.pad(field, beyond, mode="symmetric")
+        return np.pad(field, self._beyond, mode="symmetric")
 
     def alone(self, field: Array) -> Array:
         """Return a field on the coarse cells with zeros around them, shape (sx, sy)."""
-        beyond = [(0, more - own) for more, own in zip(self.shown, self.coarse, strict=True)]
-        return np.pad(field, beyond)
+        return np.pad(field, self._beyond)
 
     def of(self, fields: Array) -> Spectrum:
         """Return the waves of fields, shape (..., sx, sy)."""
@@ -124,4 +124,4 @@ def _filter(coarse: tuple[int, int]) -> Array:
     """Fall from one to zero between two radii of the plane of wave numbers."""
     radius = np.hypot(np.arange(coarse[0])[:, None] / coarse[0], np.arange(coarse[1]) / coarse[1])
     falling = (_DROPPED - radius) / (_DROPPED - _KEPT)
-    return np.clip(falling, 0.0, 1.0).astype(np.float64)
+    return np.clip(falling, 0.0, 1.0)

@@ -1,9 +1,11 @@
-"""Search for the cells in contact: pressures, gaps and what is wrong with them, step by step.
+"""Search for the cells in contact, step by step.
 
-A step takes cells with a pressure or a negative gap as the contact, solves its linear system
-roughly by conjugate gradients and drops tensile pressures (primal-dual active set). A body that may
-turn on few cells is held by each of them: there cells are dropped one at a time (primal active
-set), so that no step leaves it without support.
+A step takes the cells with a pressure or a negative gap as the contact, solves its linear system
+roughly by conjugate gradients and drops tensile pressures (primal-dual active set). Where a plane
+that may turn rests on few cells, each of them is needed to hold it. There, cells are dropped one at
+a time (primal active set), so that no step leaves the plane without support.
+
+Theory: demos/theory.md, section 3.
 """
 
 from __future__ import annotations
@@ -11,177 +13,177 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from micro.compliance.elastic_grid import Cells, ElasticGrid
+from geometry.errors import NotConverged
+from micro.compliance.cells import Cells
 from micro.contact.conjugate_gradients import ContactCells
-from micro.contact.constraints import Limits
+from micro.contact.problem import ContactPressures, ContactProblem
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 
+_TRUSTING_STEPS = 20
+"""Steps that may raise the energy when they lower the residual; later ones must lower the energy.
+Where cells of very different sides meet the periodic kernel, whose inverse is then far from an
+M-matrix, sets may otherwise return to where they were."""
 _MOST_ITERATIONS = 100
-"""Iterations in a pass; an exact solution of a wrong set is of no use."""
+"""Iterations in a step; an exact solution of a wrong set is of no use."""
 _MOST_HALVINGS = 12
 _FEW = 6
-"""Cells that carry a body free to turn below which they are dropped one at a time: of 300 planes
-that hardly touch (1e-5 … 1e-3 of the largest force) the slowest took 9 times the products of the
-level plane, 74 times when that waits until a step fails; with 12 the median doubles."""
-_HELD = 1e-8
-"""Weight of cells that touch without pressure, of the largest pressure, in the body's motions."""
+"""Cells under a plane free to turn below which they are dropped one at a time. Of 300 planes that
+hardly touch (1e-5 … 1e-3 of the largest force) the slowest took 9 times the products of the level
+plane; it took 74 times when this waited until a step failed. With 12 the median doubles."""
+_CONSTRAINED_WEIGHT = 1e-8
+"""Weight of cells that touch without pressure in the body's motions, of the largest pressure."""
 _NOISE = 1e-12
 """Changes of a pressure at a bound that are rounding, of the largest pressure: loads that must stay
 as they are may leave a cell none."""
 _ROUNDING = 4.0 * float(np.finfo(float).eps)
-"""Part of the largest distance of a plane free to turn that its gaps are known to."""
+"""Accuracy of the gaps of a plane free to turn, of its largest distance."""
 _FORCING = (0.2, 0.01)
-"""Parts of the present error that a pass leaves of the gaps in a new set and in a set kept."""
+"""Parts of the present error that a step leaves of the gaps, in a new set and in the same set."""
 
 
-class ContactSearch:
+class ActiveSet:
     """Pressures on cells and how far they are from a solution.
 
     Args:
-        grid: The elastic body.
-        required: Displacement that the body asks for, up to its free motions, (nx, ny) [mm].
-        limits: Bounds and loads of the pressures.
-        pressure: Pressures / E* to begin with, within these limits, shape (nx, ny).
-        motion: Free motions while nothing touches, shape (k,) [mm].
+        problem: The contact problem.
+        start: Pressures / E* ≥ 0 to begin with, shape (nx, ny).
 
     Attributes:
-        pressure: Present pressures / E*, which are within their limits, shape (nx, ny).
+        pressure: Present pressures / E*, which are admissible, shape (nx, ny).
         motion: Free motions of the body that close the gaps best, shape (k,) [mm].
         gap: Gaps, shape (nx, ny) [mm].
-        scale: Largest displacement that the body asks for [mm].
+        scale: Largest interference, free motions included [mm].
         residual: Largest violation of the contact conditions, over the scale.
-        rounding: Residual by the rounding of distances.
+        rounding: Residual that rounding of distances alone can make.
+
+    Raises:
+        NotConverged: When no pressures within the bounds meet the loads.
     """
 
-    def __init__(
-        self, grid: ElasticGrid, required: Array, limits: Limits, pressure: Array, motion: Array
-    ) -> None:
-        self.grid, self.required, self.limits = grid, required, limits
-        self.motion = motion
-        self._singly = False  # from where a step of all cells at once gained nothing
-        self._held: Indices = np.zeros(0, np.intp)  # at a bound without a gap
-        self._mask: Flags = np.zeros(required.shape, bool)
+    def __init__(self, problem: ContactProblem, start: Array) -> None:
+        self.problem = problem
+        self._one_by_one = False  # since a step of all cells at once gained nothing
+        self._constrained: Indices = np.zeros(0, np.intp)  # cells at a bound that have no gap
+        self._set: Flags = np.zeros(problem.interference.shape, bool)
         self._yielding: Flags | None = None
+        pressure, self.motion = problem.started(start)
         self._accept(pressure)
 
     def _accept(self, pressure: Array) -> None:
-        """Evaluate pressures within their bounds that meet the loads."""
-        self.pressure = pressure
-        gap = self.grid.displacement(pressure)
-        work = float(np.vdot(pressure, gap))
-        asked = float(np.vdot(pressure, self.required))
-        self._energy = work - 2.0 * asked  # twice the elastic less the external one
-        gap -= self.required
-        highest = self.required
-        if self.limits.motions is not None:
+        """Evaluate admissible pressures."""
+        problem, self.pressure = self.problem, pressure
+        gap = problem.compliance.displacement(pressure)
+        twice_elastic = float(np.vdot(pressure, gap))
+        self._energy = twice_elastic - 2.0 * float(np.vdot(pressure, problem.interference))
+        gap -= problem.interference
+        interference = problem.interference
+        if problem.motions is not None:
             if pressure.any():
-                self.motion = self.limits.motions.closing(self._closing(pressure), gap)
-            nearer = self.limits.motions.displacement(self.motion)
+                self.motion = problem.motions.closing(self._weights(pressure), gap)
+            nearer = problem.motions.displacement(self.motion)
             gap -= nearer
-            highest = self.required + nearer
-        self.gap = gap  # within the memory of the displacement
-        self.scale = float(highest.max())
-        elastic = gap if self.limits.upper == np.inf else gap[pressure < self.limits.upper]
+            interference = interference + nearer
+        self.gap = gap  # in the memory of the displacement
+        self.scale = float(interference.max())
+        elastic = gap if problem.upper == np.inf else gap[pressure < problem.upper]
         worst = max(-float(elastic.min(initial=0.0)), float(gap[pressure > 0.0].max(initial=0.0)))
         self.residual = max(0.0, worst) / self.scale if self.scale > 0.0 else 0.0
         self.rounding = 0.0
-        if self.limits.turns and self.scale > 0.0:
-            self.rounding = _ROUNDING * float(np.abs(highest).max()) / self.scale
+        if problem.turns and self.scale > 0.0:
+            self.rounding = _ROUNDING * float(np.abs(interference).max()) / self.scale
 
-    def _closing(self, pressure: Array) -> Array:
-        """Return weights of the cells whose gaps tell the motions: yielding cells may overlap."""
-        weights = pressure
-        if self.limits.upper < np.inf and (pressure < self.limits.upper).any(where=pressure > 0.0):
-            weights = np.where(pressure < self.limits.upper, pressure, 0.0)
-        if self._held.size:
+    def _weights(self, pressure: Array) -> Array:
+        """Return weights of the cells whose gaps give the motions; yielding cells may overlap."""
+        weights, upper = pressure, self.problem.upper
+        if upper < np.inf and (pressure < upper).any(where=pressure > 0.0):
+            weights = np.where(pressure < upper, pressure, 0.0)
+        if self._constrained.size:
             weights = weights.copy()
-            weights.ravel()[self._held] += _HELD * float(pressure.max())
+            weights.ravel()[self._constrained] += _CONSTRAINED_WEIGHT * float(pressure.max())
         return weights
 
     def step(self, tolerance: float, *, cautious: bool) -> None:
-        """Solve on the cells that seem to touch and accept what that gives.
+        """Solve on the cells that seem to touch and accept the pressures.
 
         Args:
-            tolerance: Largest residual asked for.
-            cautious: Whether no step may raise the energy. Steps that lower it cannot return to
-                where they were: that is needed where cells of very different sides meet the
-                periodic kernel, whose inverse is then far from an M-matrix, for which the sets are
-                known to converge.
+            tolerance: Largest residual wanted.
+            cautious: Whether no step may raise the energy.
         """
-        if not self._singly and not self._few():
+        few = self.problem.turns and np.count_nonzero(self.pressure) <= _FEW
+        if not self._one_by_one and not few:
             old = self.pressure
-            if self._step_together(tolerance, cautious=cautious or self.limits.unloaded):
+            if self._step_together(tolerance, cautious=cautious or self.problem.unloaded):
                 return
-            if not self.limits.turns:
+            if not self.problem.turns:
                 return
-            self._singly = True
+            self._one_by_one = True
             self._accept(old)
-        self._step_singly(tolerance)
-
-    def _few(self) -> bool:
-        """Whether so few cells carry a body that may turn that none is to be lost by chance."""
-        return self.limits.turns and np.count_nonzero(self.pressure) <= _FEW
+        self._step_one_by_one(tolerance)
 
     def _step_together(self, tolerance: float, *, cautious: bool) -> bool:
-        """Move all cells at once, by less while that is no gain; tell whether it was one."""
-        mask = self._touching()
-        kept = np.array_equal(mask, self._mask)
-        if not kept:
-            self._mask, self._contact = mask, self._among(np.flatnonzero(mask))
+        """Move all cells at once, by less while that gains nothing; return whether it gained."""
+        touching = self._touching()
+        same = np.array_equal(touching, self._set)
+        if not same:
+            self._set, self._contact = touching, self._among(np.flatnonzero(touching))
         cells = self._contact.cells.flat
         change = self._contact.close(
-            self.gap.ravel()[cells], stop=self._stop(tolerance, kept), limit=_MOST_ITERATIONS
+            self.gap.ravel()[cells], stop=self._stop(tolerance, same), limit=_MOST_ITERATIONS
         )
         old, residual, energy = self.pressure, self.residual, self._energy
         for halving in range(_MOST_HALVINGS):
-            moved = self._moved(old, cells, 0.5**halving * change)
-            if moved is None:
+            moved = old.copy()
+            part = old.ravel()[cells] + 0.5**halving * change
+            moved.ravel()[cells] = np.clip(part, 0.0, self.problem.upper)
+            admissible = self.problem.admissible(moved, self._yielding)
+            if admissible is None:
                 continue
-            self._accept(moved)
+            self._accept(admissible)
             gain = self._energy < energy or (self.residual < residual and not cautious)
             if gain or self.residual <= max(tolerance, self.rounding):
                 return True
         return False
 
-    def _step_singly(self, tolerance: float) -> None:
+    def _step_one_by_one(self, tolerance: float) -> None:
         """Close the gaps of cells, dropping one at a time that would leave its bounds.
 
-        Each move keeps the loads and lowers the energy, however few cells carry the body: what
-        drops many at once may leave it on a single contact, which cannot hold it. Cells that stay
-        at a bound without a gap tell how a body turns that lies on two contacts and the middle
-        between.
+        Each move keeps the loads and lowers the energy, however few cells carry the body. A step
+        that drops many at once may leave it on a single contact, which cannot hold it. Cells that
+        stay at a bound without a gap determine the tilt of a body that lies on two contacts in line
+        with its middle.
         """
-        cells, old = self._carrying(), self.pressure
-        new, stop = old.copy(), self._stop(tolerance, kept=True)
+        cells, old, upper = self._carrying(), self.pressure, self.problem.upper
+        new, stop = old.copy(), self._stop(tolerance, same=True)
         pressure, gap = old.ravel()[cells], self.gap.ravel()[cells]
         for _ in range(len(cells)):
             contact = self._among(cells)
             change = contact.close(gap, stop=stop, limit=_MOST_ITERATIONS)
-            bound = (pressure <= 0.0) | (pressure >= self.limits.upper)
+            bound = (pressure <= 0.0) | (pressure >= upper)
             change[bound & (np.abs(change) <= _NOISE * old.max())] = 0.0
-            first, part = _first_bounds(pressure, change, self.limits.upper)
+            first, part = _first_bounds(pressure, change, upper)
             if part > 0.0:
-                pressure = np.clip(pressure + part * change, 0.0, self.limits.upper)
-                gap = gap + part * self.grid.comply(contact.cells, change)
+                pressure = np.clip(pressure + part * change, 0.0, upper)
+                displaced = self.problem.compliance.apply_compliance(contact.cells, change)
+                gap = gap + part * displaced
             if part == 1.0:
                 break
-            new.ravel()[cells[first]] = np.where(change[first] > 0.0, self.limits.upper, 0.0)
+            new.ravel()[cells[first]] = np.where(change[first] > 0.0, upper, 0.0)
             left = np.ones(len(cells), bool)
             left[first] = False
             cells, pressure, gap = cells[left], pressure[left], gap[left]
         new.ravel()[cells] = pressure
-        self._held = cells[(pressure <= 0.0) | (pressure >= self.limits.upper)]
-        found = self.limits.met(new, self._yielding)
+        self._constrained = cells[(pressure <= 0.0) | (pressure >= upper)]
+        found = self.problem.admissible(new, self._yielding)
         self._accept(old if found is None else found)
 
     def _carrying(self) -> Indices:
         """Return the cells that carry between the bounds, and as many with the worst gaps."""
         touching = self._touching()
-        carry = touching & (self.pressure > 0.0) & (self.pressure < self.limits.upper)
-        carry.ravel()[self._held] = True
+        carry = touching & (self.pressure > 0.0) & (self.pressure < self.problem.upper)
+        carry.ravel()[self._constrained] = True
         entering = np.flatnonzero(touching & ~carry)
         worst = np.argsort(-np.abs(self.gap.ravel()[entering]), kind="stable")
         entering = entering[worst[: max(1, np.count_nonzero(carry))]]
@@ -189,43 +191,73 @@ class ContactSearch:
 
     def _touching(self) -> Flags:
         """Return the cells to find pressures of; those that yield are not among them."""
-        mask = (self.pressure > 0.0) | (self.gap < 0.0)
-        if self.limits.upper < np.inf:
-            self._yielding = (self.pressure >= self.limits.upper) & (self.gap <= 0.0)
-            mask &= ~self._yielding
-        mask.ravel()[self._held] = True
-        return mask
+        touching = (self.pressure > 0.0) | (self.gap < 0.0)
+        if self.problem.upper < np.inf:
+            self._yielding = (self.pressure >= self.problem.upper) & (self.gap <= 0.0)
+            touching &= ~self._yielding
+        touching.ravel()[self._constrained] = True
+        return touching
 
-    def _stop(self, tolerance: float, kept: bool) -> float:
+    def _stop(self, tolerance: float, same: bool) -> float:
         """Return the largest gap that a linear solution leaves [mm]."""
-        return max(_FORCING[kept] * self.residual, 0.25 * tolerance) * self.scale
+        return max(_FORCING[same] * self.residual, 0.25 * tolerance) * self.scale
 
     def _among(self, flat: Indices) -> ContactCells:
         """Return the linear problem of some cells by their flat indices."""
-        cells = Cells.of(flat, self.required.shape)
-        levers = np.empty((0, flat.size))
-        if self.limits.motions is not None:
-            levers = self.limits.motions.levers_of(flat)
-        return ContactCells.among(self.grid, cells, levers)
-
-    def _moved(self, old: Array, cells: Indices, change: Array) -> Array | None:
-        """Return pressures after a change of some, within their limits; None where none are."""
-        new = old.copy()
-        new.ravel()[cells] = np.clip(old.ravel()[cells] + change, 0.0, self.limits.upper)
-        return self.limits.met(new, self._yielding)
+        cells, motions = Cells.of(flat, self.gap.shape), self.problem.motions
+        levers = np.empty((0, flat.size)) if motions is None else motions.levers_of(flat)
+        return ContactCells.among(self.problem.compliance, cells, levers)
 
 
 def _first_bounds(pressure: Array, change: Array, upper: float) -> tuple[Indices, float]:
-    """Return which cells a change drives out of their bounds first, and the part that it may do.
+    """Return which cells a change drives out of their bounds first, and the part it may do.
 
-    Of those that are at their bound already, it is the half that is driven most.
+    Of cells that are at their bound already, it is the half that is driven most.
     """
-    room = np.where(change < 0.0, pressure, upper - pressure)
+    distance = np.where(change < 0.0, pressure, upper - pressure)
     size = np.abs(change)
-    stuck = np.flatnonzero((room <= 0.0) & (size > 0.0))
+    stuck = np.flatnonzero((distance <= 0.0) & (size > 0.0))
     if stuck.size:
         most = np.argsort(-size[stuck], kind="stable")[: (stuck.size + 1) // 2]
         return stuck[most], 0.0
-    ways = np.divide(room, size, out=np.full_like(change, np.inf), where=size > 0.0)
-    first = int(np.argmin(ways))
-    return np.array([first]), min(1.0, float(ways[first]))
+    parts = np.divide(distance, size, out=np.full_like(change, np.inf), where=size > 0.0)
+    first = int(np.argmin(parts))
+    return np.array([first]), min(1.0, float(parts[first]))
+
+
+def solve(
+    problem: ContactProblem, start: Array, tolerance: float, *, most_steps: int = 200
+) -> ContactPressures:
+    """Solve the contact problem on one grid.
+
+    The residual ε bounds the error of the force: the solution is exact for a body whose heights
+    differ by no more than ε δ, so the force lies between those at (1 − ε) δ and (1 + ε) δ. Loads of
+    free motions are met to rounding.
+
+    Args:
+        problem: The contact problem.
+        start: Pressures / E* ≥ 0 to start from, shape (nx, ny).
+        tolerance: Largest residual.
+        most_steps: Sets of cells that are tried at most.
+
+    Raises:
+        NotConverged: When the residual stays above the tolerance, or no pressures within their
+            bounds meet the loads.
+
+    Source:
+        Hintermüller, Ito & Kunisch 2002, doi 10.1137/S1052623401383558; Polonsky & Keer 1999,
+        doi 10.1016/S0043-1648(99)00113-1.
+    """
+    used = problem.compliance.products
+    search = ActiveSet(problem, start)
+    for steps in range(most_steps):
+        if search.residual <= max(tolerance, search.rounding):
+            products = problem.compliance.products - used
+            return ContactPressures(search.pressure, search.motion, search.residual, products)
+        search.step(tolerance, cautious=steps >= _TRUSTING_STEPS)
+    raise NotConverged(
+        f"the contact pressure (residual {search.residual:.1e}, asked {tolerance:.1e})",
+        reason="set of cells in contact not found",
+        iterations=problem.compliance.products - used,
+        remedy="raise the tolerance or take smaller steps of the approach",
+    )

@@ -1,8 +1,10 @@
 """Conjugate gradients for the pressures of a given set of cells in contact.
 
-With the set fixed the contact is a linear system: the pressures p on the cells A in contact make
-the gap vanish there, (G p)_A = d_A, or make it a free rigid motion of the body while the loads of
-that motion stay as they are.
+With the set fixed the contact is a linear system. The pressures p on the cells A in contact make
+the gap vanish there, (C p)_A = d_A. Where motions of the rigid body are free, they make the gap a
+rigid motion, while the loads of that motion stay as they are.
+
+Theory: demos/theory.md, section 3.
 """
 
 from __future__ import annotations
@@ -12,54 +14,54 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from micro.compliance.elastic_grid import Cells, ElasticGrid
+from micro.compliance.cells import Cells
+from micro.compliance.grid_compliance import GridCompliance
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class ContactCells:
     """Cells in contact, loaded by a rigid body of which k motions are free.
 
     Args:
-        grid: The elastic body.
+        compliance: The elastic body.
         cells: The n cells in contact.
         levers: How much nearer each free motion brings the cells, shape (k, n).
-        resistance: Roughly the pressures by each of these motions, shape (k, n).
+        resistance: Pressures by each of these motions, by the approximate inverse, shape (k, n).
         inverse: Inverse of the loads of these pressures, levers · resistance, shape (k, k).
     """
 
-    grid: ElasticGrid
+    compliance: GridCompliance
     cells: Cells
     levers: Array
     resistance: Array
     inverse: Array
 
     @classmethod
-    def among(cls, grid: ElasticGrid, cells: Cells, levers: Array) -> ContactCells:
+    def among(cls, compliance: GridCompliance, cells: Cells, levers: Array) -> ContactCells:
         """Prepare a set of cells.
 
         Args:
-            grid: The elastic body.
+            compliance: The elastic body.
             cells: The n cells in contact.
             levers: How much nearer each of k ≥ 0 free motions brings them, shape (k, n).
         """
-        found = [grid.resist(cells, lever) for lever in levers]
+        found = [compliance.apply_inverse(cells, lever) for lever in levers]
         resistance = np.array(found).reshape(levers.shape)
-        stiffness = levers @ resistance.T
-        inverse = np.linalg.pinv(stiffness, rcond=1e-10)
-        return cls(grid=grid, cells=cells, levers=levers, resistance=resistance, inverse=inverse)
+        inverse = np.linalg.pinv(levers @ resistance.T, rcond=1e-10)
+        return cls(compliance, cells, levers, resistance, inverse)
 
     def balanced(self, gap: Array) -> Array:
         """Subtract from gaps the part that free motions of the body take up."""
         if not len(self.levers):
             return gap
-        # transposed: the approximate resistance is symmetric to single precision alone
+        # transposed: the approximate resistance is symmetric only to single precision
         return gap - (self.inverse.T @ (self.resistance @ gap)) @ self.levers
 
     def preconditioned(self, gap: Array) -> Array:
         """Return roughly the pressures that make these gaps, without loads on free motions."""
-        found = self.grid.resist(self.cells, gap)
+        found = self.compliance.apply_inverse(self.cells, gap)
         if not len(self.levers):
             return found
         return found - (self.inverse @ (self.levers @ found)) @ self.resistance
@@ -69,11 +71,11 @@ class ContactCells:
 
         Args:
             gap: Gaps of the cells under the present pressures, shape (n,) [mm].
-            stop: Largest gap to leave [mm].
+            stop: Largest gap that may be left [mm].
             limit: Number of iterations after which the change is returned as it is.
 
         Returns:
-            Change of the pressures / E*, shape (n,); of any sign.
+            Change of the pressures / E*, shape (n,); of either sign.
 
         Source:
             Polonsky & Keer 1999, doi 10.1016/S0043-1648(99)00113-1, for the given force by removal
@@ -88,7 +90,7 @@ class ContactCells:
             if size <= 0.0:
                 break
             direction = step + (size / before) * direction
-            answer = self.grid.comply(self.cells, direction)
+            answer = self.compliance.apply_compliance(self.cells, direction)
             curvature = float(direction @ answer)
             if curvature <= 0.0:
                 break

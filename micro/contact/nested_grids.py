@@ -1,125 +1,119 @@
-"""Start on a grid from the solution on a grid half as fine, and so on down to a small one.
+"""A contact problem on the cells of a surface, on boxes of them and on coarser grids.
 
-The set of cells in contact is then found on the coarse grids, where that costs little, and only
-its edge is left to the fine one (full multigrid: Zhao, Vollebregt & Oosterlee 2014,
+Pressures to start from come from the solution on a grid half as fine, and so on down to a small
+one. The set of cells in contact is then found on the coarse grids, where that costs little, and
+only its edge is left to the fine one (full multigrid: Zhao, Vollebregt & Oosterlee 2014,
 doi 10.3846/13926292.2014.909899).
+
+Theory: demos/theory.md, section 3.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import NotConverged
-from micro.compliance.bounding_box import Box
-from micro.compliance.elastic_grid import ElasticGrid, ElasticGrids
-from micro.contact.problem import Pressures, contact_pressure
+from micro.compliance.cells import Box
+from micro.compliance.grid_compliance import Compliance, GridCompliance
+from micro.contact.active_set import solve
+from micro.contact.problem import ContactPressures, ContactProblem
 from micro.contact.rigid_motions import Motions
 
 Array = NDArray[np.float64]
 
-_FEW_CELLS = 32
+FEW_CELLS = 32
 """Cells per side on which a solution from nothing costs nothing."""
 _ROUGH = 2e-2
 """Residual on the coarse grids; their discretisation errs by more."""
 
 
-def nested_pressure(
-    grids: ElasticGrids,
-    required: Array,
-    spacing: tuple[float, float],
-    *,
-    motions: Motions | None = None,
-    upper: float = np.inf,
-    tolerance: float,
-    box: Box,
-) -> Pressures:
-    """Find the pressures under a rigid body from nothing but its shape.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SurfaceProblem:
+    """Contact of a rigid body with a rectangle of cells of a surface.
 
     Args:
-        grids: Elastic bodies.
-        required: Displacement that the body asks for, shape (nx, ny) [mm].
-        spacing: Sides of a cell [mm].
-        motions: Free motions of the body and their loads; none when not given.
+        compliance: The elastic body.
+        interference: Overlap of the undeformed bodies at zero free motions, (nx, ny) [mm].
+        motions: Free motions of the rigid body with their loads; none when not given.
         upper: Upper bound of the pressures / E*.
-        tolerance: Largest residual.
-        box: Place of the cells.
-
-    Returns:
-        As `contact_pressure`; the iterations on coarse grids are not counted.
-
-    Raises:
-        NotConverged: When the residual stays above the tolerance on one of the grids.
+        spacing: Sides of a cell [mm].
+        corner: Corner of the first cell on the surface [mm].
     """
-    start = coarse_start(grids, required, spacing, motions, upper, _corner(box, spacing))
-    grid = grids.at(required.shape, spacing, box)
-    return contact_pressure(
-        grid, required, start, motions=motions, upper=upper, tolerance=tolerance
-    )
 
+    compliance: Compliance
+    interference: Array
+    motions: Motions | None
+    upper: float
+    spacing: tuple[float, float]
+    corner: tuple[float, float] = (0.0, 0.0)
 
-def coarse_pressure(
-    grids: ElasticGrids,
-    required: Array,
-    spacing: tuple[float, float],
-    *,
-    motions: Motions | None = None,
-    upper: float = np.inf,
-    tolerance: float,
-    corner: tuple[float, float],
-) -> Pressures:
-    """Find the pressures on a coarse grid whose first cell has a given corner [mm].
-
-    See `nested_pressure`.
-    """
-    start = coarse_start(grids, required, spacing, motions, upper, corner)
-    grid: ElasticGrid = grids.coarse(required.shape, spacing, corner)
-    return contact_pressure(
-        grid, required, start, motions=motions, upper=upper, tolerance=tolerance
-    )
-
-
-def coarse_start(
-    grids: ElasticGrids,
-    required: Array,
-    spacing: tuple[float, float],
-    motions: Motions | None,
-    upper: float,
-    corner: tuple[float, float],
-) -> Array:
-    """Return pressures to start from, by a grid half as fine; even ones on a small grid."""
-    halved = [n > _FEW_CELLS for n in required.shape]
-    total = 0.0 if motions is None else float(np.abs(motions.loads).max())
-    if not any(halved):
-        return np.full(required.shape, total / required.size)
-    factors = [1 + h for h in halved]
-    try:
-        rough = coarse_pressure(
-            grids,
-            coarsened(required, factors),
-            (spacing[0] * factors[0], spacing[1] * factors[1]),
-            motions=None if motions is None else motions.coarsened(factors),
-            upper=upper,
-            tolerance=_ROUGH,
-            corner=corner,
+    def on(self, box: Box) -> SurfaceProblem:
+        """Return the problem of a box of these cells, which carries all loads."""
+        return replace(
+            self,
+            interference=np.ascontiguousarray(self.interference[box]),
+            motions=None if self.motions is None else self.motions.on(box),
+            corner=box.corner(self.spacing),
         )
-    except NotConverged:  # a start is a matter of time alone
-        return np.full(required.shape, total / required.size)
-    return refined(rough.pressure, factors)[: required.shape[0], : required.shape[1]]
+
+    def coarsened(self, factors: Sequence[int]) -> SurfaceProblem:
+        """Return the problem on coarse cells of so many fine ones along x and y."""
+        return replace(
+            self,
+            interference=coarsened(self.interference, factors),
+            motions=None if self.motions is None else self.motions.coarsened(factors),
+            spacing=(self.spacing[0] * factors[0], self.spacing[1] * factors[1]),
+        )
+
+    def with_compliance(self, compliance: GridCompliance) -> ContactProblem:
+        """Return the problem on these cells with their compliance."""
+        return ContactProblem(
+            compliance=compliance,
+            interference=self.interference,
+            motions=self.motions,
+            upper=self.upper,
+        )
+
+    def solve_coarse(self, tolerance: float) -> ContactPressures:
+        """Solve on these cells without free sides and slopes, from nothing.
+
+        Raises:
+            NotConverged: As for `solve`.
+        """
+        start = self.nested_start()
+        shape = self.interference.shape
+        grid = self.compliance.on_coarse(shape, self.spacing, self.corner)
+        return solve(self.with_compliance(grid), start, tolerance)
+
+    def nested_start(self) -> Array:
+        """Return pressures / E* to start from, shape (nx, ny).
+
+        They come from a grid half as fine. On a small grid they are uniform and meet the loads.
+        """
+        shape = self.interference.shape
+        total = 0.0 if self.motions is None else float(np.abs(self.motions.loads).max())
+        factors = [1 + (n > FEW_CELLS) for n in shape]
+        if max(factors) > 1:
+            try:
+                found = self.coarsened(factors).solve_coarse(_ROUGH)
+                return refined(found.pressure, factors)[: shape[0], : shape[1]]
+            except NotConverged:  # a bad start only costs time
+                pass
+        return np.full(shape, total / self.interference.size)
 
 
-def _corner(box: Box, spacing: tuple[float, float]) -> tuple[float, float]:
-    return box.rows.start * spacing[0], box.columns.start * spacing[1]
-
-
-def coarsened(field: Array, factors: list[int]) -> Array:
+def coarsened(field: Array, factors: Sequence[int]) -> Array:
     """Average blocks of cells; an incomplete last block is filled with its last cells."""
-    spare = [(0, -n % factor) for n, factor in zip(field.shape, factors, strict=True)]
-    full = np.pad(field, spare, mode="edge")
+    missing = [(0, -n % factor) for n, factor in zip(field.shape, factors, strict=True)]
+    full = np.pad(field, missing, mode="edge")
     rows, columns = (n // factor for n, factor in zip(full.shape, factors, strict=True))
     return full.reshape(rows, factors[0], columns, factors[1]).mean(axis=(1, 3))
 
 
-def refined(field: Array, factors: list[int]) -> Array:
+def refined(field: Array, factors: Sequence[int]) -> Array:
     """Repeat cells."""
     return np.repeat(np.repeat(field, factors[0], axis=0), factors[1], axis=1)

@@ -20,7 +20,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from micro.compliance.bounding_box import Box
+from micro.compliance.cells import Box
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

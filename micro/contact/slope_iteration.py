@@ -1,7 +1,11 @@
-"""Finite slopes in a contact problem: their displacements follow from the solution before.
+"""Finite slopes in a contact problem, by fixed-point iteration.
 
-They are a few per cent of all, and change by a hundredth of that in the second solution. The
-solutions need not be more accurate than the next change: the first ones stop early.
+The displacements that finite slopes add depend on the pressures and are evaluated on the whole
+surface. Each solution takes them from the solution before it. They are a few per cent of all
+displacements, and change by a hundredth of that in the second solution. Solutions need not be more
+accurate than the next change, so the first ones stop early.
+
+Theory: demos/theory.md, section 7.
 """
 
 from __future__ import annotations
@@ -12,67 +16,107 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import NotConverged
-from micro.compliance.elastic_grid import ElasticGrids
-from micro.contact.anderson import Anderson
-from micro.contact.problem import Pressures
+from micro.compliance.grid_compliance import Compliance
+from micro.contact.problem import ContactPressures
 from micro.contact.rigid_motions import Motions
 
 Array = NDArray[np.float64]
-Solve = Callable[[Array, Motions | None, Pressures | None, float], Pressures]
-"""From the displacement asked for, free motions, a start and a tolerance to a solution."""
+Solve = Callable[[Array, Motions | None, ContactPressures | None, float], ContactPressures]
+"""From the interference, free motions, a start and a tolerance to a solution."""
 
-_MOST_LAGS = 30
+_MOST_SOLUTIONS = 30
 _FIRST = 1e-2
 """Residual of the first solution, before finite slopes are known."""
 _AHEAD = 2e-2
-"""Residual of a solution, of the last change by finite slopes: what the next change will be."""
-_LAG = 3e-9
-"""Change by finite slopes that is let be, of the largest displacement."""
+"""Residual of a solution over the last change by finite slopes: about what the next change is."""
+_CONVERGED = 3e-9
+"""Change by finite slopes at which the iteration ends, over the largest interference."""
+_MEMORY = 2
+"""Steps that the mixing remembers."""
+_NOISE = 2.0
+"""Change of a residual over the step above which the step was not its cause."""
+_DEPENDENT = 1e-2
+"""Changes that differ less in direction, times their length, are taken for one."""
 
 
-def with_slopes(
+class AndersonMixing:
+    """Fixed-point iteration x ← x + r(x), extrapolated from the last few residuals r.
+
+    Source:
+        Walker & Ni 2011, doi 10.1137/10078356X, eq. 2.1 in the form of differences.
+    """
+
+    def __init__(self) -> None:
+        self._last: tuple[Array, Array] | None = None
+        self._steps: list[tuple[Array, Array]] = []
+
+    def next(self, point: Array, residual: Array) -> Array:
+        """Return the next point.
+
+        Args:
+            point: Where the iteration is, of any shape.
+            residual: What a plain step would change, of the same shape.
+        """
+        if self._last is not None:
+            step, change = point - self._last[0], residual - self._last[1]
+            size = float(np.linalg.norm(change))
+            if 0.0 < size <= _NOISE * float(np.linalg.norm(step)):
+                pair = step / size, change / size  # they shrink by orders of magnitude
+                self._steps = [*self._steps, pair][-_MEMORY:]
+        self._last = point, residual
+        moved = point + residual
+        if not self._steps:
+            return moved
+        changes = np.stack([change.ravel() for _, change in self._steps])
+        shares = np.linalg.lstsq(changes.T, residual.ravel(), rcond=_DEPENDENT)[0]
+        for share, (step, change) in zip(shares, self._steps, strict=True):
+            moved = moved - share * (step + change)
+        return moved
+
+
+def solve_with_slopes(
     solve: Solve,
-    grids: ElasticGrids,
-    required: Array,
+    compliance: Compliance,
+    interference: Array,
     motions: Motions | None,
-    start: Pressures | None,
+    start: ContactPressures | None,
     tolerance: float,
-) -> Pressures:
+) -> ContactPressures:
     """Solve a contact problem until it agrees with the displacements by finite slopes.
 
     Args:
-        solve: Solves it without them.
-        grids: The elastic body; without finite slopes one solution is all.
-        required: Displacement that the body asks for, shape (nx, ny) [mm].
-        motions: Free motions of the body.
+        solve: Solves it with given displacements by finite slopes taken off the interference.
+        compliance: The elastic body; without finite slopes one solution is all.
+        interference: Overlap of the undeformed bodies, shape (nx, ny) [mm].
+        motions: Free motions of the body; none when not given.
         start: A solution nearby.
         tolerance: Largest residual.
 
     Raises:
         NotConverged: When a solution does not converge, or displacements do not agree.
     """
-    if grids.slopes is None:
-        return solve(required, motions, start, tolerance)
-    known, lag = Anderson(), np.zeros(required.shape)
+    if compliance.slopes is None:
+        return solve(interference, motions, start, tolerance)
+    mixing, displaced = AndersonMixing(), np.zeros(interference.shape)
     if start is not None and start.pressure.any():
-        lag = grids.by_slopes(start.pressure)
-    rough, iterations, passes = max(tolerance, _FIRST), 0, 0
-    last = max(_LAG, 10.0 * tolerance)
-    for _ in range(_MOST_LAGS):
-        found = start = solve(required - lag, motions, start, rough)
-        iterations, passes = iterations + found.iterations, passes + found.passes
+        displaced = compliance.slope_displacement(start.pressure)
+    accuracy, iterations = max(tolerance, _FIRST), 0
+    last = max(_CONVERGED, 10.0 * tolerance)
+    for _ in range(_MOST_SOLUTIONS):
+        found = start = solve(interference - displaced, motions, start, accuracy)
+        iterations += found.iterations
         touching = found.pressure > 0.0
         if not touching.any():
             return found
-        change = grids.by_slopes(found.pressure) - lag
-        nearer = required if motions is None else required + motions.displacement(found.motion)
+        change = compliance.slope_displacement(found.pressure) - displaced
+        nearer = (
+            interference if motions is None else interference + motions.displacement(found.motion)
+        )
         left = float(np.abs(change[touching]).max()) / float(nearer[touching].max())
-        if left <= last and rough <= tolerance:
-            residual = max(found.residual, left)
-            return found._replace(residual=residual, iterations=iterations, passes=passes)
-        lag = known.next(lag, change)
-        ahead = _AHEAD * left
-        rough = tolerance if ahead <= last else min(_FIRST, ahead)
+        if left <= last and accuracy <= tolerance:
+            return found._replace(residual=max(found.residual, left), iterations=iterations)
+        displaced = mixing.next(displaced, change)
+        accuracy = tolerance if _AHEAD * left <= last else min(_FIRST, _AHEAD * left)
     raise NotConverged(
         "the displacements by finite slopes",
         reason=f"they still change by {left:.1e} of the displacement",

@@ -1,9 +1,11 @@
-"""The half-space model: a rough surface cell by cell, without assumptions on its asperities."""
+"""The half-space model: a rough surface cell by cell, without assumptions on its asperities.
+
+Theory: demos/theory.md, section 4.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 from typing import Any, Self
 
@@ -12,27 +14,25 @@ from numpy.typing import ArrayLike, NDArray
 
 from geometry import Control, Partition, PatchGrid, Surface
 from geometry.errors import InputError
-from geometry.rigid_plane import RigidPlane
-from micro.checks import checked_approaches, checked_means, whole_patch
-from micro.compliance.elastic_grid import BodyTerm, ElasticGrids, SurfaceTerm
+from micro.compliance.body_modes import BodyModes
 from micro.compliance.free_sides import FreeSides
-from micro.contact.pressing import Pressing
-from micro.contact.problem import Pressures
-from micro.contact.rigid_motions import Motions
-from micro.half_space.patch_sums import CellSums
+from micro.compliance.grid_compliance import Compliance, SlopeTerm
+from micro.contact.solver import ContactSolver
+from micro.half_space.patch_sums import response_row
+from micro.half_space.plane_contact import LEVEL, PlaneContact
 from micro.half_space.state import HalfSpaceState
+from micro.model import checked_approaches, checked_patches, whole_patch
 from micro.response import Pressed, Response
 
 Array = NDArray[np.float64]
 
-_LEVEL = (0.0, 0.0)
 
-
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class HalfSpaceModel:
     """A surface on an elastic half-space, pressed by a rigid plane.
 
     Pressure is uniform on every cell; contact conditions hold at the cell centres.
+    `HalfSpaceModel(surface, contact_modulus=4000.0).solve(8e-3).force` is a whole example.
 
     Args:
         surface: The surface.
@@ -41,12 +41,12 @@ class HalfSpaceModel:
             a periodic half-space is not determined: displacements, and so the approach, count
             from the mean of the displaced surface.
         tolerance: Largest residual of a solution (see `HalfSpaceState`), which bounds the error of
-            the force; on a random surface of 256² cells the force erred by 5e-10 with 1e-8, and by
+            the force. On a random surface of 256² cells the force erred by 5e-10 with 1e-8, and by
             1e-13 with 1e-10.
         highest: Height z_M that the approach counts from [mm], such as that of the surface that
             this one was resampled from; the surface's own when not given.
-        sides: Free sides of the surface's rectangle, which yield beyond the half-space; none when
-            not given.
+        sides: Free sides of the surface's rectangle, which soften the half-space near them; none
+            when not given.
         body: What a finite body adds to the half-space and its sides; a half-space when not given.
         slopes: What the finite slopes of the surface add; the theory of small slopes when not
             given.
@@ -54,20 +54,22 @@ class HalfSpaceModel:
 
     Raises:
         InputError: When the modulus, the tolerance or the bound is not positive, a periodic model
-            is asked of a surface that is not, or with free sides, or these are not the surface's.
+            has a surface that is not periodic or has free sides, or the free sides are not those of
+            the surface.
 
     Source:
         Polonsky & Keer 1999, doi 10.1016/S0043-1648(99)00113-1.
     """
 
     surface: Surface
+    _: KW_ONLY
     contact_modulus: float
     periodic: bool = False
     tolerance: float = 1e-8
     highest: float | None = None
     sides: FreeSides | None = None
-    body: BodyTerm | None = None
-    slopes: SurfaceTerm | None = None
+    body: BodyModes | None = None
+    slopes: SlopeTerm | None = None
     upper: float = np.inf
 
     def __post_init__(self) -> None:
@@ -80,22 +82,16 @@ class HalfSpaceModel:
             raise InputError(
                 "the upper bound of the pressures must be positive", value=self.upper, allowed="> 0"
             )
+        source, lengths, sides = self.surface.source, self.surface.lengths, self.sides
         if self.periodic and not self.surface.periodic:
-            raise InputError(
-                "a periodic half-space needs a periodic surface", value=self.surface.source
-            )
-        self._check_sides()
-
-    def _check_sides(self) -> None:
-        if self.sides is None:
-            return
-        if self.periodic:
-            raise InputError("a periodic half-space has no free sides", value=self.sides)
-        if not np.allclose(self.sides.lengths, self.surface.lengths, rtol=1e-9, atol=0.0):
+            raise InputError("a periodic half-space needs a periodic surface", value=source)
+        if self.periodic and sides is not None:
+            raise InputError("a periodic half-space has no free sides", value=sides)
+        if sides is not None and not np.allclose(sides.lengths, lengths, rtol=1e-9, atol=0.0):
             raise InputError(
                 "the free sides are not those of the surface",
-                value=self.sides.lengths,
-                allowed=f"{self.surface.lengths} mm",
+                value=sides.lengths,
+                allowed=f"{lengths} mm",
             )
 
     @property
@@ -111,7 +107,7 @@ class HalfSpaceModel:
     @property
     def first_touch(self) -> float:
         """Approach of a level plane at first contact of a cell's centre [mm]."""
-        return -float(self._required(self._plane(0.0, _LEVEL)).max())
+        return self.reference_height - float(self.surface.heights.max())
 
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
         """Return the model of one patch cut out along its borders; see `MicroModel.of_patch`.
@@ -120,22 +116,15 @@ class HalfSpaceModel:
         little smaller than those. The patch has a half-space of its own.
         """
         piece = self.surface.piece(*patches.bounds(index))
-        model = replace(
-            self,
-            surface=piece,
-            highest=self.reference_height,
-            periodic=False,
-            sides=None,
-            body=None,
-            slopes=None,
-        )
+        alone: dict[str, Any] = {"periodic": False, "sides": None, "body": None, "slopes": None}
+        model = replace(self, surface=piece, highest=self.reference_height, **alone)
         return model, whole_patch(piece)
 
     def solve(
         self,
         approach: float,
         *,
-        tilt: tuple[float, float] = _LEVEL,
+        tilt: tuple[float, float] = LEVEL,
         start: HalfSpaceState | None = None,
     ) -> HalfSpaceState:
         """Solve the contact at one approach of the plane.
@@ -156,7 +145,7 @@ class HalfSpaceModel:
         self,
         force: float,
         *,
-        tilt: tuple[float, float] | None = _LEVEL,
+        tilt: tuple[float, float] | None = LEVEL,
         start: HalfSpaceState | None = None,
     ) -> HalfSpaceState:
         """Solve the contact under a given normal force.
@@ -192,75 +181,35 @@ class HalfSpaceModel:
             InputError: When a periodic surface is pressed to full contact or by a tilted plane.
             NotConverged: When the contact conditions cannot be met to the tolerance.
         """
-        pressure = None if start is None else self._started(start.pressure)
-        tilt = _LEVEL if start is None else start.plane.tilt
-        near = None if start is None else start.plane.approach
-        return self._solved(control, pressure, tilt, near)
-
-    def _solved(
-        self,
-        control: Control,
-        start: Array | None,
-        tilt: tuple[float, float],
-        near: float | None,
-    ) -> HalfSpaceState:
-        tilt = tilt if control.tilt is None else control.tilt
-        if control.force == 0.0:
-            level = self._required(self._plane(0.0, tilt))
-            return self._pressed(self._plane(-float(level.max()), tilt), None)
-        if control.tilt is None:
-            return self._turned(control, start)
-        if control.approach is not None:
-            return self._pressed(self._plane(control.approach, tilt), start)
-        level = self._required(self._plane(0.0, tilt))
-        known = None
-        if start is not None and start.any() and near is not None:
-            known = Pressures(start, np.array([near]), 0.0, 0, 0)
-        found = self._pressing.by_force(level, self._total(control), known)
-        return self._state(self._plane(float(found.motion[0]), tilt), found)
-
-    def _turned(self, control: Control, start: Array | None) -> HalfSpaceState:
-        """Solve with a plane that may turn about the middle."""
-        if self.periodic:
-            raise InputError("a plane cannot turn on a periodic surface", value="tilt free")
-        half = 0.5 * float(np.hypot(*self.surface.lengths))
-        x, y = (
-            (centres - 0.5 * length) / half
-            for centres, length in zip(
-                (self.surface.x, self.surface.y), self.surface.lengths, strict=True
-            )
-        )
-        required = self._required(self._plane(control.approach or 0.0, _LEVEL))
-        total = None if control.force is None else self._total(control)
-        known = None if start is None else Pressures(start, np.zeros(3), 0.0, 0, 0)
-        found = self._pressing.by_turning(required, Motions.turning(x, y, total), known)
-        approach = control.approach if control.force is None else float(found.motion[0])
-        return self._state(
-            self._plane(float(approach or 0.0), _slopes(found.motion[-2:], half)), found
-        )
-
-    def _total(self, control: Control) -> float:
-        dx, dy = self.surface.spacing
-        return (control.force or 0.0) / (self.contact_modulus * dx * dy)
+        if start is None:
+            return self._contact.equilibrium(control, None, None)
+        return self._contact.equilibrium(control, start.pressure, start.plane)
 
     def respond(
         self,
         approaches: ArrayLike,
         *,
-        patches: Partition,
-        mean_heights: ArrayLike,
-        tilt: tuple[float, float] = _LEVEL,
+        patches: Partition | None = None,
+        mean_heights: ArrayLike | None = None,
+        tilt: tuple[float, float] = LEVEL,
     ) -> Response:
         """Solve along approaches; see `MicroModel.respond`.
 
-        Each starts from the two solutions before it, extrapolated. A cell that straddles a border
-        of patches is shared by area.
+        Each solution starts from the two before it, extrapolated in the approach. A cell that
+        straddles a border of patches is shared by area.
         """
-        sums = self._sums(patches, mean_heights)
+        patches, means = checked_patches(self.surface, patches, mean_heights)
         given = checked_approaches(approaches)
-        order = np.argsort(given, kind="stable")
-        path = self._along([self._plane(given[index], tilt) for index in order])
-        rows = {int(index): sums.row(*step) for index, step in zip(order, path, strict=True)}
+        rows: dict[int, dict[str, Any]] = {}
+        before = last = None
+        for index in np.argsort(given, kind="stable"):
+            plane = self._contact.plane(float(given[index]), tilt)
+            start = None if last is None else last.pressure
+            if last is not None and before is not None and last.approach > before.approach:
+                ahead = (plane.approach - last.approach) / (last.approach - before.approach)
+                start = np.maximum(last.pressure + ahead * (last.pressure - before.pressure), 0.0)
+            before, last = last, self._contact.at(plane, start)
+            rows[int(index)] = self._row(last, patches, means)
         ordered = [rows[index] for index in range(len(given))]
         return Response.of(ordered, self.name, self.contact_modulus, patches)
 
@@ -268,104 +217,35 @@ class HalfSpaceModel:
         self,
         control: Control,
         *,
-        patches: Partition,
-        mean_heights: ArrayLike,
+        patches: Partition | None = None,
+        mean_heights: ArrayLike | None = None,
         start: Any = None,
     ) -> Pressed:
         """Solve one load step; see `MicroModel.press`."""
-        sums = self._sums(patches, mean_heights)
-        pressure, tilt, near = None, _LEVEL, None
-        if start is not None:
-            pressure, tilt, near = self._started(start[0]), start[1].tilt, start[1].approach
-        state = self._solved(control, pressure, tilt, near)
-        rows = [sums.row(state.plane, state)]
+        patches, means = checked_patches(self.surface, patches, mean_heights)
+        state = self._contact.equilibrium(control, *(start or (None, None)))
+        rows = [self._row(state, patches, means)]
         response = Response.of(rows, self.name, self.contact_modulus, patches)
         return Pressed(response, state.plane, (state.pressure, state.plane))
 
-    def _sums(self, patches: Partition, mean_heights: ArrayLike) -> CellSums:
-        means = checked_means(mean_heights, patches)
-        return CellSums(
-            surface=self.surface, patches=patches, mean_heights=means, highest=self.reference_height
-        )
-
-    def _along(self, planes: list[RigidPlane]) -> Iterator[tuple[RigidPlane, HalfSpaceState]]:
-        """Solve at rising approaches; pressures are extrapolated in the approach."""
-        before = last = None
-        for plane in planes:
-            first = None
-            if last is not None:
-                first = last.pressure / self.contact_modulus
-                if before is not None and last.approach > before.approach:
-                    ahead = (plane.approach - last.approach) / (last.approach - before.approach)
-                    change = last.pressure - before.pressure
-                    first = np.maximum(first + ahead * change / self.contact_modulus, 0.0)
-            before, last = last, self._pressed(plane, first)
-            yield plane, last
-
-    def _started(self, pressure: Array) -> Array:
-        if pressure.shape != self.surface.grid:
-            raise InputError(
-                "the solution to start from is of another grid",
-                value=pressure.shape,
-                allowed=f"{self.surface.grid}",
-            )
-        return np.asarray(np.divide(pressure, self.contact_modulus))
-
-    def _pressed(self, plane: RigidPlane, start: Array | None) -> HalfSpaceState:
-        required = self._required(plane)
-        if self.periodic and required.mean() >= 0.0:
-            raise InputError(
-                "a periodic surface has no gap left at this approach",
-                value=plane.approach,
-                allowed=f"< {plane.approach - required.mean():.6g} mm; beyond it give the force",
-            )
-        known = None if start is None else Pressures(start, np.zeros(0), 0.0, 0, 0)
-        return self._state(plane, self._pressing.by_approach(required, known))
-
-    def _plane(self, approach: float, tilt: tuple[float, float]) -> RigidPlane:
-        self._check_tilt(tilt)
-        return RigidPlane.above(self.surface, approach, tilt)
-
-    def _check_tilt(self, tilt: tuple[float, float]) -> None:
-        if self.periodic and any(tilt):
-            raise InputError(
-                "a tilted plane does not continue periodically", value=tilt, allowed="(0, 0)"
-            )
-
-    def _required(self, plane: RigidPlane) -> Array:
-        surface = self.surface
-        below = self.reference_height - surface.heights
-        return np.asarray(plane.at(surface.x[:, None], surface.y) - below)
-
-    def _state(self, plane: RigidPlane, found: Pressures) -> HalfSpaceState:
-        return HalfSpaceState(
-            plane=plane,
-            required=self._required(plane),
-            pressure=found.pressure * self.contact_modulus,
-            contact_modulus=self.contact_modulus,
-            spacing=self.surface.spacing,
-            periodic=self.periodic,
-            residual=found.residual,
-            iterations=found.iterations,
-            grids=self._pressing.grids,
-        )
+    def _row(self, state: HalfSpaceState, patches: Partition, means: Array) -> dict[str, Any]:
+        return response_row(self.surface, state, patches, means, self.reference_height)
 
     @cached_property
-    def _pressing(self) -> Pressing:
-        grids = ElasticGrids(
+    def _contact(self) -> PlaneContact:
+        compliance = Compliance(
             periodic=self.periodic,
             modulus=self.contact_modulus,
             sides=self.sides,
             body=self.body,
             slopes=self.slopes,
         )
-        return Pressing(
-            grids=grids,
+        solver = ContactSolver(
+            compliance=compliance,
             spacing=self.surface.spacing,
             tolerance=self.tolerance,
             upper=self.upper / self.contact_modulus,
         )
-
-
-def _slopes(turn: Array, half: float) -> tuple[float, float]:
-    return float(turn[0]) / half, float(turn[1]) / half
+        return PlaneContact(
+            surface=self.surface, reference_height=self.reference_height, solver=solver
+        )

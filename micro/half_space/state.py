@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.rigid_plane import RigidPlane
-from micro.compliance.bounding_box import Box
-from micro.compliance.elastic_grid import ElasticGrids
+from micro.compliance.cells import Box
+from micro.compliance.grid_compliance import Compliance
 from micro.half_space.contact_spots import Contacts, find_contacts
 
 Array = NDArray[np.float64]
@@ -18,32 +18,28 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HalfSpaceState:
-    """Contact of all cells at one approach; maps are evaluated when first asked for.
+    """Contact of all cells at one approach; maps are evaluated when first used.
 
     Args:
         plane: The rigid plane: approach at the centre from first touch, and slopes.
-        required: Displacement that the plane asks of each cell, δ(x, y) − (z_M − z), negative
+        interference: Overlap of the plane and the undeformed surface, δ(x, y) − (z_M − z), negative
             where they are apart, shape (nx, ny) [mm].
         pressure: Contact pressure, shape (nx, ny) [MPa].
-        contact_modulus: E* [MPa].
         spacing: Sides (dx, dy) of a cell [mm].
-        periodic: Whether surface and pressures continue periodically.
         residual: Largest violation of gap ≥ 0 and of gap = 0 under pressure, relative to the
-            largest displacement asked for. It bounds the error of the force: this is exact for
-            a surface whose heights differ by ``residual`` δ at most.
+            largest interference. It bounds the error of the force: this is exact for a surface
+            whose heights differ by ``residual`` δ at most.
         iterations: Products of the compliance with pressures.
-        grids: Elastic body of the model.
+        compliance: Elastic body of the model.
     """
 
     plane: RigidPlane
-    required: Array
+    interference: Array
     pressure: Array
-    contact_modulus: float
     spacing: tuple[float, float]
-    periodic: bool
     residual: float
     iterations: int
-    grids: ElasticGrids = field(repr=False)
+    compliance: Compliance = field(repr=False)
 
     @property
     def approach(self) -> float:
@@ -59,6 +55,11 @@ class HalfSpaceState:
     def in_contact(self) -> NDArray[np.bool_]:
         """Which cells carry a pressure, shape (nx, ny)."""
         return self.pressure > 0.0
+
+    @property
+    def periodic(self) -> bool:
+        """Whether surface and pressures continue periodically."""
+        return self.compliance.periodic
 
     @property
     def counted_area(self) -> float:
@@ -81,13 +82,14 @@ class HalfSpaceState:
 
         On a periodic surface it counts from its own mean.
         """
-        whole = Box.whole(self.pressure.shape)
-        grid = self.grids.at(self.pressure.shape, self.spacing, whole)
-        pressure = np.divide(self.pressure, self.contact_modulus)
-        found = grid.displacement(pressure)
-        return found if self.grids.slopes is None else found + self.grids.by_slopes(pressure)
+        pressure = np.divide(self.pressure, self.compliance.modulus)
+        whole = Box.whole(pressure.shape)
+        found = self.compliance.on_grid(pressure.shape, self.spacing, whole).displacement(pressure)
+        if self.compliance.slopes is not None:
+            found += self.compliance.slope_displacement(pressure)
+        return found
 
     @property
     def gap(self) -> Array:
         """Distance of the displaced surface from the plane, shape (nx, ny) [mm]."""
-        return self.displacement - self.required
+        return self.displacement - self.interference

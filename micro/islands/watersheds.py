@@ -1,106 +1,227 @@
-"""Peaks of a sampled surface, the catchments that climb to them and the passes between.
+"""Watersheds of a surface: the volumes and moments above any level, and connected regions.
 
-Every sample climbs to the highest of its 8 neighbours until it reaches a peak; the samples that
-reach the same peak are its catchment. The climb never goes down, so above any level a catchment
-is connected, and two of them are one region when their pass lies above the level.
+The samples of each watershed are sorted by depth below its peak, and their moments are summed up
+in that order. So the sums above a level, which may differ between watersheds, cost one search for
+each peak.
+
+Theory: demos/theory.md, section 9.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from geometry import Surface
+from geometry.summits import coincident, constrained_summits
+from micro.islands.division import Saddles, divided, saddles_between, sampled
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-_FINEST = 8
-_MOST_SAMPLES = 2**18
-_HALF = ((0, 1), (1, -1), (1, 0), (1, 1))
-_NEIGHBOURS = (*_HALF, *((-i, -j) for i, j in _HALF))
+_FEW = 32  # samples of the smallest cap that has a shape of its own
+_POWERS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+_ORDER = np.array([2.0, 2.5, 2.5, 3.0, 3.0, 3.0])[:, None]
 
 
-class Passes(NamedTuple):
-    """Touching pairs of catchments.
-
-    Attributes:
-        first: Smaller peak numbers, shape (m,).
-        second: Larger peak numbers, shape (m,).
-        height: Heights of the highest pass between them, shape (m,) [mm].
-    """
-
-    first: Indices
-    second: Indices
-    height: Array
-
-
-def sampled(surface: Surface) -> Array:
-    """Return heights at the centres of cells that divide those of the surface.
-
-    A surface of few cells is sampled more finely on its interpolant: up to 8 samples per cell and
-    direction, 512 × 512 in all.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Watersheds:
+    """The watersheds of n peaks.
 
     Args:
-        surface: The surface.
+        x: Abscissae of the peaks, shape (n,) [mm].
+        y: Ordinates, shape (n,) [mm].
+        z: Heights, shape (n,) [mm].
+        saddles: Highest saddles between touching watersheds.
+        owner: Peak of every sample, by watershed and there by depth, shape (s,).
+        sample: Flat indices of the samples, shape (s,).
+        depth: Depths of the samples below their peak, shape (s,) [mm].
+        moments: X^p Y^q of the samples from their peak for the six powers up to 2, (6, s).
+        grid: Numbers of samples over the surface.
+        cell: Area of a sample [mm²].
     """
-    finer = min(_FINEST, int(np.sqrt(_MOST_SAMPLES / surface.heights.size)))
-    if finer <= 1:
-        return surface.heights
-    x, y = (
-        (np.arange(cells * finer) + 0.5) * side / finer
-        for cells, side in zip(surface.grid, surface.spacing, strict=True)
-    )
-    return surface.height_at(x[:, None], y)
+
+    x: Array
+    y: Array
+    z: Array
+    saddles: Saddles
+    owner: Indices
+    sample: Indices
+    depth: Array
+    moments: Array
+    grid: tuple[int, int]
+    cell: float
+
+    @classmethod
+    def of(
+        cls,
+        surface: Surface,
+        *,
+        tilt_offset: Surface | None = None,
+        floor: float = -np.inf,
+        ceiling: float = np.inf,
+    ) -> Self:
+        """Divide what rises above a floor into watersheds, one for each summit.
+
+        Args:
+            surface: The surface; it ends at its border, also when it is periodic.
+            tilt_offset: What a tilt adds to its heights, on the same cells; it need not be
+                periodic.
+            floor: Height below which samples are left out [mm]. Every peak above the floor keeps
+                its 33 highest samples all the same, which give its caps their shape.
+            ceiling: Height that no peak exceeds, for peaks higher by rounding [mm].
+        """
+        parts = [surface] if tilt_offset is None else [surface, tilt_offset]
+        heights = np.sum([sampled(part) for part in parts], axis=0)
+        side = np.array(surface.lengths) / heights.shape
+        owner, peak = divided(heights)
+        top = np.stack(np.unravel_index(peak, heights.shape), axis=1)
+        summit = constrained_summits(surface, (top + 0.5) * side, tilt_offset)
+        z = np.sum([part.height_at(*summit.T) for part in parts], axis=0)
+        z = np.minimum(np.maximum(z, heights.flat[peak]), ceiling)
+        # Several samples on one oblique ridge can be peaks where the interpolant has one only.
+        name = coincident(surface, summit)
+        order = np.lexsort((-z, name))
+        best = order[np.searchsorted(name[order], np.arange(name.max() + 1))]
+        owner, summit, z = name[owner], summit[best], z[best]
+        owner = np.where(_needed(heights.ravel(), owner, z, floor), owner, -1)
+        return cls._sorted(heights, owner, summit, z, side)
+
+    @classmethod
+    def _sorted(cls, heights: Array, owner: Indices, summit: Array, z: Array, side: Array) -> Self:
+        saddles = saddles_between(heights, owner.reshape(heights.shape))
+        sample = np.flatnonzero(owner >= 0)
+        depth = np.maximum(z[owner[sample]] - heights.flat[sample], 0.0)
+        order = np.lexsort((depth, owner[sample]))
+        sample, depth, owner = sample[order], depth[order], owner[sample][order]
+        place = (np.stack(np.unravel_index(sample, heights.shape), axis=1) + 0.5) * side
+        along, across = (place - summit[owner]).T
+        return cls(
+            x=summit[:, 0],
+            y=summit[:, 1],
+            z=z,
+            saddles=saddles,
+            owner=owner,
+            sample=sample,
+            depth=depth,
+            moments=np.stack([along**p * across**q for p, q in _POWERS]),
+            grid=(heights.shape[0], heights.shape[1]),
+            cell=float(side.prod()),
+        )
+
+    def __len__(self) -> int:
+        return len(self.z)
+
+    def caps(self, height: Array) -> Array:
+        """Return ∫ X^p Y^q dV of what lies within a height below each peak, shape (6, n).
+
+        The powers are 1, X, Y, X², XY, Y² from the peak [mm³ … mm⁵]. Where a cap holds fewer
+        than 32 samples its shape is that of the larger cap that holds so many, a paraboloid (cut
+        by the border, if need be) that shrinks towards its peak.
+
+        Args:
+            height: Heights of the caps, shape (n,) [mm].
+        """
+        least = self.least_height
+        taken = np.maximum(height, least)
+        ends = np.searchsorted(self._key, np.arange(len(self)) + taken / self._deepest)
+        ends = np.clip(ends, self._start[:-1], self._start[1:])
+        sums, deep = (table[:, ends] - table[:, self._start[:-1]] for table in self._cumulated)
+        shrunk = np.divide(height, taken, out=np.zeros_like(height), where=taken > 0.0)
+        return self.cell * (taken * sums - deep) * shrunk**_ORDER
+
+    def above(self, height: Array) -> tuple[Indices, Indices, Array]:
+        """Return the samples within a height below each peak.
+
+        Args:
+            height: Heights of the caps, shape (n,) [mm].
+
+        Returns:
+            Their watersheds, flat indices and heights above the base of the cap [mm].
+        """
+        over = height[self.owner] - self.depth
+        taken = np.flatnonzero(over > 0.0)
+        return self.owner[taken], self.sample[taken], over[taken]
+
+    def regions(self, linked: NDArray[np.bool_]) -> Indices:
+        """Return a number for each watershed, the same for those that saddles link, shape (n,).
+
+        Args:
+            linked: Which saddles link, shape (m,).
+        """
+        first, second, _ = self.saddles
+        pairs = (np.ones(np.count_nonzero(linked)), (first[linked], second[linked]))
+        graph = coo_array(pairs, shape=(len(self), len(self)))
+        return connected_components(graph, directed=False)[1]
+
+    def open_saddles(self, level: Array) -> NDArray[np.bool_]:
+        """Return which saddles lie above the levels of both their watersheds, shape (m,).
+
+        Args:
+            level: Level of each watershed, shape (n,) [mm].
+        """
+        first, second, height = self.saddles
+        return height > np.maximum(level[first], level[second])
+
+    @cached_property
+    def _start(self) -> Indices:
+        return np.searchsorted(self.owner, np.arange(len(self) + 1))
+
+    @cached_property
+    def _deepest(self) -> float:
+        return 2.0 * float(self.depth.max(initial=0.0)) or 1.0
+
+    @cached_property
+    def _key(self) -> Array:
+        return self.owner + self.depth / self._deepest
+
+    @cached_property
+    def whole_caps(self) -> Array:
+        """Heights of the caps of all samples of watersheds with at most 32, else 0, (n,) [mm].
+
+        Where all samples of such a watershed are equally deep the height is twice their depth,
+        for the cap to have a volume. It is 0 where they are as high as the peak.
+        """
+        start, end = self._start[:-1], self._start[1:]
+        small = np.flatnonzero((end > start) & (end - start <= _FEW))
+        highest, lowest = self.depth[start[small]], self.depth[end[small] - 1]
+        heights: Array = np.zeros(len(self))
+        heights[small] = np.where(lowest > highest, lowest, 2.0 * lowest)
+        return heights
+
+    @cached_property
+    def least_height(self) -> Array:
+        """Heights of the caps with 32 samples, 0 for smaller watersheds, shape (n,) [mm]."""
+        last = self._start[:-1] + _FEW
+        many = last < self._start[1:]
+        least: Array = np.zeros(len(self))
+        least[many] = self.depth[last[many]]
+        return least
+
+    @cached_property
+    def _cumulated(self) -> tuple[Array, Array]:
+        nothing = np.zeros((len(_POWERS), 1))
+        moments, deep = (
+            np.concatenate([nothing, np.cumsum(part, axis=1)], axis=1)
+            for part in (self.moments, self.moments * self.depth)
+        )
+        return moments, deep
 
 
-def watersheds(heights: Array) -> tuple[Indices, Indices]:
-    """Return the peak number of every sample, shape (nx ny,), and the peaks' flat indices.
-
-    Equal neighbours climb to the one with the larger flat index; a plateau has one peak, or
-    several whose passes are as high as they are.
-
-    Args:
-        heights: Samples, shape (nx, ny) [mm].
-    """
-    nx, ny = heights.shape
-    padded = np.pad(heights, 1, constant_values=-np.inf)
-    best, climb = heights.copy(), np.zeros(heights.shape, dtype=np.intp)
-    for i, j in _NEIGHBOURS:
-        beside = padded[1 + i : 1 + i + nx, 1 + j : 1 + j + ny]
-        ahead = i * ny + j > climb
-        better = (beside > best) | ((beside == best) & ahead)
-        best[better], climb[better] = beside[better], i * ny + j
-    target = np.arange(heights.size) + climb.ravel()
-    while not np.array_equal(target, further := target[target]):
-        target = further
-    peak = np.flatnonzero(climb.ravel() == 0)
-    number = np.empty(heights.size, dtype=np.intp)
-    number[peak] = np.arange(len(peak))
-    return number[target], peak
-
-
-def passes_between(heights: Array, owner: Indices) -> Passes:
-    """Return the highest pass between every two catchments that touch.
-
-    Args:
-        heights: Samples, shape (nx, ny) [mm].
-        owner: Peak number of every sample, −1 for samples left out, shape (nx, ny).
-    """
-    pairs, level = [], []
-    for i, j in _HALF:
-        here = np.s_[: -i or None, max(-j, 0) : -j if j > 0 else None]
-        there = np.s_[i:, max(j, 0) : j if j < 0 else None]
-        first, second = owner[here], owner[there]
-        touch = (first != second) & (first >= 0) & (second >= 0)
-        pairs.append(np.stack([first[touch], second[touch]]))
-        level.append(np.minimum(heights[here][touch], heights[there][touch]))
-    first, second = np.sort(np.concatenate(pairs, axis=1), axis=0)
-    height = np.concatenate(level)
-    order = np.lexsort((-height, second, first))
-    first, second, height = first[order], second[order], height[order]
-    highest = np.ones(len(first), dtype=bool)
-    highest[1:] = (first[1:] != first[:-1]) | (second[1:] != second[:-1])
-    return Passes(first[highest], second[highest], height[highest])
+def _needed(heights: Array, owner: Indices, z: Array, floor: float) -> NDArray[np.bool_]:
+    """Mark the samples above a floor, and the highest 33 of every peak above it."""
+    needed = heights > floor
+    count = np.bincount(owner[needed], minlength=len(z))
+    wanting = (z >= floor) & (count <= _FEW)
+    rest = np.flatnonzero(wanting[owner] & ~needed)
+    rest = rest[np.lexsort((-heights[rest], owner[rest]))]
+    of = owner[rest]
+    rank = np.arange(len(rest)) - np.searchsorted(of, of)
+    needed[rest[rank + count[of] <= _FEW]] = True
+    return needed

@@ -8,111 +8,111 @@ from typing import Any
 
 from geometry.errors import InputError, NotConverged
 from multiscale.cli.commands import scene_and_folder
-from multiscale.comparison.compare import compare
+from multiscale.comparison.compare import AGAINST, compare
 from multiscale.comparison.comparison import Comparison
-from multiscale.comparison.level import Level
-from multiscale.comparison.level_results import LevelResult
-from multiscale.comparison.level_runs import check_launchable
-from multiscale.comparison.outcomes import AGAINST
-from multiscale.comparison.report import bargains, headline, write_comparison
+from multiscale.comparison.launching import Launch, check_launchable
+from multiscale.comparison.report import frontier_lines, headline, write_comparison
+from multiscale.comparison.run_result import RunResult
 from multiscale.output import terminal
 from multiscale.restart.folder_lock import locked
 from multiscale.scene.quantities import parse_duration
 from multiscale.scene.scene import Scene
 
-KEPT = "levels"
-"""Folder of finished levels within the results."""
+RESULTS = "configurations"
+"""Folder of the results of all configurations, within the folder of the comparison."""
 
 ENDING = "-compare"
-"""What the folder's name has behind the scene's."""
+"""End of the name of the comparison's folder; it begins with the name of the scene."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the words that only this command knows."""
+    """Add the options that only this command has."""
     parser.add_argument(
         "--against",
-        metavar="LEVEL",
+        metavar="KIND",
+        choices=tuple(AGAINST),
         help=f"compare with {', '.join(AGAINST)}; by default the best that is reached",
     )
     parser.add_argument(
-        "--budget", metavar="TIME", help="wall time for all levels, such as 5min; by default any"
+        "--budget",
+        metavar="TIME",
+        type=budget_seconds,
+        help="wall time for all configurations, such as 5min; by default any",
     )
     parser.add_argument(
-        "--ranks", type=int, default=1, metavar="N", help="processes of each level, under mpirun"
+        "--ranks",
+        type=int,
+        default=1,
+        metavar="N",
+        help="processes of each configuration, under mpirun",
     )
 
 
-def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
-    """Run a scene at every sensible level; draw error against time.
+def compare_scene(
+    choice: argparse.Namespace, options: list[str], comm: Any, launch: Launch | None = None
+) -> None:
+    """Run a scene in every sensible configuration; draw error against time.
 
     Args:
         choice: Parsed words of the command line.
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
+        launch: Runs one configuration; by default in a process of its own.
     """
     check_launchable(choice.ranks)
-    budget = None if choice.budget is None else budget_seconds(choice.budget)
-    if choice.against is not None and choice.against not in AGAINST:
-        allowed = ", ".join(AGAINST)
-        raise InputError(
-            "is nothing to compare against", key="--against", value=choice.against, allowed=allowed
-        )
     if options:
-        raise InputError("levels take no PETSc options", key="--", value=" ".join(options))
+        raise InputError("configurations take no PETSc options", key="--", value=" ".join(options))
     scene, folder = scene_and_folder(choice, comm, ending=ENDING)
     with locked(folder, comm):
-        found = _followed(scene, choice, comm, budget, folder / KEPT)
-        for text in (*headline(found), *bargains(found), *found.warnings):
+        found = _followed(scene, choice, comm, folder / RESULTS, launch)
+        for text in (*headline(found), *frontier_lines(found), *found.warnings):
             terminal.say(comm, text)
         terminal.show_files(comm, write_comparison(folder, found))
     if found.measure is None or (choice.against and found.against != choice.against):
         raise NotConverged(
             f"the comparison against {choice.against or 'anything'}",
-            reason="LEVEL_NOT_REACHED",
+            reason="MEASURE_NOT_REACHED",
             iterations=0,
-            remedy="give more --budget; finished levels are kept",
+            remedy="give more --budget; finished configurations are not run again",
         )
 
 
 def _followed(
-    scene: Scene, choice: argparse.Namespace, comm: Any, budget: float | None, kept: Path
+    scene: Scene, choice: argparse.Namespace, comm: Any, folder: Path, launch: Launch | None
 ) -> Comparison:
-    """Run all levels and say how each ended; finished ones are kept in a folder."""
+    """Run all configurations, and print a line on each."""
     with terminal.following(comm) as (begun, ended):
+
+        def observe(result: RunResult, stored: bool) -> None:
+            spent = f"{sum(result.seconds.values()):8.2f} s" if result.seconds else " " * 10
+            status = result.status + ", from an earlier call" * stored
+            why = f": {result.message}" if result.message else ""
+            ended(f"{spent}  {result.configuration.name}: {status}{why}")
+
         try:
             return compare(
                 scene,
                 comm,
                 against=choice.against,
-                budget_s=budget,
-                folder=kept,
+                budget_s=choice.budget,
+                folder=folder,
                 ranks=choice.ranks,
-                begin=lambda level: begun(level.name),
-                observe=lambda level, result, known: ended(_line(level, result, known)),
+                launch=launch,
+                begin=lambda configuration: begun(configuration.name),
+                observe=observe,
             )
         except KeyboardInterrupt:
-            ended(f"interrupted: finished levels are kept in {kept}; the same call goes on")
+            ended(f"interrupted: finished configurations are in {folder}; the same call goes on")
             raise
-
-
-def _line(level: Level, result: LevelResult, kept: bool) -> str:
-    """Say in a line how a level ended."""
-    spent = f"{sum(result.seconds.values()):8.2f} s" if result.seconds else " " * 10
-    status = f"{result.status}, kept" if kept else result.status
-    why = f": {result.message}" if result.message else ""
-    return f"{spent}  {level.name}: {status}{why}"
 
 
 def budget_seconds(text: str) -> float:
     """Return a budget in seconds.
 
     Raises:
-        InputError: When the text is no time, or none at all.
+        argparse.ArgumentTypeError: When the text is no time, or not greater than zero.
     """
     try:
         return parse_duration(text)
     except ValueError as error:
-        problem, _, allowed = str(error).partition(" (allowed: ")
-        raise InputError(
-            problem, key="--budget", value=text, allowed=allowed.rstrip(")") or None
-        ) from None
+        raise argparse.ArgumentTypeError(f"{text!r}: {error}") from None

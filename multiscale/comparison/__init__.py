@@ -1,1 +1,1 @@
-"""A scene computed in many ways: error against time."""
+"""Compares all sensible ways to compute a scene: error against wall time."""

@@ -1,27 +1,24 @@
-"""Writes what a comparison leaves behind: table, figures and one HTML page."""
+"""Writes the files of a comparison: table, figures and one HTML page."""
 
 from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Iterator, Mapping
-from html import escape
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from multiscale.comparison.comparison import Comparison, Row
-from multiscale.comparison.measures import __doc__ as measures_text
-from multiscale.output.report import figure_element, page, table
-from multiscale.output.results import write_figure
-from multiscale.storage.whole_files import write_csv, write_text
-
-_SHARES = ("micro", "coupling", "block", "slopes", "discretisation")
+from multiscale.comparison.comparison import Comparison
+from multiscale.comparison.error_measures import __doc__ as measures_text
+from multiscale.output.results import Drawing, png
+from multiscale.results.html_page import Section, Table, page_html
+from multiscale.storage.whole_files import write_bytes, write_csv, write_text
 
 
 def write_comparison(folder: Path, comparison: Comparison) -> list[Path]:
     """Write ``compare.csv``, the figures and ``report.html``.
 
     Args:
-        folder: Where to; made when missing.
+        folder: Folder of the results; made when missing.
         comparison: The comparison.
 
     Returns:
@@ -29,171 +26,177 @@ def write_comparison(folder: Path, comparison: Comparison) -> list[Path]:
     """
     columns = comparison.to_dict()
     files = [write_csv(folder / "compare.csv", list(columns), zip(*columns.values(), strict=True))]
-    drawn = dict(_drawn(folder, comparison))
-    files.extend(drawn.values())
-    return [*files, write_text(folder / "report.html", comparison_html(comparison, drawn))]
+    drawings = list(_drawings(comparison))
+    files += [write_bytes(folder / f"{one.name}.png", one.png) for one in drawings]
+    page = comparison_html(comparison, {one.caption: one.png for one in drawings})
+    return [*files, write_text(folder / "report.html", page)]
 
 
-def _drawn(folder: Path, comparison: Comparison) -> Iterator[tuple[str, Path]]:
-    """Draw what there is to be seen; yield captions and files."""
+def _drawings(comparison: Comparison) -> Iterator[Drawing]:
     if not comparison.curves:
         return
-    from multiscale.comparison import figures as compare_figures
-    from multiscale.comparison import pareto_figure
+    from multiscale.comparison.figures import curves_figure, maps_figure, pareto_figure
 
     if comparison.measure is not None:
-        yield (
-            "Error against wall time. No other level is both faster and closer than one on the "
-            "frontier; numbers are those of the table. The measure stands at its own uncertainty.",
-            write_figure(folder / "pareto.png", pareto_figure.pareto_figure(comparison)),
+        yield Drawing(
+            "pareto",
+            "Error against wall time. No other configuration is both faster and closer than one on "
+            "the frontier; numbers are those of the table. The measure stands at its own "
+            "uncertainty.",
+            png(pareto_figure(comparison)),
         )
-    yield (
-        "Curves of the measure, the scene as it is and the closest levels; on the right what they "
-        "differ from the measure, whose uncertainty is grey.",
-        write_figure(folder / "curves.png", compare_figures.curves_figure(comparison)),
+    yield Drawing(
+        "curves",
+        "Curves of the measure, the scene as it is and the closest configurations; on the right "
+        "their differences from the measure, whose uncertainty is grey.",
+        png(curves_figure(comparison)),
     )
-    yield (
+    yield Drawing(
+        "pressures",
         "Mean pressure of every patch at the last load step, on one scale.",
-        write_figure(folder / "pressures.png", compare_figures.maps_figure(comparison)),
+        png(maps_figure(comparison)),
     )
 
 
-def comparison_html(comparison: Comparison, figures: Mapping[str, Path]) -> str:
+def comparison_html(comparison: Comparison, figures: Mapping[str, bytes]) -> str:
     """Compose the page.
 
     Args:
         comparison: The comparison.
-        figures: PNG files by caption; embedded into the page.
+        figures: PNG images by caption; they become part of the page.
 
     Returns:
         A complete HTML document.
     """
-    elements = [figure_element(caption, path) for caption, path in figures.items()]
-    title = f"patchlaw compare: {comparison.scene}"
-    parts = [
-        f"<h1>{escape(title)}</h1>",
-        *(f"<p>{escape(text)}</p>" for text in headline(comparison)),
-        "<ul>",
-        *(f"<li>{escape(text)}</li>" for text in bargains(comparison)),
-        "</ul>",
-        *(f'<p class="warning">{escape(text)}</p>' for text in comparison.warnings),
-        *elements[:1],
-        "<h2>Levels</h2>",
-        f'<div class="wide">{table(*level_cells(comparison), text_columns={1, 2})}</div>',
-        *elements[1:],
-        "<h2>Where the errors come from</h2>",
-        "<p>Signed shares of the error at the last load step, in % of the measure; they add up. "
-        "Empty where the levels that would tell were not reached.</p>",
-        f'<div class="wide">{table(*_share_cells(comparison), text_columns={1})}</div>',
-        *_failures(comparison),
-        "<h2>How errors are measured</h2>",
-        f"<pre>{escape((measures_text or '').strip())}</pre>",
-        f'<p class="note">{escape(_machine())}</p>',
+    failed = [
+        (row.name, row.status, _number(row.exit_code, "d"), row.message)
+        for row in comparison.rows
+        if row.status != "done"
     ]
-    return page(title, parts)
+    without_result = Section(
+        heading="Configurations without a result",
+        table=(("configuration", "status", "exit code", "message"), failed),
+        text_columns=(1, 3),
+    )
+    sections = [
+        Section(
+            paragraphs=list(headline(comparison)),
+            items=list(frontier_lines(comparison)),
+            warnings=comparison.warnings,
+        ),
+        Section(figures=dict(list(figures.items())[:1])),
+        Section(
+            heading="Configurations",
+            table=_table(_configuration_cells(comparison)),
+            text_columns=(1, 2),
+            wide=True,
+            figures=dict(list(figures.items())[1:]),
+        ),
+        Section(
+            heading="Errors by cause",
+            paragraphs=[
+                "Signed shares of the error at the last load step, in % of the measure; they add "
+                "up. A share is empty where the configurations that show it were not reached."
+            ],
+            table=_table(_share_cells(comparison)),
+            text_columns=(1,),
+            wide=True,
+        ),
+        *([without_result] if failed else []),
+        Section(
+            heading="How errors are measured",
+            preformatted=(measures_text or "").strip(),
+            notes=[
+                f"Timed on {platform.platform()}, {os.cpu_count()} cores, "
+                f"threads: {os.environ.get('OMP_NUM_THREADS', 'all')}."
+            ],
+        ),
+    ]
+    return page_html(f"patchlaw compare: {comparison.scene}", sections)
 
 
 def headline(comparison: Comparison) -> Iterator[str]:
-    """Yield how many levels were run and what they are compared with, in words."""
+    """Yield sentences on the number of configurations that were run, and on the measure."""
     done = sum(row.status == "done" for row in comparison.rows)
-    yield f"{done} of {len(comparison)} levels were run to the end of the load."
+    yield f"{done} of {len(comparison)} configurations were run to the end of the load."
     if comparison.measure is None:
         return
-    response, own = comparison.response, comparison.uncertainty
-    bars = [
-        (f"{response}_max", f"of the {response}"),
-        ("area_max", "of the contact area"),
-        ("distribution", "of the mean pressure in the distribution of pressures"),
-    ]
-    known = [
-        f"{_percent(getattr(own, name))} % {of}" for name, of in bars if getattr(own, name) > 0
-    ]
+    response = comparison.response
+    own = comparison.uncertainty
+    bars = (
+        (getattr(own, f"{response}_max"), f"of the {response}"),
+        (own.area_max, "of the contact area"),
+        (own.distribution, "of the mean pressure in the distribution of pressures"),
+    )
+    known = ", ".join(f"{_percent(bar)} % {part}" for bar, part in bars if bar > 0)
     yield (
         f"They are compared with “{comparison.measure}”, whose own uncertainty is "
-        f"{', '.join(known) if known else 'not known'}."
+        f"{known or 'not known'}."
     )
 
 
-def bargains(comparison: Comparison) -> Iterator[str]:
-    """Yield what time buys: the levels on the frontier, in words."""
+def frontier_lines(comparison: Comparison) -> Iterator[str]:
+    """Yield a line on each configuration of the frontier: its time and its error."""
     bar = getattr(comparison.uncertainty, f"{comparison.response}_max")
     for row in comparison.frontier():
         size = comparison.error(row)
-        less = "no more than the measure's uncertainty, " if size <= bar else ""
+        less = "no more than the uncertainty of the measure, " if size <= bar else ""
         yield f"{row.seconds:.3g} s: error {less}{_percent(size)} %: {row.name}"
 
 
-def level_cells(comparison: Comparison) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Return header and formatted rows of the table of levels."""
-    response = comparison.response
-    header = (
-        "#", "level", "status", "time [s]", "set-up", "laws", "steps", "start", "memory [MB]",
-        f"{response} max [%]", f"{response} last [%]", "area max [%]", "separation max [%]",
-        "pressure L1 [%]", "distribution [%]",
-    )  # fmt: skip
-    best = comparison.frontier()
+def _table(rows: Sequence[Mapping[str, str]]) -> Table | None:
+    """Return a table of rows by column; None without any."""
+    return (list(rows[0]), [list(row.values()) for row in rows]) if rows else None
+
+
+def _configuration_cells(comparison: Comparison) -> list[dict[str, str]]:
+    response, frontier = comparison.response, comparison.frontier()
     rows = []
     for number, row in enumerate(comparison.rows, 1):
         mark = " — measure, with its uncertainty" if row.is_measure else ""
-        mark += " — frontier" if row in best else ""
-        times = (row.seconds, row.seconds_setup, row.seconds_laws, row.seconds_steps)
-        found = row.errors
-        errors = (
-            getattr(found, f"{response}_max"), getattr(found, f"{response}_last"), found.area_max,
-            found.separation_max, found.pressure_l1, found.distribution,
-        )  # fmt: skip
+        errors = row.errors
         rows.append(
-            (
-                str(number),
-                row.name + mark,
-                row.status,
-                *(_seconds(spent) for spent in (*times, row.seconds_start)),
-                "" if row.peak_MB != row.peak_MB else f"{row.peak_MB:.0f}",
-                *map(_percent, errors),
-            )
+            {
+                "#": str(number),
+                "configuration": row.name + mark + " — frontier" * (row in frontier),
+                "status": row.status,
+                "time [s]": _number(row.seconds, ".2f"),
+                "set-up": _number(row.seconds_setup, ".2f"),
+                "laws": _number(row.seconds_laws, ".2f"),
+                "steps": _number(row.seconds_steps, ".2f"),
+                "start": _number(row.seconds_start, ".2f"),
+                "memory [MB]": _number(row.peak_MB, ".0f"),
+                f"{response} max [%]": _percent(getattr(errors, f"{response}_max")),
+                f"{response} last [%]": _percent(getattr(errors, f"{response}_last")),
+                "area max [%]": _percent(errors.area_max),
+                "separation max [%]": _percent(errors.separation_max),
+                "pressure L1 [%]": _percent(errors.pressure_l1),
+                "distribution [%]": _percent(errors.distribution),
+            }
         )
-    return header, rows
+    return rows
 
 
-def _share_cells(comparison: Comparison) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    header = (
-        "#", "level", "error", "micro model", "coupling", "half-space for block", "small slopes",
-        "discretisation and rest",
-    )  # fmt: skip
-    rows = [
-        (
-            str(number),
-            row.name,
-            _percent(getattr(row.errors, f"{comparison.response}_last")),
-            *(_percent(getattr(row.causes, name)) for name in _SHARES),
-        )
+def _share_cells(comparison: Comparison) -> list[dict[str, str]]:
+    return [
+        {
+            "#": str(number),
+            "configuration": row.name,
+            "error": _percent(getattr(row.errors, f"{comparison.response}_last")),
+            "micro model": _percent(row.shares.micro),
+            "coupling": _percent(row.shares.coupling),
+            "half-space for block": _percent(row.shares.block),
+            "small slopes": _percent(row.shares.slopes),
+            "discretisation and rest": _percent(row.shares.discretisation),
+        }
         for number, row in enumerate(comparison.rows, 1)
-        if not row.is_measure and row.causes.discretisation is not None
+        if not row.is_measure and row.shares.discretisation is not None
     ]
-    return header, rows
 
 
-def _failures(comparison: Comparison) -> Iterator[str]:
-    """Yield a section on levels that did not come to an end, where there are any."""
-    failed = [row for row in comparison.rows if row.status != "done"]
-    if failed:
-        yield "<h2>Levels without a result</h2>"
-        rows = [(row.name, row.status, _code(row), row.message) for row in failed]
-        yield table(("level", "status", "exit code", "message"), rows, text_columns={1, 3})
-
-
-def _code(row: Row) -> str:
-    return "" if row.exit_code is None else str(row.exit_code)
+def _number(value: float | None, shown: str) -> str:
+    return "" if value is None or value != value else f"{value:{shown}}"
 
 
 def _percent(value: float | None) -> str:
-    return "" if value is None or value != value else f"{100.0 * value:.3g}"
-
-
-def _seconds(spent: float) -> str:
-    return "" if spent != spent else f"{spent:.2f}"
-
-
-def _machine() -> str:
-    threads = os.environ.get("OMP_NUM_THREADS", "all")
-    return f"Timed on {platform.platform()}, {os.cpu_count()} cores, threads: {threads}."
+    return "" if value is None else _number(100.0 * value, ".3g")

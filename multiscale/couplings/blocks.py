@@ -25,7 +25,7 @@ from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import FaceCompliance, Interface
+    from macro import FaceCompliance, Interface, Material
 
 Array = NDArray[np.float64]
 
@@ -92,22 +92,24 @@ def on_body(
     body = None if half_space else scene_body(setup)
     if body is not None and face is None:
         face = body.face(comm, modes=modes, coarse=coarse)
-    block = setup.scene.block
-    material = HalfSpace(young_modulus=block.young_modulus, poisson_ratio=block.poisson_ratio)
+    section = setup.scene.block
+    material = HalfSpace(young_modulus=section.young_modulus, poisson_ratio=section.poisson_ratio)
 
     def put(model: HalfSpaceModel, order: int) -> HalfSpaceModel:
         surface, model = model.surface, replace(model, tolerance=_SHARP)
         # heights count from the highest point, which is near the loads: slopes add least there;
         # the flat body then reaches up to it, while the block's height is that of the mean plane
         higher = surface.highest - surface.mean_height if order else 0.0
-        beside: list[SurfaceStress] = []
+        edge_stresses: list[SurfaceStress] = []
         if body is not None and face is not None:
             model = replace(model, sides=body.known, body=body.term(face, higher=higher))
-            beside = _stresses(body, face, surface) if order else []
+            edge_stresses = _stresses(body, face, surface) if order else []
         if not order:
             return model
-        plane = surface.highest if beside else None
-        slopes = FiniteSlopes(surface, material, order=order, plane=plane, beside=beside)
+        plane = surface.highest if edge_stresses else None
+        slopes = FiniteSlopes(
+            surface, material, order=order, plane=plane, edge_stresses=edge_stresses
+        )
         return replace(model, slopes=slopes)
 
     return put
@@ -131,7 +133,7 @@ def scene_body(setup: ProblemSetup) -> Body:
     """
     return Body(
         shape=setup.shape,
-        material=setup.scene.block.material,
+        material=block_material(setup),
         sides=setup.scene.block.sides,
         known=free_sides(setup),
     )
@@ -155,7 +157,7 @@ def _block_sides(setup: ProblemSetup) -> FreeSides | None:
     return FreeSides(
         lengths=setup.surface.lengths,
         poisson_ratio=setup.scene.block.poisson_ratio,
-        reach=_REACH * min(*setup.surface.lengths, setup.shape.height),
+        decay_length=_REACH * min(*setup.surface.lengths, setup.shape.height),
     )
 
 
@@ -207,7 +209,7 @@ def patch_compliance(setup: ProblemSetup, comm: Any) -> Array:
         return {"compliance": patch_compliance_matrix(embedding(setup, comm))}
 
     sides = setup.scene.block.sides
-    key = (setup.shape, setup.scene.block.material, sides, setup.patches, users_options())
+    key = (setup.shape, block_material(setup), sides, setup.patches, users_options())
     return cached("plain", key, compute, comm or MPI.COMM_SELF)["compliance"]
 
 
@@ -227,7 +229,7 @@ def embedding(setup: ProblemSetup, comm: Any) -> Interface:
 
     section = setup.scene.block
     mesh = block_mesh(setup.shape, comm or MPI.COMM_SELF)
-    return Interface(Block(mesh, setup.scene.block.material, sides=section.sides), setup.patches)
+    return Interface(Block(mesh, block_material(setup), sides=section.sides), setup.patches)
 
 
 def load_together(scene: Scene, comm: Any) -> None:
@@ -244,6 +246,14 @@ def load_together(scene: Scene, comm: Any) -> None:
     """
     if comm is not None and scene.coupling.kind != "analytic":
         import macro  # noqa: F401
+
+
+def block_material(setup: ProblemSetup) -> Material:
+    """Return the elastic constants of a scene's block."""
+    from macro import Material
+
+    section = setup.scene.block
+    return Material(young_modulus=section.young_modulus, poisson_ratio=section.poisson_ratio)
 
 
 def final_field(setup: ProblemSetup, pressure: Array, comm: Any) -> tuple[Interface, Array]:

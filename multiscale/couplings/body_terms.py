@@ -23,7 +23,6 @@ from micro import (
     half_space_stress_modes,
     influence_matrix,
     side_modes,
-    side_patches,
     side_stress_modes,
 )
 
@@ -184,7 +183,7 @@ class Body:
         modulus, count = self.material.contact_modulus, self.modes
         known = influence_matrix(patches) / (np.pi * modulus)
         if self.known is not None:
-            known += side_patches(self.known, patches) / modulus
+            known += self.known.patch_compliance(patches) / modulus
             count = max(count, min(max(patches.shape), _CORNERS))
         else:
             count = max(count, min(_PER_PATCH * max(patches.shape), _MOST))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
+from multiscale.couplings.blocks import block_material
 from multiscale.couplings.load_steps import embedded_step
 from multiscale.loading.load_step import LoadStep, PatchState
 from multiscale.results.reference_record import ReferenceRecord, reference_record
@@ -148,7 +149,7 @@ def make_reference(setup: ProblemSetup, comm: Any) -> ReferenceCoupling:
             mesh, quality = rough_block_mesh(shape, surface, comm or MPI.COMM_SELF)
         except InputError as error:
             raise error.located(key="surface", file=scene.file) from None
-        block = Block(mesh, scene.block.material, sides=scene.block.sides)
+        block = Block(mesh, block_material(setup), sides=scene.block.sides)
         pressed = UnilateralContactProblem(
             block,
             surface.highest - surface.mean_height,

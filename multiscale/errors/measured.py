@@ -188,7 +188,7 @@ class _Problems:
         """Change of the force with the approach, without slopes on a coarse grid [N/mm]."""
         grid = self._half if min(self._half) >= _SMALL else self._grid
         state, approach = self._state(grid, 0), self._control.approach or 0.0
-        step = _NUDGE * float(state.required.max())
+        step = _NUDGE * float(state.interference.max())
         if not (state.force > 0.0 and step > 0.0):
             return 0.0
         back = replace(self._control, approach=approach - step)

@@ -1,1 +1,1 @@
-"""What a run leaves behind and prints: tables, figures, report, fields, words."""
+"""What a run writes and prints: tables, figures, report, fields, lines in the terminal."""

@@ -1,4 +1,4 @@
-"""Writes the fields of the last load step for ParaView: all files whole, or none."""
+"""Writes displacement and pressure of the last load step for ParaView: all files, or none."""
 
 from __future__ import annotations
 
@@ -20,21 +20,26 @@ from multiscale.couplings.reference import ReferenceCoupling
 from multiscale.run import Run
 from multiscale.storage.whole_files import remove, written
 
-_ASIDE = ".fields.partial-files"  # `outputs.remove_partial` knows it by its middle
-_OF_FILES = re.compile("file|HDF5|XDMF|ADIOS", re.IGNORECASE)  # in what dolfinx says of them
+PARTIAL_FOLDER = ".fields.partial-files"
+"""Folder of files that are not complete; `remove_partial` knows it by ``.partial-``."""
+
+_FILE_ERROR = re.compile("file|HDF5|XDMF|ADIOS", re.IGNORECASE)
+"""Texts of the errors that dolfinx raises when a file cannot be written."""
 
 
 def write_fields(folder: Path, run: Run) -> list[Path]:
     """Write displacement and pressure of the last load step as XDMF and VTX, for ParaView.
 
+    Where no mesh was pressed itself, the displacements are those of the scene's block under the
+    mean pressures of the patches. Of a reference, the fields are those of its finest rough block,
+    with the pressures of the nodes.
+
     Args:
-        folder: Where to; made when missing.
+        folder: Folder of the results; made when missing.
         run: The run.
 
     Returns:
-        The files written; none when no block took part. Where the mesh was not pressed itself,
-        the displacements are those of the scene's block under the patches' mean pressures. A
-        reference has its finest rough block and the pressures of its nodes.
+        The files written; none when no block took part.
 
     Raises:
         NotWritten: When they cannot be written whole.
@@ -45,25 +50,27 @@ def write_fields(folder: Path, run: Run) -> list[Path]:
     if not run.setup.embedded or not run.steps:
         return []
 
-    # The XDMF file names its HDF5 file, so both are written under their names in a folder aside.
-    aside, write = folder / _ASIDE, _writer(run)
+    # The XDMF file contains the name of its HDF5 file. Both are therefore written under their
+    # final names into a partial folder, and moved when they are complete.
+    partial, write = folder / PARTIAL_FOLDER, _writer(run)
 
-    def empty() -> None:
-        shutil.rmtree(aside, ignore_errors=True)  # a crash may have left one
-        with written(aside):
-            aside.mkdir(parents=True)
+    def make_empty() -> None:
+        shutil.rmtree(partial, ignore_errors=True)  # A killed run may have left one.
+        with written(partial):
+            partial.mkdir(parents=True)
 
-    on_root(run.comm, empty)
+    on_root(run.comm, make_empty)
     try:
-        _tried(write, aside / "fields.xdmf", run.comm)
-        return on_root(run.comm, lambda: _moved(aside, folder))
+        _write(write, partial / "fields.xdmf", run.comm)
+        return on_root(run.comm, lambda: _move(partial, folder))
     except BaseException:
-        shutil.rmtree(aside, ignore_errors=True)  # by any rank: the others may be stuck
+        # Every rank removes the folder: the others may be blocked in a collective call.
+        shutil.rmtree(partial, ignore_errors=True)
         raise
 
 
 def _writer(run: Run) -> Callable[[Path], None]:
-    """Return what writes the last load step: of the rough block, or the flat one with patches."""
+    """Return the function that writes the fields of the last load step to a path."""
     import macro
 
     if isinstance(run.coupling, ReferenceCoupling):
@@ -74,20 +81,23 @@ def _writer(run: Run) -> Callable[[Path], None]:
     return lambda path: macro.write_fields(path, interface, displacement, pressure)
 
 
-def _tried(write: Callable[[Path], None], path: Path, comm: Any) -> None:
-    """Write; what dolfinx says against its files, and not of bugs, becomes an error of ours."""
+def _write(write: Callable[[Path], None], path: Path, comm: Any) -> None:
+    """Write a file; an error of dolfinx about files becomes NotWritten, a bug stays as it is."""
     try:
         write(path)
     except (OSError, RuntimeError) as error:
-        if isinstance(error, PatchlawError) or not _OF_FILES.search(str(error)):
+        if isinstance(error, PatchlawError) or not _FILE_ERROR.search(str(error)):
             raise
-        atexit.register(_end, comm)
-        named = path.parent.parent / path.name
-        raise NotWritten(f"{named}: cannot be written: {error}") from error
+        atexit.register(_end_process, comm)
+        final = path.parent.parent / path.name
+        raise NotWritten(f"{final}: cannot be written: {error}") from error
 
 
-def _end(comm: Any) -> None:
-    """End at once: HDF5 would write again what it could not, when the process ends, and crash."""
+def _end_process(comm: Any) -> None:
+    """End the process before HDF5 does.
+
+    At the end of a process HDF5 tries again to write what it could not, and crashes.
+    """
     sys.stdout.flush()
     sys.stderr.flush()
     if comm is not None:
@@ -95,22 +105,25 @@ def _end(comm: Any) -> None:
     os._exit(NotWritten.exit_code)
 
 
-def _moved(aside: Path, folder: Path) -> list[Path]:
-    """Give complete files their place; not all writers tell when a disk is full."""
-    files = sorted(aside.iterdir())
+def _move(partial: Path, folder: Path) -> list[Path]:
+    """Move files to their final place once all are complete.
+
+    That is checked here, because not every writer raises an error when a disk is full.
+    """
+    files = sorted(partial.iterdir())
     for path in files:
         with written(folder / path.name):
-            _complete(path)
+            _check_complete(path)
     for path in files:
         with written(folder / path.name):
             remove(folder / path.name)
             path.replace(folder / path.name)
-    aside.rmdir()
+    partial.rmdir()
     return [folder / path.name for path in files]
 
 
-def _complete(path: Path) -> None:
-    """Raise an OSError unless a file is on the disk as a whole."""
+def _check_complete(path: Path) -> None:
+    """Raise an OSError unless the disk holds the whole file."""
     if path.is_dir():
         return
     with path.open("rb") as file:

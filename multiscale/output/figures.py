@@ -1,8 +1,8 @@
-"""Figures of a run; each function returns a matplotlib figure that shares no global state."""
+"""Figures of a run: surface, force–approach curves, pressure maps, laws, micro models."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -14,24 +14,27 @@ from geometry.patches import PatchGrid
 from geometry.surface import Surface
 from micro.response import Response
 from multiscale.laws.files import LawTable
+from multiscale.output.figure_style import (
+    PRESSURE_LABEL,
+    add_grid_and_legend,
+    curve_styles,
+    new_figure,
+)
 from multiscale.results.history import History
 
-_STYLES = ("-", "--", "-.", ":", (0, (3, 1, 1, 1, 1, 1)))
-_COLOURS = ("#0b3c5d", "#d1495b", "#1b998b", "#edae49", "#6a4c93")
-
-PRESSURE_LABEL = "mean pressure of the patch [MPa]"
-"""What colour bars of pressure maps say."""
+MOST_NUMBERED_PATCHES = 100
+"""A map of more patches shows colours alone; the numbers would cover each other."""
 
 
 def surface_figure(surface: Surface, asperities: Asperities, patches: PatchGrid) -> Figure:
-    """Draw heights over the mean plane with summits, border maxima and patch borders.
+    """Draw heights above the mean plane with summits, border maxima and patch borders.
 
     Args:
         surface: The heights.
-        asperities: Its summits.
-        patches: The partition.
+        asperities: The summits of the surface.
+        patches: The partition of the interface.
     """
-    figure = Figure(figsize=(6.4, 5.4), layout="constrained")
+    figure = new_figure(6.4, 5.4)
     draw_surface(figure, figure.add_subplot(), surface, asperities, patches)
     return figure
 
@@ -42,17 +45,17 @@ def draw_surface(
     """Draw one surface into given axes.
 
     Args:
-        figure: Owner of the axes; gets a colour bar.
-        axes: Where to draw.
+        figure: The figure of the axes; a colour bar is added to it.
+        axes: Axes to draw into.
         surface: The heights.
-        asperities: Its summits.
-        patches: The partition.
+        asperities: The summits of the surface.
+        patches: The partition of the interface.
     """
     heights = 1e3 * (surface.heights - surface.mean_height).T
     extent = (0, surface.lengths[0], 0, surface.lengths[1])
     image = axes.imshow(heights, origin="lower", extent=extent, cmap="cividis")
     figure.colorbar(image, ax=axes, label="height over the mean plane [µm]")
-    patch_lines(axes, patches, colour="white")
+    _draw_patch_borders(axes, patches, colour="white")
     summits: dict[str, Any] = {"marker": "o", "ms": 5, "mfc": "#d1495b", "mec": "white"}
     cut: dict[str, Any] = {"marker": "x", "ms": 6, "color": "black"}
     for x, y, look, label in (
@@ -68,34 +71,28 @@ def draw_surface(
 
 
 def history_figure(histories: Mapping[str, History]) -> Figure:
-    """Draw force, contact area and separation of one or more runs over each other.
+    """Draw force, contact area and mean separation of one or more runs over each other.
 
     Args:
         histories: The runs by the name that the legend shows.
     """
-    figure = Figure(figsize=(11.0, 3.6), layout="constrained")
+    figure = new_figure(11.0, 3.6)
     force, area, gap = figure.subplots(1, 3)
-    for (name, history), style, colour in zip(histories.items(), _STYLES, _COLOURS, strict=False):
-        look: dict[str, Any] = {
-            "ls": style,
-            "color": colour,
-            "marker": "o",
-            "ms": 3.5,
-            "label": name,
-        }
+    for style, history in zip(curve_styles(histories), histories.values(), strict=True):
+        look = style | {"marker": "o", "ms": 3.5}
         pressure = np.append(0.0, history.mean_pressure_MPa)
-        # a tilted plane touches first at another approach at the middle than zero
+        # The first touch of a tilted plane is not at zero approach of the middle.
         level = not any(any(step.tilt) for step in history)
         approach = 1e3 * np.append(0.0 if level else np.nan, history.approach_mm)
         force.plot(approach, pressure, **look)
         area.plot(pressure, 100 * np.append(0.0, history.contact_area_fraction), **look)
         gap.plot(1e3 * history.mean_separation_mm, history.mean_pressure_MPa, **look)
         if history.reference is not None:
-            draw_error_band(force, area, history, colour=colour)
+            draw_error_band(force, area, history, colour=style["color"])
     force.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]")
     area.set(xlabel="mean pressure [MPa]", ylabel="contact area fraction [%]")
     gap.set(xlabel="mean separation [µm]", ylabel="mean pressure [MPa]")
-    _finish(figure)
+    add_grid_and_legend(figure)
     return figure
 
 
@@ -104,7 +101,7 @@ def draw_error_band(force: Any, area: Any, history: History, *, colour: str) -> 
 
     Args:
         force: Axes of pressure [MPa] over approach [µm].
-        area: Axes of the contact area fraction [%] over pressure [MPa]; None leaves it out.
+        area: Axes of the contact area fraction [%] over pressure [MPa]; None draws no band of it.
         history: The reference.
         colour: Colour of the bands.
     """
@@ -115,26 +112,26 @@ def draw_error_band(force: Any, area: Any, history: History, *, colour: str) -> 
     nominal = history.patches.area * history.patches.count
     pressure = record.force.value / nominal
     approach = 1e3 * record.approach.value
-    look: dict[str, Any] = {"color": colour, "alpha": 0.25, "lw": 0.0, "label": record.label}
+    look: dict[str, Any] = {"color": colour, "alpha": 0.25, "lw": 0.0}
     if record.by_force:
         error = 1e3 * record.approach.error
-        force.fill_betweenx(pressure, approach - error, approach + error, **look)
+        force.fill_betweenx(
+            pressure, approach - error, approach + error, label=record.label, **look
+        )
     else:
         error = record.force.error / nominal
-        force.fill_between(approach, pressure - error, pressure + error, **look)
+        force.fill_between(approach, pressure - error, pressure + error, label=record.label, **look)
     if area is not None:
         middle, error = 100 * record.area.value, 100 * record.area.error
-        look["label"] = None
         area.fill_between(pressure, middle - error, middle + error, **look)
 
 
 def pressure_figure(history: History) -> Figure:
     """Draw the patch pressures of the last load step as a map, with their values."""
-    figure = Figure(figsize=(5.6, 4.8), layout="constrained")
+    figure = new_figure(5.6, 4.8)
     axes = figure.add_subplot()
-    draw_pressures(figure, axes, history.patches, history.steps[-1].patches.pressure_MPa)
-    last = history.steps[-1]
-    record = history.reference
+    last, record = history.steps[-1], history.reference
+    draw_pressures(figure, axes, history.patches, last.patches.pressure_MPa)
     error = "" if record is None else f" ({record.label})"
     axes.set_title(f"approach {1e3 * last.approach_mm:.3g} µm, force {last.force_N:.4g} N{error}")
     return figure
@@ -151,14 +148,14 @@ def draw_pressures(
     """Draw one map of patch pressures into given axes.
 
     Args:
-        figure: Owner of the axes; gets a colour bar, unless the scale is given.
-        axes: Where to draw.
-        patches: The partition.
+        figure: The figure of the axes; a colour bar is added to it unless `top` is given.
+        axes: Axes to draw into.
+        patches: The partition of the interface.
         pressure: Mean pressure of each patch, shape (N,) [MPa].
         top: End of the colour scale, for maps that share one [MPa].
 
     Returns:
-        The map, as a colour bar takes it.
+        The map, for a colour bar.
     """
     values = pressure.reshape(patches.grid)
     image = axes.pcolormesh(
@@ -166,35 +163,31 @@ def draw_pressures(
     )
     if top is None:
         figure.colorbar(image, ax=axes, label=PRESSURE_LABEL)
-    patch_lines(axes, patches, colour="0.7")
-    if patches.count <= 100:
+    _draw_patch_borders(axes, patches, colour="0.7")
+    if patches.count <= MOST_NUMBERED_PATCHES:
         dark = 0.55 * max(top or values.max(), 1e-300)
         for (x, y), value in zip(patches.centres, pressure, strict=True):
             text = f"{value:.2g}" if value > 0 else "open"
-            axes.text(
-                x, y, text, ha="center", va="center", color="white" if value > dark else "black"
-            )
+            colour = "white" if value > dark else "black"
+            axes.text(x, y, text, ha="center", va="center", color=colour)
     axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
     return image
 
 
 def law_figure(table: LawTable) -> Figure:
     """Draw pressure and area fraction of every patch law over closure, with the table's rows."""
-    figure = Figure(figsize=(9.0, 3.8), layout="constrained")
+    figure = new_figure(9.0, 3.8)
     pressure, area = figure.subplots(1, 2)
-    for law in table.laws:
-        if law.is_open:
-            continue
+    closing = [law for law in table.laws if not law.is_open]
+    for law in closing:
         closure = np.linspace(*law.range, 200)
         (line,) = pressure.plot(1e3 * closure, law.at(closure)[0], lw=1.2)
         pressure.plot(1e3 * law.closure, law.pressure, ".", ms=3, color=line.get_color())
         area.plot(1e3 * closure, 100 * law.area_fraction_at(closure), lw=1.2)
     pressure.set(xlabel="closure [µm]", ylabel="mean pressure of the patch [MPa]")
     area.set(xlabel="closure [µm]", ylabel="contact area fraction [%]")
-    for axes in (pressure, area):
-        axes.grid(alpha=0.3)
-    closed = sum(not law.is_open for law in table.laws)
-    figure.suptitle(f"{closed} patch laws of {len(table.laws)} patches (dots: table rows)")
+    add_grid_and_legend(figure)
+    figure.suptitle(f"{len(closing)} patch laws of {len(table.laws)} patches (dots: table rows)")
     return figure
 
 
@@ -205,10 +198,9 @@ def models_figure(responses: Mapping[str, Response], *, rms_slope: float) -> Fig
         responses: Response of each micro model by its name.
         rms_slope: rms gradient of the surface, which scales κ.
     """
-    figure = Figure(figsize=(9.6, 7.2), layout="constrained")
+    figure = new_figure(9.6, 7.2)
     (motion, separation), (area, kappa) = figure.subplots(2, 2)
-    for (name, response), style, colour in zip(responses.items(), _STYLES, _COLOURS, strict=False):
-        look: dict[str, Any] = {"ls": style, "color": colour, "label": name}
+    for look, response in zip(curve_styles(responses), responses.values(), strict=True):
         pressure, fraction = response.mean_pressure, 100 * response.contact_area_fraction
         motion.plot(1e3 * response.approach, pressure, **look)
         separation.plot(1e3 * response.mean_separation, pressure, **look)
@@ -218,31 +210,14 @@ def models_figure(responses: Mapping[str, Response], *, rms_slope: float) -> Fig
     separation.set(xlabel="mean separation [µm]", ylabel="mean pressure [MPa]", title="(ii)")
     area.set(xlabel="mean pressure [MPa]", ylabel="contact area fraction [%]", title="(iii)")
     kappa.set(xlabel="contact area fraction [%]", ylabel="κ", title="(iv)")
-    _finish(figure)
+    add_grid_and_legend(figure)
     return figure
 
 
-def _finish(figure: Figure) -> None:
-    """Add grids, and a legend in the first panel when there is more than one line."""
-    for axes in figure.axes:
-        axes.grid(alpha=0.3)
-    first = figure.axes[0]
-    if len(first.get_legend_handles_labels()[0]) > 1:
-        first.legend(frameon=False)
-
-
-def patch_lines(axes: Any, patches: PatchGrid, colour: str) -> None:
-    """Draw the borders between patches.
-
-    Args:
-        axes: Where to draw.
-        patches: The partition.
-        colour: Colour of the lines.
-    """
-    lines: Sequence[tuple[Any, NDArray[np.float64]]] = (
+def _draw_patch_borders(axes: Any, patches: PatchGrid, colour: str) -> None:
+    for draw, borders in (
         (axes.axvline, patches.borders_x[1:-1]),
         (axes.axhline, patches.borders_y[1:-1]),
-    )
-    for draw, borders in lines:
+    ):
         for border in borders:
             draw(border, color=colour, lw=0.8, alpha=0.9)

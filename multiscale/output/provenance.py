@@ -1,4 +1,4 @@
-"""What a result was made with and from."""
+"""The provenance of a result: versions, scene, options, times and convergence."""
 
 from __future__ import annotations
 
@@ -9,16 +9,19 @@ import sys
 from collections.abc import Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from typing import Any
-
-import numpy
-import scipy
 
 from multiscale.costs.prediction import peak_memory
 from multiscale.couplings.reference import ReferenceCoupling
 from multiscale.run import Run
 from multiscale.setup.problem import ProblemSetup
+
+LIBRARIES = (
+    "numpy", "scipy", "dolfinx", "petsc4py", "mpi4py", "gmsh", "h5py", "pydantic", "pint",
+    "matplotlib",
+)  # fmt: skip
+"""Libraries whose versions are recorded."""
 
 
 def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
@@ -29,9 +32,9 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         options: PETSc options given by the user.
 
     Returns:
-        A dictionary that JSON can hold; what is not known, or infinite, is None.
+        A dictionary that JSON can hold; what is unknown or infinite is None.
     """
-    history = run.history()
+    history, setup = run.history(), run.setup
     content = {
         "patchlaw": version("patchlaw"),
         "written": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -40,14 +43,14 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "scene_given": run.given.model_dump(by_alias=True, mode="json"),
         "units": "mm, N, MPa",
         "surface": {
-            "source": run.setup.surface.source,
+            "source": setup.surface.source,
             "heights_sha256": run.heights,
-            "highest_mm": run.setup.surface.highest,
-            "summits": run.setup.asperities.count,
-            "summits_in_reach": int(run.setup.reached.sum()),
-            "border_maxima_in_reach": run.setup.reached_at_border,
+            "highest_mm": setup.surface.highest,
+            "summits": setup.asperities.count,
+            "summits_in_reach": int(setup.reached.sum()),
+            "border_maxima_in_reach": setup.reached_at_border,
         },
-        "micro_model": _micro_model(run.setup),
+        "micro_model": _micro_model(setup),
         "ranks": 1 if run.comm is None else run.comm.size,
         "threads": os.environ.get("OMP_NUM_THREADS"),
         "petsc_options": options,
@@ -56,34 +59,28 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "seconds": history.seconds,
         "memory_bytes": peak_memory(),
         "errors_N": [dict(step.errors) for step in history],
-        "decision": _decision(run.setup),
+        "decision": setup.decision and {**asdict(setup.decision), "kept": setup.decision.kept},
         "steps": len(history),
         "finished": run.finished,
-        "reasons": sorted(set(history.reason)) if len(history) else [],
+        "reasons": sorted({step.reason for step in history}),
         "notes": list(history.notes),
         "versions": _versions(),
         "machine": platform.platform(),
     }
-    return {name: _known(value) for name, value in content.items()}
+    return {name: _for_json(value) for name, value in content.items()}
 
 
-def _known(value: Any) -> Any:
-    """Return a value with None for what is not finite, which is no JSON."""
+def _for_json(value: Any) -> Any:
+    """Return a value with None for every number that is not finite, which JSON cannot hold."""
     if isinstance(value, Mapping):
-        return {name: _known(part) for name, part in value.items()}
+        return {name: _for_json(part) for name, part in value.items()}
     if isinstance(value, list | tuple):
-        return [_known(part) for part in value]
+        return [_for_json(part) for part in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _decision(setup: ProblemSetup) -> dict[str, Any] | None:
-    """Return what open keys became out of what, where an accuracy decided."""
-    decision = setup.decision
-    return None if decision is None else {**asdict(decision), "kept": decision.kept}
-
-
 def _reference(run: Run) -> dict[str, Any] | None:
-    """Return what a reference's meshes are and found, where there are any."""
+    """Return the meshes of a reference and its errors; None with other couplings."""
     record, coupling = run.history().reference, run.coupling
     if record is None or not isinstance(coupling, ReferenceCoupling):
         return None
@@ -100,32 +97,18 @@ def _reference(run: Run) -> dict[str, Any] | None:
 
 
 def _micro_model(setup: ProblemSetup) -> dict[str, Any] | None:
-    """Return the micro model used and, when it was chosen, from what."""
+    """Return the micro model and, where it was chosen, the candidates; None without one."""
     if setup.micro is None:
         return None
-    if setup.choice is None:
-        return {"name": setup.model.name}
-    return {
-        "name": setup.model.name,
-        "chosen": asdict(setup.choice.taken),
-        "candidates": [asdict(candidate) for candidate in setup.choice.candidates],
-    }
+    name, choice = {"name": setup.model.name}, setup.choice
+    if choice is None:
+        return name
+    candidates = [asdict(candidate) for candidate in choice.candidates]
+    return {**name, "chosen": asdict(choice.taken), "candidates": candidates}
 
 
 def _versions() -> dict[str, str]:
-    """Return the versions of what took part; compiled parts only when they were loaded."""
-    found = {
-        "python": platform.python_version(),
-        "numpy": numpy.__version__,
-        "scipy": scipy.__version__,
-    }
-    for name in ("dolfinx", "petsc4py", "mpi4py", "gmsh"):
-        module = sys.modules.get(name)
-        if module is not None:
-            found[name] = str(getattr(module, "__version__", "unknown"))
-    for name in ("h5py", "pydantic", "pint", "matplotlib"):
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "unknown"
-    return found
+    """Return the versions of Python and of the libraries that took part."""
+    loaded = {name: sys.modules[name] for name in LIBRARIES if name in sys.modules}
+    found = {name: getattr(module, "__version__", "unknown") for name, module in loaded.items()}
+    return {"python": platform.python_version(), **found}

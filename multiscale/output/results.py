@@ -1,22 +1,24 @@
-"""Writes everything a run leaves behind: tables, laws, provenance, figures, report."""
+"""Writes the files of a run: tables, laws, provenance, figures, report."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from io import BytesIO
+from itertools import islice, zip_longest
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from geometry.collective import on_root, together
 from multiscale.laws.files import write_laws
 from multiscale.output.provenance import provenance
 from multiscale.output.report import report_html
-from multiscale.output.tables import write_tables
 from multiscale.planning import plan
+from multiscale.results.history import COLUMNS, PATCH_COLUMNS, History
 from multiscale.run import Run
 from multiscale.storage.whole_files import (
     remove,
     write_bytes,
+    write_csv,
     write_json,
     write_text,
     write_whole,
@@ -26,23 +28,39 @@ from multiscale.storage.whole_files import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_FILES = (
+FILES = (
     "history.csv", "patches.csv", "reference.csv", "laws.h5", "provenance.json", "report.html",
     "surface.png", "curves.png", "pressures.png", "laws.png", "fields.xdmf", "fields.h5",
     "fields.bp",
 )  # fmt: skip
-_RESOLUTION = 130  # of figures [dots per inch]
-_MOST_FIGURES = 4
+"""All files that a run may write."""
 
-Drawing = tuple[str, str, bytes]
-"""A figure: name of its file, caption, PNG."""
+DOTS_PER_INCH = 130
+"""Resolution of the figures."""
+
+MOST_FIGURES = 4
+"""Ranks beyond this number draw nothing, and do not load matplotlib."""
+
+
+class Drawing(NamedTuple):
+    """A figure of a run.
+
+    Attributes:
+        name: Name of its file, without the ending.
+        caption: What it shows.
+        png: The image.
+    """
+
+    name: str
+    caption: str
+    png: bytes
 
 
 def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
-    """Write the files of a run, finished or stopped: rank 0 writes, all draw.
+    """Write the files of a run, finished or stopped.
 
     Args:
-        folder: Where to; made when missing.
+        folder: Folder of the results; made when missing.
         run: The run.
         options: PETSc options given by the user, for the provenance.
 
@@ -50,26 +68,24 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
         The files written.
 
     Note:
-        Collective.
+        Collective: all ranks draw, rank 0 writes.
     """
-    drawn: list[Drawing] = []
+    drawings: Sequence[Drawing] = ()
     if run.scene.output.figures and run.steps:
         with run.phase("output"):
-            drawn = _drawn(run)
-    return on_root(run.comm, lambda: _written(folder, run, drawn, options))
+            drawings = _drawings(run)
+    return on_root(run.comm, lambda: _write(folder, run, drawings, options))
 
 
-def _written(folder: Path, run: Run, drawn: list[Drawing], options: list[str]) -> list[Path]:
-    """Write the files of a run with the figures drawn."""
-    history = run.history()
-    _remove_older(folder)
+def _write(folder: Path, run: Run, drawings: Sequence[Drawing], options: list[str]) -> list[Path]:
+    for name in FILES:  # Files of an earlier run must not stand beside those of this one.
+        with written(folder / name):
+            remove(folder / name)
+    history, table = run.history(), run.table
     files = write_tables(folder, history)
-    table = run.table
     if table is not None:
         files.append(write_whole(folder / "laws.h5", lambda path: write_laws(path, table)))
-    figures = {caption: folder / f"{name}.png" for name, caption, _ in drawn}
-    for path, (_, _, content) in zip(figures.values(), drawn, strict=True):
-        files.append(write_bytes(path, content))
+    files += [write_bytes(folder / f"{one.name}.png", one.png) for one in drawings]
     files.append(write_json(folder / "provenance.json", provenance(run, options=options)))
     if run.scene.output.report:
         page = report_html(
@@ -77,54 +93,64 @@ def _written(folder: Path, run: Run, drawn: list[Drawing], options: list[str]) -
             statements=plan.statements(run.setup),
             warnings=list(plan.warnings(run.setup)),
             history=history,
-            figures=figures,
+            figures={one.caption: one.png for one in drawings},
         )
         files.append(write_text(folder / "report.html", page))
     return files
 
 
-def _remove_older(folder: Path) -> None:
-    """Remove an earlier run's files, lest this run's tables stand beside another scene's laws."""
-    for name in _FILES:
-        with written(folder / name):
-            remove(folder / name)
-
-
-def write_figure(path: Path, figure: Figure) -> Path:
-    """Write a figure as PNG.
+def write_tables(folder: Path, history: History) -> list[Path]:
+    """Write ``history.csv``, ``patches.csv`` and, for a reference, ``reference.csv``.
 
     Args:
-        path: File to write.
-        figure: A matplotlib figure.
+        folder: Folder of the results; made when missing.
+        history: The load steps.
+
+    Returns:
+        The files written.
     """
-    return write_whole(path, lambda partial: figure.savefig(partial, dpi=_RESOLUTION))
+    header = [column.name for column in COLUMNS]
+    rows = ([column.of(step) for column in COLUMNS] for step in history)
+    files = [
+        write_csv(folder / "history.csv", header, rows),
+        write_csv(folder / "patches.csv", PATCH_COLUMNS, history.patch_rows()),
+    ]
+    if history.reference is not None:
+        columns = history.reference.columns(history.steps)
+        values = zip(*columns.values(), strict=True)
+        files.append(write_csv(folder / "reference.csv", list(columns), values))
+    return files
 
 
-def _drawn(run: Run) -> list[Drawing]:
-    """Draw the figures, each on a rank of its own where there are as many; rank 0 gets them."""
-    comm = run.comm
-    rank, size = (0, 1) if comm is None else (comm.rank, comm.size)
-
-    def draw() -> dict[int, Drawing]:
-        if rank >= _MOST_FIGURES:
-            return {}
-        mine = list(enumerate(_figures(run)))[rank::size]
-        return {at: (name, caption, _png(make())) for at, (name, caption, make) in mine}
-
-    drawn = together(comm, draw)
-    if comm is not None:
-        drawn = {at: one for part in comm.gather(drawn) or () for at, one in part.items()}
-    return [drawn[at] for at in sorted(drawn)]
-
-
-def _png(figure: Figure) -> bytes:
+def png(figure: Figure) -> bytes:
+    """Return a matplotlib figure as a PNG image."""
     content = BytesIO()
-    figure.savefig(content, dpi=_RESOLUTION)
+    figure.savefig(content, dpi=DOTS_PER_INCH)
     return content.getvalue()
 
 
+def write_figure(path: Path, figure: Figure) -> Path:
+    """Write a matplotlib figure as a PNG file."""
+    return write_bytes(path, png(figure))
+
+
+def _drawings(run: Run) -> list[Drawing]:
+    """Return the figures on rank 0; every rank draws its share of them."""
+    comm = run.comm
+    rank, size = (0, 1) if comm is None else (comm.rank, comm.size)
+
+    def draw() -> list[Drawing]:
+        mine = islice(_figures(run), rank, None, size) if rank < MOST_FIGURES else ()
+        return [Drawing(name, caption, png(make())) for name, caption, make in mine]
+
+    mine = together(comm, draw)
+    parts = [mine] if comm is None else comm.gather(mine) or []
+    # Rank k has the figures k, k + size, ….
+    return [one for figures in zip_longest(*parts) for one in figures if one is not None]
+
+
 def _figures(run: Run) -> Iterator[tuple[str, str, Callable[[], Figure]]]:
-    """Yield file name, caption and maker; matplotlib is loaded only when a figure is wanted."""
+    """Yield file name, caption and function that draws; matplotlib is loaded only here."""
     from multiscale.output import figures
 
     setup, history, table = run.setup, run.history(), run.table

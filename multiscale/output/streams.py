@@ -1,4 +1,4 @@
-"""Standard streams that may be full, closed or unable to show a letter."""
+"""Standard streams that may be full or closed, or may lack a character."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
-_PLAIN = str.maketrans(
+_ASCII_SPELLING = str.maketrans(
     {
         **dict.fromkeys("µμ", "u"),
         **{"×": "x", "·": "*", "−": "-", "–": "-", "→": "->", "…": "...", "±": "+-"},
@@ -17,37 +17,37 @@ _PLAIN = str.maketrans(
         **{"α": "alpha", "δ": "delta", "κ": "kappa", "λ": "lambda", "ν": "nu", "σ": "sigma"},
     }
 )
-_HANDLER = "patchlaw"
+_ERROR_HANDLER = "patchlaw"
 
 
 class SturdyStream:
-    """A text stream that takes what is written to it even when it has nowhere to go.
+    """A text stream to which writing never fails: after the first error it drops the text.
 
     Args:
         stream: The stream; None for one that was closed before this process began.
 
     Attributes:
-        failure: What the system said when it took no more; None while all is well.
+        failure: The first error; None while all text was written.
     """
 
     def __init__(self, stream: Any) -> None:
         self._stream = stream
         self.failure: OSError | None = None
         if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors=_HANDLER)
+            stream.reconfigure(errors=_ERROR_HANDLER)
 
     def write(self, text: str) -> int:
-        """Write a text, or drop it when something failed before."""
+        """Write a text, or drop it after an error."""
         self._attempt(lambda: self._stream.write(text))
         return len(text)
 
     def flush(self) -> None:
-        """Write what is buffered, likewise."""
+        """Write the buffered text, or drop it after an error."""
         if self._stream is not None:
             self._attempt(self._stream.flush)
 
     def isatty(self) -> bool:
-        """Tell whether a person reads along."""
+        """Tell whether the stream is a terminal."""
         return self._stream is not None and self._stream.isatty()
 
     def __getattr__(self, name: str) -> Any:
@@ -63,7 +63,8 @@ class SturdyStream:
             write()
         except OSError as error:
             self.failure = error
-            with suppress(OSError, ValueError):  # what its buffer holds goes nowhere at the end
+            # Python flushes the buffer at exit. That must not fail again, so it goes nowhere.
+            with suppress(OSError, ValueError):
                 number = self._stream.fileno()
                 with open(os.devnull, "wb") as nowhere:
                     os.dup2(nowhere.fileno(), number)
@@ -71,20 +72,20 @@ class SturdyStream:
 
 @contextmanager
 def sturdy_streams() -> Iterator[tuple[SturdyStream, SturdyStream]]:
-    """Let nothing that is printed end what this process computes.
+    """Replace the standard streams, so that an error of printing does not end a computation.
 
-    Letters that a stream cannot encode are spelt with those it can. File descriptors that are
-    closed are opened on nothing: else the next file would get the number of a standard stream.
+    Characters that a stream cannot encode are spelt in ASCII. Closed file descriptors are opened
+    on the null device: otherwise the next file would get the number of a standard stream.
 
     Yields:
-        Output and error stream, which tell afterwards whether all was written.
+        Output and error stream; their `failure` shows afterwards whether all text was written.
     """
     for number in range(3):
         try:
             os.fstat(number)
         except OSError:
-            os.open(os.devnull, os.O_RDWR)  # gets the lowest number that is free
-    codecs.register_error(_HANDLER, _spelt)
+            os.open(os.devnull, os.O_RDWR)  # It gets the lowest free number, which is this one.
+    codecs.register_error(_ERROR_HANDLER, _spell)
     former = sys.stdout, sys.stderr
     output, errors = SturdyStream(sys.stdout), SturdyStream(sys.stderr)
     sys.stdout, sys.stderr = output, errors
@@ -96,9 +97,9 @@ def sturdy_streams() -> Iterator[tuple[SturdyStream, SturdyStream]]:
         sys.stdout, sys.stderr = former
 
 
-def _spelt(error: UnicodeError) -> tuple[str | bytes, int]:
-    """Spell what a stream cannot encode, as an error handler of `codecs`."""
+def _spell(error: UnicodeError) -> tuple[str | bytes, int]:
+    """Spell characters that a stream cannot encode; an error handler of `codecs`."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
-    text = error.object[error.start : error.end].translate(_PLAIN)
+    text = error.object[error.start : error.end].translate(_ASCII_SPELLING)
     return text.encode("ascii", "backslashreplace").decode("ascii"), error.end

@@ -1,4 +1,4 @@
-"""What the command line prints; only rank 0 speaks."""
+"""Lines, tables and progress bars in the terminal; only rank 0 prints."""
 
 from __future__ import annotations
 
@@ -16,17 +16,43 @@ from geometry.errors import PatchlawError
 from multiscale.costs.prediction import Cost, peak_memory
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import LoadHistory
-from multiscale.output.report import curve_cells
 from multiscale.planning import plan
 from multiscale.results.history import History
 from multiscale.setup.problem import ProblemSetup
 
-_MOST_ROWS = 60  # load steps that are printed; files hold them all
+MOST_ROWS = 60
+"""Load steps that are printed; the files hold all of them."""
+
+TABLE_WIDTH = 100
+"""Characters of a line that tables take at least, in a log file too."""
 
 
 def speaks(comm: Any) -> bool:
-    """Tell whether this process talks to the terminal and writes files."""
+    """Tell whether this process prints and writes files.
+
+    Args:
+        comm: MPI communicator, or None.
+    """
     return comm is None or comm.rank == 0
+
+
+def _console(comm: Any, *, least_width: int = 0, stderr: bool = False) -> Console:
+    """Return a console that is silent on all ranks but the first.
+
+    Lines for tables are cut at the width of the terminal; all others stay whole, so that they can
+    be searched and copied.
+
+    Args:
+        comm: MPI communicator, or None.
+        least_width: Least width of tables; 0 for a console without tables.
+        stderr: Whether it prints to the error stream.
+    """
+    console = Console(
+        stderr=stderr, soft_wrap=not least_width, highlight=False, quiet=not speaks(comm)
+    )
+    if least_width:
+        console.width = max(console.width, least_width)
+    return console
 
 
 def complain(comm: Any, error: PatchlawError) -> None:
@@ -34,12 +60,10 @@ def complain(comm: Any, error: PatchlawError) -> None:
 
     Args:
         comm: MPI communicator, or None.
-        error: What to say.
+        error: The error.
     """
-    if speaks(comm):
-        line = escape(" ".join(str(error).splitlines()))
-        # Long lines stay whole: a message may be searched for, or cut and pasted.
-        Console(stderr=True, soft_wrap=True).print(f"[bold red]patchlaw:[/] {line}")
+    line = escape(" ".join(str(error).splitlines()))
+    _console(comm, stderr=True).print(f"[bold red]patchlaw:[/] {line}")
 
 
 def say(comm: Any, text: str) -> None:
@@ -49,8 +73,7 @@ def say(comm: Any, text: str) -> None:
         comm: MPI communicator, or None.
         text: The line.
     """
-    if speaks(comm):
-        Console(soft_wrap=True, highlight=False).print(escape(text))
+    _console(comm).print(escape(text))
 
 
 def show_pairs(comm: Any, pairs: Sequence[tuple[str, str]], warnings: Sequence[str] = ()) -> None:
@@ -61,9 +84,7 @@ def show_pairs(comm: Any, pairs: Sequence[tuple[str, str]], warnings: Sequence[s
         pairs: Topics and sentences.
         warnings: Sentences that a user should not miss.
     """
-    if not speaks(comm):
-        return
-    console = _wide_console()
+    console = _console(comm, least_width=TABLE_WIDTH)
     table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
     for topic, sentence in pairs:
         table.add_row(f"[bold]{escape(topic)}[/]", escape(sentence))
@@ -73,52 +94,52 @@ def show_pairs(comm: Any, pairs: Sequence[tuple[str, str]], warnings: Sequence[s
 
 
 def show_plan(
-    comm: Any, setup: ProblemSetup, made: Cost | None = None, lacking: Sequence[str] = ()
+    comm: Any, setup: ProblemSetup, cost: Cost | None = None, shortages: Sequence[str] = ()
 ) -> None:
     """Print what a run will do, and why.
 
     Args:
         comm: MPI communicator, or None.
-        setup: The scene's ingredients.
-        made: What it is predicted to take; None leaves it out.
-        lacking: What a run would need more nodes for.
+        setup: The problem, set up from the scene.
+        cost: Predicted time and memory; None leaves them out.
+        shortages: Sentences on the memory that these nodes lack.
     """
     if speaks(comm):
-        notes = [*plan.warnings(setup), *lacking]
-        show_pairs(comm, list(plan.statements(setup, made)), notes)
+        warnings = [*plan.warnings(setup), *shortages]
+        show_pairs(comm, list(plan.statements(setup, cost)), warnings)
 
 
 def show_times(comm: Any, seconds: Mapping[str, float]) -> None:
-    """Print what a run took.
+    """Print wall times and memory of a run.
 
     Args:
         comm: MPI communicator, or None.
         seconds: Wall time of the phases [s].
     """
-    if speaks(comm):
-        phases = ", ".join(f"{phase} {spent:.2f} s" for phase, spent in seconds.items())
-        memory = f"memory {peak_memory() / 1e6:.0f} MB"
-        _wide_console().print(f"took: {phases}; {memory}", markup=False)
+    phases = ", ".join(f"{phase} {spent:.2f} s" for phase, spent in seconds.items())
+    text = f"took: {phases}; memory {peak_memory() / 1e6:.0f} MB"
+    _console(comm, least_width=TABLE_WIDTH).print(text, markup=False)
 
 
 @contextmanager
 def progress(
     comm: Any, load_history: LoadHistory, done: int = 0
 ) -> Iterator[Callable[[LoadStep], None]]:
-    """Follow load steps: by a bar, or under ``mpirun`` by a line each, fit for a log file.
+    """Show the progress of load steps: by a bar, or under ``mpirun`` by a line for each.
 
     Args:
         comm: MPI communicator, or None.
         load_history: The load steps to come.
-        done: How many of them were accepted before.
+        done: Number of load steps that were accepted before.
 
     Yields:
         The function to call with every load step.
     """
-    steps = None if load_history.force_change else load_history.count  # some may be halved
+    # Halved load steps make the total unknown.
+    steps = None if load_history.force_change else load_history.count
     if comm is not None:
-        of = "" if steps is None else f"/{steps}"
-        yield lambda step: say(comm, f"load step {step.step}{of}: {_in_short(step)}")
+        total = "" if steps is None else f"/{steps}"
+        yield lambda step: say(comm, f"load step {step.step}{total}: {_summary(step)}")
         return
     columns = (
         TextColumn("[bold]load steps"),
@@ -129,27 +150,24 @@ def progress(
     )
     with Progress(*columns) as bar:
         task = bar.add_task("preparing laws and block", total=steps, completed=done)
-        yield lambda step: bar.update(task, advance=1, description=_in_short(step))
+        yield lambda step: bar.update(task, advance=1, description=_summary(step))
 
 
-def _in_short(step: LoadStep) -> str:
+def _summary(step: LoadStep) -> str:
     return f"{1e3 * step.approach_mm:.3g} µm, {step.force_N:.4g} N"
 
 
 @contextmanager
 def following(comm: Any) -> Iterator[tuple[Callable[[str], None], Callable[[str], None]]]:
-    """Follow work of many parts: what is under way, where there is a terminal, and what is done.
+    """Follow work of many parts: the part under way, where there is a terminal, and those done.
 
     Args:
         comm: MPI communicator, or None.
 
     Yields:
-        The functions to call with what begins, and with a line on what has ended.
+        The functions to call with the part that begins, and with a line on the part that ended.
     """
-    console = Console(soft_wrap=True, highlight=False)
-    if not speaks(comm):
-        yield _nothing, _nothing
-        return
+    console = _console(comm)
     with console.status("") as status:
         yield (
             lambda text: status.update(escape(text)),
@@ -157,12 +175,8 @@ def following(comm: Any) -> Iterator[tuple[Callable[[str], None], Callable[[str]
         )
 
 
-def _nothing(text: str) -> None:
-    """Say nothing."""
-
-
 def show_history(comm: Any, history: History) -> None:
-    """Print the force–approach table and what the run says of itself.
+    """Print the force–approach table and the notes of the run.
 
     Args:
         comm: MPI communicator, or None.
@@ -170,26 +184,21 @@ def show_history(comm: Any, history: History) -> None:
     """
     if not speaks(comm):
         return
-    console = _wide_console(100 if history.reference is None else 116)
-    header, rows = curve_cells(history)
+    header, rows = history.table()
+    rows = list(rows)
     table = Table(box=None, padding=(0, 2, 0, 0))
     for name in header:
         table.add_column(escape(name.replace(" [", "\n[")), justify="right")
-    half = _MOST_ROWS // 2
-    if len(rows) > _MOST_ROWS:
-        rows[half:-half] = [("…", f"{len(rows) - _MOST_ROWS} more", *[""] * (len(header) - 2))]
+    half = MOST_ROWS // 2
+    if len(rows) > MOST_ROWS:
+        rows[half:-half] = [("…", f"{len(rows) - MOST_ROWS} more", *[""] * (len(header) - 2))]
     for row in rows:
         table.add_row(*row)
+    # A reference has one more column.
+    console = _console(comm, least_width=TABLE_WIDTH + 16 * (history.reference is not None))
     console.print(table)
     for note in history.notes:
         console.print(f"note: {escape(note)}")
-
-
-def _wide_console(least: int = 100) -> Console:
-    """Return a console of at least so many columns, which is what tables need in a log file."""
-    console = Console(highlight=False)
-    console.width = max(console.width, least)
-    return console
 
 
 def show_files(comm: Any, files: Sequence[Path]) -> None:
@@ -199,7 +208,6 @@ def show_files(comm: Any, files: Sequence[Path]) -> None:
         comm: MPI communicator, or None.
         files: The files written, all in one folder.
     """
-    if speaks(comm) and files:
-        folder = files[0].parent
+    if files:
         names = ", ".join(path.name for path in files)
-        Console(soft_wrap=True, highlight=False).print(f"results in {escape(str(folder))}: {names}")
+        say(comm, f"results in {files[0].parent}: {names}")

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry import Material
 from geometry.patches import PatchGrid, patch_means
 from geometry.surface import Surface
 from micro import (
@@ -33,7 +34,7 @@ def stated_model(scene: Scene, surface: Surface) -> MicroModel:
     return micro_model(
         scene.micro.model,
         surface,
-        contact_modulus=scene.block.material.contact_modulus,
+        contact_modulus=_modulus(scene),
         solver=scene.micro.solver,
         curvature=scene.micro.curvature,
         border=scene.micro.border,
@@ -65,7 +66,7 @@ def chosen_model(
 
     return choose(
         surface,
-        contact_modulus=scene.block.material.contact_modulus,
+        contact_modulus=_modulus(scene),
         approach=largest_local_approach(plane, surface),
         tolerance=tolerance,
         patches=patches if scene.coupling.kind != "analytic" else None,
@@ -77,7 +78,7 @@ def chosen_model(
 
 def estimated_plane(scene: Scene, surface: Surface) -> tuple[float, tuple[float, float]]:
     """Return the plane at the largest load, where loads are prescribed from a coarse half-space."""
-    rough = rough_half_space(surface, scene.block.material.contact_modulus)
+    rough = rough_half_space(surface, _modulus(scene))
     whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
     return find_plane_at_largest_load(
         scene.loading.load_history, rough, whole, patch_means(surface, whole)
@@ -101,3 +102,9 @@ def find_plane_at_largest_load(
     there = replace(load_history, points=(load_history.largest,), steps=1, force_change=None)
     (step,) = load_steps(alone, there)
     return step.approach_mm, step.tilt
+
+
+def _modulus(scene: Scene) -> float:
+    return Material(
+        young_modulus=scene.block.young_modulus, poisson_ratio=scene.block.poisson_ratio
+    ).contact_modulus

@@ -1,1 +1,1 @@
-"""What a run finds: its history, the record of a reference, notes on validity."""
+"""What a run found: load steps, values at mesh size zero with error bars, ranges of validity."""

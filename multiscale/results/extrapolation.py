@@ -1,4 +1,7 @@
-"""Extrapolates results of two or three meshes to mesh size zero, with an error bar."""
+"""Extrapolates results of two or three meshes to mesh size zero, with an error bar.
+
+Theory: demos/theory.md, section 12.
+"""
 
 from __future__ import annotations
 
@@ -6,24 +9,28 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
 
 from geometry.errors import InputError
 
 Array = NDArray[np.float64]
 
 LEAST_RATE, MOST_RATE = 0.5, 8.0
-"""Rates outside are not believed: the meshes are not yet, or no more, in the asymptotic range."""
+"""Observed rates outside are not trusted: the meshes are not in the asymptotic range."""
 
-_LESS = 1.25
-"""How far two meshes may be below the known order, or half of it if that is less. From first order
-on, c + a hᵖ (1 + b h) with b h > −0.4 is not 0.75 below, with sizes that differ by a half or more.
-The rest is for nodes that happen to lie well or badly: of seven rough blocks of order 3 whose
-finer edges are a third of a contact's radius, the least showed 2.0."""
+RATE_MARGIN = 1.25
+"""The error bar of two meshes allows a rate this much below the known order.
 
-_LESS_OBSERVED = 0.5
-"""The same of a rate that three meshes show, which knows most of b h."""
+The margin is at most half the order. From first order on, c + a hᵖ (1 + b h) with b h > −0.4 and
+sizes that differ by a factor of two or more is not 0.75 below its order. The rest is for nodes that
+happen to lie well or badly: of seven rough blocks of order 3, whose finer edges were a third of a
+contact's radius, the slowest showed 2.0."""
 
-_SLOWEST = 0.25
+OBSERVED_RATE_MARGIN = 0.5
+"""The same for a rate that three meshes show, which contains most of the effect of b h."""
+
+SLOWEST_RATE = 0.25
+"""The rate that the error bar assumes where nothing better is known."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,8 +40,8 @@ class Estimate:
     Attributes:
         value: The values, shape (steps,).
         error: Half widths of their error bars, shape (steps,); NaN where nothing is known.
-        rate: Rates that were used: the known order with two meshes, observed with three; NaN
-            where there was none to use. Shape (steps,).
+        rate: Rates that were used: the known order with two meshes, the observed rate with three;
+            NaN where no rate was used. Shape (steps,).
     """
 
     value: Array
@@ -43,21 +50,27 @@ class Estimate:
 
 
 def extrapolated(values: ArrayLike, sizes: ArrayLike, order: float | None = None) -> Estimate:
-    """Extrapolate results of meshes of falling size, by Richardson.
+    """Extrapolate results of meshes of falling size (Richardson).
 
-    With f = c + a hᵖ on meshes h₁ < h₂ the finest is wrong by a h₁ᵖ = (f₂ − f₁) / (rᵖ − 1),
-    r = h₂ / h₁. The error bar reaches from there to what a slower rate would give: the order less
-    one and a quarter, but at least half the order, with two meshes, where the order is taken on
-    trust; with three, half less than the rate they show, or than the order if they seem to
-    converge faster. Where three meshes do not converge monotonically at a rate between 0.5 and 8,
-    the finest value stands, with what a third of the known order leaves open between the first and
-    the last, a rate of 0.25 without one, or their spread if that is more. Meshes may also agree by
-    accident: no relative bar is less than half the median of all load steps.
+    With f = c + a hᵖ on meshes h₁ < h₂ the finest mesh is wrong by
+    a h₁ᵖ = (f₂ − f₁) / (rᵖ − 1), r = h₂ / h₁. The error bar is the difference between this
+    correction and the one that a slower rate would give: `RATE_MARGIN` below the known order with
+    two meshes, `OBSERVED_RATE_MARGIN` below the observed rate, or below the order if that is less,
+    with three.
+
+    Three meshes may show no rate between `LEAST_RATE` and `MOST_RATE`. Then the value of the finest
+    mesh is returned, and its error bar is the correction that a third of the known order would
+    give between the first and the last mesh (`SLOWEST_RATE` without an order), or the range of the
+    results if that is more.
+
+    Meshes may also agree by accident. Therefore no relative error bar is less than half the median
+    over all load steps.
 
     Args:
         values: Results of every mesh, the finest last, shape (meshes, steps).
-        sizes: Mesh sizes, falling, shape (meshes,). More than three meshes: the finest three count.
-        order: Known rate of convergence; needed by two meshes.
+        sizes: Mesh sizes, falling, shape (meshes,). Of more than three meshes the finest three
+            are used.
+        order: Known rate of convergence; required for two meshes.
 
     Raises:
         InputError: When shapes or sizes do not fit, or two meshes come without an order.
@@ -69,28 +82,25 @@ def extrapolated(values: ArrayLike, sizes: ArrayLike, order: float | None = None
     if len(h) == 1:
         nothing = np.full(results.shape[1], np.nan)
         return Estimate(value=results[0], error=nothing, rate=nothing.copy())
-    difference = results[-2] - results[-1]
-    ratio = h[-2] / h[-1]
+    difference, ratio = results[-2] - results[-1], h[-2] / h[-1]
     if len(h) == 2:
         assert order is not None
         rate: Array = np.full(len(difference), order)
-        slower = np.maximum(rate - _LESS, 0.5 * order)
+        slower = np.maximum(rate - RATE_MARGIN, 0.5 * order)
     else:
-        rate = _observed(results, h)
-        slower = np.fmin(rate, np.inf if order is None else order) - _LESS_OBSERVED
-        slower = np.maximum(slower, _SLOWEST)
-    correction = _correction(difference, ratio, rate)
-    bar = np.abs(_correction(difference, ratio, slower) - correction)
-    lost = np.isnan(rate)
-    cautious = np.maximum(_unsettled(results, h, order), np.ptp(results, axis=0))
-    still = np.ptp(results, axis=0) == 0.0  # such as before first touch: nothing to be wrong
-    error = np.where(lost, cautious, bar)
+        rate = _observed_rates(results, h)
+        slower = np.fmin(rate, np.inf if order is None else order) - OBSERVED_RATE_MARGIN
+        slower = np.maximum(slower, SLOWEST_RATE)
+    correction = difference / (ratio**rate - 1.0)
+    bar = np.abs(difference / (ratio**slower - 1.0) - correction)
+    unknown, spread = np.isnan(rate), np.ptp(results, axis=0)
+    error = np.where(unknown, np.maximum(_bar_without_rate(results, h, order), spread), bar)
     size = np.abs(results[-1])
     usual = np.median(error[size > 0.0] / size[size > 0.0]) if size.any() else 0.0
     return Estimate(
-        value=results[-1] - np.where(lost, 0.0, correction),
+        value=results[-1] - np.where(unknown, 0.0, correction),
         error=np.maximum(error, 0.5 * usual * size),
-        rate=np.where(still, np.nan, rate),
+        rate=np.where(spread == 0.0, np.nan, rate),  # such as before the first touch
     )
 
 
@@ -111,39 +121,30 @@ def _checked(values: ArrayLike, sizes: ArrayLike, order: float | None) -> tuple[
     return results, h
 
 
-def _unsettled(results: Array, h: Array, order: float | None) -> Array:
-    """Return what meshes that show no rate leave open.
+def _bar_without_rate(results: Array, h: Array, order: float | None) -> Array:
+    """Return error bars for meshes that show no rate.
 
-    With a known order that is what a third of it leaves between the first and the last, whose
-    difference noise matters least for; without, what almost no convergence leaves.
+    With a known order the first and the last mesh are compared: noise matters least for them.
     """
-    if order is None or len(h) == 2:
-        step, ratio, rate = results[-2] - results[-1], h[-2] / h[-1], _SLOWEST
-    else:
-        step, ratio, rate = results[0] - results[-1], h[0] / h[-1], order / 3.0
-    return np.abs(_correction(step, ratio, np.full(len(step), rate)))
+    first, rate = (-2, SLOWEST_RATE) if order is None else (0, order / 3.0)
+    return np.asarray(np.abs((results[first] - results[-1]) / ((h[first] / h[-1]) ** rate - 1.0)))
 
 
-def _correction(difference: Array, ratio: float, rate: Array) -> Array:
-    """Return the error of the finest mesh, from its difference to the next."""
-    return np.asarray(difference / (ratio**rate - 1.0))
+def _observed_rates(results: Array, h: Array) -> Array:
+    """Return the rates p that three meshes show, NaN where they show none.
 
+    They solve (h₃ᵖ − h₂ᵖ) / (h₂ᵖ − h₁ᵖ) = (f₃ − f₂) / (f₂ − f₁), whose left side rises with p.
+    """
 
-def _observed(results: Array, h: Array) -> Array:
-    """Return the rates that three meshes show, NaN where they show none, by bisection."""
-    coarse, fine = results[-3] - results[-2], results[-2] - results[-1]
-    # (h₃ᵖ − h₂ᵖ) / (h₂ᵖ − h₁ᵖ) rises with p
+    def quotient(rate: float) -> float:
+        return float(((h[-3] / h[-2]) ** rate - 1.0) / (1.0 - (h[-1] / h[-2]) ** rate))
+
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = coarse / fine
-    low: Array = np.full(len(found), LEAST_RATE)
-    high: Array = np.full(len(found), MOST_RATE)
-    shown = (found >= _quotient(h, low)) & (found <= _quotient(h, high))
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        below = _quotient(h, middle) < found
-        low, high = np.where(below, middle, low), np.where(below, high, middle)
-    return np.where(shown, 0.5 * (low + high), np.nan)
-
-
-def _quotient(h: Array, rate: Array) -> Array:
-    return np.asarray(((h[-3] / h[-2]) ** rate - 1.0) / (1.0 - (h[-1] / h[-2]) ** rate))
+        observed = (results[-3] - results[-2]) / (results[-2] - results[-1])
+    trusted = (observed >= quotient(LEAST_RATE)) & (observed <= quotient(MOST_RATE))
+    rates = np.full(len(observed), np.nan)
+    for i in np.flatnonzero(trusted):
+        rates[i] = brentq(
+            lambda rate, i=i: quotient(rate) - observed[i], LEAST_RATE, MOST_RATE, xtol=1e-14
+        )
+    return rates

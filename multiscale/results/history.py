@@ -1,55 +1,135 @@
-"""The record of a run: one row per load step, one per patch and load step."""
+"""The results of a run: a row for every load step, and a row for every patch in it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.patches import PatchGrid
 from multiscale.loading.load_step import LoadStep
+from multiscale.results.html_page import Table, table_html
 from multiscale.results.reference_record import ReferenceRecord
 
 Array = NDArray[np.float64]
 
-COLUMNS = (
-    "step",
-    "approach_mm",
-    "force_N",
-    "mean_pressure_MPa",
-    "contact_area_fraction",
-    "mean_separation_mm",
-    "contacts",
-    "newton_iterations",
-    "linear_iterations",
-    "wall_s",
-    "reason",
-    "tilt_x",
-    "tilt_y",
-    "moment_x_N_mm",
-    "moment_y_N_mm",
-    "force_error_N",
-    "approach_error_mm",
-)
 PATCH_COLUMNS = ("step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area_fraction")
+"""Columns of ``patches.csv``."""
+
+
+class Column:
+    """A column of ``history.csv``, declared as an attribute of `History`.
+
+    Of a history it is the array of the values at all load steps; what was not measured is NaN.
+
+    Args:
+        meaning: What the column holds; with the unit it is the column's documentation.
+        unit: Unit of the values; empty for plain numbers.
+        value: Returns the value of a load step; by default the step's attribute of this name.
+        heading: Heading in the table of reports, terminals and notebooks; empty for a column
+            that stands in the file alone.
+        scale: Factor between the unit of the file and the unit of the heading.
+        shown: Format of the numbers in that table.
+        error: Name of the load step's attribute that holds the error of the value; shown beside
+            it. Empty for none.
+
+    Attributes:
+        name: Name of the column and of the attribute of `History`.
+    """
+
+    name: str
+
+    def __init__(
+        self,
+        meaning: str,
+        unit: str = "",
+        *,
+        value: Callable[[LoadStep], Any] | None = None,
+        heading: str = "",
+        scale: float = 1.0,
+        shown: str = ".0f",
+        error: str = "",
+    ) -> None:
+        self.__doc__ = f"{meaning} [{unit}]." if unit else f"{meaning}."
+        self.heading = heading
+        self._value, self._scale, self._shown, self._error = value, scale, shown, error
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    @overload
+    def __get__(self, history: None, owner: type) -> Column: ...
+
+    @overload
+    def __get__(self, history: History, owner: type) -> NDArray[Any]: ...
+
+    def __get__(self, history: History | None, owner: type) -> Column | NDArray[Any]:
+        if history is None:
+            return self
+        values = [self.of(step) for step in history.steps]
+        return np.array([np.nan if value is None else value for value in values])
+
+    def of(self, step: LoadStep) -> Any:
+        """Return the value of a load step; None where it was not measured."""
+        return getattr(step, self.name) if self._value is None else self._value(step)
+
+    def text(self, step: LoadStep) -> str:
+        """Return the value of a load step as it is shown in tables, with its error."""
+        error = getattr(step, self._error, None) or 0.0
+        return with_error(self._scale * self.of(step), self._scale * error, shown=self._shown)
 
 
 @dataclass(frozen=True, kw_only=True)
 class History:
     """All load steps of a run; every column of ``history.csv`` is an attribute, as an array.
 
-    What was not measured is NaN there.
+    A new column is one more `Column` in this class, behind those that are there.
 
     Attributes:
         steps: The load steps.
         patches: The partition of the interface.
         seconds: Wall time of each phase of the run [s].
-        notes: What the run has to say about its own approximations.
-        reference: What the meshes of a reference say together; None with other couplings.
+        notes: Remarks of the run on its own approximations.
+        reference: Results of all meshes of a reference; None with other couplings.
     """
+
+    step = Column("Number of the load step, from 1", heading="step")
+    approach_mm = Column(
+        "Approach of the rigid plane, counted from the first touch", "mm",
+        heading="approach [µm]", scale=1e3, shown=".4g", error="approach_error_mm",
+    )  # fmt: skip
+    force_N = Column(
+        "Normal force on the plane", "N", heading="force [N]", shown=".6g", error="force_error_N"
+    )
+    mean_pressure_MPa = Column(
+        "Force over the nominal contact area", "MPa", heading="pressure [MPa]", shown=".5g"
+    )
+    contact_area_fraction = Column(
+        "Real over nominal contact area", heading="area [%]", scale=100, shown=".4g"
+    )
+    mean_separation_mm = Column(
+        "Mean gap between the plane and the deformed surface", "mm",
+        heading="separation [µm]", scale=1e3, shown=".4g",
+    )  # fmt: skip
+    contacts = Column("Number of asperities in contact", heading="contacts")
+    newton_iterations = Column("Newton steps, those of halved load steps too", heading="Newton")
+    linear_iterations = Column("Iterations of the linear solver", heading="linear")
+    wall_s = Column("Wall time", "s", heading="time [s]", shown=".2f")
+    reason = Column("Name of the reason for which the iteration stopped")
+    tilt_x = Column("Slope of the approach along x", "mm/mm", value=lambda step: step.tilt[0])
+    tilt_y = Column("Slope of the approach along y", "mm/mm", value=lambda step: step.tilt[1])
+    moment_x_N_mm = Column(
+        "First moment Σ P (x − xc) of the forces P", "N mm", value=lambda step: step.moment_N_mm[0]
+    )
+    moment_y_N_mm = Column(
+        "First moment Σ P (y − yc) of the forces P", "N mm", value=lambda step: step.moment_N_mm[1]
+    )
+    force_error_N = Column("Error of the force; 0 where it is prescribed", "N")
+    approach_error_mm = Column("Error of the approach; 0 where it is prescribed", "mm")
 
     steps: tuple[LoadStep, ...]
     patches: PatchGrid
@@ -63,14 +143,6 @@ class History:
     def __iter__(self) -> Iterator[LoadStep]:
         return iter(self.steps)
 
-    def __getattr__(self, name: str) -> NDArray:
-        if name not in COLUMNS:
-            raise AttributeError(
-                f"a history has no column {name!r} (columns: {', '.join(COLUMNS)})"
-            )
-        values = [getattr(step, name) for step in self.steps]
-        return np.array([np.nan if value is None else value for value in values])
-
     @property
     def patch_pressure_MPa(self) -> Array:
         """Mean pressure of each patch at each step, shape (steps, N) [MPa]."""
@@ -81,25 +153,65 @@ class History:
         """Mean closure of each patch at each step, shape (steps, N) [mm]."""
         return np.array([step.patches.closure_mm for step in self.steps])
 
-    def rows(self) -> Iterator[tuple]:
-        """Yield the rows of ``history.csv``."""
-        for step in self.steps:
-            yield tuple(getattr(step, name) for name in COLUMNS)
-
     def records(self) -> list[dict[str, Any]]:
-        """Return the rows of ``history.csv`` by column, as data frames take them."""
-        return [dict(zip(COLUMNS, row, strict=True)) for row in self.rows()]
+        """Return the rows of ``history.csv``, each as a dictionary by column."""
+        return [{column.name: column.of(step) for column in COLUMNS} for step in self.steps]
 
     def patch_records(self) -> list[dict[str, Any]]:
-        """Return the rows of ``patches.csv`` by column, as data frames take them."""
+        """Return the rows of ``patches.csv``, each as a dictionary by column."""
         return [dict(zip(PATCH_COLUMNS, row, strict=True)) for row in self.patch_rows()]
 
     def patch_rows(self) -> Iterator[tuple]:
         """Yield the rows of ``patches.csv``."""
         for step in self.steps:
-            state = step.patches
-            values = zip(
-                state.closure_mm, state.pressure_MPa, state.contact_area_fraction, strict=True
-            )
-            for index, (closure, pressure, area) in enumerate(values):
-                yield (step.step, *self.patches.unravel(index), closure, pressure, area)
+            for index in range(self.patches.count):
+                values = (getattr(step.patches, name)[index] for name in PATCH_COLUMNS[3:])
+                yield (step.step, *self.patches.unravel(index), *values)
+
+    def to_dataframe(self) -> Any:
+        """Return the rows of ``history.csv`` as a pandas data frame.
+
+        Raises:
+            ImportError: When pandas, which patchlaw does not require, is not installed.
+        """
+        try:
+            from pandas import DataFrame
+        except ImportError as error:
+            raise ImportError(
+                "History.to_dataframe needs pandas (pip install pandas); History.records gives "
+                "the same rows without it"
+            ) from error
+        return DataFrame(self.records(), columns=[column.name for column in COLUMNS])
+
+    def table(self) -> Table:
+        """Return headings and rows of the table that reports and terminals show.
+
+        A reference has one more column, with its values at mesh size zero.
+        """
+        columns = [column for column in COLUMNS if column.heading]
+        texts = {column.heading: [column.text(step) for step in self.steps] for column in columns}
+        if self.reference is not None:
+            heading, texts[heading] = self.reference.cells
+        return list(texts), list(zip(*texts.values(), strict=True))
+
+    def _repr_html_(self) -> str:
+        """Return the table as HTML, which notebooks show for a history."""
+        return table_html(self.table())
+
+
+COLUMNS = tuple(value for value in vars(History).values() if isinstance(value, Column))
+"""The columns of ``history.csv``, in their order."""
+
+
+def with_error(value: float, error: float | None, *, shown: str) -> str:
+    """Return a number with its error, both rounded to the second digit of the error.
+
+    Args:
+        value: The number.
+        error: Its error; 0 or None for none.
+        shown: Format of a number without an error.
+    """
+    if not error:
+        return f"{value:{shown}}"
+    places = max(1 - math.floor(math.log10(error)), 0)
+    return f"{value:.{places}f} ± {error:.{places}f}"

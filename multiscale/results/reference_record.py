@@ -1,8 +1,11 @@
-"""What several meshes of a rough surface say together: values at mesh size zero, error bars."""
+"""Results of all meshes of a reference: values at mesh size zero, with error bars.
+
+Theory: demos/theory.md, sections 12 and 13.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,33 +16,20 @@ from multiscale.results.extrapolation import Estimate, extrapolated
 
 Array = NDArray[np.float64]
 
-COLUMNS = (
-    "step",
-    "approach_mm",
-    "force_N",
-    "force_error_N",
-    "force_rate",
-    "contact_area_fraction",
-    "contact_area_error",
-    "area_rate",
-    "approach_error_mm",
-    "approach_rate",
-)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ReferenceRecord:
-    """Results of the meshes of a reference, and their limits; the finest mesh is the last.
+    """Results of the meshes of a reference and their limits; the finest mesh is the last.
 
     Attributes:
         sizes: Edge lengths in the contacts, falling, shape (meshes,) [mm].
         unknowns: Degrees of freedom, shape (meshes,).
         approach_mm: Approach on every mesh, shape (meshes, steps) [mm].
         force_N: Force on every mesh, shape (meshes, steps) [N].
-        contact_area_fraction: Contact area likewise, relative to the nominal area.
-        approach: The approach at mesh size zero; as prescribed where it is [mm].
-        force: The force likewise [N].
-        area: The contact area fraction likewise.
+        contact_area_fraction: Contact area relative to the nominal area, shape (meshes, steps).
+        approach: The approach at mesh size zero [mm]; exact where it is prescribed.
+        force: The force at mesh size zero [N]; exact where it is prescribed.
+        area: The contact area fraction at mesh size zero.
     """
 
     sizes: Array
@@ -53,78 +43,75 @@ class ReferenceRecord:
 
     @property
     def by_force(self) -> bool:
-        """Whether the force is prescribed: meshes then differ in approach, which else is given."""
+        """Whether the force is prescribed: the approach then differs between the meshes."""
         spread = np.ptp(self.approach_mm, axis=0)
         return bool(np.any(spread > 1e-12 * np.abs(self.approach_mm).max(axis=0)))
 
     @property
-    def _unknown(self) -> tuple[Estimate, float, str]:
-        """What is not prescribed, with the scale and unit that people read it in."""
+    def _response(self) -> tuple[Estimate, float, str]:
+        """Return force or approach, whichever is not prescribed, with the scale to its unit."""
         return (self.approach, 1e3, "µm") if self.by_force else (self.force, 1.0, "N")
 
     @property
-    def _most(self) -> int:
-        """Index of the step of the largest force."""
-        return int(np.argmax(self.force_N[-1]))
+    def _at_largest_force(self) -> tuple[float, float, float]:
+        """Return value, error and rate of the response at the largest force, in mm or N."""
+        found, step = self._response[0], int(np.argmax(self.force_N[-1]))
+        return float(found.value[step]), float(found.error[step]), float(found.rate[step])
 
     @property
     def relative_error(self) -> float:
-        """Error bar at the largest force, relative: of the force, or of the approach by force."""
+        """Relative error bar at the largest force: of the force, or of the approach by force."""
         if not self.force_N.any():
             return float("nan")
-        found, last = self._unknown[0], self._most
-        value, error = abs(float(found.value[last])), float(found.error[last])
-        return error / value if value else error
+        value, error, _ = self._at_largest_force
+        return error / abs(value) if value else error
 
     @property
     def label(self) -> str:
-        """What a table or a legend says of the discretisation error."""
+        """The discretisation error, as tables and legends show it."""
         if not np.isfinite(self.relative_error):
             return "no error bar"
         return f"± {100.0 * self.relative_error:.2g} %"
 
     @property
     def sentence(self) -> str:
-        """What a report says of the discretisation error."""
+        """The discretisation error and where it is from, as reports show it."""
         if len(self.sizes) == 1:
             return "one mesh: no error bar; reference.meshes = 2 gives one"
         if not self.force_N.size:
             return "no load step, no error bar"
         if not self.force_N.any():
             return "no contact on any mesh, no error bar"
-        what = "approach" if self.by_force else "force"
-        (found, scale, unit), last = self._unknown, self._most
-        rate = float(found.rate[last])
+        value, error, rate = self._at_largest_force
+        _, scale, unit = self._response
         if np.isnan(rate):
-            why = "the meshes show no rate, and the finest stands"
+            meshes = "meshes that show no rate: the value is that of the finest"
         elif len(self.sizes) == 2:
-            why = f"two meshes, with the known order {rate:g} of their family"
+            meshes = f"two meshes, with the known order {rate:g} of their family"
         else:
-            why = f"three meshes, with the rate {rate:.2g} that they show"
+            meshes = f"three meshes, with the rate {rate:.2g} that they show"
         return (
-            f"{what} at mesh size zero, at the largest force: {scale * found.value[last]:.5g} "
-            f"± {scale * found.error[last]:.2g} {unit} ({self.label}), extrapolated from {why}; "
+            f"{'approach' if self.by_force else 'force'} at mesh size zero, at the largest force: "
+            f"{scale * value:.5g} ± {scale * error:.2g} {unit} ({self.label}), from {meshes}; "
             "the table holds the finest mesh"
         )
 
     @property
     def cells(self) -> tuple[str, list[str]]:
         """Heading and cells of a table's column that holds the values at mesh size zero."""
-        found, scale, unit = self._unknown
+        found, scale, unit = self._response
         if len(self.sizes) == 1:
             return "at size zero", ["no error bar"] * found.value.size
-        heading = f"at size zero [{unit}]"
-        pairs = zip(scale * found.value, scale * found.error, strict=True)
-        return heading, [
+        return f"at size zero [{unit}]", [
             "no error bar" if np.isnan(error) else f"{value:.5g} ± {error:.2g}"
-            for value, error in pairs
+            for value, error in zip(scale * found.value, scale * found.error, strict=True)
         ]
 
     def without_bars(self, steps: NDArray[np.bool_]) -> ReferenceRecord:
-        """Return the record with the errors of force and area unknown at some load steps.
+        """Return the record with unknown errors of force and area at some load steps.
 
         Args:
-            steps: At which, shape (steps,).
+            steps: True at these load steps, shape (steps,).
         """
         force, area = (
             replace(one, error=np.where(steps, np.nan, one.error))
@@ -133,9 +120,10 @@ class ReferenceRecord:
         return replace(self, force=force, area=area)
 
     def with_errors(self, steps: Sequence[LoadStep]) -> tuple[LoadStep, ...]:
-        """Return the load steps, which are the finest mesh's, with what they may be off by.
+        """Return the load steps with the errors of force and approach.
 
-        That is the way to mesh size zero and the error bar there.
+        The load steps are those of the finest mesh. Their error is the distance from the value at
+        mesh size zero, and the error bar of that value.
 
         Args:
             steps: The load steps.
@@ -147,31 +135,29 @@ class ReferenceRecord:
             for i, step in enumerate(steps)
         )
 
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """Columns of ``reference.csv``: the meshes' own values follow the extrapolated ones."""
-        names = ("force_N", "approach_mm", "contact_area_fraction")
-        meshes = range(1, len(self.sizes) + 1)
-        return (*COLUMNS, *(f"{name}_mesh_{mesh}" for name in names for mesh in meshes))
-
-    def rows(self, steps: Sequence[LoadStep]) -> Iterator[tuple]:
-        """Yield the rows of ``reference.csv``.
+    def columns(self, steps: Sequence[LoadStep]) -> dict[str, Sequence[float] | Array]:
+        """Return the columns of ``reference.csv``: the limits, then the values on every mesh.
 
         Args:
             steps: The load steps.
         """
-        force, area, approach = self.force, self.area, self.approach
-        for i, step in enumerate(steps):
-            yield (
-                step.step,
-                approach.value[i],
-                *(force.value[i], force.error[i], force.rate[i]),
-                *(area.value[i], area.error[i], area.rate[i]),
-                *(approach.error[i], approach.rate[i]),
-                *self.force_N[:, i],
-                *self.approach_mm[:, i],
-                *self.contact_area_fraction[:, i],
-            )
+        limits: dict[str, Sequence[float] | Array] = {
+            "step": [step.step for step in steps],
+            "approach_mm": self.approach.value,
+            "force_N": self.force.value,
+            "force_error_N": self.force.error,
+            "force_rate": self.force.rate,
+            "contact_area_fraction": self.area.value,
+            "contact_area_error": self.area.error,
+            "area_rate": self.area.rate,
+            "approach_error_mm": self.approach.error,
+            "approach_rate": self.approach.rate,
+        }
+        return limits | {
+            f"{name}_mesh_{number}": values
+            for name in ("force_N", "approach_mm", "contact_area_fraction")
+            for number, values in enumerate(getattr(self, name), 1)
+        }
 
 
 def _known(error: float) -> float | None:
@@ -186,14 +172,14 @@ def reference_record(
     force_order: float,
     area_order: float,
 ) -> ReferenceRecord:
-    """Gather what every mesh found, and extrapolate it.
+    """Gather the results of every mesh, and extrapolate them to mesh size zero.
 
     Args:
         steps: The load steps of a reference.
         sizes: Edge lengths in the contacts, falling, shape (meshes,) [mm].
         unknowns: Degrees of freedom of the meshes.
-        force_order: Known order of the force, and of the approach under a force, in the size.
-        area_order: Known order of the contact area.
+        force_order: Known order of convergence of the force, and of the approach under a force.
+        area_order: Known order of convergence of the contact area.
     """
     found = np.array([step.meshes for step in steps], float).reshape(len(steps), len(sizes), 3)
     approach, force, area = found.transpose(2, 1, 0)

@@ -8,7 +8,6 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
-from geometry.materials import Material
 from geometry.spectrum import LARGEST_SEED, Spectrum
 from multiscale.scene.auto_values import Open, OrAuto
 from multiscale.scene.files import override, read_scene_file
@@ -117,11 +116,6 @@ class BlockSection(Section):
     margin: Annotated[Length, Field(ge=0, description="block beyond the interface")] = 0.0
     margin_cells: Count = 8
     margin_grading: Annotated[Number, Field(ge=1, le=1e6)] = 8.0
-
-    @property
-    def material(self) -> Material:
-        """Elastic constants of the block."""
-        return Material(young_modulus=self.young_modulus, poisson_ratio=self.poisson_ratio)
 
     def height_under(self, lengths: tuple[float, float]) -> float:
         """Return the height of the block under a surface of given sides [mm]."""

@@ -20,8 +20,14 @@ from geometry import Spectrum, Surface, synthesise
 from geometry.errors import NotConverged
 from micro import MODELS, micro_model
 from micro.choice.candidates import FACTORS, half_space
-from micro.choice.expected_errors import CONTACT_TERMS, GRID_TERMS, contact_terms, grid_terms
-from micro.choice.measures import ContactMeasures, contact_measures
+from micro.choice.expected_errors import (
+    CONTACT_TERMS,
+    GRID_TERMS,
+    ContactMeasures,
+    contact_measures,
+    contact_terms,
+    grid_terms,
+)
 
 SCALED = {"curvature": "contact", "border": "include"}
 KINDS = {**{name: (name, {}) for name in MODELS}, "scaled": ("elliptic", SCALED)}

@@ -27,8 +27,8 @@ def body(name, height):
     """Return the block of a name, and the free sides that its contact knows of."""
     margin = {"margin": 0.25, "margin_cells": 1} if name == "wide margin" else {}
     shape = BlockShape(interface=(1.0, 1.0), height=height, cells=(1, 1, 1), **margin)
-    reach = 0.25 * min(1.0, height)
-    sides = FreeSides(lengths=(1.0, 1.0), poisson_ratio=0.15, reach=reach)
+    decay_length = 0.25 * min(1.0, height)
+    sides = FreeSides(lengths=(1.0, 1.0), poisson_ratio=0.15, decay_length=decay_length)
     return Body(
         shape=shape,
         material=Material(young_modulus=4000.0, poisson_ratio=0.15),

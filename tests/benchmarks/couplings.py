@@ -39,7 +39,7 @@ def median(action, *given, **options):
 def block():
     """Return the compliance of the cube's top in modes."""
     shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(1, 1, 1))
-    sides = FreeSides(lengths=(1.0, 1.0), poisson_ratio=MATERIAL.poisson_ratio, reach=0.25)
+    sides = FreeSides(lengths=(1.0, 1.0), poisson_ratio=MATERIAL.poisson_ratio, decay_length=0.25)
     body = Body(shape=shape, material=MATERIAL, sides="free", known=sides)
     return body, body.face(MPI.COMM_SELF)
 

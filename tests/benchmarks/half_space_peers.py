@@ -119,7 +119,7 @@ def timed_transforms():
 
     from scipy import fft
 
-    import micro.compliance.convolution as convolution
+    import micro.compliance.half_space_grid as convolution
 
     spent = [0.0]
 

@@ -11,6 +11,7 @@ os.environ["OMP_NUM_THREADS"] = "1"
 
 import argparse
 import time
+from dataclasses import replace
 
 from mpi4py import MPI
 
@@ -24,7 +25,7 @@ from geometry import (
     synthesise,
 )
 from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
-from micro import FreeSides, HalfSpaceModel, finite_slope_effect
+from micro import FiniteSlopes, FreeSides, HalfSpace, HalfSpaceModel
 from multiscale.couplings.body_terms import Body
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
@@ -56,7 +57,7 @@ def report(surface, name, shape, scale):
 
 def concurrent(surface):
     nu, side = MATERIAL.poisson_ratio, surface.lengths[0]
-    sides = FreeSides(lengths=surface.lengths, poisson_ratio=nu, reach=0.25 * side)
+    sides = FreeSides(lengths=surface.lengths, poisson_ratio=nu, decay_length=0.25 * side)
     shape = BlockShape(interface=surface.lengths, height=1.0, cells=(1, 1, 1))
     body = Body(shape=shape, material=MATERIAL, sides="free", known=sides)
     model = HalfSpaceModel(
@@ -78,7 +79,11 @@ def main():
     surface = synthesise(SPECTRUM, grid=(256, 256), lengths=(1.0, 1.0))
     model = HalfSpaceModel(surface=surface, contact_modulus=MATERIAL.contact_modulus)
     nu = MATERIAL.poisson_ratio
-    effects = [finite_slope_effect(model, at, poisson_ratio=nu) for at in APPROACHES]
+    slopes = FiniteSlopes(
+        surface, HalfSpace(young_modulus=MATERIAL.young_modulus, poisson_ratio=nu)
+    )
+    sloped = replace(model, slopes=slopes)
+    effects = [sloped.solve(at).force / model.solve(at).force - 1.0 for at in APPROACHES]
     if COMM.rank == 0:
         told = ", ".join(f"{effect:+.1%}" for effect in effects)
         print(f"finite slopes change the force by {told}", flush=True)

@@ -33,8 +33,8 @@ def block_body(height=1.0, sides="free", *, known=True):
     shape = BlockShape(interface=SQUARE, height=height, cells=(1, 1, 1))
     free = None
     if known and sides == "free":
-        nu, reach = MATERIAL.poisson_ratio, 0.25 * min(1.0, height)
-        free = FreeSides(lengths=SQUARE, poisson_ratio=nu, reach=reach)
+        nu, decay_length = MATERIAL.poisson_ratio, 0.25 * min(1.0, height)
+        free = FreeSides(lengths=SQUARE, poisson_ratio=nu, decay_length=decay_length)
     return Body(shape=shape, material=MATERIAL, sides=sides, known=free)
 
 

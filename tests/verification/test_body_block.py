@@ -15,8 +15,12 @@ COMM = MPI.COMM_SELF
 
 
 def body(shape, nu=0.15, known=True, sides="free"):
-    reach = 0.25 * min(*shape.interface, shape.height)
-    free = FreeSides(lengths=shape.interface, poisson_ratio=nu, reach=reach) if known else None
+    decay_length = 0.25 * min(*shape.interface, shape.height)
+    free = (
+        FreeSides(lengths=shape.interface, poisson_ratio=nu, decay_length=decay_length)
+        if known
+        else None
+    )
     material = Material(young_modulus=1.0, poisson_ratio=nu)
     return Body(shape=shape, material=material, sides=sides, known=free)
 

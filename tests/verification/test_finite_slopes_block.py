@@ -62,7 +62,7 @@ def test_slopes_soften_a_low_block_as_its_mesh():
     assert found == pytest.approx(expected, abs=2.5e-3)  # −4.13 %
     # without the body's own stresses, and its height above the mean plane
     half_space = steep.slopes.half_space
-    slopes = FiniteSlopes(steep.surface, half_space, beside=steep.slopes.beside[:-1])
+    slopes = FiniteSlopes(steep.surface, half_space, edge_stresses=steep.slopes.edge_stresses[:-1])
     alone = replace(flat, slopes=slopes, tolerance=1e-8).solve(APPROACH).force / small - 1.0
     assert alone - expected > 8e-3  # −3.01 %
 
@@ -70,7 +70,7 @@ def test_slopes_soften_a_low_block_as_its_mesh():
 def test_heights_count_from_the_highest_point_of_a_higher_block():
     steep, flat = (contact_model(setup(slopes=slopes), None) for slopes in (True, False))
     assert flat.slopes is None
-    assert len(steep.slopes.beside) == 2  # the sides' stresses, and the body's
+    assert len(steep.slopes.edge_stresses) == 2  # the sides' stresses, and the body's
     surface = steep.surface
     gained = steep.body.matrix - flat.body.matrix
     # uniform pressure shortens a column without walls by p/E of its length; the bottom is clamped

@@ -6,6 +6,7 @@ force of a ball that a side cuts in half.
 
 import numpy as np
 import pytest
+from free_side_points import side_displacements
 from reference_cases import COMM, MATERIAL, MODULUS, on_block
 from scipy.interpolate import RectBivariateSpline
 
@@ -22,7 +23,7 @@ from micro import FreeSides, HalfSpace
 from multiscale.results.extrapolation import extrapolated
 
 SQUARE = (1.0, 1.0)
-SIDES = FreeSides(lengths=SQUARE, poisson_ratio=MATERIAL.poisson_ratio, reach=0.25)
+SIDES = FreeSides(lengths=SQUARE, poisson_ratio=MATERIAL.poisson_ratio, decay_length=0.25)
 HALF_SPACE = HalfSpace(young_modulus=MATERIAL.young_modulus, poisson_ratio=MATERIAL.poisson_ratio)
 APPROACH, FLAT = 3e-3, 0.01
 
@@ -52,7 +53,10 @@ def test_what_is_left_beside_a_side_is_smooth():
     x, y, _ = nodes[at].T
     beyond = down[at] - HALF_SPACE.displacements(x, y, np.zeros_like(x), square)[2, :, 0]
     grid = np.linspace(1e-3, 0.06, 60), np.linspace(y.min(), y.max(), 5)
-    side = RectBivariateSpline(*grid, SIDES.top(*grid, square)[:, :, 0]).ev(x, y) / MODULUS
+    side = (
+        RectBivariateSpline(*grid, side_displacements(SIDES, *grid, square)[:, :, 0]).ev(x, y)
+        / MODULUS
+    )
     left = beyond - side
     straight = np.polyval(np.polyfit(x, left, 1), x)
     # 0.7 % of the largest, of which most is the mesh's

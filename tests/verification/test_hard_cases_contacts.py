@@ -23,7 +23,7 @@ def test_two_summits_that_nearly_coincide(name, apart):
 
 
 @pytest.mark.parametrize("name", ["circular", "elliptic"])
-def test_a_twin_a_little_lower_is_engulfed(name):
+def test_a_twin_a_little_lower_overlaps(name):
     # hard: the lower of two takes none or all of the load, by the last digit of its height
     forces = []
     for lower in (0.0, 1e-12, 1e-9, 1e-6, 1e-3):

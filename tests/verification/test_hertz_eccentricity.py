@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from micro import axis_ratio, eccentricity, force_factor
+from micro.closed_forms.ellipse import axis_ratio, eccentricity, force_factor
 
 
 def complete_integrals(beta):

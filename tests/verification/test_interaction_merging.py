@@ -50,7 +50,7 @@ def curve(case, name, approaches):
 def test_force_grows_without_a_jump(case, name):
     approaches = np.linspace(0.0, 0.1, 201)
     response = curve(case, name, approaches)
-    assert response.engulfed[-1] > 0 and response.residual.max() <= 1e-10
+    assert response.overlapping_contacts[-1] > 0 and response.residual.max() <= 1e-10
     increments = np.diff(response.force)
     assert np.all(increments[response.force[1:] > 0.0] > 0.0)
     # A jump would make one increment stand out from its neighbours for any step: halve the step
@@ -82,7 +82,7 @@ def test_coincident_summits_share_the_force_of_one(name, count, share):
     # n (1 + (n − 1) c*)^(−3/2): exactly 1 for two by the choice of c*, three digits given else.
     tolerance = 1e-9 if count == 2 else 1e-3
     assert all_of_them.force.sum() / alone.force[0] == pytest.approx(share, rel=tolerance)
-    assert all_of_them.engulfed == count * (count - 1)
+    assert all_of_them.overlapping_contacts == count * (count - 1)
 
 
 @both_shapes
@@ -91,6 +91,8 @@ def test_kernel_is_exact_before_merging(name):
     model = asperity_model(name, CASES["two equal"], contact_modulus=E_STAR)
     states = [model.solve(approach) for approach in np.linspace(1e-3, 0.03, 100)]
     reach = np.array([state.semi_axes[0, 0] for state in states]) / 0.04
-    engulfed = np.array([state.engulfed for state in states])
-    assert np.all(engulfed[reach < 0.796] == 0) and np.all(engulfed[reach > 0.798] == 2)
+    overlapping_contacts = np.array([state.overlapping_contacts for state in states])
+    assert np.all(overlapping_contacts[reach < 0.796] == 0) and np.all(
+        overlapping_contacts[reach > 0.798] == 2
+    )
     assert reach.min() < 0.5 and reach.max() > 0.85  # the sweep passes the place

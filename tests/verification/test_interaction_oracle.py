@@ -42,7 +42,7 @@ def test_against_brute_force(case, solver):
     model = asperity_model("elliptic", asperities, contact_modulus=E_STAR, solver=solver)
     state = model.solve(approach)
     assert np.flatnonzero(state.in_contact).tolist() == contacting
-    assert state.engulfed == 0  # the oracle has the exact kernel
+    assert state.overlapping_contacts == 0  # the oracle has the exact kernel
     # The oracle's quadratures are good to 1e-10 at these distances, the solver stops at 1e-10.
     assert state.force == pytest.approx(E_STAR * force, rel=1e-7, abs=1e-12)
     assert state.displacement == pytest.approx(displacement, rel=1e-8)
@@ -51,8 +51,8 @@ def test_against_brute_force(case, solver):
 def test_shielded_summit_is_in_the_inequality():
     asperities, approach, _ = CASES["three, one shielded"]
     state = asperity_model("elliptic", asperities, contact_modulus=E_STAR).solve(approach)
-    assert state.required[1] == pytest.approx(5e-4)  # it would touch if it were alone
-    assert state.displacement[1] > 1.5 * state.required[1]  # the others push it further
+    assert state.interference[1] == pytest.approx(5e-4)  # it would touch if it were alone
+    assert state.displacement[1] > 1.5 * state.interference[1]  # the others push it further
     assert state.force[1] == 0.0
     alone = asperity_model("elliptic-independent", asperities, contact_modulus=E_STAR)
     assert alone.solve(approach).force[1] > 0.0

@@ -16,7 +16,7 @@ from scipy.interpolate import RectBivariateSpline
 from geometry import RefinedShape
 from macro import Block, Material, block_mesh
 from micro import FreeSides, HalfSpace
-from micro.compliance.side_stresses import SideStresses
+from micro.compliance.side_cells import SideStresses
 
 PLACE, WIDTH, FINE, CELLS = 0.05, 0.06, 0.012, 256
 TICKS = (np.arange(CELLS) + 0.5) / CELLS
@@ -87,7 +87,7 @@ def test_stresses_beside_a_side_are_those_of_a_meshed_block(nu):
     spacing = (1.0 / CELLS,) * 2
     pressure = np.exp(hill(TICKS[:, None], TICKS)[0])
     half_space = love_stresses(HalfSpace(young_modulus=1.0, poisson_ratio=nu), pressure, spacing)
-    sides = FreeSides(lengths=(1.0, 1.0), poisson_ratio=nu, reach=0.25)
+    sides = FreeSides(lengths=(1.0, 1.0), poisson_ratio=nu, decay_length=0.25)
     both = half_space + SideStresses(sides, spacing).stresses(pressure)
     places = np.clip(centres, TICKS[0], TICKS[-1]).T
 

@@ -38,7 +38,7 @@ def bodies(request):
     height, modes = BLOCKS[request.param]
     face = face_compliance(FACE, height, MATERIAL, "free", modes, MPI.COMM_SELF)
     whole = face.normal - half_space_modes(FACE, modes) / MODULUS
-    sides = FreeSides(lengths=FACE, poisson_ratio=0.15, reach=0.1)
+    sides = FreeSides(lengths=FACE, poisson_ratio=0.15, decay_length=0.1)
     rest = whole - side_modes(sides, modes) / MODULUS
     reference = HalfSpaceModel(
         surface=SURFACE,

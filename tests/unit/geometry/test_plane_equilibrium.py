@@ -28,7 +28,7 @@ class Supports:
             state=forces,
         )
 
-    def settle(self, start=(0.0, 0.0, 0.0), **prescribed):
+    def equilibrium(self, start=(0.0, 0.0, 0.0), **prescribed):
         control = Control(**({"tilt": None} | prescribed))
         return find_equilibrium(self, control, np.asarray(start), self.levers.half)
 
@@ -42,7 +42,7 @@ SHARES = np.linalg.solve(np.vstack([np.ones(3), TRIANGLE.T]), [1.0, 0.0, 0.0])
 @pytest.mark.parametrize("force", [1e-2, 1.0, 1e4])
 def test_tripod_bears_what_statics_says(force, power):
     height = np.array([0.02, -0.01, 0.003])
-    _, found = Supports(*TRIANGLE.T, height=height, power=power).settle(force=force)
+    _, found = Supports(*TRIANGLE.T, height=height, power=power).equilibrium(force=force)
     # 1e-13 of the force, or the rounding of depths of 1e-6 mm below heights of 1e-2 mm
     np.testing.assert_allclose(found, force * SHARES, rtol=1e-9)
 
@@ -50,7 +50,7 @@ def test_tripod_bears_what_statics_says(force, power):
 @pytest.mark.parametrize("start", [-1.0, 0.0, 1e-3, 0.5])
 def test_force_is_met_from_anywhere(start):
     supports = Supports([0.3, 0.4], [0.0, 0.1], height=[0.1, 0.2])
-    depth, _ = supports.settle((start, 0.0, 0.0), force=2.0, tilt=(0.0, 0.0))
+    depth, _ = supports.equilibrium((start, 0.0, 0.0), force=2.0, tilt=(0.0, 0.0))
     # the second support is not reached: 1e4 (δ − 0.1)^1.5 = 2, to the rounding of δ
     assert depth[0] == pytest.approx(0.1 + (2e-4) ** (2 / 3), rel=1e-14)
 
@@ -58,12 +58,12 @@ def test_force_is_met_from_anywhere(start):
 def test_plane_goes_on_to_what_can_hold_it():
     """From one support in contact it turns about that one until a third is met."""
     height = np.array([0.0, 0.3, 0.3])
-    _, found = Supports(*TRIANGLE.T, height=height).settle((1e-4, 0.0, 0.0), force=1.0)
+    _, found = Supports(*TRIANGLE.T, height=height).equilibrium((1e-4, 0.0, 0.0), force=1.0)
     np.testing.assert_allclose(found, SHARES, rtol=1e-9)  # as above
 
 
 def test_a_single_support_under_the_middle_is_enough():
-    motion, _ = Supports([0.0, 0.8], [0.0, 0.8], height=[0.0, 0.5]).settle(force=1.0)
+    motion, _ = Supports([0.0, 0.8], [0.0, 0.8], height=[0.0, 0.5]).equilibrium(force=1.0)
     assert motion[0] == pytest.approx(1e-4 ** (2 / 3), rel=1e-12)  # 1e-13 of the force
     np.testing.assert_allclose(motion[1:], 0.0, atol=1e-15)  # nothing turns it
 
@@ -72,7 +72,7 @@ def test_plane_without_force_turns_clear():
     supports = Supports([0.3, 0.4], [0.1, -0.2])
     start = np.array([5e-3, 0.0, 0.0])
     assert supports.forces(start).sum() > 0.0
-    plane, forces = supports.settle(start, approach=5e-3)
+    plane, forces = supports.equilibrium(start, approach=5e-3)
     assert plane[0] == 5e-3 and forces.sum() == 0.0
 
 
@@ -80,17 +80,17 @@ def test_plane_without_force_turns_clear():
 def test_supports_on_one_side_cannot_hold_a_plane(x):
     supports = Supports(x, [-0.5, 0.5, 0.0])
     with pytest.raises(NotConverged, match=r"NO_SUPPORT .*prescribe its tilt"):
-        supports.settle(force=1.0)
+        supports.equilibrium(force=1.0)
 
 
 def test_nothing_to_touch():
     with pytest.raises(NotConverged, match=r"at force 1 N .* NO_CONTACT .*no patch can be touched"):
-        Supports([0.0], [0.0], height=np.inf).settle(force=1.0)
+        Supports([0.0], [0.0], height=np.inf).equilibrium(force=1.0)
 
 
 def test_loads_without_value_are_a_failure():
     with pytest.raises(NotConverged, match="NOT_A_NUMBER"):
-        Supports([0.0], [0.0], height=np.nan).settle(force=1.0)
+        Supports([0.0], [0.0], height=np.nan).equilibrium(force=1.0)
 
 
 def refusing(supports, deepest):

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from micro.compliance.elastic_grid import ElasticGrid
+from micro.compliance.grid_compliance import GridCompliance
 
 
 class Dense(NamedTuple):
@@ -16,7 +16,7 @@ class Dense(NamedTuple):
     gap: np.ndarray
 
 
-def matrix_of(grid: ElasticGrid, shape):
+def matrix_of(grid: GridCompliance, shape):
     """Return the compliance of all cells, column by column, shape (n, n)."""
     count = int(np.prod(shape))
     return np.array([grid.displacement(row.reshape(shape)).ravel() for row in np.eye(count)]).T

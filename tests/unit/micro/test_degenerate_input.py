@@ -115,7 +115,7 @@ def test_approach_beyond_the_range_of_heights(surface):
         if isinstance(model, IslandModel):
             assert len(response.warnings) == 3
         elif not response.model.startswith(("elliptic-", "circular-")):
-            assert response.engulfed[-1] > 0  # merged: the result tells so
+            assert response.overlapping_contacts[-1] > 0  # merged: the result tells so
 
 
 def test_tiny_approach(surface):

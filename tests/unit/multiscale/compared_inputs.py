@@ -1,4 +1,4 @@
-"""Comparisons of any scenes whose levels end in any way, and what they may end in."""
+"""Comparisons of any scenes whose configurations end in any way."""
 
 import random
 from functools import partial
@@ -10,11 +10,10 @@ from scene_inputs import scenes, takes_long
 
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
-from multiscale.comparison.compare import compare
-from multiscale.comparison.level_results import LevelResult
-from multiscale.comparison.measures import Curves
-from multiscale.comparison.outcomes import AGAINST
+from multiscale.comparison.compare import AGAINST, compare
+from multiscale.comparison.error_measures import Curves
 from multiscale.comparison.report import comparison_html
+from multiscale.comparison.run_result import RunResult
 from multiscale.scene.scene import Scene
 from multiscale.storage.whole_files import write_csv
 
@@ -26,12 +25,12 @@ asked = st.tuples(
 )
 
 
-def ended(dice, level, seconds):
-    """Return how a level may end: well, early or badly, with odd numbers."""
-    status, load_history = dice.choice(STATUSES), level.scene.loading.load_history
+def ended(dice, configuration, seconds):
+    """Return how a configuration may end: well, early or badly, with odd numbers."""
+    status, load_history = dice.choice(STATUSES), configuration.scene.loading.load_history
     whole = len(load_history.targets)
     steps = np.arange(1.0, 1.0 + (whole if status == "done" else dice.randrange(whole)))
-    patches = PatchGrid(grid=level.scene.patches.grid, lengths=(1.0, 1.0))
+    patches = PatchGrid(grid=configuration.scene.patches.grid, lengths=(1.0, 1.0))
     numbers = {
         name: dice.choice(SIZES) * dice.uniform(0.5, 1.5) * steps
         for name in ("approach", "force", "area", "separation")
@@ -43,8 +42,8 @@ def ended(dice, level, seconds):
         **numbers,
         **{f"{name}_error": bar * numbers[name] for name in ("approach", "force", "area")},
     )
-    return LevelResult(
-        key=level.key,
+    return RunResult(
+        configuration=configuration,
         status=status,
         exit_code=dice.choice([0, 2, 3, -9, None]),
         message=dice.choice(["", "told <b>why</b>\nin two lines"]),
@@ -57,7 +56,7 @@ def ended(dice, level, seconds):
 
 
 def compared(path, number, against=None):
-    """Compare the levels of a scene, all but their runs; return how that ended."""
+    """Compare the configurations of a scene, all but their runs; return how that ended."""
     launch = partial(ended, random.Random(number))
     try:
         scene = Scene.load(path)

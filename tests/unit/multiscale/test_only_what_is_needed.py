@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import micro.pairs.interaction
-import multiscale.output.results
+import micro.interaction.hertz_pairs
 from geometry import Asperities, PatchGrid
 from micro import HalfSpaceModel, asperity_model
 from multiscale import Run, Scene, make_setup
@@ -77,13 +76,12 @@ def never(*given, **options):
 
 
 def test_only_the_force_curve(monkeypatch, tmp_path):
-    monkeypatch.setattr(multiscale.output.results, "_figures", never)
-    monkeypatch.setattr(multiscale.output.results, "report_html", never)
     monkeypatch.setattr(sys.modules["multiscale.run"], "final_field", never)
     run = Run(Scene.from_dict(data("concurrent", block=data()["block"] | {"cells": [4, 4, 4]})))
     assert len(list(run.load_steps())) == 2
     names = {path.name for path in write_results(tmp_path, run, options=[])}
     assert names == {"history.csv", "patches.csv", "provenance.json"}
+    assert "output" not in run.seconds  # no figure was drawn
 
 
 @pytest.fixture
@@ -146,14 +144,14 @@ def summits(below: int) -> Asperities:
 def evaluations(monkeypatch, below: int) -> int:
     """Return how many pairs of summits a load takes."""
     counted = [0]
-    field = micro.pairs.interaction.circular_field
+    field = micro.interaction.hertz_pairs.circular_field
 
     def watched(*given, **options):
         counted[0] += int(np.prod(np.broadcast_shapes(*(np.shape(part) for part in given))))
         return field(*given, **options)
 
     with monkeypatch.context() as patch:
-        patch.setattr(micro.pairs.interaction, "circular_field", watched)
+        patch.setattr(micro.interaction.hertz_pairs, "circular_field", watched)
         model = asperity_model("circular", summits(below), contact_modulus=1.0)
         whole = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
         model.respond([0.002, 0.004], patches=whole, mean_heights=[-0.1])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geometry import InputError, PatchGrid, Surface
+from geometry import Control, InputError, PatchGrid, Surface
 from micro import MODELS, AsperityModel, HertzContact, asperity_model, micro_model
 from micro.asperities.patch_shares import shares
 
@@ -35,7 +35,7 @@ def test_single_asperity_is_hertz(summits, name):
     hertz = HertzContact(
         contact_modulus=E_STAR, radius_major=radii[0], radius_minor=radii[1], indentation=4e-3
     )
-    assert state.required == pytest.approx([4e-3])
+    assert state.interference == pytest.approx([4e-3])
     assert state.displacement == pytest.approx([4e-3])
     assert state.force == pytest.approx([hertz.force])
     assert state.contact_area == pytest.approx([hertz.area])
@@ -57,7 +57,7 @@ def test_neighbours_share_the_load(cluster, name):
     state = asperity_model(name, cluster, contact_modulus=E_STAR).solve(3e-3)
     assert np.all(state.force <= alone.force)
     assert state.force.sum() < 0.9 * alone.force.sum()
-    assert np.all(state.displacement >= state.required - 1e-10 * 3e-3)
+    assert np.all(state.displacement >= state.interference - 1e-10 * 3e-3)
     assert np.all(state.displacement > state.indentation)  # the others press every summit
 
 
@@ -116,6 +116,18 @@ def test_curve_is_made_of_states(cluster, name):
         assert response.patch_force[row] == pytest.approx(by_patch, rel=1e-7, abs=1e-12)
 
 
+def test_without_patches_the_whole_surface_is_one(cluster):
+    model = asperity_model("elliptic", cluster, contact_modulus=E_STAR)
+    alone, given = model.respond([4e-3]), respond(model, [4e-3], ONE_PATCH)
+    assert alone.patch_force[0] == alone.force == given.force
+    assert alone.mean_separation == given.mean_separation
+    pressed = model.press(Control(force=float(alone.force[0]))).response
+    assert pressed.approach == pytest.approx([4e-3], rel=1e-8)  # forces are met to 1e-9
+    message = r"asperities do not know the mean heights of patches \(allowed: mean_heights, or no"
+    with pytest.raises(InputError, match=message):
+        model.respond([4e-3], patches=PATCHES)
+
+
 @every_model
 def test_tilt(cluster, name):
     model = asperity_model(name, cluster, contact_modulus=E_STAR)
@@ -170,7 +182,7 @@ def test_round_asperities_make_the_models_equal(summits):
 def test_surface_displacement(cluster, name):
     model = asperity_model(name, cluster, contact_modulus=E_STAR)
     state = model.solve(2e-4)  # small contacts: no kernel is continued
-    assert state.engulfed == 0
+    assert state.overlapping_contacts == 0
     summits = model.surface_displacement(state, cluster.x, cluster.y)
     assert summits == pytest.approx(state.displacement, rel=1e-12)
     far = model.surface_displacement(state, 1e3, 0.0)

@@ -7,7 +7,6 @@ import pytest
 from scipy.integrate import quad
 
 from geometry import PatchGrid
-from micro.asperities import patch_shares as attribution
 from micro.asperities.patch_shares import shares
 
 GRID = PatchGrid(grid=(4, 5), lengths=(1.0, 1.2))
@@ -123,18 +122,13 @@ def test_no_contact_has_no_share():
     assert len(shares(GRID, np.empty((0, 2)), np.empty((0, 2)), np.empty(0)).contact) == 0
 
 
-def test_large_contacts_are_shared_a_column_of_patches_at_once(monkeypatch):
-    """Laws of contacts larger than the surface took 26 s of calls for one patch each."""
-    sizes = []
-    within = attribution._Cut.within
-
-    def counted(self, on, place):
-        sizes.append(len(on))
-        return within(self, on, place)
-
-    monkeypatch.setattr(attribution._Cut, "within", counted)
+def test_shares_do_not_depend_on_how_many_are_integrated_at_once():
+    """Contacts larger than the surface reach into every patch."""
     patches = PatchGrid(grid=(16, 16), lengths=(1.0, 1.2))
-    position, _, angle = _random_contacts(300)
-    force, area = _table(position, np.full((300, 2), [9.0, 5.0]), angle, patches)
-    np.testing.assert_allclose([force.sum(axis=1), area.sum(axis=1)], 1.0, rtol=1e-12)
-    assert sum(sizes) == 300 * 256 and max(sizes) == attribution._AT_ONCE and len(sizes) == 32
+    position, _, angle = _random_contacts(20)
+    axes = np.full((20, 2), [9.0, 5.0])
+    whole, parts = (shares(patches, position, axes, angle, at_once=n) for n in (4096, 7))
+    np.testing.assert_array_equal(parts[:2], whole[:2])
+    np.testing.assert_allclose(parts.force, whole.force, rtol=1e-13)
+    np.testing.assert_allclose(parts.area, whole.area, rtol=1e-13)
+    assert len(whole.contact) == 20 * 256

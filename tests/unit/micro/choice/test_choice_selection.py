@@ -91,12 +91,11 @@ def test_the_check_is_the_difference_from_the_surfaces_own_grid():
     )
 
 
-def test_the_surfaces_own_grid_is_checked_against_a_finer_one(monkeypatch):
-    surface = rough(5)
-    monkeypatch.setattr("micro.choice.candidates.FACTORS", (1.0,))
-    choice = choose(surface, contact_modulus=1.0, approach=0.02, tolerance=0.2)
+def test_the_surfaces_own_grid_is_checked_against_a_finer_one():
+    surface, own = rough(5), "half-space on 64 × 64 cells"
+    choice = choose(surface, contact_modulus=1.0, approach=0.02, tolerance=0.2, label=own)
     expected = abs(force(choice.model, [0.01])[0] / force(fine(surface, 96), [0.01])[0] - 1.0)
-    assert choice.taken.label == "half-space on 64 × 64 cells"
+    assert choice.taken.label == own
     assert 0.0 < choice.checked_error == pytest.approx(expected, abs=1e-12)
 
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.special import ellipe, ellipk
 
 from geometry import InputError
-from micro import (
+from micro.closed_forms.ellipse import (
     area_factor,
     axis_factor,
     axis_ratio,

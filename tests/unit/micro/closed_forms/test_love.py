@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import dblquad
 
 from geometry import InputError
-from micro import love_centre, love_integral, love_mean, love_mutual
+from micro.closed_forms.love import love_centre, love_integral, love_mean, love_mutual
 
 
 def integrated(x, y, a, b):

@@ -6,9 +6,10 @@ import pytest
 from geometry import Control, Surface
 from micro import HalfSpaceModel
 from micro.compliance.body_modes import BodyModes
-from micro.compliance.bounding_box import Box
-from micro.compliance.elastic_grid import Cells, ElasticGrids
-from micro.contact.pressing import Pressing
+from micro.compliance.cells import Box, Cells
+from micro.compliance.grid_compliance import Compliance
+from micro.contact.active_set import solve
+from micro.contact.problem import ContactProblem
 
 E_STAR = 4000.0
 GRID, SPACING = (64, 48), (1.0 / 64, 0.75 / 48)
@@ -36,7 +37,7 @@ def two_bumps(lower):
 
 
 def test_is_symmetric_on_cells():
-    grid = ElasticGrids(periodic=False, modulus=E_STAR, body=random_body()).at(
+    grid = Compliance(periodic=False, modulus=E_STAR, body=random_body()).on_grid(
         GRID, SPACING, Box.whole(GRID)
     )
     p, q = np.random.default_rng(1).standard_normal((2, *GRID))
@@ -46,22 +47,26 @@ def test_is_symmetric_on_cells():
 
 
 def test_some_cells_and_a_box_are_a_part_of_all():
-    grids = ElasticGrids(periodic=False, modulus=E_STAR, body=random_body())
-    alone = ElasticGrids(periodic=False)
+    grids = Compliance(periodic=False, modulus=E_STAR, body=random_body())
+    alone = Compliance(periodic=False)
     box = Box(slice(8, 40), slice(16, 48))
     dice = np.random.default_rng(2)
     p = np.zeros(GRID)
     p[box] = np.where(dice.random(box.shape) > 0.7, dice.random(box.shape), 0.0)
-    added = [given.at(GRID, SPACING, Box.whole(GRID)).displacement(p) for given in (grids, alone)]
+    added = [
+        given.on_grid(GRID, SPACING, Box.whole(GRID)).displacement(p) for given in (grids, alone)
+    ]
     body = added[0] - added[1]
-    part = grids.at(box.shape, SPACING, box)
-    inside = part.displacement(p[box]) - alone.at(box.shape, SPACING, box).displacement(p[box])
+    part = grids.on_grid(box.shape, SPACING, box)
+    inside = part.displacement(p[box]) - alone.on_grid(box.shape, SPACING, box).displacement(p[box])
     assert inside == pytest.approx(body[box], abs=1e-12 * np.abs(body).max())
     cells = Cells.of(np.flatnonzero(p[box]), box.shape)
-    rough = part.comply(cells, p[box].ravel()[cells.flat])
+    rough = part.apply_compliance(cells, p[box].ravel()[cells.flat])
     fine = part.displacement(p[box]).ravel()[cells.flat]
     assert rough == pytest.approx(fine, abs=1e-5 * np.abs(fine).max())  # single precision
-    assert grids.risen(p, SPACING) == pytest.approx(body, abs=1e-11 * np.abs(body).max())
+    assert grids.body_displacement(p, SPACING) == pytest.approx(
+        body, abs=1e-11 * np.abs(body).max()
+    )
 
 
 @pytest.mark.parametrize(
@@ -80,22 +85,20 @@ def test_cells_lifted_into_contact_are_found(control, lower):
         surface=surface, contact_modulus=E_STAR, body=seesaw(3e-3), tolerance=1e-9
     )
     state = model.equilibrium(control)
-    overlap = state.required > 0.0
+    overlap = state.interference > 0.0
     left = surface.x < 0.5
     assert not overlap[left].any()
     assert state.in_contact[left].any() and state.in_contact[~left].any()
-    slack = 1.1e-9 * state.required.max()
+    slack = 1.1e-9 * state.interference.max()
     assert state.gap.min() >= -slack
     assert np.abs(state.gap[state.in_contact]).max() <= slack
     # the same on all cells at once, where no box can hide any
-    required = state.required
-    whole = Box.whole(GRID)
-    pressing = Pressing(
-        grids=ElasticGrids(periodic=False, modulus=E_STAR, body=seesaw(3e-3)),
-        spacing=SPACING,
-        tolerance=1e-10,
+    interference = state.interference
+    body = Compliance(periodic=False, modulus=E_STAR, body=seesaw(3e-3))
+    problem = ContactProblem(
+        compliance=body.on_grid(GRID, SPACING, Box.whole(GRID)), interference=interference
     )
-    every = pressing._on(whole, required, None, None, 1e-10)
+    every = solve(problem, np.zeros(GRID), 1e-10)
     assert state.pressure / E_STAR == pytest.approx(every.pressure, abs=1e-6 * every.pressure.max())
 
 
@@ -115,6 +118,6 @@ def test_a_body_under_a_free_plane():
     area = np.prod(SPACING)
     for arm in (surface.x[:, None] - 0.5, surface.y - 0.375):
         assert abs(np.sum(state.pressure * arm) * area) < 1e-10 * 2.0
-    assert state.gap.min() >= -1.1e-10 * state.required.max()
+    assert state.gap.min() >= -1.1e-10 * state.interference.max()
     fixed = model.solve(state.approach, tilt=state.plane.tilt)
     assert fixed.force == pytest.approx(2.0, rel=1e-8)

@@ -4,22 +4,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from free_side_points import side_displacements
 
 from geometry import Surface, UnevenPartition
 from geometry.errors import InputError
 from micro import FreeSides, HalfSpaceModel
-from micro.compliance.bounding_box import Box
-from micro.compliance.elastic_grid import Cells, ElasticGrids
-from micro.compliance.side_cells import SideCells
+from micro.compliance.cells import Box, Cells
+from micro.compliance.grid_compliance import Compliance
+from micro.compliance.side_cells import side_cells
 
-SIDES = FreeSides(lengths=(1.0, 1.5), poisson_ratio=0.2, reach=0.25)
+SIDES = FreeSides(lengths=(1.0, 1.5), poisson_ratio=0.2, decay_length=0.25)
 GRID = (20, 30)
 SPACING = (0.05, 0.05)
 
 
 @pytest.fixture(scope="module")
 def cells():
-    return SideCells(SIDES, SPACING)
+    return side_cells(SIDES, SPACING)
 
 
 def whole(cells, pressure):
@@ -59,26 +60,26 @@ def test_cells_and_rectangles_tell_the_same(cells):
     x, y = (np.arange(n) * 0.05 + 0.025 for n in GRID)
     ticks = (0.0, 0.2, 1.0), (0.0, 0.6, 0.8, 1.5)
     loads = UnevenPartition(ticks_x=ticks[0], ticks_y=ticks[1])
-    found, points = whole(cells, p), SIDES.top(x, y, loads)[:, :, 1]
+    found, points = whole(cells, p), side_displacements(SIDES, x, y, loads)[:, :, 1]
     # means over cells against their middles: 2.2 % of the largest next to the side, then 0.3 %
     assert np.abs(found - points).max() < 0.03 * points.max()
     assert np.abs(found - points)[2:].max() < 4e-3 * points.max()
 
 
 def test_grids_know_their_sides_where_they_lie():
-    grids, alone = (ElasticGrids(periodic=False, sides=sides) for sides in (SIDES, None))
+    grids, alone = (Compliance(periodic=False, sides=sides) for sides in (SIDES, None))
     box = Box(slice(0, 8), slice(20, 30))
     p = np.abs(random(5, box.shape))
-    beside = grids.at(p.shape, SPACING, box).displacement(p)
-    inside = alone.at(p.shape, SPACING, box).displacement(p)
+    beside = grids.on_grid(p.shape, SPACING, box).displacement(p)
+    inside = alone.on_grid(p.shape, SPACING, box).displacement(p)
     every = np.zeros(GRID)
     every[box] = p
-    added = whole(SideCells(SIDES, SPACING), every)[box]
+    added = whole(side_cells(SIDES, SPACING), every)[box]
     np.testing.assert_allclose(beside, inside + added, rtol=1e-12)
     where = Cells.of(np.flatnonzero(p > 1.0), p.shape)
     few = np.where(p > 1.0, p, 0.0)
-    rough = grids.at(p.shape, SPACING, box).comply(where, few.ravel()[where.flat])
-    fine = grids.at(p.shape, SPACING, box).displacement(few).ravel()[where.flat]
+    rough = grids.on_grid(p.shape, SPACING, box).apply_compliance(where, few.ravel()[where.flat])
+    fine = grids.on_grid(p.shape, SPACING, box).displacement(few).ravel()[where.flat]
     np.testing.assert_allclose(rough, fine, rtol=1e-5)  # products in single precision
 
 
@@ -86,7 +87,7 @@ def test_a_free_side_lowers_the_force_of_a_ball_beside_it():
     x = (np.arange(32) + 0.5) / 32
     ball = Surface(heights=-0.5 * ((x[:, None] - 0.1) ** 2 + (x - 0.5) ** 2), lengths=(1.0, 1.0))
     alone = HalfSpaceModel(surface=ball, contact_modulus=1.0)
-    sides = FreeSides(lengths=(1.0, 1.0), poisson_ratio=0.3, reach=0.25)
+    sides = FreeSides(lengths=(1.0, 1.0), poisson_ratio=0.3, decay_length=0.25)
     beside = replace(alone, sides=sides)
     state = beside.solve(5e-3)
     assert state.force < 0.9 * alone.solve(5e-3).force
@@ -97,13 +98,13 @@ def test_a_free_side_lowers_the_force_of_a_ball_beside_it():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"lengths": (1.0, 0.0)}, "lengths and reach must be positive and finite \\(allowed"),
-        ({"reach": np.inf}, "lengths and reach must be positive and finite \\(allowed"),
+        ({"lengths": (1.0, 0.0)}, "lengths and decay length must be positive \\(allowed"),
+        ({"decay_length": np.inf}, "lengths and decay length must be positive \\(allowed"),
         ({"poisson_ratio": 0.5}, "Poisson's ratio is out of range \\(allowed"),
     ],
 )
 def test_sides_out_of_range_are_refused(change, message):
-    given = {"lengths": (1.0, 1.0), "poisson_ratio": 0.3, "reach": 0.2}
+    given = {"lengths": (1.0, 1.0), "poisson_ratio": 0.3, "decay_length": 0.2}
     with pytest.raises(InputError, match=message):
         FreeSides(**given | change)
 

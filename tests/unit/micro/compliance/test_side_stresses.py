@@ -5,9 +5,9 @@ import pytest
 from love_stresses import love_stresses
 
 from micro import FreeSides, HalfSpace
-from micro.compliance.side_stresses import SideStresses
+from micro.compliance.side_cells import SideStresses
 
-SIDES = FreeSides(lengths=(1.0, 1.5), poisson_ratio=0.2, reach=0.25)
+SIDES = FreeSides(lengths=(1.0, 1.5), poisson_ratio=0.2, decay_length=0.25)
 GRID, SPACING = (20, 30), (0.05, 0.05)
 
 
@@ -38,7 +38,7 @@ def test_opposite_sides_are_alike(cells, axis):
 
 def test_axes_may_change_places(cells):
     p = random(4)
-    other = FreeSides(lengths=(1.5, 1.0), poisson_ratio=0.2, reach=0.25)
+    other = FreeSides(lengths=(1.5, 1.0), poisson_ratio=0.2, decay_length=0.25)
     turned = SideStresses(other, SPACING).stresses(p.T)[[1, 0, 2]].transpose(0, 2, 1)
     np.testing.assert_allclose(turned, cells.stresses(p), rtol=1e-10, atol=1e-13)
 
@@ -64,7 +64,7 @@ def test_a_side_is_free_of_traction(nu):
 
 def at_the_side(nu, n):
     """Return the largest normal stress and shear, of the half-space's and of all, at x = 0."""
-    sides = FreeSides(lengths=(1.0, 1.0), poisson_ratio=nu, reach=0.25)
+    sides = FreeSides(lengths=(1.0, 1.0), poisson_ratio=nu, decay_length=0.25)
     spacing = 1.0 / n, 1.0 / n
     x = (np.arange(n) + 0.5) / n
     pressure = np.exp(-((x[:, None] - 0.05) ** 2 + (x - 0.5) ** 2) / 0.1**2)

@@ -10,7 +10,7 @@ from micro import BodyStresses, FreeSides, SideStresses, half_space_stress_modes
 from micro.compliance.half_space_modes import half_space_modes
 
 LENGTHS, COUNT, NU = (1.0, 1.5), 4, 0.2
-SIDES = FreeSides(lengths=LENGTHS, poisson_ratio=NU, reach=0.25)
+SIDES = FreeSides(lengths=LENGTHS, poisson_ratio=NU, decay_length=0.25)
 
 
 def borders(cells):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from micro.compliance.bounding_box import Box
+from micro.compliance.cells import Box
 from micro.contact.rigid_motions import Motions
 
 GRID = (9, 8)

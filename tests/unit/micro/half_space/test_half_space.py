@@ -1,12 +1,21 @@
 """The half-space model: its calls, its states and its refusals."""
 
 import pickle
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
-from geometry import InputError, NotConverged, PatchGrid, Spectrum, Surface, patch_means, synthesise
+from geometry import (
+    Control,
+    InputError,
+    NotConverged,
+    PatchGrid,
+    Spectrum,
+    Surface,
+    patch_means,
+    synthesise,
+)
 from micro import FreeSides, HalfSpaceModel
 
 E_STAR = 4000.0
@@ -37,6 +46,21 @@ def test_contact_conditions(model, approach):
     slack = 1.01 * model.tolerance * approach
     assert state.gap.min() >= -slack
     assert np.abs(state.gap[state.in_contact]).max(initial=0.0) <= slack
+
+
+def test_patches_and_mean_heights_default_to_those_of_the_surface(surface):
+    model = HalfSpaceModel(surface, contact_modulus=E_STAR)
+    whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
+    for given, patches in (({}, whole), ({"patches": PATCHES}, PATCHES)):
+        stated = {"patches": patches, "mean_heights": patch_means(surface, patches)}
+        control = Control(force=1.0)
+        for found, expected in (
+            (model.respond([2e-3, 6e-3], **given), model.respond([2e-3, 6e-3], **stated)),
+            (model.press(control, **given).response, model.press(control, **stated).response),
+        ):
+            assert found.patch_separation.shape[1] == patches.count
+            for field in fields(found):
+                assert np.array_equal(getattr(found, field.name), getattr(expected, field.name))
 
 
 def test_force_and_approach_are_inverse(model):
@@ -212,7 +236,7 @@ def test_patches_whose_borders_halve_cells_stand_alone(grid, length):
 
 
 def test_a_patch_alone_has_no_free_sides(surface):
-    sides = FreeSides(lengths=surface.lengths, poisson_ratio=0.3, reach=0.5)
+    sides = FreeSides(lengths=surface.lengths, poisson_ratio=0.3, decay_length=0.5)
     model = HalfSpaceModel(surface=surface, contact_modulus=E_STAR)
     alone, expected = (replace(model, sides=each).of_patch(PATCHES, 1)[0] for each in (sides, None))
     assert alone.sides is None

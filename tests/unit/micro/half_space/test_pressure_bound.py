@@ -35,7 +35,7 @@ def test_three_states(control, share):
     assert state.pressure.min() >= 0.0 and state.pressure.max() <= upper * (1.0 + 1e-10)
     assert full.any() and (state.in_contact & ~full).any()
     # evaluated anew on the whole grid: round-off beside the residual, of the largest displacement
-    slack = 1.1e-9 * state.required.max()
+    slack = 1.1e-9 * state.interference.max()
     assert state.gap[state.pressure == 0.0].min() >= -slack
     assert np.abs(state.gap[state.in_contact & ~full]).max() <= slack
     assert state.gap[full].max() <= slack

@@ -6,7 +6,7 @@ import pytest
 from geometry import Surface
 from micro import HertzContact
 from micro.islands.shapes import islands
-from micro.islands.volumes import Relief
+from micro.islands.watersheds import Watersheds
 
 
 def bumps(*summits, grid=256):
@@ -22,8 +22,8 @@ def bumps(*summits, grid=256):
 
 @pytest.mark.parametrize(("major", "angle"), [(0.3, 0.0), (1.2, 0.4), (3.0, 2.5)])
 def test_single_cap_is_its_paraboloid(major, angle):
-    relief = Relief.of(bumps((0.49, 0.52, 0.0, major, 0.3, angle)))
-    found = islands(relief, np.array([8e-3]), np.zeros(1, dtype=int))
+    sheds = Watersheds.of(bumps((0.49, 0.52, 0.0, major, 0.3, angle)))
+    found = islands(sheds, np.array([8e-3]), np.zeros(1, dtype=int))
     hertz = HertzContact(
         contact_modulus=1.0, radius_major=major, radius_minor=0.3, indentation=8e-3
     )
@@ -37,10 +37,10 @@ def test_single_cap_is_its_paraboloid(major, angle):
 
 def test_merged_caps_add_volume():
     pair = bumps((0.42, 0.5, 0.0, 0.2, 0.2, 0.0), (0.58, 0.5, 0.0, 0.2, 0.2, 0.0))
-    relief = Relief.of(pair)
-    height = np.where(relief.z > -1e-6, 6e-3, -1.0)
-    numbers = np.arange(len(relief))
-    two, one = islands(relief, height, numbers), islands(relief, height, 0 * numbers)
+    sheds = Watersheds.of(pair)
+    height = np.where(sheds.z > -1e-6, 6e-3, -1.0)
+    numbers = np.arange(len(sheds))
+    two, one = islands(sheds, height, numbers), islands(sheds, height, 0 * numbers)
     assert len(two) == 2 and len(one) == 1
     # P = 4/3 √R F1 w^1.5 with twice the R and F1 > 1 for the slender shape of the pair.
     assert np.sqrt(2.0) < one.force[0] / two.force[0] < 2.0
@@ -49,13 +49,13 @@ def test_merged_caps_add_volume():
 
 
 def test_displacements_leave_out_the_own_island():
-    relief = Relief.of(bumps((0.3, 0.5, 0.0, 0.2, 0.2, 0.0), (0.7, 0.5, 0.0, 0.2, 0.2, 0.0)))
-    height = np.where(relief.z > -1e-6, 2e-3, -1.0)
-    found = islands(relief, height, np.arange(len(relief)))
-    lift = (found.kernel(relief.x, relief.y) @ found.force)[height > 0.0]
-    assert lift == pytest.approx(found.force / (np.pi * 0.4), rel=1e-4)
+    sheds = Watersheds.of(bumps((0.3, 0.5, 0.0, 0.2, 0.2, 0.0), (0.7, 0.5, 0.0, 0.2, 0.2, 0.0)))
+    height = np.where(sheds.z > -1e-6, 2e-3, -1.0)
+    found = islands(sheds, height, np.arange(len(sheds)))
+    moved = (found.kernel(sheds.x, sheds.y) @ found.force)[height > 0.0]
+    assert moved == pytest.approx(found.force / (np.pi * 0.4), rel=1e-4)
     # At its own centre an island displaces by its depth, no more.
-    x, y = (np.full(len(relief), place) for place in (found.x[0], found.y[0]))
+    x, y = (np.full(len(sheds), place) for place in (found.x[0], found.y[0]))
     alone = found.kernel(x, y) @ found.force
     other = np.flatnonzero((height > 0.0) & (found.member == 1))
     beyond = alone[other][0]
@@ -63,16 +63,16 @@ def test_displacements_leave_out_the_own_island():
 
 
 def test_nothing_above():
-    relief = Relief.of(bumps((0.5, 0.5, 0.0, 0.2, 0.2, 0.0)))
-    found = islands(relief, np.full(len(relief), -1.0), np.zeros(len(relief), dtype=int))
+    sheds = Watersheds.of(bumps((0.5, 0.5, 0.0, 0.2, 0.2, 0.0)))
+    found = islands(sheds, np.full(len(sheds), -1.0), np.zeros(len(sheds), dtype=int))
     assert len(found) == 0
-    assert found.kernel(relief.x, relief.y).shape == (len(relief), 0)
+    assert found.kernel(sheds.x, sheds.y).shape == (len(sheds), 0)
 
 
 def test_same_shapes_at_other_depths_carry_by_hertz():
-    relief = Relief.of(bumps((0.3, 0.5, 0.0, 0.2, 0.2, 0.0), (0.7, 0.5, 0.0, 0.2, 0.2, 0.0)))
-    height = np.where(relief.z > -1e-6, 2e-3, -1.0)
-    found = islands(relief, height, np.arange(len(relief)))
+    sheds = Watersheds.of(bumps((0.3, 0.5, 0.0, 0.2, 0.2, 0.0), (0.7, 0.5, 0.0, 0.2, 0.2, 0.0)))
+    height = np.where(sheds.z > -1e-6, 2e-3, -1.0)
+    found = islands(sheds, height, np.arange(len(sheds)))
     deeper = found.under(4.0 * found.depth)
     assert deeper.force == pytest.approx(8.0 * found.force, rel=1e-14)
     assert deeper.semi_axes == pytest.approx(2.0 * found.semi_axes, rel=1e-14)

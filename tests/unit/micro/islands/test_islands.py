@@ -5,9 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry import InputError, NotConverged, PatchGrid, Spectrum, Surface, patch_means, synthesise
+from geometry import (
+    Control,
+    InputError,
+    NotConverged,
+    PatchGrid,
+    Spectrum,
+    Surface,
+    patch_means,
+    synthesise,
+)
+from geometry.rigid_plane import PlaneLevers
 from micro import IslandModel
-from micro.islands import passes as island_passes
+from micro.islands.equilibrium import IslandContact
+from micro.islands.watersheds import Watersheds
+from micro.plane_on_peaks import Peaks
 
 PATCHES = PatchGrid(grid=(2, 3), lengths=(1.0, 1.0))
 
@@ -15,7 +27,7 @@ PATCHES = PatchGrid(grid=(2, 3), lengths=(1.0, 1.0))
 @pytest.fixture(scope="module")
 def surface():
     spectrum = Spectrum(hurst=0.8, waves=(2, 9), rms_slope=0.2, seed=5)
-    return synthesise(spectrum, grid=(64, 64), lengths=(1.0, 1.0))
+    return synthesise(spectrum, grid=(40, 40), lengths=(1.0, 1.0))
 
 
 @pytest.fixture(scope="module")
@@ -61,8 +73,8 @@ def test_tilt_is_a_tilted_surface(surface):
     surface = replace(surface, periodic=False)  # a tilted one is not, its border differs
     model = IslandModel(surface=surface, contact_modulus=4000.0)
     tilt = (4e-3, -2e-3)
-    lean = tilt[0] * (surface.x[:, None] - 0.5) + tilt[1] * (surface.y - 0.5)
-    turned = Surface(heights=surface.heights + lean, lengths=(1.0, 1.0))
+    offset = tilt[0] * (surface.x[:, None] - 0.5) + tilt[1] * (surface.y - 0.5)
+    turned = Surface(heights=surface.heights + offset, lengths=(1.0, 1.0))
     approach = 8e-3 + turned.highest - surface.highest
     level = IslandModel(surface=turned, contact_modulus=4000.0).solve(approach)
     tilted = model.solve(8e-3, tilt=tilt)
@@ -142,12 +154,22 @@ def test_refuses(surface, model):
         model.respond([1e-2], patches=corner, mean_heights=[0.0])
 
 
-def test_passes_that_never_settle_are_an_error(model, monkeypatch):
-    monkeypatch.setattr(island_passes, "_MOST_PASSES", 0)
+def test_islands_that_do_not_converge_are_an_error(surface):
+    sheds = Watersheds.of(surface)
+    below, count = surface.highest - sheds.z, len(sheds)
+    levers = PlaneLevers.at(sheds.x, sheds.y, surface.lengths)
+    contact = IslandContact(
+        watersheds=sheds,
+        peaks=Peaks(levers=levers, depth=below, force=lambda over: 0.0),
+        control=Control(approach=8e-3, tilt=(0.0, 0.0)),
+        level=np.full(count, surface.highest - 8e-3),
+        motion=np.array([8e-3, 0.0, 0.0]),
+        contact_modulus=4000.0,
+        body=None,
+    )
     message = (
-        "^the passes between islands and their displacements at an approach of .* mm did not "
-        "converge: "
-        r'MAX_ITERATIONS after 0 iterations; .*micro\.model = "half-space"'
+        r"^the iteration between islands and their displacements at an approach of 0\.008 mm did "
+        r'not converge: MAX_ITERATIONS after 2 iterations; .*micro\.model = "half-space"'
     )
     with pytest.raises(NotConverged, match=message):
-        model.solve(1e-3)
+        contact.equilibrium(most_iterations=2)

@@ -1,22 +1,21 @@
-"""Comparisons end to end: records, report, command line; levels run in this process."""
+"""Comparisons end to end: records, report, command line; all is run in this process."""
 
 import csv
-from argparse import Namespace
+from argparse import ArgumentTypeError, Namespace
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from geometry.errors import InputError
+from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
 from multiscale import compare
 from multiscale.cli.command_line import main
 from multiscale.cli.compare import budget_seconds, compare_scene
-from multiscale.comparison.level_process import level_result
-from multiscale.comparison.level_results import LevelResult
-from multiscale.comparison.levels import SMALL_SLOPES
-from multiscale.comparison.measures import Curves
+from multiscale.comparison.catalogue import SMALL_SLOPES
+from multiscale.comparison.error_measures import Curves
+from multiscale.comparison.run_result import RunResult, run_here
 from multiscale.run import run
 from multiscale.scene.scene import Scene
 
@@ -31,17 +30,17 @@ PICKED = (
 )  # fmt: skip
 
 
-RUN = {}  # levels that were run already, by key: several tests want the same
+RUN = {}  # results by key of the configuration: several tests want the same
 
 
-def launched(level, seconds):
-    """Run some of the levels here; the others fail as a crash does."""
-    if level.is_own or level.name.startswith(PICKED):
-        if level.key not in RUN:
-            result = level_result(level.scene, None, key=level.key)
-            RUN[level.key] = replace(result, cpu_s=sum(result.seconds.values()))
-        return RUN[level.key]
-    return LevelResult(key=level.key, status="failed", exit_code=-9, message="killed")
+def launched(one, seconds):
+    """Run some of the configurations here; the others fail as a crash does."""
+    if one.is_own or one.name.startswith(PICKED):
+        if one.key not in RUN:
+            result = run_here(one)
+            RUN[one.key] = replace(result, cpu_s=sum(result.seconds.values()))
+        return RUN[one.key]
+    return RunResult(configuration=one, status="failed", exit_code=-9, message="killed")
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +48,7 @@ def found():
     return compare(Scene.load(PAPER, TINY), launch=launched)
 
 
-def test_best_level_is_the_measure(found):
+def test_the_best_is_the_measure(found):
     assert (found.against, found.response) == ("concurrent", "force")
     assert found.measure == "concurrent, half-space 64 × 64"
     measure = found[found.measure]
@@ -65,7 +64,7 @@ def test_errors_are_those_of_the_forces(found):
         assert found[name].errors.force_max == pytest.approx(expected, rel=1e-12)  # the same sums
 
 
-def test_causes_of_every_level_add_up(found):
+def test_shares_of_every_error_add_up(found):
     for record in found.records():
         shares = [record[name] for name in record if name.startswith("share_")]
         if record["is_measure"] or record["error_force_last"] is None:
@@ -74,7 +73,7 @@ def test_causes_of_every_level_add_up(found):
         assert total == pytest.approx(record["error_force_last"], abs=1e-12)  # a sum of five
 
 
-def test_failed_levels_have_rows_and_no_errors(found):
+def test_failed_configurations_have_rows_and_no_errors(found):
     failed = [row for row in found.rows if row.status == "failed"]
     assert len(failed) > 10
     for row in failed:
@@ -92,21 +91,21 @@ def test_measure_that_is_not_reached_is_told():
     missed = compare(Scene.load(PAPER, TINY), against="reference", launch=launched)
     assert missed.against == "concurrent"
     assert missed.warnings == (
-        "no level of kind reference was reached: compared against the concurrent instead",
+        "no configuration of kind reference was reached: compared against the concurrent instead",
     )
 
 
 def test_busy_machine_is_told():
-    def slow(level, seconds):
-        return replace(launched(level, seconds), cpu_s=0.0)
+    def slow(one, seconds):
+        return replace(launched(one, seconds), cpu_s=0.0)
 
     (warning,) = compare(Scene.load(PAPER, TINY), launch=slow).warnings
     assert "the machine was busy with something else" in warning
 
 
 def test_nothing_reached_is_no_comparison():
-    def never(level, seconds):
-        return LevelResult(key=level.key, status="failed")
+    def never(one, seconds):
+        return RunResult(configuration=one, status="failed")
 
     empty = compare(Scene.load(PAPER, TINY), launch=never)
     assert (empty.measure, empty.frontier()) == (None, ())
@@ -117,11 +116,11 @@ def test_prescribed_force_is_measured_by_the_approach():
     scene = Scene.load(PAPER, TINY).model_dump(by_alias=True, mode="json", exclude_none=True)
     scene["load"] = {"force": 2.0, "steps": 2, "tilt": "free"}
 
-    def analytic(level, seconds):
-        assert level.scene.loading.tilt == "free"
-        if level.name.startswith("analytic, half-space"):
-            return level_result(level.scene, None, key=level.key)
-        return LevelResult(key=level.key, status="not started")
+    def analytic(one, seconds):
+        assert one.scene.loading.tilt == "free"
+        if one.name.startswith("analytic, half-space"):
+            return run_here(one)
+        return RunResult(configuration=one, status="not started")
 
     by_force = compare(Scene.from_dict(scene), launch=analytic)
     coarse = by_force["analytic, half-space 32 × 32"]
@@ -130,41 +129,41 @@ def test_prescribed_force_is_measured_by_the_approach():
     assert coarse.errors.force_max < 1e-6  # what the balance of the force leaves
     expected = mine / right.approach_mm - 1.0
     assert coarse.errors.approach_last == pytest.approx(expected, rel=1e-9)  # a difference
-    assert coarse.causes.discretisation == pytest.approx(expected, rel=1e-9)
+    assert coarse.shares.discretisation == pytest.approx(expected, rel=1e-9)
 
 
 def test_small_slopes_are_a_cause_of_their_own(found):
-    """Of the same level with finite ones: the difference is theirs alone."""
+    """The same with finite slopes differs by nothing else."""
     for kind in ("concurrent", "analytic"):
         steep, small = (found[f"{kind}, half-space 64 × 64{end}"] for end in ("", SMALL_SLOPES))
         assert (steep.finite_slopes, small.finite_slopes) == (True, False)
         assert 1.005 < small.force_N / steep.force_N < 1.06
-        assert small.causes.slopes > 0.005
+        assert small.shares.slopes > 0.005
         if kind == "concurrent":  # the measure
-            assert small.errors.force_last == pytest.approx(small.causes.slopes, rel=1e-12)
+            assert small.errors.force_last == pytest.approx(small.shares.slopes, rel=1e-12)
             continue
-        assert steep.causes.slopes == 0.0
-        assert small.causes.block == steep.causes.block
-    assert found["analytic, elliptic"].causes.slopes > 0.005
+        assert steep.shares.slopes == 0.0
+        assert small.shares.block == steep.shares.block
+    assert found["analytic, elliptic"].shares.slopes > 0.005
 
 
 def test_slopes_are_measured_by_a_reference_with_small_ones():
     forces = {"reference, 2": 2.0, "reference, 1": 2.1, "concurrent": 2.3}
 
-    def pressed(level, seconds):
-        known = [force for start, force in forces.items() if level.name.startswith(start)]
+    def pressed(one, seconds):
+        known = [force for start, force in forces.items() if one.name.startswith(start)]
         if not known:
-            return LevelResult(key=level.key, status="not started")
+            return RunResult(configuration=one, status="not started")
         force = np.array([known[0], 2.0 * known[0]])
-        if level.scale != 1.0:
-            force = 1.05 * level.scale * force  # stiffer by 5 % where slopes are small
+        if one.scale != 1.0:
+            force = 1.05 * force  # stiffer by 5 % where slopes are small
         nan = np.full(2, np.nan)
         errors = {"force_error": 0.01 * force, "approach_error": nan, "area_error": nan}
         curves = Curves(
             patches=PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)), force=force, area=force,
             approach=force, separation=force, patch_pressure=force[:, None], **errors,
         )  # fmt: skip
-        return LevelResult(key=level.key, status="done", curves=curves, seconds={"laws": 1.0})
+        return RunResult(configuration=one, status="done", curves=curves, seconds={"laws": 1.0})
 
     by_reference = compare(Scene.load(PAPER, TINY), launch=pressed)
     assert by_reference.measure.startswith("reference, 2 meshes")
@@ -172,8 +171,8 @@ def test_slopes_are_measured_by_a_reference_with_small_ones():
     assert small.force_N == pytest.approx(1.05 * 4.2, rel=1e-12)  # as if heights were the scene's
     concurrent = by_reference["concurrent, half-space 64 × 64, small slopes"]
     lost = 1.0 - 1.0 / 1.05
-    assert concurrent.causes.slopes == pytest.approx(lost * 4.6 / 4.0, rel=1e-12)
-    assert small.causes.slopes is None
+    assert concurrent.shares.slopes == pytest.approx(lost * 4.6 / 4.0, rel=1e-12)
+    assert small.shares.slopes is None
 
 
 @pytest.mark.parametrize(
@@ -181,7 +180,7 @@ def test_slopes_are_measured_by_a_reference_with_small_ones():
     [
         ({"against": "experiment"}, r"'experiment': is nothing to compare against \(allowed: ref"),
         ({"budget_s": 0.0}, "is no budget"),
-        ({"comm": type("Comm", (), {"size": 2})()}, "not possible inside an MPI job"),
+        ({"comm": type("Comm", (), {"size": 2})()}, "cannot be launched in an MPI job"),
     ],
 )
 def test_wrong_arguments(arguments, text):
@@ -199,34 +198,30 @@ def test_budget(text, seconds):
 @pytest.mark.parametrize(
     ("text", "problem"),
     [
-        (
-            "5",
-            r"--budget = '5': has no unit \(allowed: a quantity in units of s, such as \"55 min\"",
-        ),
+        ("5", r"'5': has no unit \(allowed: a quantity in units of s, such as \"55 min\""),
         ("5 mm", "has the wrong unit"),
         ("soon", "cannot be read as a quantity"),
         ("-1 s", "must be greater than 0"),
     ],
 )
 def test_no_budget(text, problem):
-    with pytest.raises(InputError, match=problem):
+    with pytest.raises(ArgumentTypeError, match=problem):
         budget_seconds(text)
 
 
-def call(capsys, *words):
-    code = main(["compare", str(PAPER), *words, "--set", *TINY])
-    shown = capsys.readouterr()
-    return code, shown.out, shown.err
+def chosen(folder, **choice):
+    words = {"scene": PAPER, "set": TINY, "out": folder, "ranks": 1}
+    return Namespace(**words | {"against": None, "budget": None} | choice)
 
 
-def test_command_writes_table_figures_and_report(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr("multiscale.comparison.level_runs.launch_process", launched)
-    code, shown, err = call(capsys, "--out", str(tmp_path))
-    assert (code, err) == (0, "")
+def test_command_writes_table_figures_and_report(capsys, tmp_path):
+    compare_scene(chosen(tmp_path), [], None, launch=launched)
+    shown = capsys.readouterr().out
     assert "They are compared with “concurrent, half-space 64 × 64" in shown
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {
-        "compare.csv", "pareto.png", "curves.png", "pressures.png", "report.html", "levels",
+        "compare.csv", "pareto.png", "curves.png", "pressures.png", "report.html",
+        "configurations",
     }  # fmt: skip
     with (tmp_path / "compare.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
@@ -236,39 +231,35 @@ def test_command_writes_table_figures_and_report(capsys, tmp_path, monkeypatch):
     report = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert report.count("data:image/png;base64,") == 3
     assert "://" not in report  # it needs no network
-    assert "Levels without a result" in report
+    assert "Configurations without a result" in report
 
-    def none_again(level, seconds):
-        assert not level.is_own and not level.name.startswith(PICKED)
-        return launched(level, seconds)
+    def none_again(one, seconds):
+        assert not one.is_own and not one.name.startswith(PICKED)
+        return launched(one, seconds)
 
-    monkeypatch.setattr("multiscale.comparison.level_runs.launch_process", none_again)
-    code, shown, _ = call(capsys, "--out", str(tmp_path))
-    assert code == 0
-    assert f"{OWN_NAME}: done, kept" in shown
+    compare_scene(chosen(tmp_path), [], None, launch=none_again)
+    assert f"{OWN_NAME}: done, from an earlier call" in capsys.readouterr().out
 
 
-def test_command_tells_when_the_measure_was_not_reached(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr("multiscale.comparison.level_runs.launch_process", launched)
-    code, shown, err = call(capsys, "--out", str(tmp_path), "--against", "reference")
-    assert code == 3
-    assert "the comparison against reference did not converge: LEVEL_NOT_REACHED" in err
-    assert "compared against the concurrent instead" in shown
+def test_command_tells_when_the_measure_was_not_reached(capsys, tmp_path):
+    text = "the comparison against reference did not converge: MEASURE_NOT_REACHED"
+    with pytest.raises(NotConverged, match=text):
+        compare_scene(chosen(tmp_path, against="reference"), [], None, launch=launched)
+    assert "compared against the concurrent instead" in capsys.readouterr().out
     assert (tmp_path / "report.html").exists()
 
 
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        (["--against", "truth"], "--against = 'truth': is nothing to compare against (allowed: re"),
-        (["--budget", "soon"], "--budget = 'soon': cannot be read as a quantity"),
+        (["--against", "truth"], "argument --against: invalid choice: 'truth' (choose from 'refe"),
+        (["--budget", "soon"], "argument --budget: 'soon': cannot be read as a quantity"),
         (["--ranks", "0"], "--ranks = 0: is no number of processes"),
     ],
 )
 def test_command_refuses_before_anything_is_run(capsys, tmp_path, words, text):
-    code, _, err = call(capsys, "--out", str(tmp_path / "out"), *words)
-    assert code == 2
-    assert text in err
+    assert main(["compare", str(PAPER), "--out", str(tmp_path / "out"), *words]) == 2
+    assert text in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 
@@ -285,7 +276,7 @@ def test_history_gives_records():
     }  # fmt: skip
 
 
-def test_levels_take_no_petsc_options():
-    choice = Namespace(ranks=1, budget=None, against=None)
-    with pytest.raises(InputError, match="-- = '-ksp_monitor': levels take no PETSc options"):
-        compare_scene(choice, ["-ksp_monitor"], None)
+def test_configurations_take_no_petsc_options():
+    text = "-- = '-ksp_monitor': configurations take no PETSc options"
+    with pytest.raises(InputError, match=text):
+        compare_scene(chosen(None), ["-ksp_monitor"], None)

@@ -8,7 +8,7 @@ import pytest
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from multiscale.comparison.comparison import Comparison, Row
-from multiscale.comparison.measures import Measures
+from multiscale.comparison.error_measures import ErrorMeasures
 
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
 
@@ -16,14 +16,15 @@ PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
 def row(name, seconds, error, status="done"):
     return Row(
         name=name, kind="analytic", model="elliptic", heights="8x8", patches="2x2", cells="",
-        status=status, seconds=seconds, errors=Measures(force_max=error, approach_max=2 * error),
+        status=status, seconds=seconds,
+        errors=ErrorMeasures(force_max=error, approach_max=2 * error),
     )  # fmt: skip
 
 
 def comparison(rows, bar=float("nan"), quantity="approach"):
     return Comparison(
         scene="some", rows=tuple(rows), quantity=quantity, steps=2, grid=PATCHES, measure="best",
-        uncertainty=Measures(force_max=bar),
+        uncertainty=ErrorMeasures(force_max=bar),
     )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from compared_inputs import asked, compared
 from hypothesis import HealthCheck, given, settings
 from scene_inputs import BASE, toml
 
-from multiscale.comparison.level_results import LevelResult, read_result, write_result
+from multiscale.comparison.run_result import RunResult, read_result, write_result
 
 few = settings(
     derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)
@@ -30,12 +30,13 @@ def test_command_lines_of_any_words(tmp_path_factory, words):
     called(path, words)
 
 
-def test_a_kept_level_that_was_damaged_is_run_again(tmp_path):
-    path = write_result(tmp_path / "a.json", LevelResult(key="a", status="done", start_s=0.25))
+def test_a_damaged_file_is_no_result(tmp_path):
+    result = RunResult(configuration=None, status="done", start_s=0.25)
+    path = write_result(tmp_path / "a.json", result)
     whole = path.read_text(encoding="utf-8")
-    assert read_result(path).start_s == 0.25
+    assert read_result(path, None).start_s == 0.25
     for damaged in (whole.replace("0.25", "0.35"), whole[:-9], "[" * 10**5, "{}", '"sha256"', ""):
         path.write_text(damaged, encoding="utf-8")
-        assert read_result(path) is None
+        assert read_result(path, None) is None
     path.write_text(json.dumps(json.loads(whole)["result"]), encoding="utf-8")  # of earlier ones
-    assert read_result(path) is None
+    assert read_result(path, None) is None

@@ -49,7 +49,7 @@ def setup(
 def test_cells_know_the_free_sides_of_their_block(kind, coupling):
     found = setup(kind, coupling=coupling)
     # a quarter of the block's height, its shortest side
-    expected = FreeSides(lengths=(1.0, 1.0), poisson_ratio=0.15, reach=0.2)
+    expected = FreeSides(lengths=(1.0, 1.0), poisson_ratio=0.15, decay_length=0.2)
     assert free_sides(found) == expected
     model = contact_model(found, None)
     assert model.sides == expected

@@ -14,7 +14,6 @@ from geometry.errors import InputError
 from multiscale import Scene, make_setup, run
 from multiscale.cli.command_line import main
 from multiscale.output.figures import history_figure, pressure_figure
-from multiscale.output.report import curve_cells
 from multiscale.planning import plan
 from multiscale.results.reference_record import reference_record
 
@@ -78,7 +77,7 @@ def test_finest_mesh_is_the_history_and_meshes_differ(history):
 def test_error_bar_is_told_everywhere(history):
     label = history.reference.label
     assert re.fullmatch(r"± [\d.e+]+ %", label)
-    header, rows = curve_cells(history)
+    header, rows = history.table()
     assert header[-1] == "at size zero [N]"
     assert all("±" in row[-1] for row in rows)
     assert any(label in note for note in history.notes)
@@ -88,7 +87,7 @@ def test_one_mesh_has_no_error_bar():
     history = run(scene("reference.meshes=1", "load.steps=1"))
     assert history.reference.label == "no error bar"
     assert np.isnan(history.reference.force.error).all()
-    header, rows = curve_cells(history)
+    header, rows = history.table()
     assert (header[-1], rows[0][-1]) == ("at size zero", "no error bar")
     assert not history.reference.by_force
     assert any("no error bar" in note for note in history.notes)
@@ -142,7 +141,7 @@ def test_under_a_force_the_approach_has_the_error_bar(by_force):
     record = by_force.reference
     assert record.by_force
     assert np.all(record.approach.error > 0.0)
-    assert curve_cells(by_force)[0][-1] == "at size zero [µm]"
+    assert by_force.table()[0][-1] == "at size zero [µm]"
     assert "approach at mesh size zero" in record.sentence
 
 
@@ -170,8 +169,7 @@ def test_contact_that_all_meshes_miss_has_no_error_bar():
     assert np.isnan([record.force.error[0], record.area.error[0]]).all()
     assert record.force.error[1] > 0.0
     assert record.cells[1][0] == "no error bar"
-    (row, _) = record.rows(history.steps)
-    assert np.isnan(row[record.columns.index("force_error_N")])
+    assert np.isnan(record.columns(history.steps)["force_error_N"][0])
 
 
 def test_plane_above_the_surface_is_no_error():

@@ -14,10 +14,9 @@ from geometry.rigid_plane import Control
 from multiscale import Run, Scene, run
 from multiscale.couplings.blocks import on_body
 from multiscale.errors.measured import ErrorProbe, MeasuredErrors
-from multiscale.output.report import curve_cells, with_error
-from multiscale.output.results import write_results
-from multiscale.output.tables import write_tables
+from multiscale.output.results import write_results, write_tables
 from multiscale.restart.resuming import checkpoint_of
+from multiscale.results.history import with_error
 
 
 def scene(kind="analytic", grid=40, *, check="last", load=None, seed=4, **micro):
@@ -172,7 +171,7 @@ def test_errors_are_columns_and_stand_beside_the_values(tmp_path):
     rows = list(csv.DictReader((tmp_path / "history.csv").open()))
     assert rows[0]["force_error_N"] == ""
     assert float(rows[1]["force_error_N"]) == history.force_error_N[1]
-    header, cells = curve_cells(history)
+    header, cells = history.table()
     at = header.index("force [N]")
     assert "±" not in cells[0][at]
     value, error = cells[1][at].split(" ± ")
@@ -208,4 +207,4 @@ def test_report_and_provenance_hold_the_errors(tmp_path):
     ],
 )
 def test_values_are_rounded_to_their_errors(value, error, told):
-    assert with_error(value, error, digits=6) == told
+    assert with_error(value, error, shown=".6g") == told

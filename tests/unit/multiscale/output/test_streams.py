@@ -115,11 +115,11 @@ def test_interrupt_during_imports_is_quiet(root, seconds):
     assert "Traceback" not in done.stderr
 
 
-def is_level(number):
-    return b"level_process" in Path(f"/proc/{number}/cmdline").read_bytes()
+def is_configuration(number):
+    return b"run_result" in Path(f"/proc/{number}/cmdline").read_bytes()
 
 
-def test_levels_end_with_the_comparison_that_was_told_to(root, tmp_path):
+def test_processes_end_with_the_comparison_that_was_told_to(root, tmp_path):
     words = ["compare", PAPER, "--out", str(tmp_path / "out")]
     process = subprocess.Popen(
         [*COMMAND, *words],
@@ -130,11 +130,12 @@ def test_levels_end_with_the_comparison_that_was_told_to(root, tmp_path):
         text=True,
     )
     children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
-    level = []
-    while not level and process.poll() is None:
+    found = []
+    while not found and process.poll() is None:
         time.sleep(0.1)
-        level = [each for each in children.read_text(encoding="ascii").split() if is_level(each)]
+        numbers = children.read_text(encoding="ascii").split()
+        found = [number for number in numbers if is_configuration(number)]
     process.send_signal(signal.SIGTERM)
     _, told = process.communicate()
     assert process.returncode == 143, told
-    assert level and not Path(f"/proc/{level[0]}").exists()
+    assert found and not Path(f"/proc/{found[0]}").exists()

@@ -77,7 +77,7 @@ def test_steps_are_counted_from_the_first_patch_beyond_its_law(parts):
     assert noted([step(1, *below)], table) == []
     (note,) = noted([step(1, *below), step(2, *beyond), step(3, *(1.01 * limit))], table)
     assert "range of validity: 2 of 3; first step 2: 3 of 4 patches are loaded beyond" in note
-    assert "the model circular-independent stands for; micro.model = 'half-space'" in note
+    assert "the range of the model circular-independent; micro.model = 'half-space'" in note
 
 
 def test_models_that_see_cells_have_no_range(parts):

@@ -1,0 +1,198 @@
+"""The half-space on a grid of cells, by fast Fourier transforms; for E* = 1.
+
+Pressures are uniform on the cells, and displacements are those of the cells' centres: their
+convolution with Love's rectangle. On a periodic grid each wave has its own compliance 2/|q|.
+
+Theory: demos/theory.md, section 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from micro.closed_forms.love import corner_integral
+from micro.compliance.cells import Cells
+
+Array = NDArray[np.float64]
+Field = NDArray[Any]
+Rows = NDArray[np.intp]
+
+_CHUNK = 2**15
+"""Numbers in a block of rows that is transformed at a time: temporaries stay in the cache."""
+
+
+def love_kernel(grid: tuple[int, int], spacing: tuple[float, float]) -> Array:
+    """Return the displacement at cell (i, j) by uniform unit pressure on cell (0, 0).
+
+    Love's rectangle at the cell centres, L((i dx, j dy))/π: differences of one corner integral on
+    the lattice of cell corners. The relative error grows as 1e-16 (distance / cell)².
+
+    Args:
+        grid: Numbers of cells (nx, ny).
+        spacing: Sides (dx, dy) of a cell [mm].
+
+    Returns:
+        Shape (nx, ny) [mm]; even in both distances.
+
+    Source:
+        Love 1929; Johnson 1985, eq. 3.25.
+    """
+    corners = [(np.arange(n + 1) - 0.5) * step for n, step in zip(grid, spacing, strict=True)]
+    terms = corner_integral(corners[0][:, None], corners[1])
+    return np.diff(np.diff(terms, axis=0), axis=1) / np.pi
+
+
+def padded_spectrum(padded: tuple[int, int], spacing: tuple[float, float]) -> Array:
+    """Return the transform of Love's kernel on a padded grid, where convolution is not circular.
+
+    The padding holds the kernel too, though no pressure acts there: the spectrum of a kernel
+    without steps is positive.
+
+    Args:
+        padded: Cells (mx, my) of the padded grid, at least twice the loaded ones less one.
+        spacing: Sides (dx, dy) of a cell [mm].
+
+    Returns:
+        Real half spectrum, shape (mx, my // 2 + 1) [mm].
+    """
+    nearest = [np.minimum(np.arange(m), m - np.arange(m)) for m in padded]
+    kernel = love_kernel((padded[0] // 2 + 1, padded[1] // 2 + 1), spacing)
+    return np.ascontiguousarray(fft.rfft2(kernel[nearest[0][:, None], nearest[1]]).real)
+
+
+def periodic_spectrum(grid: tuple[int, int], spacing: tuple[float, float]) -> Array:
+    """Return the periodic Green's function 2/|q| at the wave vectors q of a grid.
+
+    The mean displacement of a periodic half-space is not determined. It is set to 0, so that
+    displacements count from the mean of the displaced surface.
+
+    Args:
+        grid: Numbers of cells (nx, ny) of a period.
+        spacing: Sides (dx, dy) of a cell [mm].
+
+    Returns:
+        Real half spectrum, shape (nx, ny // 2 + 1) [mm].
+
+    Source:
+        Johnson 1985, eq. 13.7; Stanley & Kato 1997, doi 10.1115/1.2833523.
+    """
+    qx = 2.0 * np.pi * fft.fftfreq(grid[0], spacing[0])
+    qy = 2.0 * np.pi * fft.rfftfreq(grid[1], spacing[1])
+    q = np.hypot(qx[:, None], qy)
+    return np.divide(2.0, q, out=np.zeros_like(q), where=q > 0.0)
+
+
+class Convolution:
+    """Multiplication by a real spectrum, in the precision of that spectrum.
+
+    Rows are transformed block by block into one complex array, in which everything else happens in
+    place: no large array is allocated per call. Rows that are empty, or not wanted, are never
+    transformed.
+
+    Args:
+        spectrum: Real half spectrum of the kernel, shape (mx, my // 2 + 1).
+        grid: Cells (nx, ny) of the fields.
+        padded: Cells (mx, my) of the grid on which the convolution is circular.
+        work: Complex array of the spectrum's shape and precision; overwritten by every call.
+    """
+
+    def __init__(
+        self, spectrum: Field, grid: tuple[int, int], padded: tuple[int, int], work: Field
+    ) -> None:
+        self.grid, self.padded = grid, padded
+        self._factors = np.repeat(spectrum, 2, axis=1)  # of real and imaginary parts
+        self._work = work
+
+    def __call__(self, field: Field, rows: Rows | None = None) -> Field:
+        """Convolve a field in place.
+
+        Args:
+            field: Values on the cells of some rows of the grid, shape (r, ny); overwritten.
+            rows: Indices of these rows, shape (r,), zeros being on all others; all rows of the
+                grid when not given.
+
+        Returns:
+            ``field``, holding the result on the same rows.
+        """
+        blocks = list(self._blocks(rows))
+        self._work[self.grid[0] if rows is None else 0 :] = 0.0
+        for here, there in blocks:
+            self._work[there] = fft.rfft(field[here], n=self.padded[1], axis=1)
+        work = fft.fft(self._work, axis=0, overwrite_x=True)
+        parts = work.view(self._factors.dtype)
+        np.multiply(parts, self._factors, out=parts)
+        work = fft.ifft(work, axis=0, overwrite_x=True)
+        for here, there in blocks:
+            back = fft.irfft(work[there], n=self.padded[1], axis=1)
+            field[here] = back[:, : self.grid[1]]
+        return field
+
+    def on_cells(self, cells: Cells, values: Array) -> Array:
+        """Convolve values on some cells, in single precision; return those of the same cells."""
+        scale = float(np.abs(values).max(initial=0.0)) or 1.0  # single precision ends at 1e-38
+        field = np.zeros((len(cells.rows), self.grid[1]), np.float32)
+        field.ravel()[cells.place] = values / scale
+        found = self(field, cells.rows).ravel()[cells.place]
+        return found.astype(np.float64) * scale
+
+    def _blocks(self, rows: Rows | None) -> Iterator[tuple[slice, slice | Rows]]:
+        """Yield blocks of rows: where they are in the field and where in the grid."""
+        size = max(1, _CHUNK // self.padded[1])
+        count = self.grid[0] if rows is None else len(rows)
+        for first in range(0, count, size):
+            here = slice(first, min(first + size, count))
+            yield here, here if rows is None else rows[here]
+
+
+class HalfSpaceGrid:
+    """Compliance of nx × ny cells of a half-space, and its approximate inverse.
+
+    The inverse is that of the kernel on a period as large as the grid. Cut down to the cells in
+    contact it preconditions conjugate gradients, as the inverse by transforms of Zhao, Vollebregt &
+    Oosterlee 2014 (Numer. Linear Algebra Appl. 21, 256-274) smooths their multigrid.
+
+    Args:
+        grid: Numbers of cells (nx, ny).
+        spacing: Sides (dx, dy) of a cell [mm].
+        periodic: Whether pressures continue periodically; a half-space that is loaded on the grid
+            alone otherwise.
+
+    Attributes:
+        compliance: Product in double precision.
+        rough_compliance: The same in single precision.
+        inverse: Product with the approximate inverse, in single precision.
+    """
+
+    def __init__(
+        self, grid: tuple[int, int], spacing: tuple[float, float], *, periodic: bool
+    ) -> None:
+        padded = period = grid
+        if periodic:
+            spectrum = periodic_spectrum(grid, spacing)
+            waves = spectrum
+        else:
+            padded, period = _good(2 * n - 1 for n in grid), _good(grid)
+            spectrum = padded_spectrum(padded, spacing)
+            waves = periodic_spectrum(period, spacing)
+        rough = spectrum.astype(np.float32)
+        # at the mean of a period, where the compliance vanishes, its largest value counts
+        inverse = 1.0 / np.where(waves > 0.0, waves, waves.max() or 1.0)
+        work = np.empty(spectrum.shape, complex)  # one for all: they take turns
+        single = work.ravel().view(np.complex64)
+        part = single[: inverse.size].reshape(inverse.shape)
+        self.compliance = Convolution(spectrum, grid, padded, work)
+        self.rough_compliance = Convolution(
+            rough, grid, padded, single[: rough.size].reshape(rough.shape)
+        )
+        self.inverse = Convolution(inverse.astype(np.float32), grid, period, part)
+
+
+def _good(counts: Iterable[int]) -> tuple[int, int]:
+    """Return the next numbers of cells with a fast transform."""
+    x, y = (int(fft.next_fast_len(count, real=True)) for count in counts)
+    return x, y

@@ -1,0 +1,1 @@
+"""Contacts that displace each other: the contact problem, its solvers and the pairs of contacts."""

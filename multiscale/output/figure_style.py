@@ -1,0 +1,81 @@
+"""The style that all figures share: colours, markers, lines, legends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from itertools import cycle
+from typing import Any
+
+from matplotlib.figure import Figure
+
+COLOURS = {
+    "analytic": "#0b3c5d",
+    "isolated": "#d1495b",
+    "consistent": "#1b998b",
+    "concurrent": "#edae49",
+    "reference": "#6a4c93",
+}
+"""Colour of each coupling."""
+
+MARKERS = {
+    "analytic": "o",
+    "isolated": "s",
+    "consistent": "D",
+    "concurrent": "^",
+    "reference": "*",
+}
+"""Marker of each coupling."""
+
+LINE_STYLES = ("-", "--", "-.", ":", (0, (3, 1, 1, 1, 1, 1)))
+"""Line styles of curves that are drawn over each other."""
+
+ERROR_BAND = {"color": "#e8eaed", "zorder": 0}
+"""Look of the band within an error bar, behind everything else."""
+
+PRESSURE_LABEL = "mean pressure of the patch [MPa]"
+"""Label of the colour bars of pressure maps."""
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Return an empty figure, which shares no global state of matplotlib.
+
+    Args:
+        width: Width [inch].
+        height: Height [inch].
+    """
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def curve_styles(names: Iterable[str]) -> Iterator[dict[str, Any]]:
+    """Yield line style, colour and label for each of several curves.
+
+    Args:
+        names: Labels of the curves.
+    """
+    for name, style, colour in zip(
+        names, cycle(LINE_STYLES), cycle(COLOURS.values()), strict=False
+    ):
+        yield {"ls": style, "color": colour, "label": name}
+
+
+def add_grid_and_legend(figure: Figure) -> None:
+    """Draw a grid in every panel, and a legend in the first when it has more than one line."""
+    for axes in figure.axes:
+        axes.grid(alpha=0.3)
+    first = figure.axes[0]
+    if len(first.get_legend_handles_labels()[0]) > 1:
+        first.legend(frameon=False)
+
+
+def panels_above_legend(figure: Figure, panels: int, share: float) -> tuple[list[Any], Any]:
+    """Return panels side by side, and empty axes below them for a common legend.
+
+    Args:
+        figure: The figure.
+        panels: Number of panels.
+        share: Height of the legend relative to that of the panels.
+    """
+    grid = figure.add_gridspec(2, panels, height_ratios=(1.0, share))
+    below = figure.add_subplot(grid[1, :])
+    below.axis("off")
+    return [figure.add_subplot(grid[0, index]) for index in range(panels)], below

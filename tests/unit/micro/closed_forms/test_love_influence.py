@@ -1,0 +1,88 @@
+"""Mean influence of rectangles against high precision, cell sums and each other."""
+
+import mpmath
+import numpy as np
+import pytest
+
+from geometry import PatchGrid, UnevenPartition
+from micro import influence_matrix
+from micro.closed_forms.love import love_mean, mutual_influence
+from micro.compliance.grid_compliance import Compliance
+
+
+def _exact(dx, dy, a, b):
+    """The closed form with 50 digits, from which nothing cancels."""
+    with mpmath.workdps(50):
+        dx, dy, a, b = map(mpmath.mpf, (dx, dy, a, b))
+
+        def fourfold(u, v):
+            rho = mpmath.sqrt(u * u + v * v)
+            logs = u * mpmath.asinh(v / abs(u)) + v * mpmath.asinh(u / abs(v)) if u and v else 0
+            return u * v * logs / 2 - rho**3 / 6
+
+        total = sum(
+            p * q * fourfold(dx + 2 * i * a, dy + 2 * j * b)
+            for i, p in ((-1, 1), (0, -2), (1, 1))
+            for j, q in ((-1, 1), (0, -2), (1, 1))
+        )
+        return float(total / (4 * a * b))
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "error"), [(0.5, 0.5, 1e-12), (0.1, 0.5, 1e-11), (0.5, 0.05, 1e-10)]
+)
+def test_mutual_influence_at_any_distance(a, b, error):
+    for k in (0, 1, 3, 4, 5, 6, 7, 8, 15, 40, 200, 5000):
+        for m in (0, 1, 4, 16, 45, 70):
+            dx, dy = 2 * a * k, 2 * b * m
+            assert mutual_influence(dx, dy, a, b) == pytest.approx(_exact(dx, dy, a, b), rel=error)
+
+
+def test_matrix_is_symmetric_with_loves_mean_on_the_diagonal():
+    patches = PatchGrid(grid=(3, 5), lengths=(1.0, 1.3), origin=(0.2, -0.1))
+    influence = influence_matrix(patches)
+    assert np.array_equal(influence, influence.T)
+    assert np.diag(influence) == pytest.approx(float(love_mean(*patches.half_sizes)), rel=1e-14)
+    i, j = 3, 11
+    apart = patches.centres[i] - patches.centres[j]
+    direct = mutual_influence(*apart, *patches.half_sizes)
+    assert influence[i, j] == pytest.approx(direct, rel=1e-12)
+
+
+def test_finer_patches_sum_up_to_coarser_ones():
+    coarse, fine = (PatchGrid(grid=grid, lengths=(1.0, 2.0)) for grid in ((2, 3), (8, 9)))
+    owner = coarse.index_of(*fine.centres.T)
+    gather = np.equal.outer(np.arange(coarse.count), owner)
+    means = gather / gather.sum(axis=1, keepdims=True)
+    # the same pressure on all parts; means of the parts' means
+    assert means @ influence_matrix(fine) @ gather.T == pytest.approx(
+        influence_matrix(coarse), rel=1e-12
+    )
+
+
+def test_means_over_patches_agree_with_the_cell_kernel():
+    patches = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
+    displaced = []
+    for cells in (32, 64):
+        pressure = np.zeros((cells, cells))
+        pressure[: cells // 2, : cells // 2] = 1.0
+        shift = Compliance(periodic=False).on_grid(pressure.shape, (1 / cells, 1 / cells))
+        parts = shift.displacement(pressure).reshape(2, cells // 2, 2, cells // 2)
+        displaced.append(parts.mean(axis=(1, 3)).ravel())
+    expected = influence_matrix(patches)[0] / np.pi
+    # means of values at cell centres: second order but for the logarithmic slope at the border
+    error = [np.abs(found / expected - 1.0).max() for found in displaced]
+    assert error[1] < 1e-3
+    assert error[1] < 0.4 * error[0]
+
+
+def test_unequal_rectangles_sum_up_equal_ones():
+    fine = PatchGrid(grid=(8, 6), lengths=(1.0, 1.3), origin=(0.2, -0.1))
+    uneven = UnevenPartition(
+        ticks_x=tuple(fine.borders_x[[0, 1, 4, 6, 8]]), ticks_y=tuple(fine.borders_y[[0, 3, 4, 6]])
+    )
+    gather = np.equal.outer(np.arange(uneven.count), uneven.index_of(*fine.centres.T))
+    means = gather / gather.sum(axis=1, keepdims=True)
+    whole = means @ influence_matrix(fine) @ gather.T
+    # rounding of the closed form, (distance / side)⁴
+    assert influence_matrix(uneven) == pytest.approx(whole, rel=1e-12)

@@ -1,0 +1,78 @@
+"""Residual, continuation, refusals and memory of the contact problem."""
+
+import numpy as np
+import pytest
+
+from geometry import InputError, NotConverged
+from micro.closed_forms.ellipse import shape_factors
+from micro.interaction.contact_problem import (
+    BYTES_PER_PAIR,
+    TOLERANCE,
+    ContactProblem,
+    active_set,
+    checked_pairs,
+    solve,
+)
+from micro.interaction.hertz_pairs import HertzPairs
+
+
+@pytest.fixture
+def problem(cluster):
+    shape = shape_factors(cluster.radius_major, cluster.radius_minor)
+    kernel = HertzPairs.among(cluster, shape, circular=False)
+    return ContactProblem(interaction=kernel, interference=5e-3 + cluster.z)
+
+
+def refusing(limit):
+    """Return a method that cannot take steps beyond a share of the scale, and its calls."""
+    calls = []
+
+    def method(problem, start):
+        grown = problem.interference.max() - calls[-1] if calls else problem.interference.max()
+        if grown > limit:
+            raise NotConverged("test", reason="TOO_FAR", iterations=3, remedy="none")
+        calls.append(problem.interference.max())
+        return active_set(problem, start)
+
+    return method, calls
+
+
+def test_residual_measures_every_condition(problem):
+    none = np.zeros(7)
+    one = problem.scale
+    met = problem.interference.copy()
+    assert problem.residual(met, none) == 0.0
+    assert problem.residual(np.zeros(7), none) == 1.0  # penetration
+    pulled = problem.interference + 0.5 * one
+    assert problem.residual(np.full(7, 0.25 * one), pulled) == pytest.approx(0.25)  # force at a gap
+    assert problem.residual(np.full(7, -one), pulled) == 0.0  # pushed off by the others
+
+
+def test_continuation_reaches_the_same_solution(problem):
+    direct = active_set(problem, np.zeros(7))
+    method, loads = refusing(0.2 * problem.scale)
+    found = solve(problem, method, np.zeros(7))
+    assert found.indentation == pytest.approx(direct.indentation, abs=1e-9 * problem.scale)
+    assert found.residual <= TOLERANCE
+    assert len(loads) >= 5 and loads[-1] == problem.scale
+    assert found.iterations > direct.iterations
+
+
+def test_gives_up_loudly(problem):
+    method, _ = refusing(0.0)
+    message = r"7 interacting asperities .*reached 0.0% of it\) did not converge: TOO_FAR after"
+    with pytest.raises(NotConverged, match=message):
+        solve(problem, method, np.zeros(7))
+
+
+def test_pairs_that_do_not_fit_into_the_memory_are_refused():
+    most = BYTES_PER_PAIR * 3000.0**2
+    checked_pairs(3000, 3000, "asperities", available=most)
+    message = (
+        r"^micro\.model: the interaction of 3001 asperities needs 0\.432 GB of memory and 0\.432 GB"
+        r" are there \(allowed: half-space, "
+    )
+    with pytest.raises(InputError, match=message):
+        checked_pairs(3001, 3001, "asperities", available=most)
+    with pytest.raises(InputError, match="of 1000 islands needs 480 GB"):
+        checked_pairs(10**7, 1000, "islands", available=most)

@@ -1,0 +1,83 @@
+"""Both solvers of the contact problem: agreement, starts, rate, failure."""
+
+import numpy as np
+import pytest
+
+from geometry import NotConverged
+from micro.closed_forms.ellipse import shape_factors
+from micro.interaction.contact_problem import TOLERANCE, ContactProblem, active_set, damped_step
+from micro.interaction.hertz_pairs import HertzPairs
+from micro.interaction.truncated_newton import truncated_newton
+
+
+def problem(asperities, approach):
+    shape = shape_factors(asperities.radius_major, asperities.radius_minor)
+    kernel = HertzPairs.among(asperities, shape, circular=False)
+    interference = np.maximum(approach + asperities.z, 1e-9)
+    return ContactProblem(interaction=kernel, interference=interference)
+
+
+both = pytest.mark.parametrize("method", [active_set, truncated_newton])
+
+
+@both
+@pytest.mark.parametrize("approach", [1e-4, 5e-3, 5e-2])
+def test_conditions_hold(cluster, method, approach):
+    case = problem(cluster, approach)
+    found = method(case, np.zeros(7))
+    assert np.all(found.indentation >= 0.0)
+    gap = found.displacement - case.interference
+    slack = TOLERANCE * case.scale
+    assert np.all(gap >= -slack)
+    assert np.all((found.indentation == 0.0) | (np.abs(gap) <= slack))
+    assert found.residual <= TOLERANCE
+
+
+@pytest.mark.parametrize("approach", [1e-4, 5e-3, 5e-2])
+def test_solvers_agree_from_any_start(cluster, approach):
+    case = problem(cluster, approach)
+    reference = active_set(case, np.zeros(7)).indentation
+    rng = np.random.default_rng(1)
+    starts = [
+        case.interference,
+        5 * approach * rng.random(7),
+        np.where(rng.random(7) < 0.5, approach, 0),
+    ]
+    for method in (active_set, truncated_newton):
+        for start in starts:
+            # Both stop at 1e-10 of the scale; the Jacobian's inverse is below 10 here.
+            found = method(case, start).indentation
+            assert found == pytest.approx(reference, abs=1e-9 * case.scale)
+
+
+@both
+def test_solution_is_its_own_start(cluster, method):
+    case = problem(cluster, 5e-3)
+    found = method(case, np.zeros(7))
+    assert method(case, found.indentation).iterations <= 1
+
+
+def test_newton_is_fast(cluster):
+    assert active_set(problem(cluster, 5e-3), np.zeros(7)).iterations <= 6
+
+
+@pytest.mark.parametrize(
+    ("method", "limit", "what", "reason"),
+    [
+        (active_set, "most_iterations", "Newton's method on the active set", "MAX_ITERAT"),
+        (truncated_newton, "most_iterations", "the truncated Newton minimisation", "MAX_ITERAT"),
+        (truncated_newton, "most_sets", "the truncated Newton minimisation", "CONTACTING_SET"),
+    ],
+)
+def test_running_out_is_an_error(cluster, method, limit, what, reason):
+    with pytest.raises(NotConverged, match=f"^{what} did not converge: {reason}.* after"):
+        method(problem(cluster, 5e-3), np.zeros(7), **{limit: 1})
+
+
+def test_step_that_never_gains_is_an_error():
+    def worse(point):
+        return None, 1.0 + np.abs(point)
+
+    message = "^a damped Newton step did not converge: LINE_SEARCH after 1 iterations; lower load"
+    with pytest.raises(NotConverged, match=message):
+        damped_step(worse, np.zeros(2), np.ones(2), np.full(2, 0.3))

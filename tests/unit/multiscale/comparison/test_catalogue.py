@@ -1,0 +1,212 @@
+"""Which configurations a scene has, in which order, and what tells them apart."""
+
+import os
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from geometry.patches import PatchGrid
+from multiscale.comparison.catalogue import SMALL_SLOPES, configurations
+from multiscale.comparison.compare import ranked, refinements, resolved_scene
+from multiscale.comparison.configuration import pressure_grid
+from multiscale.comparison.error_measures import Curves
+from multiscale.comparison.run_result import RunResult
+from multiscale.resolution.auto_keys import auto_keys
+from multiscale.scene.scene import Scene
+from multiscale.setup.checks import EMBEDDED_CELLS
+
+COLUMNS = (
+    "approach", "force", "area", "separation", "approach_error", "force_error", "area_error",
+)  # fmt: skip
+PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
+
+
+@cache
+def made(*overrides, ranks=1):
+    return configurations(Scene.load(PAPER, overrides), ranks)
+
+
+def small(*overrides, ranks=1):
+    """Return the configurations of a surface with few heights, which takes less time."""
+    return made("surface.grid=[64, 64]", *overrides, ranks=ranks)
+
+
+def test_paper_has_every_kind_and_the_scene_itself():
+    found = made()
+    kinds = {one.kind for one in found}
+    assert kinds == {"analytic", "isolated", "consistent", "concurrent", "reference"}
+    models = {one.model for one in found if one.kind == "analytic"}
+    assert models >= {
+        "elliptic", "circular", "elliptic-independent", "circular-independent", "islands",
+        "half-space",
+    }  # fmt: skip
+    for kind in ("isolated", "consistent"):
+        grids = {one.content["patches"]["grid"][0] for one in found if one.kind == kind}
+        assert grids == {1, 2, 4, 8, 16}
+    (own,) = [one for one in found if one.is_own]
+    assert own.scene.coupling == Scene.load(PAPER).coupling
+    assert own.scene.block == Scene.load(PAPER).block
+
+
+def test_cheapest_come_first_and_none_twice():
+    found = made()
+    costs = [one.cost for one in found]
+    assert costs == sorted(costs)
+    assert found[0].kind == "analytic"
+    assert found[-1].kind == "reference"
+    assert len({one.key for one in found}) == len({one.name for one in found}) == len(found)
+
+
+def test_coarser_surfaces_still_carry_the_band():
+    halves = {one.heights[0] for one in made() if one.name.startswith("analytic, half-space")}
+    assert sorted(halves) == [32, 64, 128, 256]
+    waves = made("surface.spectrum.waves=[2, 30]")
+    halves = {one.heights[0] for one in waves if one.name.startswith("analytic, half-space")}
+    assert sorted(halves) == [128, 256]  # three heights per wave
+
+
+def test_heights_from_a_file_are_taken_as_they_are(tmp_path):
+    file = tmp_path / "scan.npy"
+    np.save(file, 1e-3 * np.random.default_rng(1).normal(size=(40, 20)))
+    text = (
+        "[surface]\nfile = 'scan.npy'\nlengths = [2, 1]\n[block]\nyoung_modulus = '4 GPa'\n"
+        "poisson_ratio = 0.3\n[load]\napproach = '1 um'\n"
+    )
+    (tmp_path / "scan.toml").write_text(text, encoding="utf-8")
+    scene = Scene.load(tmp_path / "scan.toml")
+    found = configurations(scene)
+    assert {one.heights for one in found} == {(40, 20)}
+    assert {one.content["surface"]["file"] for one in found} == {str(file)}
+    before = {one.key for one in found}
+    np.save(file, 1e-3 * np.random.default_rng(2).normal(size=(40, 20)))
+    assert not before & {one.key for one in configurations(scene)}  # other heights, other results
+
+
+def test_other_scenes_have_other_keys():
+    keys = {one.key for one in small()}
+    assert not keys & {one.key for one in small("surface.spectrum.seed=2")}
+    assert keys & {one.key for one in small("patches.grid=[2, 2]")}  # what does not see patches
+
+
+def test_only_couplings_use_ranks():
+    ranks = {(one.kind == "analytic", one.ranks) for one in small(ranks=3)}
+    assert ranks == {(True, 1), (False, 3)}
+    several = {one.key for one in small(ranks=3) if one.ranks == 3}
+    assert several.isdisjoint(one.key for one in small())
+
+
+def test_all_configurations_take_the_same_steps():
+    for one in small("load.force_change=0.2", "load.steps=3"):
+        assert one.scene.loading.force_change is None
+        targets = np.divide(one.scene.loading.load_history.targets, one.scale)
+        assert targets == pytest.approx([8e-3 / 3, 16e-3 / 3, 8e-3])
+
+
+@pytest.mark.parametrize(
+    ("grid", "common"), [((1, 1), (4, 4)), ((3, 8), (6, 8)), ((5, 2), (5, 4)), ((4, 4), (4, 4))]
+)
+def test_pressures_are_compared_on_multiples_of_the_patches(grid, common):
+    assert pressure_grid(Scene.load(PAPER, [f"patches.grid={list(grid)}"])) == common
+
+
+def test_load_by_force_or_free_tilt_has_configurations_too():
+    for overrides in (["load.tilt=free"], ["load.force=3 N"]):
+        scene = Scene.load(PAPER, ["surface.grid=[64, 64]"]).model_dump(
+            by_alias=True, mode="json", exclude_none=True
+        )
+        if overrides == ["load.force=3 N"]:
+            scene["load"] = {"force": 3.0, "steps": 2}
+            found = configurations(Scene.from_dict(scene))
+        else:
+            found = small(*overrides)
+        assert {"analytic", "concurrent", "reference"} <= {one.kind for one in found}
+
+
+def test_small_slopes_scale_heights_and_load_together():
+    found = small("load.tilt=[0.01, 0]")
+    (low,) = [one for one in found if one.scale != 1.0]
+    (steep,) = [one for one in found if f"{one.name}, heights × 0.1" == low.name]
+    assert (steep.scale, low.scale) == (1.0, 0.1)
+    assert low.scene.surface.spectrum.rms_slope == pytest.approx(0.0215, rel=1e-12)  # rounding
+    assert low.scene.loading.approach == pytest.approx((0.8e-3,), rel=1e-12)
+    assert low.scene.loading.tilt == pytest.approx((1e-3, 0.0), rel=1e-12)
+    assert low.scene.reference == steep.scene.reference
+
+
+def test_scene_that_leaves_all_open_has_configurations_that_stand(tmp_path):
+    text = (
+        "accuracy = 0.05\n[surface]\nspectrum = { hurst = 0.95, waves = [2, 4], rms_slope = 0.2 }\n"
+        "grid = 'auto'\nlengths = [1, 1]\n[block]\nyoung_modulus = '4 GPa'\npoisson_ratio = 0.3\n"
+        "cells = 'auto'\n[patches]\ngrid = 'auto'\n[micro]\nmodel = 'auto'\n[coupling]\n"
+        "kind = 'auto'\n[load]\napproach = '8 um'\nsteps = 2\n"
+    )
+    (tmp_path / "open.toml").write_text(text, encoding="utf-8")
+    scene = Scene.load(tmp_path / "open.toml")
+    settled = resolved_scene(scene, tmp_path)
+    assert resolved_scene(scene, tmp_path) == settled  # what was kept
+    found = configurations(settled)
+    (own,) = [one for one in found if one.is_own]
+    assert own.scene.coupling.kind in ("consistent", "concurrent")
+    assert (own.scene.accuracy, own.scene.micro.model) == (0.05, "auto")
+    for one in found:
+        assert auto_keys(one.scene) <= {"micro.model"}
+        assert not auto_keys(one.scene) or one.is_own or one.kind == "reference"
+    meshed = [one.scene.block.cells for one in found if "elements" in one.name]
+    assert EMBEDDED_CELLS in meshed  # laws on a mesh are not left with what a smooth rest needs
+
+
+def ended(one, *, finite_slopes=True):
+    ones = np.ones(2)
+    curves = Curves(
+        patches=PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)),
+        patch_pressure=ones[:, None],
+        **{key: ones for key in COLUMNS},
+    )
+    return RunResult(configuration=one, status="done", curves=curves, finite_slopes=finite_slopes)
+
+
+def test_the_best_has_finite_slopes_and_then_the_most_heights():
+    concurrent = [one for one in made() if one.kind == "concurrent"]
+    found = [ended(one, finite_slopes=not one.name.endswith(SMALL_SLOPES)) for one in concurrent]
+    best = [one.configuration.name.removeprefix("concurrent, half-space ") for one in found]
+    assert sorted(best) == sorted(
+        ["32 × 32", "64 × 64", "128 × 128", "256 × 256", f"128 × 128{SMALL_SLOPES}"]
+    )
+    best = ranked(found, "concurrent")
+    assert best[0].configuration.heights == (256, 256)
+    assert best[-1].configuration.name.endswith(SMALL_SLOPES)
+    ((coarse, fine),) = refinements(best)
+    assert (coarse, fine) == tuple(f"concurrent, half-space {n} × {n}" for n in (128, 256))
+
+
+def test_all_configurations_but_one_of_low_heights_see_the_true_ones():
+    found = made()
+    slopes = {one.scene.surface.spectrum.rms_slope for one in found if one.scale == 1.0}
+    assert slopes == {0.215}
+    for kind in ("analytic", "consistent", "concurrent"):
+        half_spaces = [one for one in found if one.kind == kind and one.model == "half-space"]
+        assert len({one.heights for one in half_spaces}) == 4
+        small = [one for one in half_spaces if one.scene.micro.finite_slopes is False]
+        assert [one.name.endswith(SMALL_SLOPES) for one in small] == [True]
+        names = [one.name for one in half_spaces]
+        assert small[0].name.removesuffix(SMALL_SLOPES) in names
+
+
+def test_cells_of_the_block_are_stated_by_laws_on_its_mesh_alone():
+    for one in made():
+        assert (one.scene.block.cells is None) != one.scene.coupling.on_mesh
+        assert one.scene.reference.cells is None
+    hexahedra = made("reference.cells=[16, 16, 8]")
+    assert {one.scene.reference.cells for one in hexahedra} == {(16, 16, 8)}
+    assert len([one for one in hexahedra if one.kind == "reference"]) == 3
+
+
+def test_references_that_fit_no_memory_are_told(monkeypatch):
+    pages = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 30_000}  # 0.12 GB
+    monkeypatch.setattr(os, "sysconf", pages.__getitem__)
+    refused = {one.name: one.refusal for one in made("block.cells=[8, 8, 4]") if one.refusal}
+    assert "reference, 3 meshes, 7.37 µm" in refused
+    assert all(name.startswith("reference") for name in refused)
+    assert all("GB of memory" in text for text in refused.values())
