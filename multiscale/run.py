@@ -28,14 +28,14 @@ from multiscale.couplings.blocks import (
 from multiscale.couplings.load_steps import EmbeddedCoupling
 from multiscale.couplings.newton_choice import newton_choice
 from multiscale.couplings.reference import ReferenceCoupling, recorded, reference_notes
-from multiscale.errors.load_steps import checked, error_notes, error_probe
 from multiscale.laws.files import LawTable, read_laws, write_laws
 from multiscale.laws.refinement import missed_notes
 from multiscale.laws.repair import repair_notes
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling, LoadPosition, LoadStepper, Restorable
-from multiscale.machine.mpi_job import for_large
-from multiscale.machine.nodes import nodes_of
+from multiscale.machine.mpi_job import large_object_comm
+from multiscale.machine.nodes import cluster_nodes
+from multiscale.measured_errors import checked, error_notes, error_probe
 from multiscale.resolution.auto_keys import resolved_keys
 from multiscale.resolution.problem_setup import make_setup
 from multiscale.results.history import History
@@ -96,9 +96,9 @@ class Run:
         self.interface: Interface | None = None
         self.coupling: Coupling | None = None
         load_together(scene, comm)
-        nodes = nodes_of(comm)
+        nodes = cluster_nodes(comm)
         self.setup: ProblemSetup = on_root(
-            for_large(comm), lambda: make_setup(scene, settled, nodes)
+            large_object_comm(comm), lambda: make_setup(scene, settled, nodes)
         )
         self.scene = self.setup.scene
         self.seconds = dict(self.setup.seconds)
@@ -107,7 +107,7 @@ class Run:
         """Make what puts the half-space model on its body, once; None for other micro models."""
         if self._on_body is None and isinstance(self.setup.micro, HalfSpaceModel):
             with self.phase("block"):
-                alone = not self.setup.embedded
+                alone = not self.setup.has_block
                 self._on_body = on_body(self.setup, self.comm, half_space=alone)
         return self._on_body
 
@@ -134,7 +134,7 @@ class Run:
         if self.coupling is None:
             made: LawTable | MicroModel | None = None
             if self.setup.micro is not None:
-                made = self.make_laws() if self.setup.by_laws else self.make_model()
+                made = self.make_laws() if self.setup.uses_laws else self.make_model()
             with self.phase("block"):
                 coupling, self.interface = assemble(self.setup, made, self.comm)
                 if self._resumed and self._resumed.state and isinstance(coupling, Restorable):

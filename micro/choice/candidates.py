@@ -10,6 +10,7 @@ import numpy as np
 
 from geometry import PatchGrid, Surface
 from micro.asperities.model import MODELS
+from micro.choice.cost import contact_box_share, solution_seconds
 from micro.choice.expected_errors import ContactMeasures, contact_error, grid_error
 from micro.factory import micro_model
 from micro.half_space.model import HalfSpaceModel
@@ -22,19 +23,6 @@ _LEAST_CELLS, _FEWEST_CELLS = 8, 16
 _MOST_CELLS = 2**22
 """Cells of the largest grid that is offered."""
 _SCALED = "elliptic with curvature at the contact's scale and border summits"
-_COSTS = {
-    "elliptic": (2e-3, 1.8e-7, 1e-3, 0.0),
-    "circular": (2e-3, 1.8e-7, 1e-3, 0.0),
-    "elliptic-independent": (2e-3, 1.8e-7, 3e-4, 0.0),
-    "circular-independent": (2e-3, 1.8e-7, 3e-4, 0.0),
-    "scaled": (0.15, 1e-7, 4e-3, 6e-7),
-    "islands": (0.15, 1e-7, 3e-3, 1e-8),
-    "half-space": (0.0, 2e-7, 3e-3, 4e-7),
-}
-"""Seconds to set up, and per cell; seconds per approach, and per cell: minima on one core."""
-
-Cost = Callable[[str, int], float]
-"""Time of all solutions of a kind of model on so many cells [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,25 +63,31 @@ def options(
     surface: Surface,
     measures: Sequence[ContactMeasures],
     *,
+    approach: float,
     contact_modulus: float,
     solutions: int,
     patches: PatchGrid | None,
     periodic: bool,
-    cost: Cost | None = None,
 ) -> Iterator[Option]:
     """Yield the models that a surface and its patches allow.
 
     Args:
         surface: The surface.
-        measures: Its contacts at every load that errors are promised for.
+        measures: Its contacts at every load that errors are promised for, the largest last.
+        approach: Largest approach of the plane [mm].
         contact_modulus: E* [MPa].
         solutions: Approaches to be solved for.
         patches: Patches that must hold at least 8 cells of a grid along each side.
         periodic: Whether only periodic models are wanted.
-        cost: Predicted time of all solutions of a kind on so many cells [s]; by default what one
-            core took when it was measured.
     """
-    seconds = cost or partial(_cost, solutions=solutions)
+    box = contact_box_share(surface.heights - (surface.highest - approach))
+    # the density of the summits above the plane is the square of crowding over contact radius
+    radius = measures[-1].cells_per_radius * max(surface.spacing)
+    summits = round(surface.area * (measures[-1].crowding / radius) ** 2)
+
+    def seconds(kind: str, cells: int) -> float:
+        return solutions * solution_seconds(kind, cells, box=box, summits=summits)
+
     parts = patches.grid if patches else (1, 1)
     named = partial(micro_model, surface=surface, contact_modulus=contact_modulus)
     by_contacts: list[tuple[str, str, Callable[[], MicroModel]]] = []
@@ -157,11 +151,6 @@ def resampled(surface: Surface, grid: tuple[int, int]) -> Surface:
     )
     points = np.meshgrid(x, y, indexing="ij")
     return replace(surface, heights=surface.height_at(*points))
-
-
-def _cost(kind: str, cells: int, solutions: int) -> float:
-    set_up, per_cell, each, each_per_cell = _COSTS[kind]
-    return set_up + per_cell * cells + solutions * (each + each_per_cell * cells)
 
 
 def _fits(cells: tuple[int, int], parts: tuple[int, int]) -> bool:

@@ -19,7 +19,7 @@ import numpy as np
 
 from geometry import PatchGrid, Surface
 from geometry.errors import InputError, NotConverged
-from micro.choice.candidates import Candidate, Cost, Option, grid_of, half_space, options
+from micro.choice.candidates import Candidate, Option, grid_of, half_space, options
 from micro.choice.expected_errors import ContactMeasures, contact_measures, grid_error
 from micro.model import MicroModel
 
@@ -62,7 +62,6 @@ def choose(
     solutions: int = 40,
     patches: PatchGrid | None = None,
     periodic: bool = False,
-    cost: Cost | None = None,
     label: str | None = None,
 ) -> Choice:
     """Choose a micro model of a surface.
@@ -79,11 +78,9 @@ def choose(
         contact_modulus: E* [MPa].
         approach: Largest approach of the plane [mm].
         tolerance: Largest relative error of the force.
-        solutions: Approaches that the model will be solved for; set-up is shared among them.
+        solutions: Approaches that the model will be solved for.
         patches: Patches that must hold at least 8 cells of a grid along each side.
         periodic: Whether surface and pressures continue periodically; else the border is free.
-        cost: Predicted time of all solutions, of a kind of model (its name, or ``scaled``) on so
-            many cells [s]; by default what one core took when it was measured.
         label: Label of the only candidate that may be taken, such as an earlier choice.
 
     Raises:
@@ -105,11 +102,11 @@ def choose(
         options(
             surface,
             [half, whole],
+            approach=approach,
             contact_modulus=contact_modulus,
             solutions=solutions,
             patches=patches,
             periodic=periodic,
-            cost=cost,
         )
     )
     if label is not None:

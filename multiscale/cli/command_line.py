@@ -17,7 +17,7 @@ from geometry.errors import InputError, NotWritten, OutOfMemory, PatchlawError
 from multiscale.cli import commands
 from multiscale.cli import compare as compare_command
 from multiscale.cli import doctor as doctor_command
-from multiscale.machine.mpi_job import check_address_space, petsc_leaves_signals, world
+from multiscale.machine.mpi_job import check_address_space, keep_petsc_from_signals, world
 from multiscale.output import terminal
 from multiscale.output.streams import sturdy_streams
 from multiscale.restart.interruption import Ended, ended_by_signals
@@ -72,7 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(arguments: Sequence[str] | None) -> int:
     """Run one command and return its exit code."""
-    petsc_leaves_signals()
+    keep_petsc_from_signals()
     try:
         check_address_space()
         comm = world()

@@ -12,17 +12,16 @@ from typing import Any
 from geometry.collective import on_root
 from geometry.errors import InputError, NotConverged, PatchlawError
 from geometry.statistics import roughness
-from multiscale.costs.prediction import Cost
+from multiscale.costs.prediction import Cost, predicted_cost
 from multiscale.couplings.blocks import load_together
 from multiscale.laws.files import write_laws
-from multiscale.machine.mpi_job import for_large, refuse_detached_processes
-from multiscale.machine.nodes import ClusterNodes, nodes_of
+from multiscale.machine.mpi_job import large_object_comm, refuse_detached_processes
+from multiscale.machine.nodes import ClusterNodes, cluster_nodes
 from multiscale.output import terminal
 from multiscale.output.field_files import write_fields
 from multiscale.output.results import write_figure, write_results
 from multiscale.planning import plan
-from multiscale.planning.forecast import forecast
-from multiscale.planning.memory import shortages
+from multiscale.planning.block_plan import memory_warnings
 from multiscale.resolution.problem_setup import make_setup
 from multiscale.restart.folder_lock import locked
 from multiscale.restart.interruption import Interruption, Stopped
@@ -88,7 +87,7 @@ def _stepped(
     load_history = run.scene.loading.load_history
     with terminal.progress(run.comm, load_history, len(run.steps)) as advance:
         try:
-            if run.setup.by_laws:
+            if run.setup.uses_laws:
                 run.make_laws()
             keeper.write()
             interruption.check("before the block was made")
@@ -129,15 +128,15 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
     """
     scene, _ = scene_and_folder(choice, comm, writes=False)
     load_together(scene, comm)
-    nodes = nodes_of(comm)
-    setup, made = on_root(for_large(comm), lambda: _planned(scene, nodes))
-    terminal.show_plan(comm, setup, made, list(shortages(setup, nodes)))
+    nodes = cluster_nodes(comm)
+    setup, made = on_root(large_object_comm(comm), lambda: _planned(scene, nodes))
+    terminal.show_plan(comm, setup, made, list(memory_warnings(setup, nodes)))
 
 
 def _planned(scene: Scene, nodes: ClusterNodes) -> tuple[ProblemSetup, Cost]:
     """Plan a run, on more nodes like those here if it takes them."""
-    setup = make_setup(scene, nodes=replace(nodes, more=True))
-    return setup, forecast(setup)
+    setup = make_setup(scene, nodes=replace(nodes, extensible=True))
+    return setup, predicted_cost(setup)
 
 
 def tabulate_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -174,8 +173,8 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
         comm: MPI communicator; None for a process on its own.
     """
     scene, folder = scene_and_folder(choice, comm)
-    nodes = replace(nodes_of(comm), more=True)  # a surface needs no room for its block
-    setup = on_root(for_large(comm), lambda: make_setup(scene, nodes=nodes))
+    nodes = replace(cluster_nodes(comm), extensible=True)  # a surface needs no room for its block
+    setup = on_root(large_object_comm(comm), lambda: make_setup(scene, nodes=nodes))
     rough = roughness(setup.surface)
     pairs = [
         ("surface", plan.surface_statement(setup)),

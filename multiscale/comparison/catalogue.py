@@ -26,10 +26,10 @@ from multiscale.comparison.configuration import (
     scaled,
 )
 from multiscale.costs.prediction import predicted_cost
-from multiscale.machine.rates import Machine
+from multiscale.costs.work import Machine
 from multiscale.resolution.problem_setup import make_setup
 from multiscale.scene.scene import Scene
-from multiscale.setup.checks import EMBEDDED_CELLS, patch_grid
+from multiscale.setup.checks import LAW_BLOCK_CELLS, patch_grid
 from multiscale.setup.surface import make_surface
 
 SMALL_SLOPES = ", small slopes"
@@ -239,7 +239,7 @@ class _Catalogue:
     def _cells(self) -> tuple[int, int, int]:
         """Elements of a block whose mesh carries the laws."""
         stated = self._scene.block.cells
-        return stated if isinstance(stated, tuple) else EMBEDDED_CELLS
+        return stated if isinstance(stated, tuple) else LAW_BLOCK_CELLS
 
     @property
     def _patch_grids(self) -> list[Grid]:

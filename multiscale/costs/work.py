@@ -1,48 +1,85 @@
-"""Counts of the kinds of work that a run consists of, and the time that they take on a machine."""
+"""Work, in seconds on the machine where it was measured, and how much slower this machine is."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, cached_property
 
-from multiscale.machine.rates import Machine
+import numpy as np
+from scipy import fft
+from scipy.sparse import csr_array
+
+_TRANSFORM, _PRODUCT = 0.51e-3, 2.8e-3
+"""Times of the two benchmarks on one core of an Intel Xeon (Rocket Lake, 3 GHz), on which all work
+was measured [s]."""
+_LEAST_TIME, _LEAST_REPETITIONS = 0.04, 3
+"""Time [s] and repetitions that a benchmark takes at least."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Work:
-    """How much of each kind of work there is; the names are those of the rates of `Machine`.
+    """Time that something takes on one core of the machine where work was measured.
 
     Attributes:
-        call: Small calls into numpy: interpreted work, whatever the sizes.
-        passes: Additions in long arrays.
-        transform: N log2 N of real transforms of N points.
-        function: Logarithms.
-        flop: Operations of dense or sparse factorisations.
-        product: Entries of sparse matrices that vectors are multiplied with.
+        arrays: Time of numpy: transforms, dense matrices and interpreted calls [s].
+        sparse: Time of products with sparse matrices, which the memory's speed limits [s].
     """
 
-    call: float = 0.0
-    passes: float = 0.0
-    transform: float = 0.0
-    function: float = 0.0
-    flop: float = 0.0
-    product: float = 0.0
+    arrays: float = 0.0
+    sparse: float = 0.0
 
     def __add__(self, other: Work) -> Work:
-        return Work(**{kind: count + other._counts[kind] for kind, count in self._counts.items()})
+        return Work(arrays=self.arrays + other.arrays, sparse=self.sparse + other.sparse)
 
     def __mul__(self, times: float) -> Work:
-        return Work(**{kind: count * times for kind, count in self._counts.items()})
+        return Work(arrays=times * self.arrays, sparse=times * self.sparse)
 
     __rmul__ = __mul__
 
-    def seconds(self, machine: Machine) -> float:
-        """Return the time it takes [s]; rates of work that does not occur are not measured.
 
-        Args:
-            machine: How fast each kind of work is.
-        """
-        return sum(count * getattr(machine, kind) for kind, count in self._counts.items() if count)
+class Machine:
+    """How many times longer work takes here than on the machine where it was measured.
 
-    @property
-    def _counts(self) -> dict[str, float]:
-        return {field.name: getattr(self, field.name) for field in fields(self)}
+    Both ratios are measured when they are first needed and then kept. Each takes a tenth of a
+    second. The shortest of several repetitions counts, so that other programs hardly matter.
+    """
+
+    @cached_property
+    def arrays(self) -> float:
+        """Ratio for numpy, from a real transform of 384 × 384 points."""
+        points: np.ndarray = np.ones((384, 384))
+        return _shortest(lambda: fft.rfft2(points)) / _TRANSFORM
+
+    @cached_property
+    def sparse(self) -> float:
+        """Ratio for sparse products, from a matrix of 2.4 million entries times a vector."""
+        order, bands = 60_000, 40
+        starts = np.arange(0, (order + 1) * bands, bands)
+        columns = np.clip(np.arange(order)[:, None] + np.arange(bands), 0, order - 1).ravel()
+        matrix = csr_array((np.ones(columns.size), columns, starts), shape=(order, order))
+        vector = np.ones(order)
+        return _shortest(lambda: matrix @ vector) / _PRODUCT
+
+    def seconds(self, work: Work) -> float:
+        """Return the time that work takes here [s]; only ratios that it needs are measured."""
+        arrays = work.arrays * self.arrays if work.arrays else 0.0
+        return arrays + (work.sparse * self.sparse if work.sparse else 0.0)
+
+
+@cache
+def this_machine() -> Machine:
+    """Return the machine that runs this process, whose ratios are measured once."""
+    return Machine()
+
+
+def _shortest(work: Callable[[], object]) -> float:
+    """Return the shortest time of repeated work [s]; the first time is not counted."""
+    work()
+    times: list[float] = []
+    while len(times) < _LEAST_REPETITIONS or sum(times) < _LEAST_TIME:
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return min(times)

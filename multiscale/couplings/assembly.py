@@ -40,7 +40,7 @@ def make_table(setup: ProblemSetup, model: MicroModel, comm: Any) -> LawTable:
         Collective.
     """
     kind = setup.scene.coupling.kind
-    if not setup.by_laws:
+    if not setup.uses_laws:
         raise InputError(
             "has no laws",
             key="coupling.kind",
@@ -67,7 +67,7 @@ def make_table(setup: ProblemSetup, model: MicroModel, comm: Any) -> LawTable:
         model,
         setup.patches,
         mean_heights=setup.mean_heights,
-        closure_ends=setup.closure_ends,
+        closure_ends=setup.largest_closures,
         love=setup.scene.coupling.love,
         tolerance=setup.table_tolerance,
         most_rows=setup.table_rows,

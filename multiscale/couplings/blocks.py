@@ -53,7 +53,7 @@ def contact_model(setup: ProblemSetup, comm: Any) -> MicroModel:
         Collective.
     """
     model = setup.model
-    embedded = setup.embedded and setup.scene.coupling.kind != "isolated"
+    embedded = setup.has_block and setup.scene.coupling.kind != "isolated"
     if isinstance(model, HalfSpaceModel):
         order = SLOPES if setup.finite_slopes else 0
         return on_body(setup, comm, half_space=not embedded)(model, order)
@@ -152,7 +152,7 @@ def free_sides(setup: ProblemSetup) -> FreeSides | None:
 
 def _block_sides(setup: ProblemSetup) -> FreeSides | None:
     """Return the free sides of a scene's block that end its interface; None without them."""
-    if not setup.embedded or setup.scene.block.sides != "free" or setup.shape.margin:
+    if not setup.has_block or setup.scene.block.sides != "free" or setup.shape.margin:
         return None
     return FreeSides(
         lengths=setup.surface.lengths,

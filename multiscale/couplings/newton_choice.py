@@ -40,7 +40,7 @@ def full_cycles(setup: ProblemSetup, steps: int) -> int:
         setup: The scene's ingredients.
         steps: Load steps.
     """
-    return steps * min(max(setup.reached_patches, 1), MOST_CYCLES_PER_STEP)
+    return steps * min(max(setup.interfering_patches, 1), MOST_CYCLES_PER_STEP)
 
 
 def newton_choice(setup: ProblemSetup, table: LawTable | None = None) -> NewtonChoice:
@@ -71,7 +71,7 @@ def newton_choice(setup: ProblemSetup, table: LawTable | None = None) -> NewtonC
     compliance = CYCLES_PER_PATCH * patches
     full = full_cycles(setup, steps)
     fewer = "fewer" if compliance < full else "more"
-    unless = "" if compliance < full or table or setup.by_summits else _UNLESS
+    unless = "" if compliance < full or table or setup.uses_summits else _UNLESS
     return NewtonChoice(
         condensed=compliance < full,
         why=(

@@ -15,7 +15,7 @@ from typing import Any
 
 from multiscale.doctor.finding import Finding
 from multiscale.machine.mpi_job import detached_processes
-from multiscale.machine.nodes import group_memory
+from multiscale.machine.nodes import control_group_memory
 
 _LAUNCHERS = {"Open MPI": "Open MPI", "HYDRA": "MPICH", "MPICH": "MPICH", "Intel": "Intel MPI"}
 
@@ -158,7 +158,7 @@ def _free_bytes() -> float:
     lines = Path("/proc/meminfo").read_text(encoding="utf-8").splitlines()
     fields = {name: rest.split()[0] for name, _, rest in (line.partition(":") for line in lines)}
     free = 1024.0 * float(fields["MemAvailable"])
-    return min([free, *(limit - used for limit, used in group_memory())])
+    return min([free, *(limit - used for limit, used in control_group_memory())])
 
 
 def _gathered(comm: Any, value: Any) -> list[Any]:

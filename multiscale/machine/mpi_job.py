@@ -1,4 +1,4 @@
-"""The MPI job of this process, and whether it came together as its launcher meant it."""
+"""The MPI job of this process, and whether its launcher started it as one job."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from geometry.errors import InputError
 _LEAST_DATA = 0.5e9
 """Address space that a small run takes beside the program: 64 × 64 heights do with 0.3 GB [B]."""
 
-# what launchers tell every process of the number of processes: Open MPI's mpirun; Hydra (MPICH,
-# Intel MPI) and others that speak PMI; Hydra, of one node; Slurm's srun, inside which the others
-# may have been started: the first that is set counts
 _SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS")
+"""Variables by which launchers tell processes how many they are. The first that is set counts.
+They belong to Open MPI's mpirun; to Hydra (MPICH, Intel MPI) and others that use PMI; to Hydra on
+one node; to Slurm's srun, inside which the others may have been started."""
 
 
-def petsc_leaves_signals() -> None:
-    """Keep PETSc from taking SIGHUP, and without Open MPI SIGTERM, from who watches for them.
+def keep_petsc_from_signals() -> None:
+    """Keep PETSc from handling SIGHUP and SIGTERM, which end a run in time.
 
-    Its handlers end the process with exit code 59. It must be told before it starts.
+    Its handlers would end the process with exit code 59. Call this before PETSc is imported.
     """
     option, given = "-no_signal_handler", os.environ.get("PETSC_OPTIONS", "")
     if option not in given.split():
@@ -32,10 +32,10 @@ def petsc_leaves_signals() -> None:
 
 
 def check_address_space() -> None:
-    """Refuse to start where MPI or the matrix products would not find room for themselves.
+    """Refuse to start where the address space is too small for MPI and matrix products.
 
-    OpenBLAS asks for its buffers at its first product, and for ever where the system has none: let
-    it have them before data fill the address space.
+    OpenBLAS allocates its buffers at the first product, and waits for ever where there is no memory
+    left. A product here makes it allocate them before data fill the address space.
 
     Raises:
         InputError: When the limit of the address space is too low.
@@ -72,10 +72,10 @@ def world() -> Any:
     return MPI.COMM_WORLD if MPI.COMM_WORLD.size > 1 else None
 
 
-def for_large(comm: Any) -> Any:
-    """Return a communicator for what may be larger than MPI can count, 2 GB in one message.
+def large_object_comm(comm: Any) -> Any:
+    """Return a communicator for pickled objects that may exceed the 2 GB of an MPI message.
 
-    Large arrays travel beside the pickle, so that neither end holds them twice; small messages
+    Large arrays are sent beside the pickle, so that neither end holds them twice. Small objects
     take longer than through the communicator itself.
 
     Args:
@@ -89,23 +89,24 @@ def for_large(comm: Any) -> Any:
 
 
 def detached_processes() -> tuple[str, int] | None:
-    """Tell whether a launcher started several processes that do not know of each other.
+    """Find out whether a launcher started several processes that are no MPI job.
 
     Returns:
-        The variable by which the launcher says so, and how many they are; None when all is well.
+        The launcher's variable with the number of processes, and this number; None for an MPI job
+        or a process on its own.
     """
     if world() is not None:
         return None
-    told = ((name, os.environ.get(name, "")) for name in _SIZES)
-    name, count = next(((name, int(text)) for name, text in told if text.isdigit()), ("", 1))
+    values = ((name, os.environ.get(name, "")) for name in _SIZES)
+    name, count = next(((name, int(text)) for name, text in values if text.isdigit()), ("", 1))
     return (name, count) if count > 1 else None
 
 
 def refuse_detached_processes() -> None:
-    """Refuse to compute what every other process of this start computes as well.
+    """Refuse several processes that are no MPI job, each of which would compute the whole scene.
 
     Raises:
-        InputError: When the launcher is not the one of the MPI that mpi4py was built with.
+        InputError: When the launcher is not that of the MPI that mpi4py was built with.
     """
     found = detached_processes()
     if found is None:

@@ -12,8 +12,8 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from typing import Any
 
-from multiscale.costs.prediction import peak_memory
 from multiscale.couplings.reference import ReferenceCoupling
+from multiscale.machine.nodes import peak_memory
 from multiscale.run import Run
 from multiscale.setup.problem import ProblemSetup
 
@@ -47,8 +47,8 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
             "heights_sha256": run.heights,
             "highest_mm": setup.surface.highest,
             "summits": setup.asperities.count,
-            "summits_in_reach": int(setup.reached.sum()),
-            "border_maxima_in_reach": setup.reached_at_border,
+            "summits_in_reach": int(setup.interfering_summits.sum()),
+            "border_maxima_in_reach": setup.interfering_border_maxima,
         },
         "micro_model": _micro_model(setup),
         "ranks": 1 if run.comm is None else run.comm.size,

@@ -1,80 +1,161 @@
-"""States what the block of a run is made of, before anything expensive starts."""
+"""Says what the block or the meshes of a run are, whether they fit its patches and the memory."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
-from geometry.meshes.block import alignment
+from geometry.meshes.block import BlockShape, alignment
+from multiscale.machine.nodes import ClusterNodes
+from multiscale.setup.checks import memory_requests
 from multiscale.setup.problem import ProblemSetup
+from multiscale.setup.reference_meshes import ReferenceMeshes, reference_requests
 
-STIFF_FROM = 0.45
+LOCKING_FROM = 0.45
 """Poisson's ratio above which linear elements lock. Two by two patches on 8 × 8 × 6 trilinear
-cells are 1.6 % too stiff there, 6 % at 0.49 and 57 % at 0.4999; as many nodes of quadratic ones
-0.5, 1.1 and 1.5 %."""
-
-
-_BODY_TERM = (
-    "decomposed: the half-space's own near field, and what the finite block adds to it in smooth "
-    "modes of its contact face, from finite elements of high order"
-)
+cells are 1.6 % too stiff there, 6 % at 0.49 and 57 % at 0.4999. As many nodes of quadratic cells
+are 0.5, 1.1 and 1.5 % too stiff."""
+LEAST_ACROSS = {1: 12.0, 2: 3.0}
+"""Edges across a typical contact below which the force is wrong by several per cent, by the
+element's degree."""
+LEAST_CELLS_PER_PATCH = 4
+"""Linear cells along a patch below which the block is too stiff under a patch's pressure."""
 
 
 def block_statement(setup: ProblemSetup) -> str:
-    """Say what the block is made of, and at what price."""
-    text = _BODY_TERM if setup.scene.coupling.decomposed else _elements(setup)
-    return f"{text}, {_size(setup)}, contact modulus {setup.model.contact_modulus:.6g} MPa"
+    """Say what the block is made of.
 
-
-def _size(setup: ProblemSetup) -> str:
-    """Say how large the block is, and what its sides do."""
-    (lx, ly), height = setup.surface.lengths, setup.shape.height
-    return f"{lx:g} × {ly:g} mm and {height:g} mm high, {setup.scene.block.sides} sides"
+    Args:
+        setup: The problem, with a block.
+    """
+    if setup.meshes is not None:
+        return f"{_meshes(setup.meshes)}; {setup.scene.block.sides} sides"
+    (lx, ly), shape = setup.surface.lengths, setup.shape
+    text = (
+        "decomposed: the half-space's own near field, and what the finite block adds to it in "
+        "smooth modes of its contact face, from finite elements of high order"
+    )
+    if not setup.scene.coupling.decomposed:
+        split = "" if shape.hexahedral else " split into tetrahedra"
+        margin = f", {shape.margin:g} mm beyond it in {shape.margin_cells} cells"
+        text = (
+            f"finite elements under the patches, {_times(shape.cells)} hexahedra{split} "
+            f"({shape.element}) under the interface, grading {shape.grading:g}"
+            f"{margin if shape.margin else ''}"
+        )
+    return (
+        f"{text}, {lx:g} × {ly:g} mm and {shape.height:g} mm high, "
+        f"{setup.scene.block.sides} sides, contact modulus {setup.model.contact_modulus:.6g} MPa"
+    )
 
 
 def block_warnings(setup: ProblemSetup) -> Iterator[str]:
-    """Yield what a user should know about the block's cells."""
-    if not setup.scene.coupling.decomposed:
-        yield from _element_warnings(setup)
-
-
-def _elements(setup: ProblemSetup) -> str:
-    shape = setup.shape
-    margin = (
-        f", {shape.margin:g} mm beyond it in {shape.margin_cells} cells" if shape.margin else ""
-    )
-    kind = "hexahedra" if shape.hexahedral else "hexahedra split into tetrahedra"
-    return (
-        f"finite elements under the patches, {_times(shape.cells)} {kind} ({shape.element}) under "
-        f"the interface, grading {shape.grading:g}{margin}"
-    )
-
-
-def _element_warnings(setup: ProblemSetup) -> Iterator[str]:
-    cells = min(c / n for c, n in zip(setup.shape.cells[:2], setup.patches.grid, strict=True))
-    if cells * setup.shape.degree < 4:
-        yield (
-            f"{cells:.3g} cells along a patch: fewer than four linear (two quadratic) ones make "
-            "the block stiffer by several per cent under a patch's pressure; refine block.cells"
-        )
-    yield from locking(setup.shape.degree, setup.scene.block.poisson_ratio)
-    fit = alignment(setup.shape, setup.patches)
-    if not fit:
-        yield fit.sentence
-
-
-def locking(degree: int, poisson_ratio: float) -> Iterator[str]:
-    """Yield a warning where elements are much too stiff for a nearly incompressible block.
+    """Yield what a user should know about the cells of the block.
 
     Args:
-        degree: Polynomial degree of the elements.
-        poisson_ratio: Of the block.
+        setup: The problem, with a block.
     """
-    if degree == 1 and poisson_ratio > STIFF_FROM:
+    yield from _patch_warnings(setup)
+    if setup.meshes is not None:
+        yield from _mesh_warnings(setup.meshes)
+    elif setup.scene.coupling.decomposed:
+        return
+    else:
+        counts = zip(setup.shape.cells[:2], setup.patches.grid, strict=True)
+        cells = min(cells / patches for cells, patches in counts)
+        if cells * setup.shape.degree < LEAST_CELLS_PER_PATCH:
+            yield (
+                f"{cells:.3g} cells along a patch: fewer than four linear (two quadratic) ones "
+                "make the block stiffer by several per cent under a patch's pressure; refine "
+                "block.cells"
+            )
+    mesh, poisson_ratio = setup.meshes or setup.shape, setup.scene.block.poisson_ratio
+    if mesh.degree == 1 and poisson_ratio > LOCKING_FROM:
         yield (
             f"linear elements lock as Poisson's ratio comes near 0.5 (here {poisson_ratio:g}): the "
             "block is too stiff by several per cent or more; take block.element = 'Q2' or 'P2', or "
             "coupling.compliance = 'decomposed', whose elements are of high order"
         )
+    if setup.meshes is None:
+        fit = alignment(setup.shape, setup.patches)
+        if not fit:
+            yield fit.sentence
+
+
+def memory_warnings(setup: ProblemSetup, nodes: ClusterNodes) -> Iterator[str]:
+    """Yield what a run needs more memory for than the nodes have.
+
+    Args:
+        setup: The problem.
+        nodes: The nodes there are.
+    """
+    requests = [*memory_requests(setup.scene)]
+    if setup.meshes is not None:
+        requests += reference_requests(setup.scene, setup.meshes)
+    for request in requests:
+        if not nodes.fits(request):
+            key = "" if request.value is None else f"{request.key} = {request.value}: "
+            yield f"{key}{request.sentence}; there is {nodes.remedy(request)}"
+
+
+def _patch_warnings(setup: ProblemSetup) -> Iterator[str]:
+    if setup.scene.coupling.kind != "isolated":
+        return
+    grids = zip(setup.surface.grid, setup.patches.grid, strict=True)
+    if setup.model.name == "islands" and any(cells % patches for cells, patches in grids):
+        yield (
+            "patch borders cut cells of the surface: every patch is taken alone along whole cells; "
+            "a grid that is a multiple of the patches would fit"
+        )
+    widths = [length + 2.0 * setup.shape.margin for length in setup.surface.lengths]
+    if max(setup.patches.size) > 0.5 * min(setup.shape.height, *widths):
+        yield (
+            "the patches are not small against the block: the half-space correction (Love) inside "
+            "their laws is an approximation there"
+        )
+
+
+def _meshes(meshes: ReferenceMeshes) -> str:
+    finest = meshes.shapes[-1]
+    if isinstance(finest, BlockShape):
+        kind = f"{_times(finest.cells)} hexahedra ({finest.element}), grading {finest.grading:g}"
+        where, unknowns = "edges", [f"{count}" for count in meshes.unknowns]
+    else:  # unknowns are an estimate, which is worth two digits
+        kind = f"tetrahedra ({finest.element}), small only where contact can occur"
+        where = "edges there"
+        unknowns = [f"about {int(float(f'{count:.2g}'))}" for count in meshes.unknowns]
+    count = {1: "one mesh", 2: "two meshes", 3: "three meshes"}[len(meshes.shapes)]
+    return (
+        f"{count} of {kind}; {where} of {_listed(f'{1e3 * size:.3g}' for size in meshes.sizes)} "
+        f"µm, {meshes.across:.2g} across a typical contact; {_listed(unknowns)} unknowns, about "
+        f"{meshes.bytes / 1e9:.2g} GB of memory"
+    )
+
+
+def _mesh_warnings(meshes: ReferenceMeshes) -> Iterator[str]:
+    finest = meshes.shapes[-1]
+    if len(meshes.shapes) == 1:
+        yield (
+            "one mesh: the discretisation error stays unknown, and the results have no error bar; "
+            "reference.meshes = 2 gives one"
+        )
+    if meshes.across < LEAST_ACROSS[meshes.degree]:
+        yield (
+            f"{meshes.across:.2g} edges across a typical contact at the largest load: the force is "
+            f"wrong by several per cent; refine {meshes.key}"
+        )
+    if isinstance(finest, BlockShape):
+        top = float(finest.ticks[2][-1] - finest.ticks[2][-2])
+        if top > 2.0 * float(meshes.sizes[-1]):
+            yield (
+                f"the top layer is {1e3 * top:.3g} µm high, more than twice the width of its "
+                "cells, which see the contacts no better than cubes would: take more layers, or a "
+                "larger block.grading"
+            )
+
+
+def _listed(parts: Iterable[str]) -> str:
+    *first, last = parts
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def _times(cells: tuple[int, ...]) -> str:

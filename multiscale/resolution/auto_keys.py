@@ -1,7 +1,8 @@
-"""Keys of a scene that are left to the plan: which they are, and what they became."""
+"""Auto values of a scene: which keys have one, what to start from, and what they became."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -9,46 +10,41 @@ from pydantic import ValidationError
 
 from geometry.surface import Surface
 from micro import HalfSpaceModel
-from multiscale.scene.scene import Scene
+from multiscale.scene.scene import Scene, SpectrumSection
 from multiscale.scene.sections import CouplingSection, ReferenceSection
 from multiscale.setup.checks import PROVISIONAL_PATCHES
 from multiscale.setup.problem import ProblemSetup
 
 DEFAULT_ACCURACY = 0.02
 """Relative error of the force that is kept unless the scene says."""
-
 PATCHES_ACROSS = 8
 """Patches along the shorter side, enough for a map."""
-
+LEAST_HEIGHTS, MOST_HEIGHTS = 32, 2048
+"""Heights along a side of grids that are chosen."""
 REFERENCE = "reference"
-"""Section that is settled as a whole beside an accuracy."""
+"""Section that is resolved as a whole beside an accuracy."""
+
+_KEYS = ("surface.grid", "micro.model", "coupling.kind", "patches.grid", "block.cells")
 
 
 def auto_keys(scene: Scene) -> frozenset[str]:
-    """Return the keys that are left to the plan: ``"auto"``, or not stated beside an accuracy.
+    """Return the keys with auto values: ``"auto"``, or not stated beside an accuracy.
 
     The block's cells are one of them only under laws on its mesh.
 
     Args:
         scene: The scene as it was given.
     """
-    free = set()
-    for name, key in (
-        ("surface", "grid"),
-        ("micro", "model"),
-        ("coupling", "kind"),
-        ("patches", "grid"),
-        ("block", "cells"),
-    ):
+    found = set()
+    for key in _KEYS:
+        name, _, field = key.partition(".")
         section = getattr(scene, name)
-        unstated = scene.accuracy is not None and key not in section.model_fields_set
-        if name == "micro":  # its other keys are about a model that they want stated
+        unstated = scene.accuracy is not None and field not in section.model_fields_set
+        if name == "micro":  # its other keys belong to a model that is stated
             unstated = unstated and not section.model_fields_set
-        if getattr(section, key) == "auto" or (unstated and name != "surface"):
-            free.add(f"{name}.{key}")
-    if not scene.coupling.on_mesh:
-        free.discard("block.cells")
-    return frozenset(free)
+        if getattr(section, field) == "auto" or (unstated and name != "surface"):
+            found.add(key)
+    return frozenset(found if scene.coupling.on_mesh else found - {"block.cells"})
 
 
 def accuracy_of(scene: Scene) -> float:
@@ -61,49 +57,63 @@ def accuracy_of(scene: Scene) -> float:
 
 
 def is_measured(scene: Scene) -> bool:
-    """Tell whether errors are measured before the run, to choose what a scene leaves open.
+    """Tell whether errors are measured before the run to resolve auto values.
 
-    Without an accuracy, a micro model alone that is left open is chosen by its own error
-    (`micro.choose`).
+    Without an accuracy, a micro model that is the only auto value besides patches and cells is
+    chosen by its own error, see `micro.choose`.
 
     Args:
         scene: The scene as it was given.
     """
-    free = auto_keys(scene)
-    if scene.accuracy is None and free <= {"micro.model", "patches.grid", "block.cells"}:
-        return False
-    fine = scene.coupling.kind == "reference" and scene.accuracy is not None
-    return bool(free & {"surface.grid", "micro.model", "coupling.kind"}) or fine
+    auto = auto_keys(scene)
+    if scene.accuracy is None:
+        return not auto <= {"micro.model", "patches.grid", "block.cells"}
+    return bool(auto & {"surface.grid", "micro.model", "coupling.kind"}) or (
+        scene.coupling.kind == "reference"
+    )
 
 
-def provisional(scene: Scene, free: frozenset[str]) -> Scene:
-    """Return a scene whose open keys, but for the surface's grid, have values to start from.
+def provisional(scene: Scene, auto: frozenset[str]) -> Scene:
+    """Return a scene with values to start from for its auto keys, but for the surface's grid.
 
     Args:
         scene: The scene as it was given.
-        free: Its open keys.
+        auto: Its auto keys.
     """
-    changes: dict[str, Any] = {}
-    if "micro.model" in free:
-        measured = is_measured(scene) and scene.micro.tolerance is None
-        model = "half-space" if measured else "auto"
-        changes["micro"] = scene.micro.model_copy(update={"model": model})
-    if "coupling.kind" in free:
-        changes["coupling"] = next(couplings(scene))
-    if "block.cells" in free:
-        changes["block"] = scene.block.model_copy(update={"cells": None})
-    if "patches.grid" in free:
-        changes["patches"] = scene.patches.model_copy(update={"grid": PROVISIONAL_PATCHES})
-    return scene.model_copy(update=changes)
+    measured = is_measured(scene) and scene.micro.tolerance is None
+    start: dict[str, Any] = {
+        "micro.model": "half-space" if measured else "auto",
+        "block.cells": None,
+        "patches.grid": PROVISIONAL_PATCHES,
+    }
+    changed = scene
+    for key in auto & set(start):
+        changed = with_value(changed, key, start[key])
+    if "coupling.kind" in auto:
+        changed = changed.model_copy(update={"coupling": next(couplings(scene))})
+    return changed
+
+
+def with_value(scene: Scene, key: str, value: Any) -> Scene:
+    """Return a scene with another value of a key, which is not checked.
+
+    Args:
+        scene: The scene.
+        key: Section and name, such as ``"patches.grid"``.
+        value: The value.
+    """
+    name, _, field = key.partition(".")
+    section = getattr(scene, name).model_copy(update={field: value})
+    return scene.model_copy(update={name: section})
 
 
 def resolved_keys(setup: ProblemSetup, given: Scene) -> dict[str, Any]:
-    """Return what the open keys of a scene became, so that a run goes on as it began.
+    """Return what the auto values of a scene became, so that a run goes on as it began.
 
-    Rates of the machine decide near ties, and another session may run on another machine.
+    The speed of the machine decides near ties, and another session may run on another machine.
 
     Args:
-        setup: The ingredients.
+        setup: The problem.
         given: The scene as it was given.
 
     Returns:
@@ -111,60 +121,55 @@ def resolved_keys(setup: ProblemSetup, given: Scene) -> dict[str, Any]:
         a half-space; of coupling and reference the whole section.
     """
     found: dict[str, Any] = {}
-    scene = setup.scene
     for key in sorted(auto_keys(given)):
-        section, _, name = key.partition(".")
+        name, _, field = key.partition(".")
+        section = getattr(setup.scene, name)
         if key == "coupling.kind":
-            found[key] = scene.coupling.model_dump(mode="json", exclude_unset=True)
-        elif key == "micro.model":
-            found[key] = _settled_model(setup)
+            found[key] = section.model_dump(mode="json", exclude_unset=True)
+        elif key != "micro.model":
+            found[key] = getattr(section, field)
+        elif setup.choice is not None:
+            found[key] = setup.choice.taken.label
         else:
-            found[key] = getattr(getattr(scene, section), name)
+            cells = setup.micro.surface.grid if isinstance(setup.micro, HalfSpaceModel) else None
+            found[key] = cells and list(cells)
     if is_measured(given):
-        found[REFERENCE] = scene.reference.model_dump(mode="json", exclude_unset=True)
+        found[REFERENCE] = setup.scene.reference.model_dump(mode="json", exclude_unset=True)
     return found
 
 
-def _settled_model(setup: ProblemSetup) -> Any:
-    if setup.choice is not None:
-        return setup.choice.taken.label
-    return list(setup.micro.surface.grid) if isinstance(setup.micro, HalfSpaceModel) else None
-
-
-def with_resolved(scene: Scene, settled: Mapping[str, Any]) -> Scene:
-    """Return a scene whose open keys, but for the micro model's cells, are what they became.
+def with_resolved(scene: Scene, resolved: Mapping[str, Any]) -> Scene:
+    """Return a scene whose auto values are what they became, but for the micro model's cells.
 
     Args:
         scene: The scene as it was given.
-        settled: What `resolved_keys` returned.
+        resolved: What `resolved_keys` returned.
     """
-    changes: dict[str, Any] = {}
-    for key in auto_keys(scene) & set(settled):
-        section, _, name = key.partition(".")
-        value = settled[key]
+    changed = scene
+    for key in auto_keys(scene) & set(resolved):
+        value = resolved[key]
         if key == "coupling.kind":
-            changes[section] = CouplingSection.model_validate(value)
-            continue
-        if key == "micro.model":
-            if not isinstance(value, list):
-                continue
-            value = "half-space"
-        value = tuple(value) if isinstance(value, list) else value
-        changes[section] = getattr(scene, section).model_copy(update={name: value})
-    if REFERENCE in settled:
-        changes[REFERENCE] = ReferenceSection.model_validate(settled[REFERENCE])
-    return scene.model_copy(update=changes)
+            coupling = CouplingSection.model_validate(value)
+            changed = changed.model_copy(update={"coupling": coupling})
+        elif key != "micro.model":
+            changed = with_value(changed, key, tuple(value) if isinstance(value, list) else value)
+        elif isinstance(value, list):
+            changed = with_value(changed, key, "half-space")
+    if REFERENCE in resolved:
+        reference = ReferenceSection.model_validate(resolved[REFERENCE])
+        changed = changed.model_copy(update={REFERENCE: reference})
+    return changed
 
 
 def couplings(scene: Scene) -> Iterator[CouplingSection]:
-    """Yield the couplings without meshed roughness that go with what a scene states.
+    """Yield the couplings that may be chosen beside what a scene states of its coupling.
 
-    Isolated laws are never offered.
+    They are concurrent and consistent; neither isolated laws nor meshed roughness are among them.
 
     Args:
         scene: The scene as it was given.
     """
-    stated = scene.coupling.model_dump(exclude_unset=True) | {"kind": "auto"}
+    stated = scene.coupling.model_dump(exclude_unset=True)
     for kind in ("concurrent", "consistent"):
         try:
             yield CouplingSection.model_validate(stated | {"kind": kind})
@@ -184,3 +189,39 @@ def map_grid(surface: Surface) -> tuple[int, int]:
         for length, most in zip(surface.lengths, surface.grid, strict=True)
     )
     return x, y
+
+
+def heights_per_wave(
+    spectrum: SpectrumSection, grid: tuple[int, int], lengths: tuple[float, float]
+) -> float:
+    """Return the heights along the shortest wavelength of a spectrum.
+
+    Args:
+        spectrum: The spectrum.
+        grid: Heights in x and y.
+        lengths: Sides of the surface [mm].
+    """
+    waves = _most_waves(spectrum, lengths)
+    return min(n / most for n, most in zip(grid, waves, strict=True))
+
+
+def on_waves(scene: Scene, count: int) -> Scene:
+    """Return a scene on a grid with so many heights along the shortest wavelength.
+
+    Args:
+        scene: The scene, of a spectrum.
+        count: Heights along the wavelength.
+    """
+    section = scene.surface
+    if section.spectrum is None or section.lengths is None:  # refused when the scene was read
+        return scene
+    waves = _most_waves(section.spectrum, section.lengths)
+    grid = tuple(min(max(8 * math.ceil(count * k / 8), LEAST_HEIGHTS), MOST_HEIGHTS) for k in waves)
+    return with_value(scene, "surface.grid", grid)
+
+
+def _most_waves(spectrum: SpectrumSection, lengths: tuple[float, float]) -> list[float]:
+    """Return the largest number of waves along each side."""
+    if spectrum.waves is not None:  # counted along x
+        return [spectrum.waves[1], spectrum.waves[1] * lengths[1] / lengths[0]]
+    return [band[1] for band in (spectrum.waves_x, spectrum.waves_y) if band]

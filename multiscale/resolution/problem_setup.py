@@ -1,4 +1,4 @@
-"""Turns a scene into its ingredients, and settles what it leaves open."""
+"""Sets up the problem of a scene and resolves its auto values."""
 
 from __future__ import annotations
 
@@ -8,13 +8,26 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from geometry.asperities import Asperities, find_asperities
+import numpy as np
+
+from geometry.asperities import find_asperities
 from geometry.errors import InputError
+from geometry.materials import Material
 from geometry.patches import PatchGrid, patch_means
+from geometry.rigid_plane import RigidPlane
 from geometry.surface import Surface
-from micro import HalfSpaceModel, MicroModel, resampled
+from micro import (
+    Choice,
+    HalfSpaceModel,
+    MicroModel,
+    choose,
+    micro_model,
+    resampled,
+)
+from multiscale.couplings.load_steps import ContactCoupling
+from multiscale.loading.stepper import Coupling, LoadHistory, load_steps
 from multiscale.machine.nodes import ClusterNodes
-from multiscale.resolution.accuracy import accurate_stage
+from multiscale.resolution.accuracy import setup_by_accuracy
 from multiscale.resolution.auto_keys import (
     accuracy_of,
     auto_keys,
@@ -22,96 +35,90 @@ from multiscale.resolution.auto_keys import (
     map_grid,
     provisional,
     with_resolved,
+    with_value,
 )
-from multiscale.resolution.micro_model import (
-    chosen_model,
-    estimated_plane,
-    find_plane_at_largest_load,
-    stated_model,
-)
+from multiscale.resolution.mesh_accuracy import MeshError, measured_mesh_error
 from multiscale.scene.scene import Scene
-from multiscale.setup.checks import check_load, check_patches, check_size, patch_grid
+from multiscale.setup.checks import check_load, check_memory, check_patches, patch_grid
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import reference_meshes
 from multiscale.setup.surface import make_shape, make_surface
 
+_ESTIMATE_CELLS = 96
+"""Cells along a side, at most, of the half-space that estimates the plane at the largest load."""
+SOLUTIONS_OF_LAWS = 40
+"""Approaches that a table of laws takes, roughly, for the cost of a micro model."""
+
 
 def make_setup(
-    scene: Scene, settled: Mapping[str, Any] | None = None, nodes: ClusterNodes | None = None
+    scene: Scene,
+    resolved: Mapping[str, Any] | None = None,
+    nodes: ClusterNodes | None = None,
+    *,
+    mesh_error: MeshError = measured_mesh_error,
 ) -> ProblemSetup:
-    """Make or read the surface, find its summits, settle what is open, check that all fits.
+    """Set up the problem of a scene: make the surface, resolve auto values, check that all fits.
 
     Args:
         scene: The scene.
-        settled: What open keys became when the run began; see `resolved_keys`.
+        resolved: What auto values became when the run began; see `resolved_keys`.
         nodes: The nodes of the run; None for this process alone.
+        mesh_error: Measures the relative error of a reference's meshes at the largest load.
 
     Raises:
         InputError: When something cannot be made or does not fit; names file, key and value.
+        NotConverged: When a contact problem cannot be solved.
     """
-    began, nodes = time.perf_counter(), nodes or ClusterNodes()
-    known = settled or {}
-    free = auto_keys(scene) - set(known)
-    start = provisional(with_resolved(scene, known), free)
-    if free and is_measured(scene) and not known:
-        setup = accurate_stage(scene, start, lambda stated: _stage(stated, nodes))
-        return replace(setup, seconds={"surface": 0.0, "choice": time.perf_counter() - began})
-    if "patches.grid" in free:
-        section = start.patches.model_copy(update={"grid": map_grid(make_surface(start))})
-        start = start.model_copy(update={"patches": section})
-    return _stage(start, nodes, known.get("micro.model"))
+    began, nodes, known = time.perf_counter(), nodes or ClusterNodes(), resolved or {}
+    auto = auto_keys(scene) - set(known)
+    start = provisional(with_resolved(scene, known), auto)
+    if auto and is_measured(scene) and not known:
+        found = setup_by_accuracy(scene, start, lambda stated: _setup(stated, nodes), mesh_error)
+        return replace(found, seconds={"surface": 0.0, "choice": time.perf_counter() - began})
+    if "patches.grid" in auto:
+        start = with_value(start, "patches.grid", map_grid(make_surface(start)))
+    return _setup(start, nodes, known.get("micro.model"))
 
 
-def _stage(scene: Scene, nodes: ClusterNodes, known: Any = None) -> ProblemSetup:
-    """Return the ingredients of a scene of which the micro model alone may be open.
+def _setup(scene: Scene, nodes: ClusterNodes, known: Any = None) -> ProblemSetup:
+    """Set up the problem of a scene of which the micro model alone may have an auto value.
 
     Args:
         scene: The scene.
         nodes: The nodes of the run.
-        known: What became of the micro model when the run began: a label, or cells; None when
-            that is not known.
-
-    Raises:
-        InputError: When something cannot be made or does not fit; names file, key and value.
+        known: What the micro model became when the run began, a label or cells; None when that is
+            not known.
     """
     began = time.perf_counter()
-    check_size(scene, nodes)
+    check_memory(scene, nodes)
     surface = make_surface(scene)
     check_patches(scene, surface)
     check_load(scene, surface)
     patches = PatchGrid(grid=patch_grid(scene), lengths=surface.lengths)
-    asperities = find_asperities(surface, periodic=False)  # the block's sides are free
+    given: dict[str, Any] = {
+        "scene": scene,
+        "surface": surface,
+        "asperities": find_asperities(surface, periodic=False),  # the block's sides are free
+        "patches": patches,
+        "mean_heights": patch_means(surface, patches),
+        "shape": make_shape(scene, surface),
+    }
+    made = time.perf_counter()
+    seconds = {"surface": made - began}
     if scene.coupling.kind == "reference":
-        return _reference_stage(scene, surface, patches, asperities, nodes, began)
-    seconds, choice = {"surface": time.perf_counter() - began}, None
+        plane = _estimated_plane(scene, surface)
+        meshes = reference_meshes(scene, surface, plane, nodes)
+        return ProblemSetup(
+            **given, micro=None, plane_at_largest_load=plane, meshes=meshes, seconds=seconds
+        )
+    choice = None
     if scene.micro.model == "auto":
-        made = time.perf_counter()
-        tolerance = scene.micro.tolerance or accuracy_of(scene)
-        choice = chosen_model(scene, surface, patches, tolerance, known)
+        choice = _chosen_model(scene, surface, patches, known)
         seconds["micro choice"] = time.perf_counter() - made
     model = choice.model if choice else stated_model(scene, surface)
     if isinstance(known, list) and isinstance(model, HalfSpaceModel):
         cells = resampled(surface, (int(known[0]), int(known[1])))
         model = replace(model, surface=cells, highest=surface.highest)
-    _check_summits(scene, model)
-    mean_heights = patch_means(surface, patches)
-    return ProblemSetup(
-        scene=scene,
-        surface=surface,
-        asperities=asperities,
-        micro=model,
-        patches=patches,
-        mean_heights=mean_heights,
-        shape=make_shape(scene, surface),
-        plane_at_largest_load=find_plane_at_largest_load(
-            scene.loading.load_history, model, patches, mean_heights
-        ),
-        choice=choice,
-        seconds=seconds,
-    )
-
-
-def _check_summits(scene: Scene, model: MicroModel) -> None:
     if not math.isfinite(model.first_touch):
         raise InputError(
             "the surface has no summit that could carry load",
@@ -120,27 +127,80 @@ def _check_summits(scene: Scene, model: MicroModel) -> None:
             allowed="half-space, islands",
             file=scene.file,
         )
-
-
-def _reference_stage(
-    scene: Scene,
-    surface: Surface,
-    patches: PatchGrid,
-    asperities: Asperities,
-    nodes: ClusterNodes,
-    began: float,
-) -> ProblemSetup:
-    """Return the ingredients of a reference, which needs no micro model."""
-    plane_at_largest_load = estimated_plane(scene, surface)
+    coupling = ContactCoupling(model, patches, given["mean_heights"])
+    plane = plane_at_largest_load(scene.loading.load_history, coupling, surface)
     return ProblemSetup(
-        scene=scene,
-        surface=surface,
-        asperities=asperities,
-        micro=None,
-        patches=patches,
-        mean_heights=patch_means(surface, patches),
-        shape=make_shape(scene, surface),
-        plane_at_largest_load=plane_at_largest_load,
-        meshes=reference_meshes(scene, surface, plane_at_largest_load, nodes),
-        seconds={"surface": time.perf_counter() - began},
+        **given, micro=model, plane_at_largest_load=plane, choice=choice, seconds=seconds
     )
+
+
+def stated_model(scene: Scene, surface: Surface) -> MicroModel:
+    """Return the micro model that a scene names.
+
+    Args:
+        scene: The scene.
+        surface: Its surface.
+    """
+    return micro_model(
+        scene.micro.model,
+        surface,
+        contact_modulus=_modulus(scene),
+        solver=scene.micro.solver,
+        curvature=scene.micro.curvature,
+        border=scene.micro.border,
+    )
+
+
+def plane_at_largest_load(
+    load_history: LoadHistory, coupling: Coupling, surface: Surface
+) -> RigidPlane:
+    """Return the rigid plane at the largest load.
+
+    Args:
+        load_history: The loads.
+        coupling: Finds the plane where the force or the moment is prescribed.
+        surface: The surface.
+
+    Raises:
+        NotConverged: When the plane is not found in smaller steps either.
+    """
+    if load_history.quantity == "approach" and load_history.tilt is not None:
+        return RigidPlane.above(surface, load_history.largest, load_history.tilt)
+    largest = replace(load_history, points=(load_history.largest,), steps=1, force_change=None)
+    (step,) = load_steps(coupling, largest)
+    return RigidPlane.above(surface, step.approach_mm, step.tilt)
+
+
+def _estimated_plane(scene: Scene, surface: Surface) -> RigidPlane:
+    """Return the rigid plane at the largest load on a half-space of few cells."""
+    x, y = surface.grid
+    cells = resampled(surface, (min(x, _ESTIMATE_CELLS), min(y, _ESTIMATE_CELLS)))
+    model = HalfSpaceModel(surface=cells, contact_modulus=_modulus(scene), highest=surface.highest)
+    whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
+    coupling = ContactCoupling(model, whole, patch_means(surface, whole))
+    return plane_at_largest_load(scene.loading.load_history, coupling, surface)
+
+
+def _chosen_model(scene: Scene, surface: Surface, patches: PatchGrid, label: str | None) -> Choice:
+    """Choose the micro model for the largest approach anywhere, or take the one of a label."""
+    kind, plane = scene.coupling.kind, _estimated_plane(scene, surface)
+    solutions = scene.loading.load_history.count
+    if kind in ("isolated", "consistent"):
+        solutions = SOLUTIONS_OF_LAWS
+    # a tilted plane comes nearest at a corner of the surface
+    tilted = 0.5 * float(np.abs(np.multiply(surface.lengths, plane.tilt)).sum())
+    return choose(
+        surface,
+        contact_modulus=_modulus(scene),
+        approach=plane.approach + tilted,
+        tolerance=scene.micro.tolerance or accuracy_of(scene),
+        patches=patches if kind != "analytic" else None,
+        solutions=solutions,
+        label=label,
+    )
+
+
+def _modulus(scene: Scene) -> float:
+    block = scene.block
+    material = Material(young_modulus=block.young_modulus, poisson_ratio=block.poisson_ratio)
+    return material.contact_modulus

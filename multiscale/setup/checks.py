@@ -1,9 +1,10 @@
-"""Refuses scenes that could never fit, before anything is made; settles the block's cells."""
+"""Refuses scenes that could never fit: too much memory, too many patches, too large loads."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
 from geometry.errors import InputError
 from geometry.files import BYTES_PER_HEIGHT
@@ -13,40 +14,31 @@ from multiscale.scene.scene import Scene
 
 BYTES_PER_CELL = 5000
 """Memory that mesh, stiffness and multigrid take per cell, roughly, over all ranks [B]."""
-
 BYTES_PER_SENT_HEIGHT = 17
 """Memory of a height and its spline on every rank, once the surface is made [B]."""
-
 BYTES_PER_PAIR = 40
-"""Memory that dense matrices take per pair of patches: compliance, tangent, factors [B]."""
+"""Memory of dense matrices per pair of patches: compliance, tangent and factors [B]."""
+BYTES_PER_LAW, BYTES_PER_NEW_LAW = 3_600, 11_400
+"""Memory of a law with 65 rows of 7 numbers on every rank, and of what it takes besides where it
+is made, while rows are inserted [B]."""
+BYTES_PER_STATE, BYTES_PER_STEP = 24, 1000
+"""Memory of a patch's results and of the other results of a load step [B]."""
 
-BYTES_PER_LAW = 3_600
-"""Memory of a law with 65 rows of 7 numbers on every rank [B]."""
-
-BYTES_PER_NEW_LAW = 11_400
-"""Memory that it takes besides where it is made, while rows are put between others [B]."""
-
-BYTES_PER_STATE = 24
-"""Memory of what a patch carries at one load step [B]."""
-
-EMBEDDED_CELLS = (40, 40, 25)
-"""Cells of a block that carries the laws itself: those of Waddad et al. 2016."""
-
-FIELD_CELLS = (20, 20, 12)
-"""Cells of a block that is meshed for its fields alone, after the load."""
-
+LAW_BLOCK_CELLS, FIELD_CELLS = (40, 40, 25), (20, 20, 12)
+"""Cells of a block that carries laws on its mesh, those of Waddad et al. 2016, and of one that is
+meshed after the load for its fields alone."""
 PROVISIONAL_PATCHES = (4, 4)
-"""Patches of a scene that leaves them open, until they are chosen."""
+"""Patches that stand for ``"auto"`` until they are chosen."""
 
 
 def block_cells(scene: Scene) -> tuple[int, int, int]:
-    """Return the cells of the flat block's mesh: those asked for, or as many as its part needs.
+    """Return the cells of the flat block's mesh: those of the scene, or as many as its use needs.
 
-    Laws need it fine under every patch; fields do not.
+    Laws need a fine mesh under every patch; fields do not.
     """
     cells = scene.block.cells
     if cells is None or cells == "auto":
-        return EMBEDDED_CELLS if scene.coupling.on_mesh else FIELD_CELLS
+        return LAW_BLOCK_CELLS if scene.coupling.on_mesh else FIELD_CELLS
     return cells
 
 
@@ -58,71 +50,79 @@ def meshes_block(scene: Scene) -> bool:
 
 
 def patch_grid(scene: Scene) -> tuple[int, int]:
-    """Return the patches along x and y: those asked for, or what stands for them until chosen."""
+    """Return the patches along x and y, or what stands for ``"auto"`` until they are chosen."""
     grid = scene.patches.grid
     return PROVISIONAL_PATCHES if grid == "auto" else grid
 
 
-def check_size(scene: Scene, nodes: ClusterNodes) -> None:
-    """Refuse what could never fit into the memory of the nodes, before anything is allocated.
-
-    Keys that are left to the plan are passed over: it takes nothing that would be refused.
+def check_memory(
+    scene: Scene, nodes: ClusterNodes, requests: Iterable[MemoryRequest] | None = None
+) -> None:
+    """Refuse what does not fit into the memory of the nodes, before it is allocated.
 
     Args:
         scene: The scene.
         nodes: The nodes of the run.
+        requests: The memory that is needed; by default `memory_requests` of the scene.
 
     Raises:
         InputError: Names the key, its value and what is allowed.
     """
-    for key, value, what, need in needs(scene):
-        if not nodes.fit(need):
+    for request in memory_requests(scene) if requests is None else requests:
+        if not nodes.fits(request):
+            value, other = request.value, request.alternative
             raise InputError(
-                f"{what}needs about {need.alone / 1e9:.3g} GB of memory",
-                key=key,
+                request.sentence,
+                key=request.key,
                 value=list(value) if isinstance(value, tuple) else value,
-                allowed=f"what fits into {nodes.room(need)}",
+                allowed=f"what fits into {nodes.remedy(request)}{'; or ' * bool(other)}{other}",
                 file=scene.file,
             )
 
 
-def needs(scene: Scene) -> Iterator[tuple[str, object, str, MemoryRequest]]:
-    """Yield keys, their values, what of them takes memory, and how much.
+def memory_requests(scene: Scene) -> Iterator[MemoryRequest]:
+    """Yield the memory that a scene needs, key by key.
+
+    Auto values are left out: none is chosen that would not fit. A reference requests the memory of
+    its meshes itself.
 
     Args:
         scene: The scene.
     """
-    grid, patches = scene.surface.grid, scene.patches.grid
+
+    def request(key: str, value: Any, purpose: str = "", **sizes: Any) -> MemoryRequest:
+        return MemoryRequest(key=key, value=value, purpose=purpose, **sizes)
+
+    grid, patches, kind = scene.surface.grid, scene.patches.grid, scene.coupling.kind
     if isinstance(grid, tuple):
-        kept = math.prod(grid) * BYTES_PER_SENT_HEIGHT
-        made = math.prod(grid) * BYTES_PER_HEIGHT - kept
-        yield "surface.grid", grid, "", MemoryRequest(held=kept, once=made)
-    if meshes_block(scene):  # a reference checks its meshes itself
+        sent = math.prod(grid) * BYTES_PER_SENT_HEIGHT
+        made = math.prod(grid) * BYTES_PER_HEIGHT - sent
+        yield request("surface.grid", grid, per_rank=sent, root_only=made)
+    if meshes_block(scene):
         nx, ny, nz = block_cells(scene)
-        yield "block.cells", (nx, ny, nz), "", MemoryRequest(shared=nx * ny * nz * BYTES_PER_CELL)
+        yield request("block.cells", (nx, ny, nz), shared=nx * ny * nz * BYTES_PER_CELL)
         if scene.block.margin:
-            more = 2 * scene.block.margin_cells
-            need = MemoryRequest(shared=(nx + more) * (ny + more) * nz * BYTES_PER_CELL)
-            yield "block.margin_cells", scene.block.margin_cells, "", need
+            margin = scene.block.margin_cells
+            cells = (nx + 2 * margin) * (ny + 2 * margin) * nz
+            yield request("block.margin_cells", margin, shared=cells * BYTES_PER_CELL)
     if not isinstance(patches, tuple):
         return
-    count, steps = math.prod(patches), scene.loading.steps * len(scene.loading.load_history.points)
-    yield "patches.grid", patches, "", MemoryRequest(held=count * BYTES_PER_HEIGHT)
-    if scene.coupling.kind not in ("analytic", "reference"):
-        what = "the interaction of all patches with each other "
-        yield "patches.grid", patches, what, MemoryRequest(held=count**2 * BYTES_PER_PAIR)
-    if scene.coupling.kind in ("isolated", "consistent"):
-        law, new = count * BYTES_PER_LAW, count * BYTES_PER_NEW_LAW
-        dealt = scene.coupling.kind == "isolated"  # to the ranks; else all are made by rank 0
-        need = MemoryRequest(held=law, shared=new) if dealt else MemoryRequest(held=law, once=new)
-        yield "patches.grid", patches, "a law for every patch ", need
-    what = f"the history of {count} patches "
-    need = MemoryRequest(held=steps * (count * BYTES_PER_STATE + 1000))
-    yield "load.steps", scene.loading.steps, what, need
+    key, count = "patches.grid", math.prod(patches)
+    yield request(key, patches, per_rank=count * BYTES_PER_HEIGHT)
+    if kind not in ("analytic", "reference"):
+        purpose = "the interaction of all patches with each other"
+        yield request(key, patches, purpose, per_rank=count**2 * BYTES_PER_PAIR)
+    if kind in ("isolated", "consistent"):  # isolated laws are divided over the ranks
+        where = "shared" if kind == "isolated" else "root_only"
+        sizes = {"per_rank": count * BYTES_PER_LAW, where: count * BYTES_PER_NEW_LAW}
+        yield request(key, patches, "a law for every patch", **sizes)
+    steps, purpose = scene.loading.load_history.count, f"the history of {count} patches"
+    size = steps * (count * BYTES_PER_STATE + BYTES_PER_STEP)
+    yield request("load.steps", scene.loading.steps, purpose, per_rank=size)
 
 
 def check_patches(scene: Scene, surface: Surface) -> None:
-    """Refuse patches that no element or no height can resolve."""
+    """Refuse more patches than heights of the surface or cells of the interface."""
     limits: list[tuple[str, Sequence[int]]] = [("heights of the surface", surface.grid)]
     if meshes_block(scene):
         limits.append(("cells of the interface (block.cells)", block_cells(scene)[:2]))
@@ -143,12 +143,12 @@ def check_load(scene: Scene, surface: Surface) -> None:
     if scene.coupling.kind == "analytic":
         return
     block, loading = scene.block, scene.loading
-    most, named, unit = block.height_under(surface.lengths), "the block's height", "mm"
     if loading.force is not None:
+        key, points = "load.force", loading.force
         most, named, unit = block.young_modulus * surface.area, "E times area", "N"
-    key, points = "load.force", loading.force
-    if points is None:
+    else:
         key, points = "load.approach", loading.approach or ()
+        most, named, unit = block.height_under(surface.lengths), "the block's height", "mm"
     if max(points) > most:
         raise InputError(
             "presses the block to nothing",

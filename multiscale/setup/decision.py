@@ -1,4 +1,4 @@
-"""What was taken for the keys that a scene leaves open, and why."""
+"""What was taken for the auto values of a scene, and why."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ class Alternative:
     """A way to compute a scene.
 
     Attributes:
-        label: The coupling, and what it works on.
+        label: The coupling, and the cells, meshes or micro model that it works on.
         seconds: Predicted time of the run [s].
     """
 
@@ -29,12 +29,12 @@ class Decision:
     """What was taken, the errors that were measured for it, and what else there was.
 
     Attributes:
-        accuracy: Relative error of the force that was asked for.
+        accuracy: Relative error of the force that was requested.
         taken: What was taken.
         errors: Measured errors of the force by cause, relative to it, at the load where they are
             worst; empty where they cannot be measured beforehand.
         others: What was predicted to take longer, or could not keep the accuracy.
-        missed: Errors by cause of what was tried first and could not keep it, if anything.
+        missed: Errors by cause of what was tried first and could not keep the accuracy, if any.
     """
 
     accuracy: float
@@ -45,28 +45,30 @@ class Decision:
 
     @property
     def error(self) -> float:
-        """Measured relative error of the force; 0 where it was not."""
+        """Measured relative error of the force; 0 where it was not measured."""
         return sum(self.errors.values())
 
     @property
     def kept(self) -> bool:
-        """Whether what was measured is within the accuracy."""
+        """Whether the measured error is within the accuracy."""
         return bool(self.errors) and self.error <= self.accuracy
 
     @property
     def sentence(self) -> str:
         """What was taken, what was measured for it, and what else there was."""
-        asked = f"an accuracy of {100 * self.accuracy:.3g} % is asked for"
-        parts = [self.taken.text, f"{asked}, {_told(self.errors)}"]
+        parts = [
+            self.taken.text,
+            f"an accuracy of {100 * self.accuracy:.3g} % is asked for, {_listed(self.errors)}",
+        ]
         if self.missed:
-            parts.append(f"without meshing the roughness {_told(self.missed)}")
+            parts.append(f"without meshing the roughness {_listed(self.missed)}")
         if self.others:
             parts.append(f"instead, {'; '.join(each.text for each in self.others)}")
         return "; ".join(parts)
 
     @property
     def warning(self) -> str | None:
-        """Say that the accuracy is not kept; None where it is, or is not known beforehand."""
+        """A warning that the accuracy is not kept; None where it is, or is not known beforehand."""
         if self.kept or not self.errors:
             return None
         largest = max(self.errors, key=lambda cause: self.errors[cause])
@@ -76,7 +78,7 @@ class Decision:
         )
 
 
-def _told(errors: Mapping[str, float]) -> str:
+def _listed(errors: Mapping[str, float]) -> str:
     if not errors:
         return "which is not measured beforehand"
     causes = ", ".join(f"{cause} {100 * error:.2g} %" for cause, error in errors.items())

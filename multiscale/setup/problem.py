@@ -1,4 +1,4 @@
-"""A scene's cheap ingredients: surface, summits, patches, micro model, block shape."""
+"""The problem set up from a scene: surface, patches, micro model and shape of the block."""
 
 from __future__ import annotations
 
@@ -17,34 +17,37 @@ from geometry.surface import Surface
 from micro import AsperityModel, Choice, HalfSpaceModel, MicroModel, ScaledModel
 from multiscale.laws.refinement import MOST_ROWS
 from multiscale.scene.scene import Scene
-from multiscale.setup.contact_estimate import largest_local_approach
 from multiscale.setup.decision import Decision
 from multiscale.setup.reference_meshes import ReferenceMeshes
 
 Array = NDArray[np.float64]
 
 CLOSURE_RESERVE = 0.15
-"""Closure beyond the largest approach that laws are made for, relative to the deepest overlap."""
+"""Closure that laws are made for beyond the largest approach, relative to the largest interference.
+The surface of a bent block may rise between the loads of its patches."""
+TABLE_TOLERANCE = {"cells": 5e-4, "summits": 1e-4}
+"""Interpolation error of laws by default. Finer tables would trace the steps of single cells."""
+TABLE_ROWS = {"cells": MOST_ROWS, "summits": 400}
+"""Most rows of laws. Each row costs a solution, which is dear on cells."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ProblemSetup:
-    """Everything that is known before laws and finite elements are made.
+    """Everything that is known of a scene before laws and finite elements are made.
 
     Attributes:
-        scene: The scene, what it left open settled but for ``micro.model``.
+        scene: The scene with its auto values resolved, but for ``micro.model``.
         surface: Its rough surface.
         asperities: The surface's summits.
         micro: Micro model of the whole surface; None in a reference, which has none.
         patches: Partition of the interface.
         mean_heights: Mean height of each patch, shape (N,) [mm].
-        shape: The block's shape and mesh.
-        plane_at_largest_load: Largest approach at the middle of the interface [mm] and the plane's
-        slopes
-            there; where force or moment are prescribed, those of the surface on a half-space.
-        choice: Why this micro model, where the scene leaves it open.
+        shape: Shape and mesh of the block.
+        plane_at_largest_load: The rigid plane at the largest load. Where the force or the moment is
+            prescribed, it is the plane in equilibrium on a half-space.
+        choice: Why this micro model was chosen, where the scene says ``auto``.
         meshes: The meshes of a reference; None with other couplings.
-        decision: Why this coupling, these patches and cells, where the scene leaves them open.
+        decision: Why the auto values became what they are, where measured errors decided.
         seconds: Wall time of making the surface and of choosing the micro model [s].
     """
 
@@ -55,7 +58,7 @@ class ProblemSetup:
     patches: PatchGrid
     mean_heights: Array
     shape: BlockShape
-    plane_at_largest_load: tuple[float, tuple[float, float]]
+    plane_at_largest_load: RigidPlane
     choice: Choice | None = None
     meshes: ReferenceMeshes | None = None
     decision: Decision | None = None
@@ -73,113 +76,109 @@ class ProblemSetup:
         return self.micro
 
     @property
-    def embedded(self) -> bool:
-        """Whether a block takes part."""
+    def has_block(self) -> bool:
+        """Whether the surface is on a block instead of a half-space."""
         return self.scene.coupling.kind != "analytic"
 
     @property
-    def by_laws(self) -> bool:
-        """Whether the patches get laws."""
+    def uses_laws(self) -> bool:
+        """Whether the load steps use patch laws."""
         return self.scene.coupling.kind in ("isolated", "consistent")
 
     @property
     def finite_slopes(self) -> bool:
-        """Whether the micro model sees that slopes are finite."""
+        """Whether the micro model takes finite slopes into account."""
         stated = self.scene.micro.finite_slopes
         able = self.scene.coupling.kind != "isolated" and isinstance(self.micro, HalfSpaceModel)
         return able if stated is None else stated and able
 
     @property
-    def by_summits(self) -> bool:
-        """Whether the micro model sees summits rather than the whole surface."""
+    def uses_summits(self) -> bool:
+        """Whether the micro model knows the summits alone and not the whole surface."""
         return isinstance(self.micro, AsperityModel | ScaledModel)
 
     @property
     def ignores_border(self) -> bool:
-        """Whether maxima on the surface's border carry no load in the micro model."""
-        model = self.micro
-        return self.by_summits and not (
-            isinstance(model, ScaledModel) and model.border == "include"
-        )
+        """Whether maxima on the border of the surface carry no load in the micro model."""
+        includes = isinstance(self.micro, ScaledModel) and self.micro.border == "include"
+        return self.uses_summits and not includes
 
     @property
     def table_tolerance(self) -> float:
-        """Interpolation error that laws are tabulated to.
-
-        By default 1e-4, and 5e-4 for models that see cells, whose steps finer tables would trace.
-        """
-        return self.scene.coupling.table_tolerance or (1e-4 if self.by_summits else 5e-4)
+        """Interpolation error that laws are tabulated to."""
+        return self.scene.coupling.table_tolerance or TABLE_TOLERANCE[self._seen]
 
     @property
     def table_rows(self) -> int:
-        """Rows that laws may take to get there; models that see cells pay for each."""
-        return 400 if self.by_summits else MOST_ROWS
+        """Most rows of a table of laws."""
+        return TABLE_ROWS[self._seen]
 
     @property
-    def largest_local_approach(self) -> float:
-        """How near the plane at the largest load comes anywhere [mm]."""
-        return largest_local_approach(self.plane_at_largest_load, self.surface)
+    def _seen(self) -> str:
+        return "summits" if self.uses_summits else "cells"
+
+    def interference(self, x: Array, y: Array, z: Array) -> Array:
+        """Return how far points lie above the undeformed plane at the largest load [mm].
+
+        Args:
+            x: First coordinate of the points [mm].
+            y: Second coordinate [mm].
+            z: Height [mm].
+        """
+        return self.plane_at_largest_load.at(x, y) - (self.surface.highest - z)
+
+    @property
+    def cell_interference(self) -> Array:
+        """Interference of the heights of the surface, shape (nx, ny) [mm]."""
+        surface = self.surface
+        return self.interference(surface.x[:, None], surface.y, surface.heights)
 
     @cached_property
     def largest_interference(self) -> float:
-        """Deepest overlap of plane and undeformed surface at the largest load [mm].
+        """Largest interference of the surface [mm], never less than the approach at the middle.
 
-        A level plane overlaps by its approach; the approach at the middle of a tilted one may be
-        negative though its lower side touches.
+        Under a tilted plane the approach at the middle may be negative while its lower side
+        touches.
         """
-        overlap = self._overlap(*self._cells)
-        return max(self.plane_at_largest_load[0], float(overlap.max()))
+        return max(self.plane_at_largest_load.approach, float(self.cell_interference.max()))
 
     @property
-    def closure_ends(self) -> Array:
-        """Largest closure that each patch's law is made for, shape (N,) [mm].
-
-        It is the largest approach there, and a reserve: the surface of a bent block may rise
-        between its loads, and a free plane may turn further than on a half-space. Laws that hold
-        at points see the approach at the patch's corners; so does a level patch alone that has to
-        carry a force, for under the tilted plane its contacts may lie at a corner.
-        """
-        approach, tilt = self.plane_at_largest_load
-        ends = RigidPlane.above(self.patches, approach, tilt).means(self.patches)
-        coupling, loading = self.scene.coupling, self.scene.loading
-        alone_by_force = coupling.kind == "isolated" and loading.force is not None
-        if coupling.interface == "pointwise" or alone_by_force:
-            ends = ends + 0.5 * float(np.abs(np.multiply(self.patches.size, tilt)).sum())
-        if loading.tilt == "free":
-            ends = ends + (ends.max() - approach)
-        return ends + CLOSURE_RESERVE * self.largest_interference
+    def interfering_summits(self) -> NDArray[np.bool_]:
+        """Which summits have a positive interference, shape (n,)."""
+        summits = self.asperities
+        return self.interference(summits.x, summits.y, summits.z) > 0.0
 
     @property
-    def reached(self) -> NDArray[np.bool_]:
-        """Which summits lie within the largest approach, shape (n,)."""
-        return self._overlap(self.asperities.x, self.asperities.y, self.asperities.z) > 0.0
-
-    @property
-    def reached_at_border(self) -> int:
-        """Number of the border's maxima within the largest approach."""
+    def interfering_border_maxima(self) -> int:
+        """Number of maxima on the border of the surface with a positive interference."""
         cut = self.asperities
-        return int(np.sum(self._overlap(cut.border_x, cut.border_y, cut.border_z) > 0.0))
+        return int(np.sum(self.interference(cut.border_x, cut.border_y, cut.border_z) > 0.0))
 
     @property
-    def reached_cells(self) -> NDArray[np.bool_]:
-        """Which cells of the surface lie within the largest approach, shape (nx ny,)."""
-        return self._overlap(*self._cells) > 0.0
-
-    @property
-    def reached_patches(self) -> int:
-        """Number of patches with anything that the largest closure of their laws can touch."""
-        summits = self.asperities.x, self.asperities.y, self.asperities.z
-        x, y, z = summits if self.ignores_border else self._cells
+    def interfering_patches(self) -> int:
+        """Number of patches that the largest closures of their laws bring into contact."""
+        if self.ignores_border:
+            x, y, z = self.asperities.x, self.asperities.y, self.asperities.z
+        else:
+            grid = np.meshgrid(self.surface.x, self.surface.y, indexing="ij")
+            x, y, z = (part.ravel() for part in (*grid, self.surface.heights))
         owner = self.patches.index_of(x, y)
-        return int(np.unique(owner[self.closure_ends[owner] > self.surface.highest - z]).size)
+        closes = self.largest_closures[owner] > self.surface.highest - z
+        return int(np.unique(owner[closes]).size)
 
     @property
-    def _cells(self) -> tuple[Array, Array, Array]:
-        x, y = np.meshgrid(self.surface.x, self.surface.y, indexing="ij")
-        return x.ravel(), y.ravel(), self.surface.heights.ravel()
+    def largest_closures(self) -> Array:
+        """Largest closure that the law of each patch is made for, shape (N,) [mm].
 
-    def _overlap(self, x: Array, y: Array, z: Array) -> Array:
-        """Return how far the plane at the largest load lies below points of the surface [mm]."""
-        approach, tilt = self.plane_at_largest_load
-        from_centre = np.column_stack((x, y)) - 0.5 * np.asarray(self.surface.lengths)
-        return np.asarray(approach + from_centre @ np.asarray(tilt) - (self.surface.highest - z))
+        It is the largest mean approach of the patch and `CLOSURE_RESERVE`. Laws that hold at points
+        need the approach at the corners of the patch. So do isolated laws under a force, whose
+        contacts may lie at a corner. A free plane may tilt further than on a half-space.
+        """
+        plane, loading = self.plane_at_largest_load, self.scene.loading
+        ends = plane.means(self.patches)
+        isolated_force = self.scene.coupling.kind == "isolated" and loading.force is not None
+        if self.scene.coupling.interface == "pointwise" or isolated_force:
+            ends = ends + 0.5 * float(np.abs(np.multiply(self.patches.size, plane.tilt)).sum())
+        if loading.tilt == "free":
+            ends = ends + (ends.max() - plane.approach)
+        return ends + CLOSURE_RESERVE * self.largest_interference

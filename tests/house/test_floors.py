@@ -51,7 +51,7 @@ FLOORS = {
         "results scene",
         "setup",
         "couplings",
-        "costs errors",
+        "costs measured_errors",
         "resolution",
         "planning run",
         "output restart",

@@ -7,7 +7,7 @@ from pathlib import Path
 from mpi4py import MPI
 
 from multiscale import Run, Scene
-from multiscale.machine.nodes import nodes_of
+from multiscale.machine.nodes import cluster_nodes
 
 COMM = MPI.COMM_WORLD
 PAPER = Path(__file__).parents[2] / "demos" / "scenes" / "paper.toml"
@@ -31,7 +31,7 @@ if __name__ == "__main__":
         setup.asperities.count,
         setup.model.contact_modulus.hex(),
     )
-    nodes = nodes_of(COMM)
+    nodes = cluster_nodes(COMM)
     everywhere = COMM.gather(told)
     if COMM.rank == 0:
         print(*sorted(set(everywhere)), parts(setup), nodes.ranks, sep="\n")

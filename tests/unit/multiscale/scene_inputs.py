@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from geometry.errors import InputError, NotConverged
-from multiscale.planning.forecast import forecast
+from multiscale.costs.prediction import predicted_cost
 from multiscale.planning.plan import statements, warnings
 from multiscale.resolution.problem_setup import make_setup
 from multiscale.run import run
@@ -232,7 +232,7 @@ def planned(path, overrides=()):
         if takes_long(scene):
             return "not tried"
         setup = make_setup(scene)
-        made = forecast(setup)
+        made = predicted_cost(setup)
         told = [*(text for _, text in statements(setup, made)), *warnings(setup)]
         assert all(np.isfinite(part) for part in (made.total, made.memory)), told
     except InputError as error:

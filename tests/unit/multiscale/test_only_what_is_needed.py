@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +15,9 @@ from geometry import Asperities, PatchGrid
 from micro import HalfSpaceModel, asperity_model
 from multiscale import Run, Scene, make_setup
 from multiscale.cli.command_line import main
+from multiscale.costs.prediction import predicted_cost
+from multiscale.costs.work import Machine, Work, this_machine
 from multiscale.output.results import write_results
-from multiscale.planning.forecast import forecast
 
 FINITE_ELEMENTS = ("dolfinx", "petsc4py", "macro", "gmsh")
 PICTURES = ("matplotlib",)
@@ -84,49 +84,25 @@ def test_only_the_force_curve(monkeypatch, tmp_path):
     assert "output" not in run.seconds  # no figure was drawn
 
 
-@pytest.fixture
-def presses(monkeypatch):
-    """Cells of every grid that the half-space is solved on."""
-    made: list[int] = []
-    state = HalfSpaceModel._state
-
-    def counted(self, plane, found):
-        made.append(self.surface.heights.size)
-        return state(self, plane, found)
-
-    monkeypatch.setattr(HalfSpaceModel, "_state", counted)
-    return made
-
-
 @pytest.mark.parametrize("kind", ["analytic", "isolated", "consistent", "concurrent"])
-def test_a_plan_solves_nothing_of_the_scene(monkeypatch, presses, kind):
+def test_a_plan_solves_nothing_of_the_scene(monkeypatch, kind):
+    for solution in ("solve", "solve_force", "equilibrium", "respond", "press"):
+        monkeypatch.setattr(HalfSpaceModel, solution, never)
     monkeypatch.setattr("multiscale.couplings.blocks.embedding", never)
     monkeypatch.setattr("multiscale.couplings.body_terms.Body.face", never)
     monkeypatch.setattr("multiscale.couplings.blocks.on_body", never)
     monkeypatch.setattr("multiscale.couplings.assembly.make_table", never)
     given = data(kind, grid=128)
     setup = make_setup(Scene.from_dict(given))
-    made = forecast(setup)
-    assert made.total > 0.0
-    assert presses == []
+    assert predicted_cost(setup).total > 0.0
 
 
-def test_patches_out_of_reach_build_no_law(monkeypatch):
+def test_patches_out_of_reach_build_no_law():
     given = data("isolated", patches={"grid": [4, 4]}, load={"approach": 0.003, "steps": 1})
     run = Run(Scene.from_dict(given))
-    reached = run.setup.reached_patches
+    reached = run.setup.interfering_patches
     assert 0 < reached < 16
-    solved = set()
-    state = HalfSpaceModel._state
-
-    def counted(self, plane, found):
-        solved.add(self.surface.heights.tobytes())
-        return state(self, plane, found)
-
-    monkeypatch.setattr(HalfSpaceModel, "_state", counted)
-    laws = run.make_laws().laws
-    assert len(solved) == reached
-    assert sum(law.pressure.size > 0 for law in laws) == reached
+    assert sum(law.pressure.size > 0 for law in run.make_laws().laws) == reached
 
 
 def summits(below: int) -> Asperities:
@@ -164,15 +140,15 @@ def test_summits_out_of_reach_cost_nothing(monkeypatch):
     assert evaluations(monkeypatch, 40) == alone
 
 
-def test_a_scene_without_open_keys_weighs_no_alternatives(monkeypatch):
-    monkeypatch.setattr("multiscale.resolution.accuracy.predicted_cost", never)
-    monkeypatch.setattr("multiscale.resolution.problem_setup.accurate_stage", never)
+def test_a_scene_without_auto_values_predicts_no_cost():
+    this_machine.cache_clear()
     setup = make_setup(Scene.from_dict(data("consistent")))
     assert setup.decision is None
+    assert vars(this_machine()) == {}  # whose speed no prediction has asked for
 
 
-def test_a_run_predicts_nothing_and_writes_what_it_took(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr("multiscale.costs.prediction.run_work", never)
+def test_a_run_predicts_nothing_and_writes_what_it_took(tmp_path, capsys):
+    this_machine.cache_clear()
     path = tmp_path / "scene.json.toml"
     path.write_text(
         "[surface]\nspectrum = {hurst = 0.9, waves = [2, 4], rms_slope = 0.1}\n"
@@ -181,16 +157,15 @@ def test_a_run_predicts_nothing_and_writes_what_it_took(monkeypatch, tmp_path, c
         "[load]\napproach = 0.004\nsteps = 2\n[output]\nfigures = false\n"
     )
     assert main(["run", str(path), "--out", str(tmp_path / "results")]) == 0
-    told = capsys.readouterr().out
-    assert "took: surface" in told
-    assert "memory" in told
+    assert vars(this_machine()) == {}
+    printed = capsys.readouterr().out
+    assert "took: surface" in printed
+    assert "memory" in printed
 
 
-def test_rates_are_measured_only_where_they_are_needed():
-    from multiscale.costs.work import Work
-    from multiscale.machine.rates import Machine
-
+def test_ratios_of_a_machine_are_measured_only_where_they_are_needed():
     machine = Machine()
-    assert Work(call=10.0, passes=5.0).seconds(machine) > 0.0
-    assert set(vars(machine)) == {"call", "passes"}
-    assert replace(Work(call=1.0), call=0.0).seconds(Machine()) == 0.0
+    assert machine.seconds(Work()) == 0.0
+    assert vars(machine) == {}
+    assert machine.seconds(Work(arrays=10.0)) > 0.0
+    assert set(vars(machine)) == {"arrays"}

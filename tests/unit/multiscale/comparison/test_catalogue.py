@@ -15,7 +15,7 @@ from multiscale.comparison.error_measures import Curves
 from multiscale.comparison.run_result import RunResult
 from multiscale.resolution.auto_keys import auto_keys
 from multiscale.scene.scene import Scene
-from multiscale.setup.checks import EMBEDDED_CELLS
+from multiscale.setup.checks import LAW_BLOCK_CELLS
 
 COLUMNS = (
     "approach", "force", "area", "separation", "approach_error", "force_error", "area_error",
@@ -154,7 +154,7 @@ def test_scene_that_leaves_all_open_has_configurations_that_stand(tmp_path):
         assert auto_keys(one.scene) <= {"micro.model"}
         assert not auto_keys(one.scene) or one.is_own or one.kind == "reference"
     meshed = [one.scene.block.cells for one in found if "elements" in one.name]
-    assert EMBEDDED_CELLS in meshed  # laws on a mesh are not left with what a smooth rest needs
+    assert LAW_BLOCK_CELLS in meshed  # laws on a mesh are not left with what a smooth rest needs
 
 
 def ended(one, *, finite_slopes=True):

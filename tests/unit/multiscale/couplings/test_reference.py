@@ -305,7 +305,7 @@ REFUSED = {
     "element": (["block.element=P1"], "block.element = 'P1': does not go with a reference of hex"),
     "memory": (
         ["reference.cells=[3000, 3000, 100]"],
-        "reference.cells = (3000, 3000, 100): the reference needs about",
+        "reference.cells = [3000, 3000, 100]: the reference needs about",
     ),
     "meshes": (["reference.meshes=4"], "reference.meshes = 4: must be less than or equal to 3"),
     "unknown": (["reference.methods=penalty"], "unknown key; did you mean 'method'?"),

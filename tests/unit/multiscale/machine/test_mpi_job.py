@@ -12,7 +12,7 @@ PAPER = "demos/scenes/paper.toml"
 
 
 @pytest.mark.parametrize(
-    ("told", "found"),
+    ("variables", "found"),
     [
         ({}, None),
         ({"PMI_SIZE": "1"}, None),
@@ -25,8 +25,8 @@ PAPER = "demos/scenes/paper.toml"
         ({"OMPI_COMM_WORLD_SIZE": "1", "SLURM_STEP_NUM_TASKS": "4"}, None),
     ],
 )
-def test_what_launchers_tell(monkeypatch, told, found):
-    for name, value in told.items():
+def test_variables_of_launchers(monkeypatch, variables, found):
+    for name, value in variables.items():
         monkeypatch.setenv(name, value)
     assert detached_processes() == found
 
@@ -37,13 +37,13 @@ def test_nothing_is_computed_many_times(monkeypatch, tmp_path, capsys, command):
     out = tmp_path / "out"
     words = [] if command == "plan" else ["--out", str(out)]
     assert main([command, PAPER, *words, "--set", "surface.grid=[16, 16]"]) == 2
-    told = capsys.readouterr().err
-    assert "PMI_SIZE = 64: this is one of 64 processes, but each stands alone" in told
-    assert "For 64 independent runs, unset PMI_SIZE" in told
+    printed = capsys.readouterr().err
+    assert "PMI_SIZE = 64: this is one of 64 processes, but each stands alone" in printed
+    assert "For 64 independent runs, unset PMI_SIZE" in printed
     assert not out.exists()
 
 
-def test_one_process_is_no_stranger():
+def test_one_process_is_not_refused():
     refuse_detached_processes()
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PMI_SIZE", "2")
@@ -59,6 +59,6 @@ def test_a_user_without_home_is_told_what_to_set(monkeypatch, capsys):
 
     monkeypatch.setattr(Path, "home", homeless)
     assert main(["plan", PAPER]) == 2
-    told = capsys.readouterr().err
-    assert "HOME: this user has no home folder, and MPI does not start without" in told
-    assert "(allowed: set it to any folder)" in told
+    printed = capsys.readouterr().err
+    assert "HOME: this user has no home folder, and MPI does not start without" in printed
+    assert "(allowed: set it to any folder)" in printed

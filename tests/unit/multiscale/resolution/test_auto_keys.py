@@ -9,6 +9,7 @@ import pytest
 
 from geometry.errors import InputError
 from multiscale import Scene, make_setup
+from multiscale.machine.nodes import ClusterNodes
 from multiscale.planning.plan import statements, warnings
 from multiscale.resolution.auto_keys import auto_keys, couplings, resolved_keys
 
@@ -53,14 +54,14 @@ def test_tighter_accuracies_measure_smaller_errors_on_finer_grids():
         assert not [text for text in warnings(setup) if "accuracy" in text]
 
 
-def test_open_keys_become_values_and_the_plan_says_what_was_measured():
+def test_auto_values_are_resolved_and_the_plan_says_what_was_measured():
     setup = make_setup(scene({"grid": "auto"}, accuracy=0.05, **OPEN))
-    settled = setup.scene
-    assert settled.coupling.kind in ("concurrent", "consistent")
-    assert settled.patches.grid == (8, 8)
-    assert settled.surface.grid == setup.surface.grid == setup.micro.surface.grid
-    assert settled.micro.model == "half-space"
-    assert settled.block.cells == "auto"  # of no mesh
+    resolved = setup.scene
+    assert resolved.coupling.kind in ("concurrent", "consistent")
+    assert resolved.patches.grid == (8, 8)
+    assert resolved.surface.grid == setup.surface.grid == setup.micro.surface.grid
+    assert resolved.micro.model == "half-space"
+    assert resolved.block.cells == "auto"  # of no mesh
     assert set(setup.decision.errors) == {"body", "slopes", "grid"}
     assert setup.decision.error <= setup.decision.accuracy == 0.05
     assert dict(statements(setup))["choice"] == setup.decision.sentence
@@ -121,12 +122,12 @@ def test_cells_are_left_to_the_plan_only_under_laws_on_a_mesh():
     ],
 )
 def test_stated_keys_are_respected(stated):
-    settled = make_setup(scene(accuracy=0.05, **stated)).scene
+    resolved = make_setup(scene(accuracy=0.05, **stated)).scene
     for section, keys in stated.items():
         for key, value in keys.items():
-            found = getattr(getattr(settled, section), key)
+            found = getattr(getattr(resolved, section), key)
             assert list(found) == value if isinstance(value, list) else found == value
-    assert settled.surface.grid == (48, 48)
+    assert resolved.surface.grid == (48, 48)
 
 
 @pytest.mark.parametrize(
@@ -156,9 +157,9 @@ def test_patches_are_nearly_square():
     assert setup.decision is None  # patches gather results, and have no error
 
 
-def test_a_stated_reference_gets_a_grid_and_patches(monkeypatch):
-    monkeypatch.setattr("multiscale.resolution.accuracy._Search._of_meshes", lambda *given: 0.001)
-    setup = make_setup(scene({"grid": "auto"}, accuracy=0.05, coupling={"kind": "reference"}))
+def test_a_stated_reference_gets_a_grid_and_patches():
+    given = scene({"grid": "auto"}, accuracy=0.05, coupling={"kind": "reference"})
+    setup = make_setup(given, mesh_error=lambda setup: 0.001)
     assert setup.surface.grid == (96, 96)  # 16 heights along each of 6 waves
     assert setup.patches.grid == (8, 8)
     assert setup.decision.kept
@@ -172,9 +173,8 @@ def test_models_without_measure_say_so():
     assert dict(statements(setup))["error"].startswith("not known: elliptic")
 
 
-def test_a_reference_is_taken_where_nothing_else_keeps_the_accuracy(monkeypatch):
-    monkeypatch.setattr("multiscale.resolution.accuracy._Search._of_meshes", lambda *given: 0.001)
-    setup = make_setup(scene(accuracy=0.0015))
+def test_a_reference_is_taken_where_nothing_else_keeps_the_accuracy():
+    setup = make_setup(scene(accuracy=0.0015), mesh_error=lambda setup: 0.001)
     assert setup.scene.coupling.kind == "reference"
     assert setup.micro is None
     assert setup.decision.kept
@@ -182,16 +182,15 @@ def test_a_reference_is_taken_where_nothing_else_keeps_the_accuracy(monkeypatch)
     assert "without meshing the roughness measured" in setup.decision.sentence
 
 
-def test_meshes_are_refined_until_their_bar_keeps_the_accuracy(monkeypatch):
-    def error(search, setup):
-        return float((setup.meshes.sizes[-1] / 0.03) ** 3)
+def test_meshes_are_refined_until_their_error_keeps_the_accuracy():
+    def made(accuracy, **reference):
+        given = scene(accuracy=accuracy, coupling={"kind": "reference"}, reference=reference)
+        return make_setup(given, mesh_error=lambda s: (float(s.meshes.sizes[-1]) / 0.03) ** 3)
 
-    monkeypatch.setattr("multiscale.resolution.accuracy._Search._of_meshes", error)
-    coupling = {"kind": "reference"}
-    coarse, fine = (make_setup(scene(accuracy=a, coupling=coupling)) for a in (0.1, 0.01))
+    coarse, fine = made(0.1), made(0.01)
     assert fine.meshes.sizes[-1] < coarse.meshes.sizes[-1]
     assert fine.decision.error <= 0.01
-    stated = make_setup(scene(accuracy=0.01, coupling=coupling, reference={"fine": 0.03}))
+    stated = made(0.01, fine=0.03)
     assert stated.meshes.sizes[-1] == pytest.approx(0.03)
     assert "most of it by mesh" in stated.decision.warning
 
@@ -234,20 +233,14 @@ def test_refuses(wrong, problem):
         ({"source": {"grid": [1_000_000, 1_000_000]}}, r"surface\.grid = \[1000000, 1000000\]"),
     ],
 )  # fmt: skip
-def test_sizes_that_fit_no_memory_are_refused_before_anything_is_made(
-    monkeypatch, sections, problem
-):
-    def never(scene):
-        raise AssertionError("a surface was made")
-
-    monkeypatch.setattr("multiscale.resolution.problem_setup.make_surface", never)
-    pages = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 4_000_000}  # 16 GB
-    monkeypatch.setattr("multiscale.machine.nodes.os.sysconf", pages.__getitem__)
+def test_sizes_that_fit_no_memory_are_refused_before_anything_is_made(sections, problem):
+    source = {"spectrum": None, "file": "nowhere.npy", "grid": None}  # could not be read
+    given = scene(**{"source": source} | sections)
     with pytest.raises(InputError, match=problem):
-        make_setup(scene(**sections))
+        make_setup(given, nodes=ClusterNodes(memory=16e9))
 
 
-def test_open_keys_survive_a_dump_and_are_in_the_schema():
+def test_auto_values_survive_a_dump_and_are_in_the_schema():
     given = scene({"grid": "auto"}, accuracy=0.03, **OPEN)
     again = Scene.from_dict(given.model_dump(by_alias=True, mode="json"))
     assert auto_keys(again) == auto_keys(given) == {

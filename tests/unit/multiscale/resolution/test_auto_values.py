@@ -1,4 +1,4 @@
-"""The choice of a micro model in a scene: what is asked for, told, refused and recorded."""
+"""The choice of a micro model in a scene: what is requested, stated, refused and recorded."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from multiscale.run import Run
 from multiscale.scene.scene import Scene
 
 
-def scene(load=None, coupling="analytic", **micro):
-    spectrum = {"hurst": 0.8, "waves": [2, 6], "rms_slope": 0.2}
+def scene(load=None, coupling="analytic", waves=(2, 6), **micro):
+    spectrum = {"hurst": 0.8, "waves": list(waves), "rms_slope": 0.2, "seed": 1}
     return Scene.from_dict(
         {
             "surface": {"spectrum": spectrum, "grid": [64, 64], "lengths": [1.0, 1.0]},
@@ -38,41 +38,44 @@ def test_without_a_tolerance_two_per_cent_are_asked():
     assert "tolerance of 2 %" in make_setup(scene(model="auto")).choice.sentence
 
 
-def chosen_for(monkeypatch, load):
-    asked = {}
+def assert_chosen_for(load, approach, solutions):
+    """The candidates of a load are those of an approach of the level plane."""
+    setup = make_setup(scene(load, model="auto", tolerance=0.1))
+    known = choose(
+        setup.surface,
+        contact_modulus=setup.model.contact_modulus,
+        approach=approach,
+        tolerance=0.1,
+        solutions=solutions,
+    )
+    for found, expected in zip(setup.choice.candidates, known.candidates, strict=True):
+        assert found.label == expected.label
+        assert found.expected_error == pytest.approx(expected.expected_error, rel=1e-12)
+        assert found.cost == pytest.approx(expected.cost, rel=1e-12)
+    assert setup.choice.checked_error == pytest.approx(known.checked_error, abs=1e-5)
 
-    def watched(*given, **options):
-        asked.update(options)
-        return choose(*given, **options)
 
-    monkeypatch.setattr("multiscale.resolution.micro_model.choose", watched)
-    make_setup(scene(load, model="auto", tolerance=0.1))
-    return asked
-
-
-def test_the_model_is_chosen_for_the_nearest_the_plane_comes(monkeypatch):
+def test_the_model_is_chosen_for_the_largest_approach_anywhere():
     load = {"approach": [0.006, 0.001, 0.004], "tilt": [0.002, -0.004], "steps": 3}
-    asked = chosen_for(monkeypatch, load)
-    # A plane tilted by 2 and 4 µm/mm comes 3 µm nearer at a corner of 1 mm².
-    assert asked["approach"] == pytest.approx(0.009, rel=1e-12)
-    assert asked["solutions"] == 9
+    # a plane tilted by 2 and 4 µm/mm comes 3 µm nearer at a corner of 1 mm²
+    assert_chosen_for(load, approach=0.009, solutions=9)
 
 
 @pytest.mark.parametrize("tilt", [[0.0, 0.0], "free"])
-def test_under_a_force_a_half_space_tells_how_near_that_is(monkeypatch, tilt):
-    asked = chosen_for(monkeypatch, {"force": 1.0, "tilt": tilt})
-    by_cells = make_setup(scene({"force": 1.0, "tilt": tilt}, model="half-space"))
-    approach, slopes = by_cells.plane_at_largest_load
-    rise = 0.5 * (abs(slopes[0]) + abs(slopes[1]))
-    assert asked["approach"] == pytest.approx(approach + rise, rel=1e-6)  # both on 64² cells
+def test_under_a_force_a_half_space_tells_the_largest_approach(tilt):
+    load = {"force": 1.0, "tilt": tilt}
+    plane = make_setup(scene(load, model="half-space")).plane_at_largest_load
+    rise = 0.5 * (abs(plane.tilt[0]) + abs(plane.tilt[1]))
+    assert_chosen_for(load, approach=plane.approach + rise, solutions=8)  # both on 64² cells
 
 
-def test_a_chosen_asperity_model_counts_and_warns_as_a_stated_one(monkeypatch):
-    monkeypatch.setattr("micro.choice.candidates.contact_error", lambda kind, at: 1e-5)
-    setup = make_setup(scene({"approach": 0.02}, model="auto", tolerance=0.45))
-    assert setup.by_summits
+def test_a_chosen_asperity_model_counts_and_warns_as_a_stated_one():
+    load, waves = {"approach": 0.01}, (2, 4)
+    setup = make_setup(scene(load, waves=waves, model="auto", tolerance=0.45))
+    assert "maxima on the surface's border" in "".join(warnings(setup))
+    assert setup.uses_summits
     assert setup.ignores_border
-    stated = make_setup(scene({"approach": 0.02}, model=setup.choice.taken.label))
+    stated = make_setup(scene(load, waves=waves, model=setup.choice.taken.label))
     assert dict(statements(setup))["contact"] == dict(statements(stated))["contact"]
     assert list(warnings(setup)) == list(warnings(stated))
     assert setup.table_tolerance == stated.table_tolerance
@@ -80,7 +83,7 @@ def test_a_chosen_asperity_model_counts_and_warns_as_a_stated_one(monkeypatch):
 
 def test_asperities_with_those_of_the_border_ignore_nothing():
     setup = make_setup(scene(model="elliptic", curvature="contact", border="include"))
-    assert setup.by_summits
+    assert setup.uses_summits
     assert not setup.ignores_border
 
 

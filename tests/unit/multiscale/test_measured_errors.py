@@ -13,7 +13,7 @@ from geometry.errors import NotConverged
 from geometry.rigid_plane import Control
 from multiscale import Run, Scene, run
 from multiscale.couplings.blocks import on_body
-from multiscale.errors.measured import ErrorProbe, MeasuredErrors
+from multiscale.measured_errors import ErrorProbe, MeasuredErrors
 from multiscale.output.results import write_results, write_tables
 from multiscale.restart.resuming import checkpoint_of
 from multiscale.results.history import with_error
@@ -81,10 +81,10 @@ def test_the_error_of_the_grid_is_that_against_a_much_finer_one(grid):
 def test_slopes_left_out_are_what_they_would_take():
     without = run(scene(grid=96, finite_slopes=False)).steps[-1]
     with_slopes = run(scene(grid=96)).steps[-1]
-    told = dict(without.errors)["slopes"]
+    stated = dict(without.errors)["slopes"]
     # measured on half of the cells
-    assert told == pytest.approx(without.force_N - with_slopes.force_N, rel=0.1)
-    assert dict(with_slopes.errors)["slopes"] < 0.3 * told
+    assert stated == pytest.approx(without.force_N - with_slopes.force_N, rel=0.1)
+    assert dict(with_slopes.errors)["slopes"] < 0.3 * stated
 
 
 def test_a_prescribed_force_has_an_error_of_the_approach():
@@ -197,7 +197,7 @@ def test_report_and_provenance_hold_the_errors(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("value", "error", "told"),
+    ("value", "error", "stated"),
     [
         (5.36912, 0.0312, "5.369 ± 0.031"),
         (5.36912, 1.26, "5.4 ± 1.3"),
@@ -206,5 +206,5 @@ def test_report_and_provenance_hold_the_errors(tmp_path):
         (5.36912, None, "5.36912"),
     ],
 )
-def test_values_are_rounded_to_their_errors(value, error, told):
-    assert with_error(value, error, shown=".6g") == told
+def test_values_are_rounded_to_their_errors(value, error, stated):
+    assert with_error(value, error, shown=".6g") == stated

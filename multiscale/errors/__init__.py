@@ -1,1 +1,0 @@
-"""Errors of load steps, measured in the run by further contact problems."""
