@@ -62,6 +62,31 @@ def together(comm: Any, work: Callable[[], T]) -> T:
     return result  # type: ignore[return-value]
 
 
+def shared(comm: Any, count: int, work: Callable[[int], T], first: int = 0) -> list[T]:
+    """Do tasks of a list in turn on all ranks: the first on one, the second on the next.
+
+    Args:
+        comm: MPI communicator (mpi4py), or None.
+        count: Number of tasks.
+        work: Does the task of an index; must not communicate itself.
+        first: Rank that takes the first task, modulo the number of ranks.
+
+    Returns:
+        The results of all tasks in their order, on every rank.
+
+    Raises:
+        Exception: The first failing rank's error, on every rank.
+
+    Note:
+        Collective.
+    """
+    rank, size = (0, 1) if comm is None else (comm.rank, comm.size)
+    own = range((rank - first) % size, count, size)
+    mine = together(comm, lambda: [work(index) for index in own])
+    gathered = [mine] if size == 1 else comm.allgather(mine)
+    return [gathered[(index + first) % size][index // size] for index in range(count)]
+
+
 def _attempt(work: Callable[[], T]) -> tuple[T | None, Exception | None]:
     """Return the result or the error of some work."""
     try:

@@ -1,4 +1,4 @@
-"""The elastic block in dolfinx, pressed by a rigid plane through one contact law per patch.
+"""The elastic block in dolfinx, in contact with a rigid plane.
 
 BlockShape → block_mesh → Block (with a Material) → Interface (with a PatchGrid)
 → LawContactProblem (with one ContactLaw per patch) → LawContactState for every load step.

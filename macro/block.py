@@ -1,4 +1,7 @@
-"""The elastic block: displacement space, supports, assembled stiffness and its solver."""
+"""The elastic block: displacement space, supports, assembled stiffness and its solver.
+
+Theory: section 11 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 
@@ -86,8 +89,8 @@ class Block:
     @cached_property
     def stiffness(self) -> PETSc.Mat:
         """Stiffness matrix [N/mm] with unit rows for constrained degrees of freedom."""
-        kind = "baij" if self._lattice else "aij"
-        matrix = compat.assemble_matrix(compat.compile_form(self._form), self.conditions, kind)
+        kind = "baij" if self.lattice else "aij"
+        matrix = compat.assemble_matrix(compat.compile_form(self.form), self.conditions, kind)
         if kind == "aij":
             matrix.setOption(PETSc.Mat.Option.SPD, True)  # for the user's direct solvers
         points = self.space.tabulate_dof_coordinates()[: self.owned_dofs // 3]
@@ -98,7 +101,7 @@ class Block:
     def solver(self) -> PETSc.KSP:
         """Linear solver of the block alone; its preconditioner also serves the contact solves."""
         return block_solver(
-            self.stiffness, self.space, self.mesh.shape, self._lattice, self.material, self.free
+            self.stiffness, self.space, self.mesh.shape, self.lattice, self.material, self.free
         )
 
     def solve(self, load: PETSc.Vec) -> Any:
@@ -138,11 +141,13 @@ class Block:
         return float(self._bottom_row.dot(displacement))
 
     @cached_property
-    def _lattice(self) -> Lattice | None:
+    def lattice(self) -> Lattice | None:
+        """The rectangular lattice of the nodes; None where they form none."""
         return lattice_of(self.space, self.mesh)
 
     @cached_property
-    def _form(self) -> Any:
+    def form(self) -> Any:
+        """Bilinear form of the stiffness, as UFL."""
         # exact on boxes and straight tetrahedra, full integration on distorted hexahedra
         degree = 2 * self.degree if self.mesh.shape.hexahedral else 2 * (self.degree - 1)
         return stiffness_form(self.space, self.material, degree)
@@ -162,7 +167,7 @@ class Block:
         """Sum of the unconstrained stiffness' rows of the bottom's vertical displacements."""
         lift = fem.Function(self.space)
         lift.x.array[3 * self._nodes(self.mesh.facet_tags.find(BOTTOM)) + 2] = 1.0
-        return compat.assemble_vector(compat.compile_form(ufl.action(self._form, lift)))
+        return compat.assemble_vector(compat.compile_form(ufl.action(self.form, lift)))
 
     def _nodes(self, facets: NDArray[np.int32]) -> NDArray[np.int32]:
         """Return this rank's nodes and ghosts on some facets of any rank, ascending.

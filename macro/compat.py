@@ -1,6 +1,6 @@
-"""The one place that knows dolfinx releases: 0.5, 0.9 and 0.11 behind one set of functions.
+"""All differences between dolfinx 0.5, 0.9 and 0.11, behind one set of functions.
 
-Every difference is probed by feature, never by version number. Callers use only what is here, what
+Differences are found by feature, never by version number. Other modules use these functions, what
 all releases share, and petsc4py.
 """
 
@@ -26,19 +26,19 @@ from geometry.errors import InputError
 from geometry.meshes.gmsh_session import sigint_untouched
 from macro.form_cache import TIMEOUT, explained
 
-_JIT = {"timeout": TIMEOUT}  # another process may be compiling the same form on a slow machine
+_JIT = {"timeout": TIMEOUT}  # for a slow machine on which another process compiles the same form
 HAS_VTX = hasattr(io, "VTXWriter")
 """Whether this dolfinx was built with ADIOS2."""
 
 _FILES_NOT_CLOSED: list[Any] = []
-"""XDMF files that could not be closed, kept from their destructor until the process ends."""
+"""XDMF files that could not be closed, referenced so that no destructor runs before exit."""
 
 _CELLS = {"hexahedron": basix.CellType.hexahedron, "tetrahedron": basix.CellType.tetrahedron}
 
 
 @contextmanager
-def _quiet_compiler() -> Iterator[None]:
-    """Keep the compiler's command lines, which older releases log, from the user's terminal."""
+def quiet_compiler() -> Iterator[None]:
+    """Suppress the compiler's command lines, which older releases log."""
     root = logging.getLogger()
     level, disabled = root.level, root.manager.disable
     logging.disable(logging.INFO)
@@ -68,17 +68,17 @@ def form_cache() -> Path:
 
 @contextmanager
 def _compiling() -> Iterator[None]:
-    """Compile in silence; what goes wrong comes with its remedy."""
-    with _quiet_compiler(), explained(form_cache()):
+    """Compile without log messages, and explain errors of the compiler."""
+    with quiet_compiler(), explained(form_cache()):
         yield
 
 
-@_quiet_compiler()
+@quiet_compiler()
 def mesh_from_gmsh(model: Any, comm: Any) -> tuple[Any, Any]:
     """Distribute the gmsh model of rank 0 as (mesh, facet tags).
 
     Args:
-        model: ``gmsh.model`` on rank 0; not looked at elsewhere.
+        model: ``gmsh.model`` on rank 0; ignored on other ranks.
         comm: MPI communicator.
 
     Note:
@@ -93,20 +93,20 @@ def mesh_from_gmsh(model: Any, comm: Any) -> tuple[Any, Any]:
     return (data.mesh, data.facet_tags) if hasattr(data, "mesh") else (data[0], data[2])
 
 
-@_quiet_compiler()
+@quiet_compiler()
 def mesh_from_cells(
     cells: NDArray[np.int64],
     points: NDArray[np.float64],
-    beyond: tuple[NDArray[np.int64], NDArray[np.int64]],
+    neighbours: tuple[NDArray[np.int64], NDArray[np.int64]],
     comm: Any,
 ) -> Any:
-    """Make a mesh without ghosts of straight cells that stay on the rank that gives them.
+    """Make a mesh of straight cells without ghosts; every cell stays on its rank.
 
     Args:
         cells: Numbers of the nodes of this rank's hexahedra or tetrahedra in the order of dolfinx,
             shape (cells, 8 or 4); there may be none.
         points: This rank's share of the nodes, numbered through the ranks, shape (n, 3).
-        beyond: Indices of this rank's cells next to those of other ranks, and these ranks, at
+        neighbours: Indices of this rank's cells next to those of other ranks, and these ranks; at
             least one pair for every common facet and none twice.
         comm: MPI communicator.
 
@@ -121,9 +121,9 @@ def mesh_from_cells(
         element = basix.ufl.element("Lagrange", cell, 1, variant, shape=(3,), dtype=np.float64)
         domain = ufl.Mesh(element)
         return dmesh.create_mesh(comm, cells=cells, x=points, e=domain, partitioner=lambda *_: stay)
-    # dolfinx 0.5 finds common vertices through ghosts, and drops these afterwards
-    rows = np.concatenate([np.arange(len(cells)), beyond[0]])
-    stay = _adjacency(rows, np.concatenate([owners, beyond[1]]))
+    # dolfinx 0.5 finds common vertices through ghosts, which it drops afterwards
+    rows = np.concatenate([np.arange(len(cells)), neighbours[0]])
+    stay = _adjacency(rows, np.concatenate([owners, neighbours[1]]))
     straight = ufl.FiniteElement(
         "Lagrange", ufl.Cell(cell, geometric_dimension=3), 1, variant="equispaced"
     )
@@ -132,7 +132,7 @@ def mesh_from_cells(
 
 
 def _adjacency(rows: NDArray[np.int64], values: NDArray[np.int64]) -> Any:
-    """Return values by row, those of a row in the order given; every row has one."""
+    """Return the adjacency list of values by row, in their order; every row has at least one."""
     order = np.argsort(rows, kind="stable")
     offsets = np.concatenate([[0], np.cumsum(np.bincount(rows))])
     return cpp.graph.AdjacencyList_int32(values[order].astype(np.int32), offsets.astype(np.int32))
@@ -272,10 +272,10 @@ def assemble_vector(form: Any) -> PETSc.Vec:
 
 
 def collect_garbage(comm: PETSc.Comm) -> None:
-    """Free the matrices and vectors that Python has dropped on all ranks, and every rank's own.
+    """Free PETSc objects that Python has dropped on all ranks, and every rank's own objects.
 
-    PETSc from 3.18 on keeps them until it is asked, because ranks drop them at different times;
-    3.18 itself does so on a single rank too.
+    From 3.18 on PETSc keeps distributed objects until this call, because ranks drop them at
+    different times; 3.18 keeps those of a single rank too.
 
     Args:
         comm: Communicator of one of them.
@@ -320,6 +320,6 @@ def write_xdmf(path: str, mesh: Any, functions: Sequence[Any]) -> None:
             file.write_function(function)
         file.close()
     except RuntimeError:
-        # on a full disk it cannot be closed, and its destructor would try again and end the process
+        # On a full disk it cannot be closed, and its destructor would end the process
         _FILES_NOT_CLOSED.append(file)
         raise

@@ -1,4 +1,7 @@
-"""Linear isotropic elasticity: stiffness form and rigid body modes."""
+"""Linear isotropic elasticity: stiffness form and rigid body modes.
+
+Theory: section 11 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The cache of compiled forms: where it is, what can be wrong with it, and what to do then."""
+"""The cache of compiled forms: stale locks, access, the compiler, and errors with a remedy."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ TIMEOUT = 60
 
 
 def stale_locks(folder: Path, older_than: float = 2.0 * TIMEOUT) -> list[Path]:
-    """Return sources whose compilation was cut short.
+    """Return sources whose compilation was interrupted.
 
-    The first process that wants a form makes its source; others wait for the mark that it is
-    compiled. A source without mark, made long ago, would keep everybody waiting in vain.
+    The first process that needs a form writes its source, and others wait for the mark that it is
+    compiled. With an old source without a mark they would wait until they time out.
 
     Args:
         folder: Folder of the compiled forms; need not exist.
-        older_than: Age from which on nobody can be at work any more [s].
+        older_than: Age beyond which no process can be compiling any more [s].
     """
     latest = time.time() - older_than
     left = []
-    with suppress(PermissionError):  # nobody who may not enter it compiles there
+    with suppress(PermissionError):  # without access there are no locks of this user
         for source in folder.glob("libffcx_*.c"):
-            with suppress(FileNotFoundError):  # another process tidies up as well
+            with suppress(FileNotFoundError):  # another process may remove it meanwhile
                 marked = source.with_suffix(".c.cached").exists()
                 if not marked and source.stat().st_mtime < latest:
                     left.append(source)
@@ -39,7 +39,7 @@ def stale_locks(folder: Path, older_than: float = 2.0 * TIMEOUT) -> list[Path]:
 
 
 def writable(folder: Path) -> bool:
-    """Tell whether a folder, or the nearest one above that exists, can be written to."""
+    """Return whether a folder, or its nearest existing parent, can be written to."""
     try:
         nearest = next(path for path in (folder, *folder.absolute().parents) if path.exists())
         return nearest.is_dir() and os.access(nearest, os.W_OK | os.X_OK)
@@ -55,7 +55,7 @@ def compiler() -> str | None:
 
 @contextmanager
 def explained(folder: Path) -> Iterator[None]:
-    """Turn what the form compiler raises into an error that says what to do.
+    """Turn an error of the form compiler into one that says what to do.
 
     Args:
         folder: Folder of the compiled forms.
@@ -75,7 +75,7 @@ def explained(folder: Path) -> Iterator[None]:
 
 
 def _remedy(folder: Path, detail: str) -> str:
-    """Return what to do, judged by the state of the cache and the last line of the error."""
+    """Return what to do, from the state of the cache and the last line of the error."""
     if stale_locks(folder, older_than=0.0):
         return f"a compilation was cut short in {folder}: patchlaw warm clears it"
     if "[Errno" in detail or not writable(folder):
@@ -84,6 +84,6 @@ def _remedy(folder: Path, detail: str) -> str:
 
 
 def _is_the_compilers(error: Exception) -> bool:
-    """Tell errors of the form compiler from bugs; with several ranks dolfinx wraps them."""
+    """Return whether the form compiler failed; on several ranks dolfinx wraps its errors."""
     wrapped = isinstance(error, RuntimeError) and "just-in-time compilation" in str(error)
     return wrapped or isinstance(error, OSError) or type(error).__name__ == "VerificationError"

@@ -1,8 +1,8 @@
 """Puts the scales together.
 
-A `Scene` becomes a problem setup (surface, summits, patches, micro model), the micro model gives
-every patch its law, the laws go onto the flat interface of an elastic block, and load steps become
-a `History`. A reference meshes the rough surface itself instead, and tells its own error.
+A `Scene` becomes a problem setup: surface, summits, patches and micro model. The micro model gives
+every patch its law, and the laws act on the flat interface of an elastic block. The load steps
+become a `History`. A reference meshes the rough surface itself instead, and measures its own error.
 """
 
 from __future__ import annotations
@@ -15,47 +15,39 @@ from typing import TYPE_CHECKING, Any
 # ruff: noqa: F401
 if TYPE_CHECKING:  # for editors and type checkers; at run time `_HOMES` says where names are
     from multiscale.comparison.compare import compare
-    from multiscale.comparison.comparison import Comparison, Row
+    from multiscale.comparison.comparison import Comparison
     from multiscale.couplings.condensed import CondensedCoupling
-    from multiscale.couplings.load_steps import ContactCoupling, EmbeddedCoupling
     from multiscale.couplings.reference import ReferenceCoupling
     from multiscale.laws.consistent import consistent_laws
-    from multiscale.laws.files import LawTable, read_laws, write_laws
+    from multiscale.laws.files import read_laws, write_laws
     from multiscale.laws.isolated import isolated_laws
-    from multiscale.laws.packed import PatchLaws
+    from multiscale.laws.law_table import LawTable, PatchLaws
     from multiscale.laws.patch_law import PatchLaw
-    from multiscale.loading.load_step import LoadStep, PatchState
+    from multiscale.loading.load_step import LoadStep
     from multiscale.loading.stepper import LoadHistory, load_steps
     from multiscale.resolution.problem_setup import make_setup
-    from multiscale.restart.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
-    from multiscale.results.extrapolation import Estimate, extrapolated
+    from multiscale.results.extrapolation import extrapolated
     from multiscale.results.history import History
-    from multiscale.results.reference_record import ReferenceRecord
     from multiscale.run import Run, run
     from multiscale.scene.scene import Scene
-    from multiscale.setup.problem import ProblemSetup
 
 _MODULES = {
     "comparison.compare": "compare",
-    "comparison.comparison": "Comparison Row",
+    "comparison.comparison": "Comparison",
     "couplings.condensed": "CondensedCoupling",
-    "couplings.load_steps": "ContactCoupling EmbeddedCoupling",
     "couplings.reference": "ReferenceCoupling",
     "laws.consistent": "consistent_laws",
-    "laws.files": "LawTable read_laws write_laws",
+    "laws.files": "read_laws write_laws",
     "laws.isolated": "isolated_laws",
-    "laws.packed": "PatchLaws",
+    "laws.law_table": "LawTable PatchLaws",
     "laws.patch_law": "PatchLaw",
-    "loading.load_step": "LoadStep PatchState",
+    "loading.load_step": "LoadStep",
     "loading.stepper": "LoadHistory load_steps",
     "resolution.problem_setup": "make_setup",
-    "restart.checkpoint": "Checkpoint read_checkpoint write_checkpoint",
-    "results.extrapolation": "Estimate extrapolated",
+    "results.extrapolation": "extrapolated",
     "results.history": "History",
-    "results.reference_record": "ReferenceRecord",
     "run": "Run run",
     "scene.scene": "Scene",
-    "setup.problem": "ProblemSetup",
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names.split()}
 """Module of every public name, which is imported with the first use of the name, for speed."""

@@ -14,9 +14,10 @@ from geometry.rigid_plane import Control
 from macro import Block, Material, block_mesh
 from micro import influence_matrix
 from multiscale.couplings.dense_newton import DenseNewton
-from multiscale.laws.packed import PatchLaws
+from multiscale.laws.files import repaired_law
+from multiscale.laws.law_table import PatchLaws
 from multiscale.laws.patch_law import PatchLaw
-from multiscale.laws.repair import evened_law
+from multiscale.laws.rows import LawRows
 
 LAPS, MODULI, UNITS = 10, (4e9, 1e3, 1e12), {"m": 1e3, "um": 1e-3}
 SOFT = {"patches__grid": [2, 2], "surface__grid": [16, 16]}
@@ -113,15 +114,14 @@ def shifted() -> tuple[Any, ...]:
 
 
 def law(closure: Any, pressure: Any, shift: float) -> PatchLaw:
-    """Return a law through points from a touch on, repaired where noise makes it fall."""
+    """Return a law through points from first touch on, repaired where noise makes it fall."""
     closure, pressure = np.array(closure) + shift, np.array(pressure)
     none = np.zeros(len(closure))
-    return evened_law(
-        PatchLaw(
-            closure=closure, pressure=pressure, approach=closure, contact_area_fraction=none,
-            contacts=none.astype(int), relief=none, touch=shift, reach=0.02,
-        )
+    rows = LawRows(
+        closure=closure, pressure=pressure, approach=closure, contact_area_fraction=none,
+        contacts=none.astype(int), unresolved_displacement=none,
     )  # fmt: skip
+    return repaired_law(PatchLaw(rows=rows, first_touch=shift, initial_separation=0.02))
 
 
 GRID = np.linspace(0.0, 9e-3, 19)

@@ -5,6 +5,8 @@ On an element, t from −1 to 1, the shape functions are (1 ∓ t)/2 and
 are orthogonal, so that all matrices are nearly diagonal. Functions on a line that is symmetric
 about its start are even or odd: its first element extends beyond the start, and has even or odd
 polynomials only.
+
+Theory: section 6 of ``demos/theory.md``.
 """
 
 from __future__ import annotations

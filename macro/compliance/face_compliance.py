@@ -1,4 +1,7 @@
-"""Compliance of a block's top, and the stresses in it, in Legendre modes."""
+"""Compliance of a block's top, and the stresses in it, in Legendre modes.
+
+Theory: section 6 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 
@@ -127,17 +130,13 @@ def _gathered(
             seen_x, seen_y = (odd_x + turn) % 2, (odd_y + turn) % 2
             field[seen_x::2, seen_y::2, odd_x::2, odd_y::2] = part
     normal, xx, yy, xy, growth = total.reshape(-1, count**2, count**2) / area**2
+    # Hooke's law from the strains in the face and σ_zz = −p
+    nu = material.poisson_ratio
+    modulus = material.young_modulus / (1.0 - nu**2)
+    pushed = nu / (1.0 - nu) * (np.eye(count**2) / area)
+    sigma_xx, sigma_yy = modulus * (xx + nu * yy) - pushed, modulus * (yy + nu * xx) - pushed
     return FaceCompliance(
         normal=0.5 * (normal + normal.T),  # symmetric up to rounding
         growth=0.5 * (growth + growth.T),
-        stresses=_stresses(xx, yy, xy, np.eye(count**2) / area, material),
+        stresses=np.stack([sigma_xx, sigma_yy, material.young_modulus / (1.0 + nu) * xy]),
     )
-
-
-def _stresses(xx: Array, yy: Array, xy: Array, pressure: Array, material: Material) -> Array:
-    """Return σ_xx, σ_yy, σ_xy from the strains in the face and σ_zz = −p by Hooke's law."""
-    nu = material.poisson_ratio
-    modulus = material.young_modulus / (1.0 - nu**2)
-    pushed = nu / (1.0 - nu) * pressure
-    found = modulus * (xx + nu * yy) - pushed, modulus * (yy + nu * xx) - pushed
-    return np.stack([*found, material.young_modulus / (1.0 + nu) * xy])

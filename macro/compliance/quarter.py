@@ -3,6 +3,8 @@
 The two vertical planes of symmetry divide the block into quarters. Under a pressure that is even
 along an axis, the displacement component along that axis is odd along it, and the other components
 are even; under an odd pressure it is the other way round.
+
+Theory: section 6 of ``demos/theory.md``.
 """
 
 from __future__ import annotations

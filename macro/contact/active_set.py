@@ -12,6 +12,8 @@ active set, removes the nodes in tension and adds those that penetrate (HintermÃ
 end. Free motions of the plane are unknowns of the same linear solves, in which the active nodes
 move with the plane. Conjugate gradients are preconditioned by the multigrid of the block without
 contact, corrected near the active nodes.
+
+Theory: section 12 of ``demos/theory.md``.
 """
 
 from __future__ import annotations
@@ -39,9 +41,6 @@ _LOOSE, _CLOSER = 0.1, 1e-2
 
 _FEW = 200
 """The set changes little when at most one active node in this many changes."""
-
-MOST_SOLVES = 100
-"""Linear solves of a load step before it fails."""
 
 _PATIENCE = 10
 """Solves without progress before nodes change one by one."""
@@ -83,22 +82,19 @@ class PrimalDualActiveSet:
         block: The block.
         top: Nodes of its top.
         plane: The plane over the nodes of the top.
+
+    Attributes:
         most_solves: Linear solves of a load step before it fails.
 
     Note:
         Everything here is collective.
     """
 
-    def __init__(
-        self,
-        block: Block,
-        top: TopNodes,
-        plane: PlaneOverNodes,
-        *,
-        most_solves: int = MOST_SOLVES,
-    ) -> None:
+    most_solves = 100
+
+    def __init__(self, block: Block, top: TopNodes, plane: PlaneOverNodes) -> None:
         self._block, self._top, self._plane = block, top, plane
-        self.most_solves = most_solves
+        self._comm = block.mesh.comm
         # one layer of quadratic elements reaches as far as two of linear ones
         self._solver = ConstrainedSolver(block.stiffness, block.solver.pc, layers=3 - block.degree)
         self._tolerance = contact_tolerance()
@@ -115,8 +111,7 @@ class PrimalDualActiveSet:
             NotConverged: When the active set does not converge, nothing can hold the plane, or a
                 linear solve fails; earlier solutions stay what they were.
         """
-        guess = self._history.guess(control)
-        displacement = self._block.stiffness.createVecRight()
+        guess, displacement = self._history.guess(control), self._block.stiffness.createVecRight()
         displacement.array[:] = guess.displacement
         placed = self._plane.placed(control, guess.plane)
         now = _Iterate(control, placed, displacement, guess.contact > 0.0)
@@ -135,7 +130,7 @@ class PrimalDualActiveSet:
                 self._put_on_plane(now)
             iterations, allowed = self._solve_active(now, motions, tolerance)
             spent += iterations
-            forces, depth = self._forces, self._depth(now)
+            forces, depth = self._residual.array_r[self._top.dofs], self._depth(now)
             largest = self._largest(forces[now.active])
             pulled = now.active & (forces < -self._tolerance * largest)
             beyond = depth > self._tolerance * self._largest(displacement.array_r)
@@ -165,18 +160,17 @@ class PrimalDualActiveSet:
         None when a load acts along a motion that they do not resist.
         """
         motions = self._plane.supported_motions(now.control.free, now.active)
-        loads = _prescribed_loads(now.control)
+        loads = now.control.loads[now.control.free]
         borne = motions @ np.linalg.lstsq(motions, loads, rcond=None)[0]
         lost = np.abs(loads - borne).max(initial=0.0)
         return None if lost > self._tolerance * (now.control.force or 0.0) else motions
 
     def _put_on_plane(self, now: _Iterate) -> None:
         """Move active nodes onto the plane; without any, the block is at rest."""
-        if self._count(now.active):
-            depth = self._depth(now)
-            now.displacement.array[self._top.dofs[now.active]] -= depth[now.active]
-        else:
+        if not self._count(now.active):
             now.displacement.set(0.0)
+        depth = self._depth(now)[now.active]
+        now.displacement.array[self._top.dofs[now.active]] -= depth
         self._update_residual(now.displacement)
 
     def _solve_active(self, now: _Iterate, supported: Array, tolerance: float) -> tuple[int, float]:
@@ -188,7 +182,7 @@ class PrimalDualActiveSet:
         if not self._count(now.active):
             return 0, 0.0
         free, levers = now.control.free, self._plane.levers
-        dofs, loads = self._top.dofs[now.active], supported.T @ _prescribed_loads(now.control)
+        dofs, loads = self._top.dofs[now.active], supported.T @ now.control.loads[free]
         motions = levers.scaled(free)[now.active] @ supported
         before = now.displacement.array_r[dofs].copy()
         residual = self._residual.copy()
@@ -207,15 +201,15 @@ class PrimalDualActiveSet:
     def _converged(self, now: _Iterate, sets: int, spent: int) -> ContactSolution:
         """Remove the last penetrations, and remember the solution for later guesses."""
         depth = self._depth(now)
-        now.displacement.array[self._top.dofs] -= np.where(
-            now.active, depth, np.maximum(depth, 0.0)
-        )
+        removed = np.where(now.active, depth, np.maximum(depth, 0.0))
+        now.displacement.array[self._top.dofs] -= removed
         self._update_residual(now.displacement)
+        forces = np.maximum(self._residual.array_r[self._top.dofs], 0.0)
         largest = self._largest(now.displacement.array_r)
         found = ContactSolution(
             plane=now.plane,
             displacement=now.displacement.array_r.copy(),
-            nodal_force=np.where(now.active, np.maximum(self._forces, 0.0), 0.0),
+            nodal_force=np.where(now.active, forces, 0.0),
             # vertices of quadratic triangles touch without a force
             touching=now.active | (depth > -_CLOSED * largest),
             active_sets=sets,
@@ -231,12 +225,6 @@ class PrimalDualActiveSet:
         self._block.stiffness.mult(displacement, self._residual)
         self._residual.scale(-1.0)
 
-    @property
-    def _forces(self) -> Array:
-        """Contact forces of this rank's nodes of the top at the residual's displacement [N]."""
-        forces: Array = self._residual.array_r[self._top.dofs]
-        return forces
-
     def _depth(self, now: _Iterate) -> Array:
         return self._plane.penetration(now.plane, -now.displacement.array_r[self._top.dofs])
 
@@ -245,7 +233,7 @@ class PrimalDualActiveSet:
 
     def _first(self, moved: Flags) -> Flags:
         """Keep the first of the flags, over all ranks (Murty 1974: such changes cannot cycle)."""
-        comm = self._block.mesh.comm
+        comm = self._comm
         lowest = comm.allreduce(comm.rank if moved.any() else comm.size, op=MPI.MIN)
         alone = np.zeros_like(moved)
         if comm.rank == lowest:
@@ -253,8 +241,7 @@ class PrimalDualActiveSet:
         return alone
 
     def _largest(self, values: Array) -> float:
-        comm = self._block.mesh.comm
-        return float(comm.allreduce(float(np.abs(values).max(initial=0.0)), op=MPI.MAX))
+        return float(self._comm.allreduce(float(np.abs(values).max(initial=0.0)), op=MPI.MAX))
 
     def _norm(self, values: Array) -> float:
         return float(np.sqrt(self._sum(float(values @ values))))
@@ -263,9 +250,4 @@ class PrimalDualActiveSet:
         return int(self._sum(int(np.count_nonzero(flags))))
 
     def _sum(self, values: Any) -> Any:
-        return self._block.mesh.comm.allreduce(values, op=MPI.SUM)
-
-
-def _prescribed_loads(control: Control) -> Array:
-    """Return the prescribed loads along the free motions of the plane, shape (k,) [N]."""
-    return control.loads[control.free]
+        return self._comm.allreduce(values, op=MPI.SUM)

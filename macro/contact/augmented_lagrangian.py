@@ -8,6 +8,8 @@ Without multipliers p₀ this is the penalty method, p = k ⟨d⟩. The augmente
 pressures of one solve as the multipliers of the next, until no point in contact penetrates
 (Alart & Curnier 1991, doi 10.1016/0045-7825(91)90022-X). For every p₀ a generalised Newton's method
 with line search finds the equilibrium.
+
+Theory: section 12 of ``demos/theory.md``.
 """
 
 from __future__ import annotations
@@ -62,6 +64,10 @@ class AugmentedLagrangian:
         penalty: The stiffness k [MPa/mm]; None: 1000 E* over the size of each facet.
         exact: Whether multipliers remove the penetration; otherwise it is the penalty method.
 
+    Attributes:
+        law: Law of the quadrature points.
+        equilibrium: Equations of the block with this law.
+
     Note:
         Everything here is collective.
     """
@@ -79,17 +85,17 @@ class AugmentedLagrangian:
         whole = PatchGrid(grid=(1, 1), lengths=block.mesh.shape.interface)
         self._interface = interface = Interface(block, whole, degree=2 * block.degree)
         self._sampling = sampling = interface.pointwise
-        (distance,) = top.spread(plane.distance)
+        (distance,) = top.with_ghosts(plane.distance)
         points = interface.quadrature
         unit = block.material.contact_modulus / _facet_sizes(points.cell, points.weight)
         self._stiff = _HARD * unit if penalty is None else np.full_like(unit, penalty)
         self._soft = np.minimum(_SOFT * unit, self._stiff)
         self._tolerance = contact_tolerance()
         self._penetration = PENETRATION[block.degree]
-        self._law = AugmentedLaw(np.sum(points.values * distance[points.nodes], axis=1))
-        self._contact = LawContact(interface, sampling, [self._law])
-        self._equilibrium = Equilibrium(block, sampling, self._contact)
-        self._newton = FacetNewton(self._equilibrium, self._law, interface, top, plane)
+        self.law = AugmentedLaw(np.sum(points.values * distance[points.nodes], axis=1))
+        self._contact = LawContact(interface, sampling, [self.law])
+        self.equilibrium = Equilibrium(block, sampling, self._contact)
+        self._newton = FacetNewton(self.equilibrium, self.law, interface, top, plane)
         self._history = Extrapolation(block.owned_dofs, len(points.x))
 
     def solve(self, control: Control) -> ContactSolution:
@@ -100,7 +106,7 @@ class AugmentedLagrangian:
                 stay what they were.
         """
         guess = self._history.guess(control)
-        contact, law = self._contact, self._law
+        contact, law = self._contact, self.law
         contact.control, contact.plane = control, self._plane.placed(control, guess.plane)
         law.multiplier = np.maximum(guess.contact, 0.0) if self._exact else 0.0 * guess.contact
         displacement = self._block.stiffness.createVecRight()
@@ -110,27 +116,28 @@ class AugmentedLagrangian:
         for _ in range(_MOST_UPDATES):
             more, cycles = self._newton.solve(displacement, tolerance, control)
             steps, spent = steps + more, spent + cycles
-            closure = self._equilibrium.closure(displacement)
+            closure = self.equilibrium.closure(displacement)
             # penetration of points without pressure, penetration or gap of points under pressure
             depth = self._largest((law.pressure(closure) - law.multiplier) / law.slope)
-            missed = depth / max(self._penetration * self._largest(displacement.array_r), _TINY)
+            allowed = self._penetration * self._largest(displacement.array_r)
+            ratio = depth / max(allowed, _TINY)
             hard = bool(np.all(law.slope >= self._stiff))
             hard = bool(self._block.mesh.comm.allreduce(hard, op=MPI.LAND))
-            if hard and tolerance <= self._tolerance and (missed <= 1.0 or not self._exact):
+            if hard and tolerance <= self._tolerance and (ratio <= 1.0 or not self._exact):
                 return self._converged(displacement, steps, spent)
             if self._exact:
                 law.multiplier = law.pressure(closure)
-            if self._exact and hard and missed > _FALL * before:
+            if self._exact and hard and ratio > _FALL * before:
                 hardest = np.minimum(_HARDER * hardest, _HARDEST * self._stiff)
-            before = missed
+            before = ratio
             law.slope = np.minimum(_HARDER * law.slope, hardest)
-            near = min(0.1 * tolerance, SPARE * self._penetration * missed) if self._exact else 0.0
+            near = min(0.1 * tolerance, SPARE * self._penetration * ratio) if self._exact else 0.0
             tolerance = max(self._tolerance, near) if hard or not self._exact else tolerance
         raise not_found(control, "MULTIPLIERS", _MOST_UPDATES)
 
     def _converged(self, displacement: PETSc.Vec, steps: int, spent: int) -> ContactSolution:
-        closure, plane = self._equilibrium.closure(displacement), self._contact.plane.copy()
-        pressure, load = self._law.pressure(closure), displacement.duplicate()
+        closure, plane = self.equilibrium.closure(displacement), self._contact.plane.copy()
+        pressure, load = self.law.pressure(closure), displacement.duplicate()
         samples = self._sampling.operator.createVecRight()
         samples.array[:] = pressure
         self._sampling.operator.mult(samples, load)

@@ -1,4 +1,7 @@
-"""Equilibrium of a block whose top stands on unilateral springs, by generalised Newton's method."""
+"""Equilibrium of a block whose top stands on unilateral springs, by generalised Newton's method.
+
+Theory: section 12 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 
@@ -133,7 +136,7 @@ class FacetNewton:
         slope = self._law.stiffness(self._equilibrium.closure(displacement))
         points = self._interface.quadrature
         rows, columns = np.nonzero((np.abs(points.values) > _ON) & (slope > 0.0)[:, None])
-        loaded = self._top.collect(points.nodes[rows, columns], np.ones(len(rows))) > 0.0
+        loaded = self._top.sum_of_ranks(points.nodes[rows, columns], np.ones(len(rows))) > 0.0
         free = self._equilibrium.contact.control.free
         motions = self._plane.levers.scaled(free)[loaded]
         motions = motions @ self._plane.supported_motions(free, loaded)

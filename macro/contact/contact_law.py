@@ -1,4 +1,7 @@
-"""LawContact laws under a rigid plane, which is given or follows from its force and moment."""
+"""Contact laws under a rigid plane that is prescribed or in equilibrium with its loads.
+
+Theory: section 11 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 

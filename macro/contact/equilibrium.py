@@ -1,4 +1,7 @@
-"""Equilibrium of a block with contact laws: residual and exact tangent."""
+"""Equilibrium of a block with contact laws: residual and exact tangent.
+
+Theory: section 11 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 

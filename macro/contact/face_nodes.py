@@ -1,4 +1,7 @@
-"""The nodes of a block's top, the triangles between them, and the patches that they belong to."""
+"""The nodes of a block's top, the triangles between them, and their shares of the patches.
+
+Theory: section 12 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 
@@ -24,15 +27,16 @@ from macro.mesh.contact_face import top_facets
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-_NO_AREA = 1e-9  # of a patch
+_NO_AREA = 1e-9
+"""Area of the nodes in a patch, relative to the patch, that counts as none."""
 
 
 class TopNodes:
-    """Nodes of a block's top and what is measured with them.
+    """Nodes of a block's top, and areas, patch sums and regions of contact from nodal values.
 
-    The force and the area of a node on the border of patches are shared equally among the two or
-    four patches there. Facets are cut into triangles between neighbouring nodes, quadrilaterals
-    along both diagonals with half the weight each.
+    The force and the area of a node on the border of patches are divided equally between the two or
+    four patches there. Facets are divided into triangles between neighbouring nodes; squares are
+    divided along both diagonals, with half the weight each.
 
     Args:
         block: The block.
@@ -88,7 +92,7 @@ class TopNodes:
         return facet_lattice(self._block.mesh.mesh.topology.cell_name(), self._block.degree)
 
     def covered_area(self, touching: NDArray[np.bool_], nodal_force: Array, gap: Array) -> float:
-        """Return the contact area with its border within the facets; see `covered` [mm²].
+        """Return the contact area, whose border may lie within facets; see `covered` [mm²].
 
         Args:
             touching: Whether this rank's nodes are in contact, shape (n,).
@@ -97,16 +101,16 @@ class TopNodes:
         """
         triangles, area = self.triangles
         pressure = nodal_force / (self._thirds * self._block.material.contact_modulus)
-        values = self.spread(touching.astype(float), pressure, gap)
+        values = self.with_ghosts(touching.astype(float), pressure, gap)
         flags, pressure, gap = (value[triangles] for value in values)
         share = covered(flags > 0.5, pressure, gap, self.edges)
         return float(self._block.mesh.comm.allreduce(float(area @ share)))
 
-    def spread(self, *values: Array) -> list[Array]:
-        """Give values of nodes to every rank that sees the nodes, by rank-local node.
+    def with_ghosts(self, *values: Array) -> list[Array]:
+        """Return nodal values by rank-local node of the space, including ghosts.
 
         Args:
-            values: Up to three values of this rank's nodes, shape (n,) each.
+            values: Up to three fields of this rank's nodes of the top, shape (n,) each.
         """
         owned = np.zeros(self._block.owned_dofs)
         for axis, part in enumerate(values):
@@ -121,7 +125,7 @@ class TopNodes:
     def patch_means(self, values: Array) -> Array:
         """Return the means of nodal values over every patch, shape (N,), on every rank.
 
-        A patch without a node has the value of the nearest.
+        A patch without a node has the value of the nearest node, or the mean of several.
         """
         empty, nearest = self._empty
         means = np.empty(self.patches.count)
@@ -136,7 +140,7 @@ class TopNodes:
         Args:
             touching: Whether this rank's nodes are in contact, shape (n,).
         """
-        (flags,) = self.spread(touching.astype(float))
+        (flags,) = self.with_ghosts(touching.astype(float))
         linked = flags[self.facets] > 0.5
         some = linked.any(axis=1)
         nodes, linked = self._numbers(self.facets[some]), linked[some]
@@ -152,14 +156,14 @@ class TopNodes:
 
     @cached_property
     def _empty(self) -> tuple[NDArray[np.bool_], csr_array]:
-        """Which patches hold no node, shape (N,), and marks on the nodes nearest to them."""
-        # areas of the vertices of quadratic triangles are rounding, of either sign
+        """Which patches hold no node, shape (N,), and marks on the nodes nearest to each."""
+        # the area of vertices of quadratic triangles is rounding of either sign
         empty = self._patch_areas <= _NO_AREA * self.patches.area
         centres = self.patches.centres[empty]
         tree = cKDTree(np.stack([self.x, self.y], axis=1))
         apart = tree.query(centres)[0] if tree.n else np.full(len(centres), np.inf)
         least = np.min(self._block.mesh.comm.allgather(apart), axis=0)
-        # all of several as near
+        # all nodes at the smallest distance
         near = tree.query_ball_point(centres, (1.0 + 1e-9) * least) if tree.n else []
         rows = np.concatenate([np.empty(0, dtype=np.intp), *map(np.asarray, near)]).astype(np.intp)
         counts = np.array([len(found) for found in near], dtype=np.intp)
@@ -169,7 +173,7 @@ class TopNodes:
 
     @cached_property
     def _shares(self) -> csr_array:
-        """Share of every patch in every node of this rank, (n, N)."""
+        """Share of every node of this rank that belongs to every patch, shape (n, N)."""
         slack = 1e-9 * max(self.patches.lengths)
         sides = [
             [np.searchsorted(borders, place + offset) - 1 for offset in (-slack, slack)]
@@ -198,12 +202,12 @@ class TopNodes:
 
     @cached_property
     def _thirds(self) -> Array:
-        """Thirds of the triangles around this rank's nodes [mm²]."""
+        """A third of the area of the triangles around each of this rank's nodes [mm²]."""
         triangles, area = self.triangles
-        return self.collect(triangles, np.repeat(area[:, None] / 3.0, 3, axis=1))
+        return self.sum_of_ranks(triangles, np.repeat(area[:, None] / 3.0, 3, axis=1))
 
-    def collect(self, nodes: Index, values: Array) -> Array:
-        """Add up what all ranks have for this rank's nodes, shape (n,).
+    def sum_of_ranks(self, nodes: Index, values: Array) -> Array:
+        """Return the sums of all ranks' values at this rank's nodes, shape (n,).
 
         Args:
             nodes: Rank-local nodes of the top, any shape.
@@ -216,7 +220,7 @@ class TopNodes:
         return vector.array_r[self.dofs].copy()
 
     def _numbers(self, nodes: Index) -> Index:
-        """Return the numbers of rank-local nodes among those of all ranks."""
+        """Return the global numbers of rank-local nodes."""
         index_map = self._block.space.dofmap.index_map
         return index_map.local_to_global(nodes.ravel().astype(np.int32)).reshape(nodes.shape)
 

@@ -1,4 +1,7 @@
-"""Contact area within the facets of a block's top, from pressures and gaps of its nodes."""
+"""Contact area within the facets of a block's top, from pressures and gaps of its nodes.
+
+Theory: section 12 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +23,8 @@ class FacetLattice(NamedTuple):
 
     Attributes:
         nodes: Nodes of the cell that lie on each of its facets, shape (facets, n).
-        corners: Positions in a row of ``nodes`` of the triangles' corners, shape (m, 3).
-        weight: What each triangle counts, shape (m,): those of both diagonals of a square half.
+        corners: Indices of the triangles' corners into a row of ``nodes``, shape (m, 3).
+        weight: Weight of each triangle, shape (m,): ½ in squares, which both diagonals divide.
     """
 
     nodes: Index
@@ -30,7 +33,7 @@ class FacetLattice(NamedTuple):
 
 
 def facet_lattice(cell_name: str, degree: int) -> FacetLattice:
-    """Cut the facets of a Lagrange element into triangles between neighbouring nodes.
+    """Divide the facets of a Lagrange element into triangles between neighbouring nodes.
 
     Args:
         cell_name: ``hexahedron`` or ``tetrahedron``.
@@ -59,10 +62,10 @@ def facet_lattice(cell_name: str, degree: int) -> FacetLattice:
 def covered(touching: NDArray[np.bool_], pressure: Array, gap: Array, length: Array) -> Array:
     """Return the share of every triangle that is in contact, shape (m,).
 
-    The border of contact crosses the edges between a node that touches and one that does not.
-    Near it the pressure grows as κ √s with the distance s inside and the gap as
-    (4 κ / 3 E*) s^(3/2) outside, as for every smooth body (Johnson 1985, section 5.1,
-    doi 10.1017/CBO9781139171731); both together place it.
+    The border of contact crosses the edges between a node in contact and one out of contact. For
+    smooth bodies the pressure grows as κ √s with the distance s inside the border, and the gap as
+    (4 κ / 3 E*) s^(3/2) with the distance outside (Johnson 1985, section 5.1,
+    doi 10.1017/CBO9781139171731). The pressure at one node and the gap at the other give its place.
 
     Args:
         touching: Whether corners are in contact, shape (m, 3).

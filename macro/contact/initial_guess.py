@@ -4,6 +4,8 @@ Two kinds of guesses are needed. A rough top has no smooth energy in a basis of 
 and its guess is extrapolated. Laws on patches have one, and minimising it takes fewer linear
 iterations: over eight load steps extrapolation took 1.8 to 3.2 times as many with 4 patches and one
 closure for each, and 3 to 18 % more with 16 and 64 patches or laws at points.
+
+Theory: sections 11 and 12 of ``demos/theory.md``.
 """
 
 from __future__ import annotations
@@ -120,6 +122,10 @@ class DisplacementBasis:
         sampling: Their samples of the interface.
         size: Largest number of vectors; the oldest are dropped first.
 
+    Attributes:
+        vectors: W, this rank's degrees of freedom of the vectors, shape (k, n) [mm].
+        forces: K W, their forces, shape (k, n) [N].
+
     Note:
         Collective.
     """
@@ -127,12 +133,12 @@ class DisplacementBasis:
     def __init__(self, equilibrium: Equilibrium, sampling: Sampling, *, size: int = 32) -> None:
         self._equilibrium, self._sampling, self._size = equilibrium, sampling, size
         self._comm = equilibrium.block.mesh.comm
-        self._vectors: Array = np.empty((0, equilibrium.block.owned_dofs))  # W
-        self._forces: Array = np.empty_like(self._vectors)  # K W
+        self.vectors: Array = np.empty((0, equilibrium.block.owned_dofs))
+        self.forces: Array = np.empty_like(self.vectors)
         self._sampled: Array = np.empty((0, len(sampling.weight)))  # Wᵀ B of this rank's samples
 
     def __len__(self) -> int:
-        return len(self._vectors)
+        return len(self.vectors)
 
     def add(self, displacement: PETSc.Vec) -> None:
         """Add the part of a displacement that is new to the basis; collective."""
@@ -141,9 +147,9 @@ class DisplacementBasis:
         vector, force = displacement.array_r.copy(), work.array_r.copy()
         before = self._sum(vector @ force)
         for _ in range(2):  # a second pass removes what rounding left
-            shares = self._sum(self._vectors @ force)
-            vector -= shares @ self._vectors
-            force -= shares @ self._forces
+            shares = self._sum(self.vectors @ force)
+            vector -= shares @ self.vectors
+            force -= shares @ self.forces
         square = self._sum(vector @ force)
         if not square > _ROUNDING**2 * before:
             return
@@ -152,8 +158,8 @@ class DisplacementBasis:
         sampled = self._sampling.operator.createVecRight()
         self._sampling.operator.multTranspose(work, sampled)
         first = max(0, len(self) + 1 - self._size)
-        self._vectors = np.vstack([self._vectors, vector])[first:]
-        self._forces = np.vstack([self._forces, force])[first:]
+        self.vectors = np.vstack([self.vectors, vector])[first:]
+        self.forces = np.vstack([self.forces, force])[first:]
         self._sampled = np.vstack([self._sampled, sampled.array_r])[first:]
 
     def write_guess(self, into: PETSc.Vec) -> None:
@@ -176,7 +182,7 @@ class DisplacementBasis:
             else:
                 break
             y, value, slope = trial, trial_value, trial_slope
-        into.array[:] = y @ self._vectors
+        into.array[:] = y @ self.vectors
 
     def _projected(self, y: Array) -> tuple[Array, Array]:
         """Return the equilibrium's residual and tangent in the basis."""

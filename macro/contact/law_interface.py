@@ -1,4 +1,7 @@
-"""The contact interface: patches on the block's top, each with a law p = f(closure)."""
+"""The contact interface: patches on the block's top, each with a law p = f(closure).
+
+Theory: section 11 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 

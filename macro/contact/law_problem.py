@@ -1,4 +1,7 @@
-"""A block with contact laws on its top, under a rigid plane: one load step at a time."""
+"""A block with contact laws on its top, under a rigid plane: one load step at a time.
+
+Theory: section 11 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 
@@ -97,7 +100,7 @@ class LawContactProblem:
         contact = LawContact(interface, self._sampling, laws)
         self.equilibrium = Equilibrium(block, self._sampling, contact)
         self.newton = NewtonSolver(self.equilibrium, block.solver)
-        self._basis = DisplacementBasis(self.equilibrium, self._sampling)
+        self.basis = DisplacementBasis(self.equilibrium, self._sampling)
         self._plane: Array = np.zeros(3)
         self._closure: Array = np.zeros(len(self._sampling.weight))
 
@@ -117,11 +120,11 @@ class LawContactProblem:
         equilibrium = self.equilibrium
         equilibrium.contact.prescribe(control, self._plane)
         solution = equilibrium.block.stiffness.createVecRight()
-        self._basis.write_guess(solution)
+        self.basis.write_guess(solution)
         report = self.newton.solve(
             solution, what=f"the block at {control}", remedy="take more load steps (load.steps)"
         )
-        self._basis.add(solution)
+        self.basis.add(solution)
         state = self._state(solution, report)
         compat.collect_garbage(solution.comm)
         return state
@@ -141,7 +144,7 @@ class LawContactProblem:
         displacement = block.stiffness.createVecRight()
         found = block.solve(self._interface.load(pressure))
         displacement.array[:] = found.x.array[: block.owned_dofs]
-        self._basis.add(displacement)
+        self.basis.add(displacement)
 
     def patch_means(self, functions: Sequence[Callable[[Array], Array]]) -> Array:
         """Average functions of closure over the patches, at the latest equilibrium.

@@ -64,6 +64,10 @@ class NewtonSolver:
         problem: The equations.
         preconditioner: A linear solver whose preconditioner is set up and used for every tangent.
 
+    Attributes:
+        snes: PETSc's solver.
+        forcing: Whether tolerances of linear solves follow the residual.
+
     Note:
         Collective.
     """
@@ -73,7 +77,7 @@ class NewtonSolver:
         self._residuals: list[float] = []
         base = preconditioner.getOperators()[1]
         user = PETSc.Options(PREFIX)
-        self._forcing = not (user.hasName("ksp_rtol") or user.hasName("snes_ksp_ew"))
+        self.forcing = not (user.hasName("ksp_rtol") or user.hasName("snes_ksp_ew"))
         self.snes = PETSc.SNES().create(base.comm)
         self.snes.setOptionsPrefix(PREFIX)
         self.snes.setFunction(lambda _, *vectors: problem.residual(*vectors), base.createVecLeft())
@@ -112,7 +116,7 @@ class NewtonSolver:
         self, snes: PETSc.SNES, displacement: PETSc.Vec, _tangent: PETSc.Mat, _base: PETSc.Mat
     ) -> None:
         self._problem.update_tangent(displacement)
-        if self._forcing:
+        if self.forcing:
             now, wanted = self._residuals[-1], snes.getTolerances()[0]
             snes.ksp.setTolerances(rtol=max(min(_LOOSEST, now), _SPARE * wanted / now))
 

@@ -1,4 +1,7 @@
-"""A block whose rough top is meshed, under a rigid plane: one load step at a time."""
+"""A block whose rough top is meshed, under a rigid plane: one load step at a time.
+
+Theory: section 12 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 
@@ -83,7 +86,7 @@ class UnilateralContactProblem:
         method: ``"active-set"``: no node of the top penetrates; ``"augmented-lagrangian"``: no
             quadrature point of its facets does; ``"penalty"``: quadrature points penetrate in
             proportion to their pressure.
-        patches: Patches on the top whose forces and areas are wanted; None: the whole top.
+        patches: Patches on the top, for forces and areas by patch; None: one of the whole top.
         penalty: Pressure per penetration, for the last two methods [MPa/mm]; None: from the mesh.
 
     Attributes:

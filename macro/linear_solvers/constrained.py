@@ -1,4 +1,7 @@
-"""Conjugate gradients for displacements some of which are constrained, without a new matrix."""
+"""Conjugate gradients for displacements some of which are constrained, without a new matrix.
+
+Theory: section 12 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 

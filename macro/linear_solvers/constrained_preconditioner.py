@@ -1,4 +1,7 @@
-"""Preconditioner of a block some of whose degrees of freedom are constrained."""
+"""Preconditioner of a block some of whose degrees of freedom are constrained.
+
+Theory: section 12 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 

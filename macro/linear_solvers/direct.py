@@ -6,16 +6,13 @@ several ranks the same matrix fits in one run and fails in the next (error −9)
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from petsc4py import PETSc
 
 from geometry.errors import NotConverged
 
-DIRECT_DEFAULTS: Mapping[str, object] = {
-    "pc_type": "cholesky",
-    "pc_factor_mat_solver_type": "mumps",
-}
+DIRECT_DEFAULTS = {"pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"}
 """A factorisation, distributed over the ranks."""
 
 MARGINS = (50, 200, 800, 3200)

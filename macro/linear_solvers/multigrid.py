@@ -4,6 +4,8 @@ Grids coarsen where the planes of the lattice are close (see `coarsenings`). Dis
 interpolated trilinearly in the flat lattice, also on rough blocks, and the coarser matrices are
 Galerkin's products of the true matrix. A coarse node is one of the finer grid's nodes, and lives on
 the same rank.
+
+Theory: section 11 of ``demos/theory.md``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Which planes of a rectangular lattice stay on every coarser grid of a multigrid."""
+"""Which planes of a rectangular lattice stay on every coarser grid of a multigrid.
+
+Theory: section 11 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 

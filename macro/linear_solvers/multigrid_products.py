@@ -2,6 +2,8 @@
 
 petsc4py only hands out copies of a matrix's entries, so the blocks are read in place through
 PETSc's C interface.
+
+Theory: section 11 of ``demos/theory.md``.
 """
 
 from __future__ import annotations

@@ -10,6 +10,8 @@ other meshes, a factorisation is used where it fits into memory. Iterations to 1
     lattices        7 to 10 with tetrahedra; at ν = 0.49 13 (Q1), 14 (P1), 16 to 23 (Q2)
     refined meshes  11 to 15 up to ν = 0.3, 18 at 0.4, 24 at 0.45
     factorised      1 to 2; 10⁵ unknowns take 4 to 6 s and 1 GB, once
+
+Theory: section 11 of ``demos/theory.md``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Preconditioner of a block whose top stands on stiff springs."""
+"""Preconditioner of a block whose top stands on stiff springs.
+
+Theory: section 12 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 

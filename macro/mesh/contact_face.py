@@ -57,7 +57,7 @@ class TopFacets:
     @property
     def area(self) -> Array:
         """Areas in the plane, shape (n,) [mm²]."""
-        parallelogram = 2.0 * _areas(self.corners[:, :3])
+        parallelogram = 2.0 * triangle_areas(self.corners[:, :3])
         return parallelogram if self.corners.shape[1] == 4 else 0.5 * parallelogram
 
     def pull_back(self, facet: NDArray[np.intp], points: Array) -> Array:
@@ -97,7 +97,7 @@ def facet_quadrature(
     return FacetQuadrature(
         x=positions[:, 0],
         y=positions[:, 1],
-        weight=np.multiply.outer(2.0 * _areas(triangles), weights).ravel(),
+        weight=np.multiply.outer(2.0 * triangle_areas(triangles), weights).ravel(),
         patch=patch,
         cell=facets.cell[facet],
         nodes=compat.cell_nodes(space)[facets.cell[facet]],
@@ -131,8 +131,9 @@ def _triangles(corners: Array) -> tuple[Array, NDArray[np.intp]]:
     facet = np.arange(len(corners))
     if corners.shape[1] == 3:
         return corners, facet
-    # tensor order: vertices 0 and 3 of a quadrilateral are opposite
-    return np.concatenate([corners[:, [0, 1, 2]], corners[:, [3, 2, 1]]]), np.tile(facet, 2)
+    # Tensor order: vertices 0 and 3 of a square are opposite. The orientation decides the diagonal
+    # of what is left of a triangle cut by a border, on which the quadrature error depends.
+    return np.concatenate([corners[:, [0, 2, 1]], corners[:, [3, 1, 2]]]), np.tile(facet, 2)
 
 
 def _cut_into_patches(
@@ -142,17 +143,28 @@ def _cut_into_patches(
     slack = 1e-9 * max(patches.lengths)
     for axis, borders in enumerate((patches.borders_x, patches.borders_y)):
         for border in borders:
-            triangles, facet = _cut(triangles, facet, axis, border, slack)
+            triangles, facet = cut_triangles(triangles, facet, axis, border, slack)
         middle = triangles.mean(axis=1)[:, axis]
         inside = (middle > borders[0]) & (middle < borders[-1])
         triangles, facet = triangles[inside], facet[inside]
     return triangles, facet
 
 
-def _cut(
+def cut_triangles(
     triangles: Array, facet: NDArray[np.intp], axis: int, border: float, slack: float
 ) -> tuple[Array, NDArray[np.intp]]:
-    """Cut the triangles that a line x = border or y = border crosses into three each."""
+    """Cut the triangles that a line crosses into three each.
+
+    Args:
+        triangles: Corners, shape (n, 3, 2) [mm].
+        facet: Facet that each triangle belongs to, shape (n,).
+        axis: Axis that the line is perpendicular to, 0 or 1.
+        border: Coordinate of the line on that axis [mm].
+        slack: Distance at which a corner counts as on the line [mm].
+
+    Returns:
+        The triangles and their facets.
+    """
     height = triangles[:, :, axis] - border
     side = np.where(np.abs(height) <= slack, 0, np.sign(height)).astype(int)
     crossed = (side.min(axis=1) < 0) & (side.max(axis=1) > 0)
@@ -171,13 +183,14 @@ def _cut(
     p, q = a + share[:, :1] * (b - a), a + share[:, 1:] * (c - a)
     pieces = np.concatenate([np.stack(t, axis=1) for t in ((a, p, q), (p, b, c), (p, c, q))])
     owners = np.tile(facet[crossed], 3)
-    solid = _areas(pieces) > slack**2  # a vertex on the line leaves empty pieces
+    solid = triangle_areas(pieces) > slack**2  # a vertex on the line leaves empty pieces
     return (
         np.concatenate([triangles[~crossed], pieces[solid]]),
         np.concatenate([facet[~crossed], owners[solid]]),
     )
 
 
-def _areas(triangles: Array) -> Array:
+def triangle_areas(triangles: Array) -> Array:
+    """Return the areas of triangles, corners of shape (n, 3, 2) [mm], shape (n,) [mm²]."""
     u, v = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     return 0.5 * np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])

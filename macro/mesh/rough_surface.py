@@ -1,4 +1,7 @@
-"""Meshes of a block whose top is the rough surface itself."""
+"""Meshes of a block whose top is the rough surface itself.
+
+Theory: section 12 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 
@@ -139,10 +142,10 @@ def _straighten(flat: BlockMesh, moved: Array) -> None:
     while True:
         middles = cells[:, 4:]
         found = np.unique(np.asarray(names)[middles[_volumes(flat, moved) < _LEAST_BENT]])
-        wanted = np.union1d(done, np.concatenate(flat.comm.allgather(found)))
-        if len(wanted) == len(done):
+        straight = np.union1d(done, np.concatenate(flat.comm.allgather(found)))
+        if len(straight) == len(done):
             return
-        done = wanted
+        done = straight
         cell, edge = np.nonzero(np.isin(np.asarray(names)[middles], done))
         ends = cells[cell[:, None], _EDGES[edge]]
         moved[middles[cell, edge], 2] = moved[ends, 2].mean(axis=1)

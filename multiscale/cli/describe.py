@@ -12,7 +12,7 @@ from geometry.collective import on_root
 from geometry.statistics import roughness
 from multiscale.cli.inputs import scene_and_folder
 from multiscale.costs.prediction import Cost, predicted_cost
-from multiscale.couplings.blocks import load_together
+from multiscale.couplings.blocks import load_finite_elements
 from multiscale.laws.files import write_laws
 from multiscale.machine.mpi_job import large_object_comm
 from multiscale.machine.nodes import cluster_nodes
@@ -37,7 +37,7 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
         comm: MPI communicator; None for a process on its own.
     """
     scene, _ = scene_and_folder(choice, comm)
-    load_together(scene, comm)
+    load_finite_elements(scene, comm)
     nodes = cluster_nodes(comm)
 
     def planned() -> tuple[ProblemSetup, Cost]:

@@ -1,34 +1,32 @@
-"""Builds what a scene asks for: laws, the block or its compliance, and the coupling of them."""
+"""Makes the laws and the coupling that a scene asks for."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from geometry.errors import InputError
-from geometry.rigid_plane import Control
 from micro import MicroModel
 from multiscale.couplings.blocks import embedding, patch_compliance, patch_displacements
-from multiscale.couplings.condensed import CondensedCoupling
-from multiscale.couplings.free_tilt import TurningCoupling
+from multiscale.couplings.condensed import CondensedCoupling, FreePlaneCoupling
 from multiscale.couplings.load_steps import ContactCoupling, EmbeddedCoupling
 from multiscale.couplings.newton_choice import newton_choice
-from multiscale.couplings.reference import make_reference
+from multiscale.couplings.reference import ReferenceCoupling, make_reference
 from multiscale.laws.consistent import consistent_laws
-from multiscale.laws.files import LawTable
 from multiscale.laws.isolated import isolated_laws
-from multiscale.laws.patch_law import ExtendedLaw
+from multiscale.laws.law_table import LawTable
 from multiscale.loading.stepper import Coupling
 from multiscale.setup.problem import ProblemSetup
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import Interface
+    from macro import Block
 
 
 def make_table(setup: ProblemSetup, model: MicroModel, comm: Any) -> LawTable:
-    """Tabulate the laws of all patches: each alone, or all from the whole surface on its block.
+    """Tabulate the laws of all patches, each alone or all from the whole surface on its block.
 
     Args:
-        setup: The scene's ingredients.
+        setup: The problem set up from the scene.
         model: Its micro model on the body, see `contact_model`.
         comm: MPI communicator; None for this process alone.
 
@@ -54,9 +52,7 @@ def make_table(setup: ProblemSetup, model: MicroModel, comm: Any) -> LawTable:
             model,
             setup.patches,
             mean_heights=setup.mean_heights,
-            largest=Control(
-                **{load_history.quantity: load_history.largest}, tilt=load_history.tilt
-            ),
+            largest=load_history.control(load_history.largest),
             displacements=patch_displacements(setup, comm, dense=newton_choice(setup).condensed),
             pointwise=setup.scene.coupling.interface == "pointwise",
             tolerance=setup.table_tolerance,
@@ -75,43 +71,42 @@ def make_table(setup: ProblemSetup, model: MicroModel, comm: Any) -> LawTable:
     )
 
 
-def assemble(
-    setup: ProblemSetup, made: LawTable | MicroModel | None, comm: Any
-) -> tuple[Coupling, Interface | None]:
+def assemble(setup: ProblemSetup, make: Callable[[], LawTable | MicroModel], comm: Any) -> Coupling:
     """Put micro and macro model together as the scene asks.
 
     Args:
-        setup: The scene's ingredients.
-        made: The patch laws, of couplings that use them, or else the micro model on the body; None
-            in a reference.
+        setup: The problem set up from the scene.
+        make: Makes the patch laws, of couplings that use them, or else the micro model on the body;
+            not called for a reference.
         comm: MPI communicator; None for this process alone.
-
-    Returns:
-        The coupling, and the interface of the block that it presses itself.
 
     Note:
         Collective.
     """
-    if isinstance(made, LawTable):
-        return _with_laws(setup, made, comm)
-    if made is None:
-        return make_reference(setup, comm), None
-    return ContactCoupling(made, setup.patches, setup.mean_heights, comm), None
-
-
-def _with_laws(
-    setup: ProblemSetup, table: LawTable, comm: Any
-) -> tuple[Coupling, Interface | None]:
-    condensed = newton_choice(setup, table).condensed
-    patchwise = setup.scene.coupling.interface == "patchwise"
-    if table.path is not None and patchwise and setup.scene.loading.load_history.tilt is None:
-        return TurningCoupling(table, patch_displacements(setup, comm, dense=condensed)), None
+    if setup.micro is None:
+        return make_reference(setup, comm)
+    made = make()
+    if not isinstance(made, LawTable):
+        return ContactCoupling(made, setup.patches, setup.mean_heights, comm)
+    condensed = newton_choice(setup, made).condensed
+    mode, tilt = setup.scene.coupling.interface, setup.scene.loading.load_history.tilt
+    if made.path is not None and mode == "patchwise" and tilt is None:
+        return FreePlaneCoupling(made, patch_displacements(setup, comm, dense=condensed))
     if condensed:
-        return CondensedCoupling(table, patch_compliance(setup, comm)), None
+        return CondensedCoupling(made, patch_compliance(setup, comm))
     from macro import LawContactProblem
 
     interface = embedding(setup, comm)
-    laws = [ExtendedLaw(law) for law in table.laws]
-    mode = setup.scene.coupling.interface
-    pressed = LawContactProblem(interface.block, interface, laws, mode=mode)
-    return EmbeddedCoupling(pressed, table), interface
+    problem = LawContactProblem(interface.block, interface, made.laws, mode=mode)
+    return EmbeddedCoupling(problem, made, interface)
+
+
+def meshed_blocks(coupling: Coupling | None) -> list[Block]:
+    """Return the meshed blocks that a coupling solves its load steps on, the finest last.
+
+    Args:
+        coupling: The coupling; None before it is made.
+    """
+    if isinstance(coupling, ReferenceCoupling | EmbeddedCoupling):
+        return coupling.blocks
+    return []

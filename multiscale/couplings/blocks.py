@@ -1,7 +1,8 @@
-"""Blocks for couplings: what the contact problem sees of them, their compliance, their mesh."""
+"""The block of a scene: its terms in the contact problem, its compliance, its mesh."""
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -24,7 +25,7 @@ from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import FaceCompliance, Interface
+    from macro import Block, FaceCompliance, Interface
 
 Array = NDArray[np.float64]
 
@@ -32,31 +33,35 @@ OnBody = Callable[[HalfSpaceModel, int], HalfSpaceModel]
 """Puts a half-space model on a body; with finite slopes up to an order, 0 for none."""
 
 SLOPES = 2
-"""Order of finite slopes where they are seen."""
+"""Order of finite slopes where they are taken into account."""
 
-_REACH = 0.25
-"""Reach of free sides in the micro model, of the shortest side of the block."""
-_SHARP = 1e-10
-"""Residual of half-space solutions: their forces are then right to 1e-12, so that neither the unit
-of length nor the number of ranks is seen in a result. It costs a tenth more than 1e-8."""
+_DECAY_LENGTH = 0.25
+"""Decay length of the effect of free sides in the micro model, relative to the shortest side of
+the block."""
+
+_RESIDUAL = 1e-10
+"""Residual of half-space solutions. Their forces are then right to 1e-12, so that neither the unit
+of length nor the number of ranks changes a result. It costs a tenth more than 1e-8."""
 
 
-def contact_model(setup: ProblemSetup, comm: Any) -> MicroModel:
+def contact_model(setup: ProblemSetup, comm: Any, put_on_body: OnBody | None = None) -> MicroModel:
     """Return a scene's micro model on the body that it is pressed on, finite slopes included.
 
     Args:
-        setup: The scene's ingredients.
+        setup: The problem set up from the scene.
         comm: MPI communicator; None for this process alone.
+        put_on_body: What puts a half-space model on the scene's body, where that was solved for
+            already, see `on_body`.
 
     Note:
         Collective.
     """
     model = setup.model
-    embedded = setup.has_block and setup.scene.coupling.kind != "isolated"
+    isolated = setup.scene.coupling.kind == "isolated"
     if isinstance(model, HalfSpaceModel):
-        order = SLOPES if setup.finite_slopes else 0
-        return on_body(setup, comm, half_space=not embedded)(model, order)
-    if not embedded:
+        put_on_body = put_on_body or on_body(setup, comm, half_space=isolated)
+        return put_on_body(model, SLOPES if setup.finite_slopes else 0)
+    if isolated or not setup.has_block:
         return model
     body = scene_body(setup)
     return replace(model, body=body.term(body.face(comm)))  # type: ignore[type-var]
@@ -74,12 +79,12 @@ def on_body(
     """Return what puts half-space models on a scene's body, which is solved for once.
 
     Args:
-        setup: The scene's ingredients, with a half-space model.
+        setup: The problem set up from the scene, with a half-space model.
         comm: MPI communicator; None for this process alone.
-        half_space: Whether the body is a half-space instead of the scene's block.
+        half_space: Whether the body is a half-space even where the scene has a block.
         modes: Modes of the body along a side; by default those of its shape.
         coarse: Whether to take coarser elements for the body.
-        face: What pressures do to the body's top, where that is known; then it is not collective.
+        face: Compliance of the body's top, where that was solved for; then it is not collective.
 
     Returns:
         A function from a model and the order of finite slopes, 0 for none, to the model on the
@@ -88,19 +93,19 @@ def on_body(
     Note:
         Collective.
     """
-    body = None if half_space else scene_body(setup)
+    body = None if half_space or not setup.has_block else scene_body(setup)
     if body is not None and face is None:
         face = body.face(comm, modes=modes, coarse=coarse)
     material = block_material(setup)
 
     def put(model: HalfSpaceModel, order: int) -> HalfSpaceModel:
-        surface, model = model.surface, replace(model, tolerance=_SHARP)
-        # heights count from the highest point, which is near the loads: slopes add least there;
-        # the flat body then reaches up to it, while the block's height is that of the mean plane
+        surface, model = model.surface, replace(model, tolerance=_RESIDUAL)
+        # With finite slopes heights count from the highest point, near the loads, where slopes add
+        # least. The flat body then ends at it, while the block's height is that of the mean plane.
         higher = surface.highest - surface.mean_height if order else 0.0
         edge_stresses: list[SurfaceStress] = []
         if body is not None and face is not None:
-            model = replace(model, sides=body.known, body=body.term(face, higher=higher))
+            model = replace(model, sides=body.side_term, body=body.term(face, higher=higher))
             edge_stresses = _stresses(body, face, surface) if order else []
         if not order:
             return model
@@ -117,45 +122,38 @@ def _stresses(body: Body, face: FaceCompliance, surface: Surface) -> list[Surfac
     """Return the stresses in a contact face beyond those of the half-space."""
     grid = coarse_grid(surface)
     found: list[SurfaceStress] = []
-    if body.known is not None:
+    if body.side_term is not None:
         spacing = surface.lengths[0] / grid[0], surface.lengths[1] / grid[1]
-        found.append(side_stresses(body.known, spacing))
+        found.append(side_stresses(body.side_term, spacing))
     return [*found, body.stresses(face, grid)]
 
 
 def scene_body(setup: ProblemSetup) -> Body:
-    """Return the block of a scene, some of whose free sides its micro model knows of itself.
+    """Return the block of a scene; its free sides are a term of their own in half-space models.
 
     Args:
-        setup: The scene's ingredients.
+        setup: The problem set up from the scene.
     """
     return Body(
         shape=setup.shape,
         material=block_material(setup),
         sides=setup.scene.block.sides,
-        known=free_sides(setup),
+        side_term=free_sides(setup) if isinstance(setup.model, HalfSpaceModel) else None,
     )
 
 
 def free_sides(setup: ProblemSetup) -> FreeSides | None:
-    """Return the free sides that a scene's half-space model takes into account itself.
-
-    None where there are none, or the micro model is another one.
+    """Return the free sides of a scene's block that bound its interface; None without them.
 
     Args:
-        setup: The scene's ingredients.
+        setup: The problem set up from the scene.
     """
-    return _block_sides(setup) if isinstance(setup.model, HalfSpaceModel) else None
-
-
-def _block_sides(setup: ProblemSetup) -> FreeSides | None:
-    """Return the free sides of a scene's block that end its interface; None without them."""
     if not setup.has_block or setup.scene.block.sides != "free" or setup.shape.margin:
         return None
     return FreeSides(
         lengths=setup.surface.lengths,
         poisson_ratio=setup.scene.block.poisson_ratio,
-        decay_length=_REACH * min(*setup.surface.lengths, setup.shape.height),
+        decay_length=_DECAY_LENGTH * min(*setup.surface.lengths, setup.shape.height),
     )
 
 
@@ -163,7 +161,7 @@ def patch_displacements(setup: ProblemSetup, comm: Any, *, dense: bool) -> Calla
     """Return what gives the mean displacements of patches in the macro model of a scene.
 
     Args:
-        setup: The scene's ingredients.
+        setup: The problem set up from the scene.
         comm: MPI communicator; None for this process alone.
         dense: Whether the macro model is the compliance of the patches, or the mesh itself.
 
@@ -174,7 +172,7 @@ def patch_displacements(setup: ProblemSetup, comm: Any, *, dense: bool) -> Calla
     Note:
         Collective.
     """
-    # laws have about as many rows as they may have: fewer patches than that take fewer solves
+    # with fewer patches than rows of laws the compliance takes fewer solutions of the mesh
     if dense or setup.patches.count <= setup.table_rows:
         compliance = patch_compliance(setup, comm)
         return lambda pressures: np.asarray(pressures @ compliance.T)
@@ -188,14 +186,14 @@ def patch_compliance(setup: ProblemSetup, comm: Any) -> Array:
     """Return the compliance of a scene's block under its patches, shape (N, N) [mm/MPa].
 
     Args:
-        setup: The scene's ingredients.
+        setup: The problem set up from the scene.
         comm: MPI communicator; None for this process alone.
 
     Note:
         Collective.
     """
     if setup.scene.coupling.decomposed:
-        body = replace(scene_body(setup), known=_block_sides(setup))
+        body = replace(scene_body(setup), side_term=free_sides(setup))
         return body.patch_compliance(setup.patches, comm)
     from mpi4py import MPI
 
@@ -215,7 +213,7 @@ def embedding(setup: ProblemSetup, comm: Any) -> Interface:
     """Mesh and assemble the block of a scene, with its patches on top.
 
     Args:
-        setup: The scene's ingredients.
+        setup: The problem set up from the scene.
         comm: MPI communicator; None for this process alone.
 
     Note:
@@ -230,14 +228,15 @@ def embedding(setup: ProblemSetup, comm: Any) -> Interface:
     return Interface(Block(mesh, block_material(setup), sides=section.sides), setup.patches)
 
 
-def load_together(scene: Scene, comm: Any) -> None:
-    """Load the finite elements on all ranks where a scene may need them.
+def load_finite_elements(scene: Scene, comm: Any) -> None:
+    """Import the finite elements on all ranks where a scene may need them.
 
-    PETSc starts with collective calls on all processes of the job: one rank alone must not.
+    PETSc starts with collective calls on all processes of the job, so that one rank alone must not
+    import it.
 
     Args:
         scene: The scene.
-        comm: MPI communicator; None for this process alone, which loads them when it needs them.
+        comm: MPI communicator; None for this process alone, which imports them when it needs them.
 
     Note:
         Collective.
@@ -252,11 +251,11 @@ def block_material(setup: ProblemSetup) -> Material:
     return Material(young_modulus=section.young_modulus, poisson_ratio=section.poisson_ratio)
 
 
-def final_field(setup: ProblemSetup, pressure: Array, comm: Any) -> tuple[Interface, Array]:
+def field_under(setup: ProblemSetup, pressure: Array, comm: Any) -> tuple[Interface, Array]:
     """Return the meshed block and its displacements under pressures that are uniform on patches.
 
     Args:
-        setup: The scene's ingredients.
+        setup: The problem set up from the scene.
         pressure: Pressures of the patches, shape (N,) [MPa].
         comm: MPI communicator; None for this process alone.
 
@@ -266,3 +265,27 @@ def final_field(setup: ProblemSetup, pressure: Array, comm: Any) -> tuple[Interf
     interface = embedding(setup, comm)
     function = interface.block.solve(interface.load(pressure))
     return interface, function.x.array[: interface.block.owned_dofs].copy()
+
+
+def free_blocks(blocks: list[Block]) -> None:
+    """Free blocks that nothing else refers to any more.
+
+    PETSc keeps objects that Python drops until it is asked on their own communicator. Without this
+    a program that makes many runs would grow by a block with each.
+
+    Args:
+        blocks: The blocks; the list is emptied.
+
+    Note:
+        Collective.
+    """
+    if not blocks:
+        return
+    from macro.compat import collect_garbage
+
+    comms = [block.stiffness.comm.duplicate() for block in blocks]  # these outlive their blocks
+    blocks.clear()
+    gc.collect()  # a block and its contact problem refer to each other
+    for comm in comms:
+        collect_garbage(comm)
+        comm.destroy()

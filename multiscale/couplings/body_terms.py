@@ -1,7 +1,7 @@
-"""What the block of a scene adds to the compliance of its contact: put together from both scales.
+"""The body correction: what the block of a scene adds to the compliance of its contact.
 
-In Legendre modes of the block's top, the compliance of the block less that of the half-space, less
-what free sides add where the micro model knows of them.
+In Legendre modes of the block's top it is the compliance of the block, from finite elements, less
+that of the half-space, and less the effect of free sides where they are a term of their own.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from geometry.checks import process_memory
 from geometry.errors import InputError
+from geometry.materials import Material
 from micro import (
     BodyModes,
     BodyStresses,
@@ -28,34 +29,41 @@ from micro import (
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from geometry import BlockShape, Partition
-    from macro import FaceCompliance, Material
+    from macro import FaceCompliance
     from macro.block import Sides
 
 Array = NDArray[np.float64]
 
-_CUBE = 8
-"""Modes along a side of a cube whose free sides the half-space knows of. On Set 1's recipe (seed 1,
-8 µm) 6, 8, 10 and 14 miss 0.04, 0.012, 0.009 and 0.005 % of the force that 20 give; on a ball in
-the middle, near a side, cut by a side and by a corner 8 miss 0.003, 0.002, 0.02 and 0.1 %, 6 up to
-3 %."""
-_FLATNESS = 0.42
+_CUBE_MODES = 8
+"""Modes along a side of a cube whose free sides are a term of their own. On Set 1's recipe (seed 1,
+8 µm) the force with 6, 8, 10 and 14 differs by 0.04, 0.012, 0.009 and 0.005 % from that with 20. On
+a ball in the middle, near a side, cut by a side and by a corner 8 are within 0.003, 0.002, 0.02 and
+0.1 %, 6 within 3 %."""
+
+_FLATNESS_POWER = 0.42
 """Power of the shape's width by its depth that modes grow with: a block 0.3, 0.1 and 0.05 mm high
 and 1 mm wide needs 13, 21 and 28 for 0.1 to 0.2 %."""
-_UNTOLD = 16
-"""Modes at least where sides are not known: with 16 on a cube Set 1's recipe misses 0.4 %, a ball
-that a side cuts in half 3 % (with 8: 1.7 and 14 %; with 24: 0.15 and 0.6 %)."""
-_MARGIN = 12
+
+_LEAST_WITH_SIDES = 16
+"""Modes at least where they describe free sides too: with 16 on a cube Set 1's recipe is 0.4 % off,
+a ball that a side cuts in half 3 % (with 8: 1.7 and 14 %; with 24: 0.15 and 0.6 %)."""
+
+_LEAST_WITH_MARGIN = 12
 """Modes at least where the block is wider than the contact: with a margin of 0.05 mm on a cube 8
-miss up to 1.2 %, 12 up to 0.1 %; a corner 0.7 %."""
-_CORNERS = 12
-"""Modes for many patches where sides are known: of 16 × 16 the one in the corner misses 0.3 % with
-8 and less than 0.1 % with 12."""
+are up to 1.2 % off, 12 up to 0.1 %; a corner 0.7 %."""
+
+_MODES_OF_CORNERS = 12
+"""Modes for many patches where free sides are a term of their own: of 16 × 16 patches the one in
+the corner is 0.3 % off with 8 and less than 0.1 % with 12."""
+
+_MODES_PER_PATCH, _MOST_MODES = 2, 32
+"""Modes per patch along a side where they describe free sides too, and their largest number. Of
+4 × 4, 8 × 8 and 16 × 16 patches 16, 16 and 24 modes leave 0.01, 0.07 and 0.3 % of the largest
+entry."""
+
 _BYTES = 190.0
 """Memory of solving for K × K modes over K⁴: free blocks 100 and 200 times as wide as high, with 56
 and 75 modes, take 1.8 and 5.8 GB (and 15 and 48 s)."""
-_PER_PATCH, _MOST = 2, 32
-"""Modes per patch along a side, where sides are not known, and their largest number. Of 4 × 4,
-8 × 8 and 16 × 16 patches 16, 16 and 24 leave 0.01, 0.07 and 0.3 % of the largest entry."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,14 +74,14 @@ class Body:
         shape: Size of the block; its cells do not matter.
         material: Elastic constants.
         sides: Support of its sides.
-        known: Free sides that the contact's compliance has as a term of its own; None where the
-            body's term is to have them.
+        side_term: Free sides that are a term of their own in the contact's compliance; None where
+            the body correction includes them.
     """
 
     shape: BlockShape
     material: Material
     sides: Sides
-    known: FreeSides | None = None
+    side_term: FreeSides | None = None
 
     @property
     def lengths(self) -> tuple[float, float]:
@@ -83,13 +91,13 @@ class Body:
 
     @property
     def modes(self) -> int:
-        """Modes along a side that resolve what the block adds; see the constants above."""
+        """Modes along a side that resolve the body correction; see the constants above."""
         flatness = max(self.lengths) / min(*self.lengths, self.shape.height)
-        count = _CUBE * flatness**_FLATNESS
+        count = _CUBE_MODES * flatness**_FLATNESS_POWER
         if self.shape.margin:
-            count = max(count, _MARGIN)
-        elif self.known is None:
-            count = max(count, _UNTOLD)
+            count = max(count, _LEAST_WITH_MARGIN)
+        elif self.side_term is None:
+            count = max(count, _LEAST_WITH_SIDES)
         return math.ceil(round(count, 6))
 
     def _check_memory(self, count: int) -> None:
@@ -97,7 +105,7 @@ class Body:
         needed, memory = _BYTES * float(count) ** 4, process_memory()
         if needed <= memory:
             return
-        ratio = ((memory / _BYTES) ** 0.25 / _CUBE) ** (1.0 / _FLATNESS)
+        ratio = ((memory / _BYTES) ** 0.25 / _CUBE_MODES) ** (1.0 / _FLATNESS_POWER)
         key = "block.margin" if self.shape.margin else "block.height"
         raise InputError(
             f"the compliance of so flat a block, in {count} modes a side, needs about "
@@ -109,12 +117,12 @@ class Body:
         )
 
     def face(self, comm: Any, *, modes: int | None = None, coarse: bool = False) -> FaceCompliance:
-        """Return what pressures on the top do to it, from finite elements.
+        """Return the compliance of the top in modes, from finite elements.
 
         Args:
             comm: MPI communicator; None for this process alone.
             modes: Modes along a side; by default those of the shape.
-            coarse: Whether to take coarser elements, whose difference bounds the error.
+            coarse: Whether to take coarser elements; the difference bounds the error.
 
         Raises:
             InputError: When the modes of so flat a block do not fit into memory.
@@ -140,37 +148,38 @@ class Body:
         )
 
     def term(self, face: FaceCompliance, *, higher: float = 0.0) -> BodyModes:
-        """Return the body's term of the contact's compliance.
+        """Return the body correction.
 
         Args:
-            face: What pressures do to its top.
+            face: Compliance of the top.
             higher: Height that is added to the block, to first order [mm].
         """
         half_space = half_space_modes(self.lengths, face.count)
-        if self.known is not None:
-            half_space = half_space + side_modes(self.known, face.count)
+        if self.side_term is not None:
+            half_space = half_space + side_modes(self.side_term, face.count)
         whole = face.normal + higher * face.growth
         compliance = whole - half_space / self.material.contact_modulus
-        return BodyModes(self.lengths, compliance, self._origin)
+        origin = -self.shape.margin, -self.shape.margin
+        return BodyModes(self.lengths, compliance, origin)
 
     def stresses(self, face: FaceCompliance, grid: tuple[int, int]) -> BodyStresses:
-        """Return the stresses in the contact face that the half-space and its sides do not have.
+        """Return the stresses in the contact face less those of the half-space and its sides.
 
         Args:
-            face: What pressures do to the top.
+            face: Compliance of the top.
             grid: Cells that fill the contact face.
         """
         nu = self.material.poisson_ratio
-        known = half_space_stress_modes(self.lengths, nu, face.count)
-        if self.known is not None:
-            known = known + side_stress_modes(self.known, face.count)
-        return BodyStresses(self.lengths, grid, face.stresses - known, self.shape.margin)
+        half_space = half_space_stress_modes(self.lengths, nu, face.count)
+        if self.side_term is not None:
+            half_space = half_space + side_stress_modes(self.side_term, face.count)
+        return BodyStresses(self.lengths, grid, face.stresses - half_space, self.shape.margin)
 
     def patch_compliance(self, patches: Partition, comm: Any) -> Array:
         """Return the whole compliance of the block under its patches.
 
         Args:
-            patches: N patches of the contact face; free sides that are known end it.
+            patches: N patches of the contact face; free sides with a term of their own bound it.
             comm: MPI communicator; None for this process alone.
 
         Returns:
@@ -181,15 +190,11 @@ class Body:
             one's limit.
         """
         modulus, count = self.material.contact_modulus, self.modes
-        known = influence_matrix(patches) / (np.pi * modulus)
-        if self.known is not None:
-            known += self.known.patch_compliance(patches) / modulus
-            count = max(count, min(max(patches.shape), _CORNERS))
+        half_space = influence_matrix(patches) / (np.pi * modulus)
+        if self.side_term is not None:
+            half_space += self.side_term.patch_compliance(patches) / modulus
+            count = max(count, min(max(patches.shape), _MODES_OF_CORNERS))
         else:
-            count = max(count, min(_PER_PATCH * max(patches.shape), _MOST))
-        rest = self.term(self.face(comm, modes=count))
-        return np.asarray(known + rest.patch_compliance(patches))
-
-    @property
-    def _origin(self) -> tuple[float, float]:
-        return -self.shape.margin, -self.shape.margin
+            count = max(count, min(_MODES_PER_PATCH * max(patches.shape), _MOST_MODES))
+        correction = self.term(self.face(comm, modes=count))
+        return np.asarray(half_space + correction.patch_compliance(patches))

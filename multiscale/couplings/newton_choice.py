@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from multiscale.laws.files import LawTable
+from multiscale.laws.law_table import LawTable
 from multiscale.setup.problem import ProblemSetup
 
 MOST_CYCLES_PER_STEP = 12
-"""Multigrid cycles that a load step of the full Newton takes at most, starts from earlier steps
-included; with fewer patches in reach about one for each (the paper's cube with 4 × 4 patches, 4
-of them loaded: 39 in 8 steps; with 2 of 64 in reach 36 in 40)."""
+"""Multigrid cycles that a load step of the full Newton takes at most, when it starts from earlier
+steps. With fewer patches that can touch it takes about one for each (the paper's cube with 4 × 4
+patches, 4 of them loaded: 39 in 8 steps; with 2 of 64 that can touch: 36 in 40)."""
 
 CYCLES_PER_PATCH = 11
-"""Multigrid cycles that the compliance of one patch takes (the paper's cube with 4 × 4 and 8 × 8
-patches)."""
+"""Multigrid cycles that the compliance of one patch takes, measured on the paper's cube with 4 × 4
+and 8 × 8 patches."""
 
 
-_UNLESS = "; should a patch turn out to be flat, condensed all the same"
+_UNLESS_FLAT = "; should a patch turn out to be flat, condensed all the same"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,8 +25,8 @@ class NewtonChoice:
     """Which Newton solves the load steps, and why.
 
     Attributes:
-        condensed: Whether the dense one of the patches does.
-        why: The reason, in words.
+        condensed: Whether it is the dense one of the patches.
+        why: The reason, as a sentence.
     """
 
     condensed: bool
@@ -37,27 +37,27 @@ def full_cycles(setup: ProblemSetup, steps: int) -> int:
     """Return the multigrid cycles that load steps on the mesh are predicted to take.
 
     Args:
-        setup: The scene's ingredients.
+        setup: The problem set up from the scene.
         steps: Load steps.
     """
     return steps * min(max(setup.interfering_patches, 1), MOST_CYCLES_PER_STEP)
 
 
 def newton_choice(setup: ProblemSetup, table: LawTable | None = None) -> NewtonChoice:
-    """Choose as the scene asks, or what is predicted to take fewer multigrid cycles.
+    """Choose the Newton of the scene, or the one that is predicted to take fewer multigrid cycles.
 
-    The full Newton spends cycles on load steps until its basis of earlier solutions spans what
-    the patches can do; the condensed one spends them on the compliance, before the first step.
+    The full Newton spends cycles on load steps until its basis of earlier solutions spans all
+    states of the patches. The condensed one spends them on the compliance, before the first step.
 
     Args:
-        setup: The scene's ingredients, of a coupling with laws.
-        table: The laws, once made: those of flat patches rule out the mesh's Newton.
+        setup: The problem set up from the scene, of a coupling with laws.
+        table: The laws, once made; flat patches rule out the full Newton.
     """
     coupling = setup.scene.coupling
     if coupling.decomposed:
         return NewtonChoice(condensed=True, why="the decomposed block is its compliance")
-    flat = 0 if table is None else sum(law.is_punch for law in table.laws)
-    if flat and _left_open(setup):
+    flat = 0 if table is None else sum(law.is_flat for law in table.laws)
+    if flat and coupling.newton == "auto" and coupling.interface == "patchwise":
         why = (
             f"{flat} of {setup.patches.count} patches are flat, and their pressure is a function "
             "of closure nowhere"
@@ -71,7 +71,7 @@ def newton_choice(setup: ProblemSetup, table: LawTable | None = None) -> NewtonC
     compliance = CYCLES_PER_PATCH * patches
     full = full_cycles(setup, steps)
     fewer = "fewer" if compliance < full else "more"
-    unless = "" if compliance < full or table or setup.uses_summits else _UNLESS
+    unless = "" if compliance < full or table or setup.uses_summits else _UNLESS_FLAT
     return NewtonChoice(
         condensed=compliance < full,
         why=(
@@ -79,8 +79,3 @@ def newton_choice(setup: ProblemSetup, table: LawTable | None = None) -> NewtonC
             f"{fewer} than {steps} load steps on the mesh with about {full}{unless}"
         ),
     )
-
-
-def _left_open(setup: ProblemSetup) -> bool:
-    coupling = setup.scene.coupling
-    return coupling.newton == "auto" and coupling.interface == "patchwise"

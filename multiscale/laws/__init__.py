@@ -1,1 +1,1 @@
-"""Patch laws: pressure of a patch over its local approach, tabulated, refined, kept on disk."""
+"""Patch laws: pressure of a patch over its local approach, tabulated, refined, stored."""

@@ -4,111 +4,85 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import fields, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import h5py
+import numpy as np
 
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
+from multiscale.laws.law_table import LawTable, PlanePath
 from multiscale.laws.patch_law import PatchLaw
-from multiscale.laws.plane_path import PlanePath
-from multiscale.laws.repair import evened_law
+from multiscale.laws.rows import LawRows
 from multiscale.storage.serialisation import checksummed, stored_numbers, verified
 
-_COLUMNS = {
-    "approach": "mm",
-    "closure": "mm",
-    "pressure": "MPa",
-    "contact_area_fraction": "1",
-    "contacts": "1",
-    "relief": "mm",
-}
+FORMAT = "patchlaw laws 3"
+_COLUMNS = {one.metadata.get("stored", one.name): one for one in fields(LawRows)}
 _SCALARS = {
-    "touch": "mm",
-    "reach": "mm",
-    "interpolation_error": "1",
-    "stiffness_error": "1",
-    "warned_from": "MPa",
-    "repaired": "1",
+    "touch": "first_touch",
+    "reach": "initial_separation",
+    "interpolation_error": "interpolation_error",
+    "stiffness_error": "stiffness_error",
+    "warned_from": "warning_pressure",
+    "repaired": "repaired",
 }
 _PATH = "path"
-_PLANES = {"approach": "mm", "tilt": "1", "force": "N", "moment": "N mm"}
-FORMAT = "patchlaw laws 3"
+_PATH_UNITS = {"approach": "mm", "tilt": "1", "force": "N", "moment": "N mm"}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LawTable:
-    """The laws of all patches of an interface.
+def write_laws(path: Path, table: LawTable) -> None:
+    """Write all laws to one HDF5 file, see `law_bytes`.
 
-    Attributes:
-        patches: The partition.
-        laws: One law per patch, in the order of the flat patch index.
-        made_by: How they were made: coupling, micro model, Love's displacement, tolerance, and the
-            slopes of the plane that pressed the whole surface.
-        force_error: Estimated error of the force between the rows, see `refinement.Errors`: of
-            all patches together, or of the worst where each was tabulated alone.
-        path: The planes that pressed the whole surface, where they were free to turn; None where
-            the tilt was prescribed, and for patches alone.
+    Args:
+        path: File to write; one that exists is replaced.
+        table: The laws.
     """
-
-    patches: PatchGrid
-    laws: tuple[PatchLaw, ...]
-    made_by: dict[str, str]
-    force_error: float = float("nan")
-    path: PlanePath | None = None
-
-    def __post_init__(self) -> None:
-        if len(self.laws) != self.patches.count:
-            raise InputError("needs one law per patch", value=len(self.laws))
-
-    def __getitem__(self, index: int) -> PatchLaw:
-        return self.laws[index]
+    path.write_bytes(law_bytes(table))
 
 
-def write_laws(path: Path | BinaryIO, table: LawTable) -> None:
-    """Write all laws to one HDF5 file: a group ``patch_IX_IY`` per patch, a dataset per column.
+@lru_cache(maxsize=1)  # every checkpoint asks for the same
+def law_bytes(table: LawTable) -> bytes:
+    """Return the content of a law file.
 
-    A path is a group of its own. A checksum stands before the content; see
+    It has a group ``patch_IX_IY`` per patch with a dataset per column, and a group for the path of
+    the plane where there is one. A checksum stands before the content; see
     `multiscale.storage.serialisation`.
 
     Args:
-        path: File to write, by name or open; one that exists is replaced.
         table: The laws.
     """
-    content = checksummed(lambda file: _fill(file, table))
-    if isinstance(path, Path):
-        path.write_bytes(content)
-    else:
-        path.write(content)
 
+    def fill(file: Any) -> None:
+        file.attrs["format"] = FORMAT
+        file.attrs["patch_grid"] = table.patches.grid
+        file.attrs["lengths_mm"] = table.patches.lengths
+        file.attrs["origin_mm"] = table.patches.origin
+        file.attrs["force_error"] = table.force_error
+        for name, text in table.made_by.items():
+            file.attrs[f"made_by_{name}"] = text
+        for index, law in enumerate(table.laws):
+            group = file.create_group(_group_name(table.patches, index))
+            for name, column in _COLUMNS.items():
+                stored = group.create_dataset(name, data=getattr(law.rows, column.name))
+                stored.attrs["unit"] = column.metadata["unit"]
+            for name, attribute in _SCALARS.items():
+                group.attrs[name] = getattr(law, attribute)
+        if table.path is not None:
+            group = file.create_group(_PATH)
+            for name, unit in _PATH_UNITS.items():
+                group.create_dataset(name, data=getattr(table.path, name)).attrs["unit"] = unit
 
-def _fill(file: Any, table: LawTable) -> None:
-    file.attrs["format"] = FORMAT
-    file.attrs["patch_grid"] = table.patches.grid
-    file.attrs["lengths_mm"] = table.patches.lengths
-    file.attrs["origin_mm"] = table.patches.origin
-    file.attrs["force_error"] = table.force_error
-    for name, text in table.made_by.items():
-        file.attrs[f"made_by_{name}"] = text
-    for index, law in enumerate(table.laws):
-        group = file.create_group(_group_name(table.patches, index))
-        for name, unit in _COLUMNS.items():
-            group.create_dataset(name, data=getattr(law, name)).attrs["unit"] = unit
-        for name in _SCALARS:
-            group.attrs[name] = getattr(law, name)
-    if table.path is not None:
-        group = file.create_group(_PATH)
-        for name, unit in _PLANES.items():
-            group.create_dataset(name, data=getattr(table.path, name)).attrs["unit"] = unit
+    return checksummed(fill)
 
 
 def read_laws(path: Path | BinaryIO) -> LawTable:
     """Read a law file.
 
     The pressure of a patch alone rises with the approach; where noise in a table from elsewhere
-    makes it fall, it is repaired, and the law says by how much (`PatchLaw.repaired`). Consistent
+    makes it fall, it is repaired, and the law states by how much (`PatchLaw.repaired`). Consistent
     laws are taken as they are: neighbours that take load over make their pressures fall.
 
     Args:
@@ -119,7 +93,7 @@ def read_laws(path: Path | BinaryIO) -> LawTable:
             written before law files had a checksum.
     """
     name = str(path) if isinstance(path, Path) else None
-    if isinstance(path, Path) and not path.is_file():  # a pipe would be waited for
+    if isinstance(path, Path) and not path.is_file():  # reading a pipe would wait for its writer
         raise InputError("is not a readable law file: there is no such file", file=name)
     try:
         with h5py.File(verified(path), "r") as file:
@@ -132,6 +106,18 @@ def read_laws(path: Path | BinaryIO) -> LawTable:
         raise InputError(f"is not a readable law file: {error}", file=name) from None
 
 
+def repaired_law(law: PatchLaw) -> PatchLaw:
+    """Return a law whose pressure rises; the same one where it does.
+
+    Args:
+        law: The law of a patch alone, as a table from elsewhere may have it.
+    """
+    if np.all(np.diff(law.rows.pressure) >= 0.0):
+        return law
+    rows, change = law.rows.with_rising_pressure()
+    return replace(law, rows=rows, repaired=max(change, law.repaired))
+
+
 def _table(file: Any) -> LawTable:
     patches = PatchGrid(
         grid=_pair(file.attrs["patch_grid"], int),
@@ -140,34 +126,30 @@ def _table(file: Any) -> LawTable:
     )
     if math.prod(patches.grid) > len(file):
         raise InputError("lacks laws", value=patches.grid, allowed=f"{len(file)} groups")
-    groups = [file[_group_name(patches, index)] for index in range(patches.count)]
     made_by = {
         name.removeprefix("made_by_"): str(text)
         for name, text in file.attrs.items()
         if name.startswith("made_by_")
     }
-    law = _law if made_by.get("coupling") == "consistent" else _evened
+    laws = [_law(file[_group_name(patches, index)]) for index in range(patches.count)]
+    if made_by.get("coupling") != "consistent":
+        laws = [repaired_law(law) for law in laws]
+    path = None
+    if _PATH in file:
+        path = PlanePath(**{name: stored_numbers(file[_PATH][name]) for name in _PATH_UNITS})
     return LawTable(
         patches=patches,
-        laws=tuple(map(law, groups)),
+        laws=tuple(laws),
         made_by=made_by,
         force_error=float(file.attrs["force_error"]),
-        path=_path(file[_PATH]) if _PATH in file else None,
+        path=path,
     )
 
 
 def _law(group: Any) -> PatchLaw:
-    content: dict[str, Any] = {name: stored_numbers(group[name]) for name in _COLUMNS}
-    content.update({name: float(group.attrs[name]) for name in _SCALARS})
-    return PatchLaw(**content)
-
-
-def _path(group: Any) -> PlanePath:
-    return PlanePath(**{name: stored_numbers(group[name]) for name in _PLANES})
-
-
-def _evened(group: Any) -> PatchLaw:
-    return evened_law(_law(group))
+    rows = LawRows(**{one.name: stored_numbers(group[name]) for name, one in _COLUMNS.items()})
+    scalars = {attribute: float(group.attrs[name]) for name, attribute in _SCALARS.items()}
+    return PatchLaw(rows=rows, **scalars)
 
 
 def _group_name(patches: PatchGrid, index: int) -> str:

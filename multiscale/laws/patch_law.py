@@ -10,111 +10,92 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geometry.errors import InputError
-from multiscale.laws.interpolation import FLATTEST, Curves
+from multiscale.laws.interpolation import LEAST_SLOPE, LawCurves, LawPoint
+from multiscale.laws.rows import LawRows
 
 Array = NDArray[np.float64]
 
 
-class LawPoint(NamedTuple):
-    """Laws at local approaches.
+class LawValues(NamedTuple):
+    """What a law gives at closures, in their shape.
 
     Attributes:
-        closure: Closures [mm].
-        pressure: Mean pressures [MPa].
-        dclosure: Derivative of the closure over the local approach.
-        dpressure: Derivative of the pressure over the local approach [MPa/mm].
+        pressure: Mean pressure of the patch [MPa].
+        stiffness: Its exact derivative over the closure [MPa/mm].
+        contact_area_fraction: Real over nominal contact area.
+        separation: Mean gap between the plane and the patch's displaced surface [mm].
+        contacts: Number of contacts in the last row at or before the closure.
     """
 
-    closure: Array
     pressure: Array
-    dclosure: Array
-    dpressure: Array
-
-    @classmethod
-    def of(cls, values: Array, slopes: Array) -> LawPoint:
-        """Return the point of closure and p^(2/3), the first two of some curves."""
-        root = np.maximum(values[1], 0.0)
-        half = np.sqrt(root)
-        return cls(values[0], half * root, slopes[0], 1.5 * half * slopes[1])
+    stiffness: Array
+    contact_area_fraction: Array
+    separation: Array
+    contacts: NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PatchLaw:
-    """Mean pressure, contact area and contacts of one patch.
+    """Mean pressure, contact area and contacts of one patch: a contact law of `macro`.
 
     The closure c is the rigid approach at the patch minus the macroscopic displacement of its
-    surface: the gap g_n of Waddad et al. 2016, section 3.2. The rows are over the local rigid
-    approach s that they were computed at, and so are the interpolants: where a patch alone comes
-    near full contact, its pressure is no function of its closure any more, yet closure and
-    pressure are of s. Before the first touch pressure is zero and closure grows as s. Between rows
-    the interpolants are monotone where the rows are: p^(2/3) is interpolated (PCHIP), for Hertz'
+    surface: the gap g_n of Waddad et al. 2016, section 3.2. The law is interpolated over the local
+    rigid approach s of its rows, because near full contact the pressure of a patch taken alone is
+    no function of its closure any more, while closure and pressure remain functions of s.
+
+    Before first touch the pressure is zero and the closure grows as s. Between rows the
+    interpolants are monotone where the rows are (PCHIP). What is interpolated is p^(2/3): Hertz'
     law p ~ (s - s_touch)^(3/2) is a straight line in it, so that pressure and stiffness are right
-    from the first touch on. Beyond the rows the tangents go on.
+    from first touch on. Beyond the rows the tangents continue.
 
     Attributes:
-        closure: Closures from the first touch on, shape (n,) [mm]; empty for a patch that stays
-            open: such a law is zero as far as it goes.
-        pressure: Mean pressures, the first zero, shape (n,) [MPa].
-        approach: Local rigid approaches s, increasing, shape (n,) [mm]; where the plane was free to
-            turn, its approaches at the middle.
-        contact_area_fraction: Real over nominal contact area, shape (n,).
-        contacts: Number of asperities in contact, shape (n,).
-        relief: Mean displacement of the patch by its contacts beyond that by their mean pressure,
-            shape (n,) [mm]: what the mean gap is wider than the closure alone tells.
-        touch: Closure at first touch [mm]: the table's first, where an open patch would be touched
-            first, or infinite when it has no asperity.
-        reach: Rigid plane's height over the patch's mean plane at zero approach [mm]; the mean
-            separation is reach − c + relief.
+        rows: The rows from first touch on, the first without pressure. A patch that stays open has
+            none, and its pressure is zero.
+        first_touch: Closure at first touch [mm]: that of the first row, or where an open patch
+            would be touched first; infinite when it has nothing to touch.
+        initial_separation: Height of the rigid plane over the patch's mean plane at zero approach
+            [mm]. The mean separation is this less the closure, plus the unresolved displacement.
         interpolation_error: Estimated error of the interpolated pressure against the micro model,
-            see `refinement.Errors`.
-        stiffness_error: The same of the stiffness; NaN where nobody estimated it.
-        warned_from: Mean pressure from which on the micro model warned that the contacts lie
-            outside its range of validity [MPa]; infinite when it never did.
-        repaired: Largest change that made falling rows rise, see `repair.evened`.
+            see `multiscale.laws.refinement`.
+        stiffness_error: The same of the stiffness; NaN where it was not estimated.
+        warning_pressure: Mean pressure from which on the micro model warned that it is outside
+            its range of validity [MPa]; infinite when it never did.
+        repaired: Largest change that made falling rows rise, see `LawRows.rising`.
+
+    Raises:
+        InputError: When the rows are no law.
     """
 
-    closure: Array
-    pressure: Array
-    approach: Array
-    contact_area_fraction: Array
-    contacts: NDArray[np.int64]
-    relief: Array
-    touch: float
-    reach: float
+    rows: LawRows
+    first_touch: float
+    initial_separation: float
     interpolation_error: float = 0.0
     stiffness_error: float = float("nan")
-    warned_from: float = np.inf
+    warning_pressure: float = np.inf
     repaired: float = 0.0
 
     def __post_init__(self) -> None:
-        names = ("closure", "pressure", "approach", "contact_area_fraction", "contacts", "relief")
-        for name in names:
-            column = getattr(self, name)
-            if column.shape != self.closure.shape:
-                raise InputError("a patch law needs columns of one length")
-            if not np.all(np.isfinite(column)):
-                raise InputError(f"a patch law needs a finite {name}")
-        if self.closure.size == 1:
+        if len(self.rows) == 1:
             raise InputError("a patch law needs no row (open patch) or at least two")
-        if np.any(np.diff(self.approach) <= 0.0):
+        if np.any(np.diff(self.rows.approach) <= 0.0):
             raise InputError("a patch law needs a strictly increasing approach")
-        if np.any(self.pressure < 0.0):
+        if np.any(self.rows.pressure < 0.0):
             raise InputError("a patch law needs a pressure without tension")
-        if self.closure.size and self.pressure[0] != 0.0:
-            raise InputError("a patch law starts at zero pressure", value=self.pressure[0])
+        if len(self.rows) and self.rows.pressure[0] != 0.0:
+            raise InputError("a patch law starts at zero pressure", value=self.rows.pressure[0])
 
     @property
     def is_open(self) -> bool:
         """Whether the patch is touched nowhere in the law's range."""
-        return self.closure.size == 0
+        return len(self.rows) == 0
 
     @property
     def is_function(self) -> bool:
         """Whether the pressure is a function of closure in the whole range of the law."""
-        return self._rising == len(self.closure)
+        return self._rising == len(self.rows)
 
     @property
-    def is_punch(self) -> bool:
+    def is_flat(self) -> bool:
         """Whether closure falls from first touch on, as it does over a flat patch taken alone.
 
         Then the pressure is a function of closure nowhere.
@@ -123,115 +104,102 @@ class PatchLaw:
 
     @property
     def range(self) -> tuple[float, float]:
-        """Closures at first touch and at the end of the pressure's being a function of it [mm]."""
-        return self.touch, self.touch if self.is_open else float(self.closure[self._rising - 1])
+        """Closures between which the pressure is a function of closure [mm].
+
+        The first is that of first touch.
+        """
+        end = self.first_touch if self.is_open else float(self.rows.closure[self._rising - 1])
+        return self.first_touch, end
 
     @cached_property
-    def curves(self) -> Curves:
-        """Closure, p^(2/3), area fraction and relief over the local approach."""
+    def curves(self) -> LawCurves:
+        """Closure, p^(2/3), area fraction and unresolved displacement over the local approach."""
+        rows = self.rows
         columns = (
-            self.closure, self.pressure ** (2 / 3), self.contact_area_fraction, self.relief,
-        )  # fmt: skip
-        return Curves.through(self.approach, columns, before=(1.0, 0.0, 0.0, 0.0))
+            rows.closure,
+            rows.pressure ** (2 / 3),
+            rows.contact_area_fraction,
+            rows.unresolved_displacement,
+        )
+        return LawCurves.through(rows.approach, columns, before=(1.0, 0.0, 0.0, 0.0))
 
     def along(self, approach: ArrayLike) -> LawPoint:
-        """Return closure, pressure and their derivatives at local approaches.
+        """Return closure, pressure and their derivatives at local rigid approaches of any shape.
 
         Args:
-            approach: Local rigid approaches of any shape [mm].
+            approach: Local rigid approaches [mm].
         """
-        given = np.asarray(approach, dtype=float)
-        values, slopes = self.curves.of_one(*self.curves.placed(given.ravel()))
-        return LawPoint.of(values.reshape(-1, *given.shape), slopes.reshape(-1, *given.shape))
+        local = np.asarray(approach, dtype=float)
+        found = (part.reshape(-1, *local.shape) for part in self.curves.at(0, local.ravel()))
+        return LawPoint.of(*found)
 
-    def at(self, closure: ArrayLike, *, extend: bool = False) -> tuple[Array, Array]:
-        """Return pressure and stiffness, the exact derivative of the same interpolant.
+    def at(self, closure: ArrayLike, *, extend: bool = False) -> LawValues:
+        """Return what the law gives at closures of any shape.
 
         Args:
-            closure: Closures of any shape [mm].
-            extend: Continue along the tangent beyond the table instead of raising.
-
-        Returns:
-            Pressure [MPa] and its derivative over closure [MPa/mm], in the shape of `closure`.
+            closure: Closures [mm].
+            extend: Whether to continue along the tangent beyond the table instead of raising.
 
         Raises:
             InputError: When a closure lies beyond the law's range and `extend` is false.
         """
-        closures = self._checked(closure, extend)
-        point = LawPoint.of(*self._over_closure(closures))
-        return point.pressure, point.dpressure / np.maximum(point.dclosure, FLATTEST)
+        closures = np.asarray(closure, dtype=float)
+        if not extend:
+            self._check_range(closures)
+        values, slopes = self._over_closure(closures)
+        point = LawPoint.of(values, slopes)
+        row = np.searchsorted(self.rows.closure[: self._rising], closures, side="right") - 1
+        return LawValues(
+            pressure=point.pressure,
+            stiffness=point.dpressure / np.maximum(point.dclosure, LEAST_SLOPE),
+            contact_area_fraction=np.asarray(np.clip(values[2], 0.0, 1.0)),
+            separation=np.asarray(self.initial_separation - closures + values[3]),
+            contacts=np.where(row >= 0, np.append(self.rows.contacts, 0)[row], 0),
+        )
 
-    def area_fraction_at(self, closure: ArrayLike, *, extend: bool = False) -> Array:
-        """Return the real contact area over the nominal one.
+    def pressure(self, closure: ArrayLike) -> Array:
+        """Return the pressure at any closure, as an iteration needs it [MPa].
 
-        Args:
-            closure: Closures of any shape [mm].
-            extend: Go on beyond the table instead of raising.
-
-        Raises:
-            InputError: When a closure lies beyond the table and `extend` is false.
+        Beyond the table it continues along the tangent: whoever uses it checks the converged
+        closures with `at`.
         """
-        area = self._over_closure(self._checked(closure, extend))[0][2]
-        return np.asarray(np.clip(area, 0.0, 1.0))
+        return self.at(closure, extend=True).pressure
 
-    def contacts_at(self, closure: ArrayLike, *, extend: bool = False) -> NDArray[np.int64]:
-        """Return the number of contacts of the table row at or before each closure.
-
-        Args:
-            closure: Closures of any shape [mm].
-            extend: Keep the last row's number beyond the table instead of raising.
-
-        Raises:
-            InputError: When a closure lies beyond the table and `extend` is false.
-        """
-        closures = self._checked(closure, extend)
-        row = np.searchsorted(self.closure[: self._rising], closures, side="right") - 1
-        return np.where(row >= 0, np.append(self.contacts, 0)[row], 0)
-
-    def separation_at(self, closure: ArrayLike, *, extend: bool = False) -> Array:
-        """Return the mean gap between the plane and the patch's displaced surface [mm].
-
-        Args:
-            closure: Closures of any shape [mm].
-            extend: Go on beyond the table instead of raising.
-
-        Raises:
-            InputError: When a closure lies beyond the table and `extend` is false.
-        """
-        closures = self._checked(closure, extend)
-        return np.asarray(self.reach - closures + self._over_closure(closures)[0][3])
+    def stiffness(self, closure: ArrayLike) -> Array:
+        """Return the derivative of `pressure` over the closure [MPa/mm]."""
+        return self.at(closure, extend=True).stiffness
 
     @cached_property
     def _rising(self) -> int:
-        """Number of rows before closure stops to rise."""
-        stops = np.flatnonzero(np.diff(self.closure) <= 0.0)
-        return int(stops[0]) + 1 if stops.size else len(self.closure)
+        """Number of rows before closure stops rising."""
+        stops = np.flatnonzero(np.diff(self.rows.closure) <= 0.0)
+        return int(stops[0]) + 1 if stops.size else len(self.rows)
 
     @cached_property
-    def _risen(self) -> Curves:
-        """The curves up to where closure stops to rise, and their tangents there."""
+    def _rising_curves(self) -> LawCurves:
+        """The curves up to where closure stops rising, and their tangents there."""
         return self.curves.cut(self._rising)
 
     def _over_closure(self, closures: Array) -> tuple[Array, Array]:
         """Return values and derivatives over the approach at closures (…), shapes (f, …)."""
         given = closures.ravel()
-        piece, into = np.zeros(given.size, dtype=np.intp), given.copy()
+        piece, distance = np.zeros(given.size, dtype=np.intp), given.copy()
         if not self.is_open:
-            rows = self.closure[: self._rising]
-            into -= rows[0]
+            rows = self.rows.closure[: self._rising]
+            distance -= rows[0]
             beyond = given >= rows[-1]
-            slope = max(float(self._risen.coefficients[0, -1, 2, 0]), FLATTEST)
-            piece[beyond], into[beyond] = len(rows), (given[beyond] - rows[-1]) / slope
+            slope = max(float(self._rising_curves.coefficients[0, -1, 2, 0]), LEAST_SLOPE)
+            piece[beyond], distance[beyond] = len(rows), (given[beyond] - rows[-1]) / slope
             within = (given > rows[0]) & ~beyond
-            piece[within], into[within] = self._risen.inverted(0, rows, given[within])
-        values, slopes = self._risen.of_one(piece, into)
+            inverse = self._rising_curves.inverted(0, rows, given[within])
+            piece[within], distance[within] = inverse
+        values, slopes = self._rising_curves.within(0, piece, distance)
         return values.reshape(-1, *closures.shape), slopes.reshape(-1, *closures.shape)
 
-    def _checked(self, closure: ArrayLike, extend: bool) -> Array:
-        closures = np.asarray(closure, dtype=float)
+    def _check_range(self, closures: Array) -> None:
         start, end = self.range
-        # The end of a table is reached up to round-off of the closure's own computation.
-        if not extend and np.any(closures > end * (1 + 1e-12)):
+        # a converged closure may exceed the end of the table by its own rounding
+        if np.any(closures > end * (1 + 1e-12)):
             problem = "closure beyond the end of the patch law"
             if not self.is_function:
                 problem += ", where pressure stops being a function of closure"
@@ -240,22 +208,3 @@ class PatchLaw:
                 value=float(np.max(closures)),
                 allowed=f"closure up to {end:.6g} mm (first touch at {start:.6g} mm)",
             )
-        return closures
-
-
-@dataclass(frozen=True, slots=True)
-class ExtendedLaw:
-    """A patch law defined for every closure, as Newton's iterates need it.
-
-    Whoever uses it checks the converged closures against the table.
-    """
-
-    law: PatchLaw
-
-    def pressure(self, closure: ArrayLike) -> Array:
-        """Return the pressure [MPa] at closures of any shape [mm]."""
-        return self.law.at(closure, extend=True)[0]
-
-    def stiffness(self, closure: ArrayLike) -> Array:
-        """Return dp/dc [MPa/mm] at closures of any shape [mm]."""
-        return self.law.at(closure, extend=True)[1]

@@ -1,18 +1,22 @@
-"""One accepted load step, and what every patch carries in it."""
+"""The record of one load step, and of every patch in it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from geometry.patches import PatchGrid
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PatchState:
-    """What every patch carries at one load step.
+    """State of every patch at one load step.
 
     Attributes:
         closure_mm: Mean closure of each patch, shape (N,) [mm].
@@ -30,38 +34,38 @@ class LoadStep:
     """One accepted load step; the fields up to `reason` are columns of ``history.csv``.
 
     Attributes:
-        step: Number of the step, from 1.
+        step: Number of the step, from 1; 0 before it is accepted.
         approach_mm: Approach of the rigid plane from first touch [mm].
         force_N: Normal force on the plane [N].
         mean_pressure_MPa: Force over nominal contact area [MPa].
         contact_area_fraction: Real over nominal contact area.
         mean_separation_mm: Mean gap between the plane and the deformed surface [mm].
         contacts: Number of asperities in contact.
-        newton_iterations: Newton steps spent, on halved steps too; without laws (analytic,
-            concurrent) the iterations of the contact problem.
-        linear_iterations: Iterations of the linear solver spent.
+        newton_iterations: Newton steps, those of failed and halved steps included; without laws
+            (analytic, concurrent) the iterations of the contact problem.
+        linear_iterations: Iterations of the linear solver.
         wall_s: Wall time of the step [s].
         reason: Name of the reason for which the iteration stopped.
         patches: The state of every patch.
         imbalance: Force on the plane minus reaction of the support, relative to the force; None
-            where no support takes part.
+            where there is no support.
         residuals: Norms of the residual over the Newton steps, relative to the interface load.
         tilt: Slopes (tx, ty) of the approach about the middle of the interface [mm/mm].
         moment_N_mm: First moments (Σ P (x − xc), Σ P (y − yc)) of the forces about the middle
             [N mm].
         warnings: Why the micro model, where it was solved itself, is outside its range of
             validity; empty within it.
-        meshes: Approach [mm], force [N] and contact area fraction on every mesh of a reference,
-            the finest, which the step is of, last; empty with other couplings.
-        force_error_N: What the force may be off by [N]; 0 where it is prescribed, None where it
-            was not measured.
-        approach_error_mm: What the approach may be off by [mm]; 0 where it is prescribed, None
-            where it was not measured.
-        errors: Causes of the error and what each may change the force by at the approach found
-            [N]; empty where they were not measured.
+        meshes: Approach [mm], force [N] and contact area fraction on every mesh of a reference;
+            the last mesh is the finest, whose results the step has. Empty with other couplings.
+        force_error_N: Error bound of the force [N]; 0 where it is prescribed, None where it was
+            not measured.
+        approach_error_mm: Error bound of the approach [mm]; 0 where it is prescribed, None where
+            it was not measured.
+        errors: Causes of the error, and how much each may change the force at this approach [N];
+            empty where they were not measured.
     """
 
-    step: int
+    step: int = 0
     approach_mm: float
     force_N: float
     mean_pressure_MPa: float
@@ -69,9 +73,9 @@ class LoadStep:
     mean_separation_mm: float
     contacts: int
     newton_iterations: int
-    linear_iterations: int
-    wall_s: float
-    reason: str
+    linear_iterations: int = 0
+    wall_s: float = 0.0
+    reason: str = "CONVERGED"
     patches: PatchState
     imbalance: float | None = None
     residuals: tuple[float, ...] = ()
@@ -82,6 +86,49 @@ class LoadStep:
     force_error_N: float | None = None
     approach_error_mm: float | None = None
     errors: tuple[tuple[str, float], ...] = ()
+
+    @classmethod
+    def of_patches(
+        cls,
+        grid: PatchGrid,
+        *,
+        plane: Sequence[float] | Array,
+        load: Sequence[float] | Array,
+        closure: Array,
+        pressure: Array,
+        area_fraction: Array,
+        separation: Array | float,
+        contacts: ArrayLike,
+        **other: Any,
+    ) -> LoadStep:
+        """Return the load step that patches make together.
+
+        Args:
+            grid: The partition.
+            plane: Approach at the middle of the interface [mm], and slopes of the approach.
+            load: Force [N], and first moments of the forces about the middle [N mm].
+            closure: Mean closures of the patches, shape (N,) [mm].
+            pressure: Mean pressures of the patches, shape (N,) [MPa].
+            area_fraction: Real over nominal contact areas of the patches, shape (N,).
+            separation: Mean gaps of the patches, or their mean [mm].
+            contacts: Numbers of contacts in the patches, or their sum.
+            **other: Other fields of the load step.
+        """
+        (approach, tx, ty), (force, mx, my) = map(float, plane), map(float, load)
+        return cls(
+            approach_mm=approach,
+            force_N=force,
+            mean_pressure_MPa=force / (grid.area * grid.count),
+            contact_area_fraction=float(np.mean(area_fraction)),
+            mean_separation_mm=float(np.mean(separation)),
+            contacts=int(np.sum(contacts)),
+            patches=PatchState(
+                closure_mm=closure, pressure_MPa=pressure, contact_area_fraction=area_fraction
+            ),
+            tilt=(tx, ty),
+            moment_N_mm=(mx, my),
+            **other,
+        )
 
     @property
     def tilt_x(self) -> float:

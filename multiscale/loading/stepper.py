@@ -1,4 +1,4 @@
-"""Load programmes, and the driver that turns them into load steps of any coupling."""
+"""Load histories, and the stepper that turns them into load steps of any coupling."""
 
 from __future__ import annotations
 
@@ -15,39 +15,40 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.storage.serialisation import Arrays
 
 _MOST_HALVINGS = 8
+"""Halvings of a load step that does not converge, or that changes the force by too much."""
 
 
 class Coupling(Protocol):
     """Anything that finds the equilibrium under a rigid plane."""
 
     def press(self, control: Control) -> LoadStep:
-        """Find the equilibrium of one load step; its number is the driver's to give.
+        """Find the equilibrium of one load step, whose number is still 0.
 
         Args:
             control: What the step prescribes of the plane.
 
         Raises:
-            NotConverged: When there is none to be found; what was accepted before stays as it
-                was, so that a smaller step can be tried.
+            NotConverged: When none is found. Earlier equilibria stay what they were, so that a
+                smaller step can be tried.
         """
 
 
 @runtime_checkable
 class Restorable(Protocol):
-    """A coupling whose load steps depend on those before them, if only by where they start.
+    """A coupling whose load steps depend on those before them, if only by their initial guess.
 
-    Without it a coupling is taken to find the same equilibrium from nothing.
+    Any other coupling finds the same equilibrium without them.
     """
 
     def state(self) -> Arrays:
-        """Return what the next load step starts from; nothing in it depends on the ranks.
+        """Return what the next load step starts from; it does not depend on the number of ranks.
 
         Note:
             Collective.
         """
 
     def restore(self, state: Arrays) -> None:
-        """Go on from a state, in a coupling newly made from the same scene.
+        """Start from a state, in a coupling newly made from the same scene.
 
         Args:
             state: What `state` returned.
@@ -58,12 +59,12 @@ class Restorable(Protocol):
 
 
 class BeyondLaws(NotConverged):
-    """A patch left the range of its law; smaller steps to the same load do not help."""
+    """A patch is outside the range of its law, where smaller load steps do not help."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoadHistory:
-    """Turning points of the load, and how densely the legs between them are stepped.
+    """Turning points of the load, and the number of load steps between them.
 
     Attributes:
         quantity: What is prescribed, ``"approach"`` or ``"force"``.
@@ -71,8 +72,8 @@ class LoadHistory:
         steps: Load steps per leg.
         tilt: Slopes of the plane; None lets it turn freely.
         force_change: Largest change of the force in a step relative to the largest force so far,
-            that of the step included; steps that exceed it are halved. From no force at all to
-            the first a step may be as large as it is. None takes the steps as they are.
+            that of the step included; steps that exceed it are halved. The first step with a force
+            is not limited. None sets no limit.
     """
 
     quantity: Literal["approach", "force"]
@@ -107,14 +108,14 @@ class LoadHistory:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoadPosition:
-    """Where a programme has come to between two load steps; all that is needed to go on from there.
+    """Position in a load history between two load steps; all that is needed to continue there.
 
     Attributes:
         steps: Load steps accepted so far.
-        targets: Targets of the programme that were set out for so far.
-        ahead: Values still to be reached on the way to the latest target and that itself, the
-            nearest last; empty once it is reached.
-        smallest: Smallest increment on that way.
+        targets: Targets of the load history that were begun so far.
+        ahead: The latest target and values that are to be reached before it, the next one last;
+            empty once the target is reached.
+        smallest: Smallest increment on the way to it.
         value: Prescribed quantity at the last accepted step [mm or N].
         force: Force there [N].
         largest: Largest force so far [N].
@@ -128,11 +129,15 @@ class LoadPosition:
     force: float = 0.0
     largest: float = 0.0
 
+    def is_at_end(self, load_history: LoadHistory) -> bool:
+        """Whether all load steps of a load history are accepted."""
+        return self.targets == load_history.count and not self.ahead
+
 
 def load_steps(coupling: Coupling, load_history: LoadHistory) -> Iterator[LoadStep]:
-    """Yield the load steps of a programme as they are accepted.
+    """Yield the load steps of a load history as they are accepted.
 
-    A step that does not converge is reached through smaller ones, which are not told; one that
+    A step that does not converge is reached through smaller ones, which are not yielded. One that
     changes the force by too much is replaced by two.
 
     Args:
@@ -147,84 +152,79 @@ def load_steps(coupling: Coupling, load_history: LoadHistory) -> Iterator[LoadSt
 
 
 class LoadStepper:
-    """Makes the load steps of a programme, see `load_steps`; may go on where another one stopped.
+    """Makes the load steps of a load history, see `load_steps`, from any position in it.
 
     Args:
         coupling: What finds the equilibria.
         load_history: The loads.
-        position: Where to go on from.
+        position: Where to start.
 
     Attributes:
-        position: Where the programme has come to; up to date whenever a load step is yielded.
+        position: Position in the load history; up to date whenever a load step is yielded.
     """
 
     def __init__(
         self, coupling: Coupling, load_history: LoadHistory, position: LoadPosition | None = None
     ) -> None:
-        self._coupling, self._programme = coupling, load_history
+        self._coupling, self._load_history = coupling, load_history
         self.position = position or LoadPosition()
         self._newton = self._linear = 0
-        self._spent = 0.0
+        self._seconds = 0.0
 
     def __iter__(self) -> Iterator[LoadStep]:
-        """Yield the load steps that are still to be made."""
-        targets = self._programme.targets
-        while True:
+        """Yield the load steps from the position on."""
+        targets = self._load_history.targets
+        while not self.position.is_at_end(self._load_history):
             now = self.position
-            if now.ahead:
-                step = self._to(now.ahead[-1], now.smallest)
-                if step is None:
-                    between = 0.5 * (now.value + now.ahead[-1])
-                    self.position = replace(now, ahead=(*now.ahead, between))
-                else:
-                    yield self._accepted(step)
-            elif now.targets < len(targets):
+            if not now.ahead:
                 target = targets[now.targets]
                 smallest = abs(target - now.value) / 2**_MOST_HALVINGS
-                self.position = replace(
-                    now, targets=now.targets + 1, ahead=(target,), smallest=smallest
-                )
+                now = replace(now, targets=now.targets + 1, ahead=(target,), smallest=smallest)
+            began = time.perf_counter()
+            self.position = now
+            step = self._within_limit(now.ahead[-1])
+            self._seconds += time.perf_counter() - began
+            if step is None:
+                between = 0.5 * (now.value + now.ahead[-1])
+                self.position = replace(now, ahead=(*now.ahead, between))
             else:
-                return
+                yield self._accepted(step)
 
-    def _to(self, target: float, smallest: float) -> LoadStep | None:
-        """Press to a value; None when the force would change by too much on the way."""
-        began = time.perf_counter()
-        step = self._tried(target, smallest)
-        self._spent += time.perf_counter() - began
-        return step
-
-    def _tried(self, target: float, smallest: float) -> LoadStep | None:
-        divisible = abs(target - self.position.value) > smallest
-        if divisible and self._programme.quantity == "force" and self._is_leap(target):
+    def _within_limit(self, target: float) -> LoadStep | None:
+        """Press to a value; return None when the force would change by too much."""
+        divisible = abs(target - self.position.value) > self.position.smallest
+        by_force = self._load_history.quantity == "force"
+        if divisible and by_force and self._exceeds_limit(target):
             return None
-        step = self._pressed(target, smallest)
-        if divisible and self._is_leap(step.force_N):
-            return None
-        return step
+        step = self._reached(target)
+        return None if divisible and self._exceeds_limit(step.force_N) else step
 
-    def _is_leap(self, force: float) -> bool:
-        limit = self._programme.force_change
+    def _exceeds_limit(self, force: float) -> bool:
+        limit = self._load_history.force_change
         last, largest = self.position.force, self.position.largest
         if limit is None or last == 0.0:
             return False
         # halved steps of a force may meet the limit exactly, up to rounding
         return abs(force - last) > limit * max(largest, force) * (1.0 + 1e-9)
 
-    def _pressed(self, target: float, smallest: float) -> LoadStep:
+    def _reached(self, target: float) -> LoadStep:
         """Press to a value, through smaller steps where the whole one fails."""
         last, ahead = self.position.value, [target]
         while True:
-            control = self._programme.control(ahead[-1])
+            control = self._load_history.control(ahead[-1])
             try:
                 step = self._coupling.press(control)
-            except BeyondLaws as error:
-                raise self._failed(control, error, "") from error
             except NotConverged as error:
                 self._newton += error.iterations
-                if abs(ahead[-1] - last) <= smallest:
-                    halved = f"it was halved {_MOST_HALVINGS} times; "
-                    raise self._failed(control, error, halved) from error
+                beyond = isinstance(error, BeyondLaws)
+                if beyond or abs(ahead[-1] - last) <= self.position.smallest:
+                    halved = "" if beyond else f"it was halved {_MOST_HALVINGS} times; "
+                    raise NotConverged(
+                        f"load step {self.position.steps + 1} ({control})",
+                        reason=error.reason,
+                        iterations=error.iterations,
+                        remedy=halved + error.remedy,
+                    ) from error
                 ahead.append(0.5 * (last + ahead[-1]))
                 continue
             self._newton += step.newton_iterations
@@ -234,14 +234,14 @@ class LoadStepper:
                 return step
 
     def _accepted(self, step: LoadStep) -> LoadStep:
-        """Number a step and give it the work that led to it."""
+        """Number a step, give it all iterations and the time that led to it, and move on."""
         now = self.position
-        told = replace(
+        accepted = replace(
             step,
             step=now.steps + 1,
             newton_iterations=self._newton,
             linear_iterations=self._linear,
-            wall_s=self._spent,
+            wall_s=self._seconds,
         )
         self.position = replace(
             now,
@@ -251,13 +251,5 @@ class LoadStepper:
             force=step.force_N,
             largest=max(now.largest, step.force_N),
         )
-        self._newton, self._linear, self._spent = 0, 0, 0.0
-        return told
-
-    def _failed(self, control: Control, error: NotConverged, halved: str) -> NotConverged:
-        return NotConverged(
-            f"load step {self.position.steps + 1} ({control})",
-            reason=error.reason,
-            iterations=error.iterations,
-            remedy=halved + error.remedy,
-        )
+        self._newton, self._linear, self._seconds = 0, 0, 0.0
+        return accepted

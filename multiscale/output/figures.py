@@ -13,7 +13,7 @@ from geometry.asperities import Asperities
 from geometry.patches import PatchGrid
 from geometry.surface import Surface
 from micro.response import Response
-from multiscale.laws.files import LawTable
+from multiscale.laws.law_table import LawTable
 from multiscale.output.figure_style import (
     PRESSURE_LABEL,
     add_grid_and_legend,
@@ -181,9 +181,9 @@ def law_figure(table: LawTable) -> Figure:
     closing = [law for law in table.laws if not law.is_open]
     for law in closing:
         closure = np.linspace(*law.range, 200)
-        (line,) = pressure.plot(1e3 * closure, law.at(closure)[0], lw=1.2)
-        pressure.plot(1e3 * law.closure, law.pressure, ".", ms=3, color=line.get_color())
-        area.plot(1e3 * closure, 100 * law.area_fraction_at(closure), lw=1.2)
+        (line,) = pressure.plot(1e3 * closure, law.at(closure).pressure, lw=1.2)
+        pressure.plot(1e3 * law.rows.closure, law.rows.pressure, ".", ms=3, color=line.get_color())
+        area.plot(1e3 * closure, 100 * law.at(closure).contact_area_fraction, lw=1.2)
     pressure.set(xlabel="closure [µm]", ylabel="mean pressure of the patch [MPa]")
     area.set(xlabel="closure [µm]", ylabel="contact area fraction [%]")
     add_grid_and_legend(figure)

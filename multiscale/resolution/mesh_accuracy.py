@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from geometry.errors import InputError
-from multiscale.couplings.reference import make_reference, recorded
+from multiscale.couplings.reference import make_reference
 from multiscale.resolution.auto_keys import accuracy_of, with_value
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
@@ -46,7 +46,7 @@ def measured_mesh_error(setup: ProblemSetup) -> float:
     """
     coupling, load_history = make_reference(setup, None), setup.scene.loading.load_history
     step = coupling.press(load_history.control(load_history.largest))
-    (found,) = recorded(setup, coupling, [step]).with_errors([step])
+    (found,) = coupling.record([step]).with_errors([step])
     if not step.force_N > 0.0:
         return 0.0
     if found.force_error_N is None or found.approach_error_mm is None:

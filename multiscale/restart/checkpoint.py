@@ -64,7 +64,7 @@ def checkpoint_of(run: Run, state: Arrays) -> Checkpoint:
     """
     return Checkpoint(
         scene=given_keys(run.given),
-        resolved=run.settled,
+        resolved=run.resolved,
         heights=run.heights,
         laws=run.law_bytes,
         steps=tuple(run.steps),

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from multiscale.laws.files import LawTable
+from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 
 
@@ -19,7 +19,7 @@ def range_notes(steps: Sequence[LoadStep], table: LawTable | None) -> Iterator[s
     """
     outside = {step.step: step.warnings[0] for step in steps if step.warnings}
     if table is not None:
-        limit = np.array([law.warned_from for law in table.laws])
+        limit = np.array([law.warning_pressure for law in table.laws])
         for step in steps:
             pressure = step.patches.pressure_MPa
             if count := int(np.sum((pressure > 0.0) & (pressure >= limit))):

@@ -33,7 +33,7 @@ def body(name, height):
         shape=shape,
         material=Material(young_modulus=4000.0, poisson_ratio=0.15),
         sides="roller" if name == "rollers" else "free",
-        known=None if margin or name == "rollers" else sides,
+        side_term=None if margin or name == "rollers" else sides,
     )
 
 
@@ -54,7 +54,7 @@ def main():
         block = body(name, height)
         whole, term = median(lambda block=block: block.term(block.face(MPI.COMM_SELF)))
         half, _ = median(half_space_modes, block.lengths, block.modes)
-        beside = median(side_modes, block.known, block.modes)[0] if block.known else 0.0
+        beside = median(side_modes, block.side_term, block.modes)[0] if block.side_term else 0.0
         coarse = block.term(block.face(MPI.COMM_SELF, coarse=True))
         mean = term.matrix[0, 0] + half_space_modes(block.lengths, 1)[0, 0] / 4092.0
         lack = (term.matrix[0, 0] - coarse.matrix[0, 0]) / mean

@@ -40,7 +40,7 @@ def block():
     """Return the compliance of the cube's top in modes."""
     shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(1, 1, 1))
     sides = FreeSides(lengths=(1.0, 1.0), poisson_ratio=MATERIAL.poisson_ratio, decay_length=0.25)
-    body = Body(shape=shape, material=MATERIAL, sides="free", known=sides)
+    body = Body(shape=shape, material=MATERIAL, sides="free", side_term=sides)
     return body, body.face(MPI.COMM_SELF)
 
 
@@ -49,7 +49,7 @@ def models(cells, body, face):
     alone = HalfSpaceModel(
         surface=surface_of(cells), contact_modulus=MATERIAL.contact_modulus, tolerance=1e-10
     )
-    return alone, replace(alone, sides=body.known, body=body.term(face))
+    return alone, replace(alone, sides=body.side_term, body=body.term(face))
 
 
 def surface_of(cells):
@@ -78,7 +78,7 @@ def by_laws(body, face, count):
             displacements=lambda pressures: pressures @ compliance.T,
             most_rows=rows,
         )
-        used = max(law.approach.size for law in table.laws)
+        used = max(len(law.rows) for law in table.laws)
         print(f"laws of {count**2} patches on the block, 256², {used} rows: {spent:.2f} s")
     spent, _ = median(condensed, table, compliance)
     print(f"100 condensed load steps, {count**2} patches: {spent:.3f} s")

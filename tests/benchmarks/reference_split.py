@@ -51,7 +51,7 @@ def rough(seed, grid=256):
 def body_of():
     """Return what the block adds to the half-space with its sides, which serves every surface."""
     shape = BlockShape(interface=(SIDE, SIDE), height=SIDE, cells=(1, 1, 1))
-    body = Body(shape=shape, material=MATERIAL, sides="free", known=SIDES)
+    body = Body(shape=shape, material=MATERIAL, sides="free", side_term=SIDES)
     return body.term(body.face(COMM))
 
 

@@ -59,7 +59,7 @@ def concurrent(surface):
     nu, side = MATERIAL.poisson_ratio, surface.lengths[0]
     sides = FreeSides(lengths=surface.lengths, poisson_ratio=nu, decay_length=0.25 * side)
     shape = BlockShape(interface=surface.lengths, height=1.0, cells=(1, 1, 1))
-    body = Body(shape=shape, material=MATERIAL, sides="free", known=sides)
+    body = Body(shape=shape, material=MATERIAL, sides="free", side_term=sides)
     model = HalfSpaceModel(
         surface=surface,
         contact_modulus=MATERIAL.contact_modulus,

@@ -52,7 +52,7 @@ FLOORS = {
         "setup",
         "couplings",
         "costs measured_errors",
-        "resolution",
+        "notes resolution",
         "planning run",
         "output restart",
         "comparison",

@@ -35,7 +35,7 @@ def block_body(height=1.0, sides="free", *, known=True):
     if known and sides == "free":
         nu, decay_length = MATERIAL.poisson_ratio, 0.25 * min(1.0, height)
         free = FreeSides(lengths=SQUARE, poisson_ratio=nu, decay_length=decay_length)
-    return Body(shape=shape, material=MATERIAL, sides=sides, known=free)
+    return Body(shape=shape, material=MATERIAL, sides=sides, side_term=free)
 
 
 @cache
@@ -51,7 +51,7 @@ def on_block(surface, *, height=1.0, sides="free", known=True, tolerance=1e-8):
         surface=surface,
         contact_modulus=MODULUS,
         tolerance=tolerance,
-        sides=block_body(height, sides, known=known).known,
+        sides=block_body(height, sides, known=known).side_term,
         body=body_term(height, sides, known),
     )
 

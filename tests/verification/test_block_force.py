@@ -146,10 +146,10 @@ def test_what_nothing_holds_is_told_and_changes_nothing():
     right = [PowerLaw(3e4, touch=np.inf)] * 2 + [PowerLaw(3e4), PowerLaw(6e4)]
     pressed = LawContactProblem(interface.block, interface, right)
     before = pressed.solve(Control(force=2.0))
-    known = len(pressed._basis)
+    known = len(pressed.basis)
     with pytest.raises(NotConverged, match=r"NO_SUPPORT .*prescribe its tilt \(load.tilt\)"):
         pressed.solve(Control(force=3.0, tilt=None))
-    assert len(pressed._basis) == known
+    assert len(pressed.basis) == known
     np.testing.assert_array_equal(
         pressed.patch_means([np.array] * 4),
         before.closure,  # still of the latest equilibrium

@@ -22,7 +22,7 @@ def body(shape, nu=0.15, known=True, sides="free"):
         else None
     )
     material = Material(young_modulus=1.0, poisson_ratio=nu)
-    return Body(shape=shape, material=material, sides=sides, known=free)
+    return Body(shape=shape, material=material, sides=sides, side_term=free)
 
 
 @pytest.mark.parametrize("margin", [{}, {"margin": 0.25, "margin_cells": 2}])

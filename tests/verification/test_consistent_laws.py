@@ -49,8 +49,8 @@ def test_force_of_the_whole_surface(name, count):
     surface = rough(1)
     patches = PatchGrid(grid=(count, count), lengths=surface.lengths)
     model, means, table = table_of(surface, patches, name)
-    law = max(table.laws, key=lambda law: law.approach.size)
-    rows = law.approach[[-1, len(law.approach) // 2]]
+    law = max(table.laws, key=lambda law: len(law.rows))
+    rows = law.rows.approach[[-1, len(law.rows) // 2]]
     between = np.random.default_rng(3).uniform(0.1 * END, END, 5)
     asked = np.sort(np.append(rows, between))
     forces = model.respond(asked, patches=patches, mean_heights=means).force
@@ -62,13 +62,13 @@ def test_force_of_the_whole_surface(name, count):
         assert macro_force(table, distance) == pytest.approx(force, rel=allowed)
 
 
-def test_rows_run_out_where_they_are_told_to():
+def test_no_more_rows_than_allowed():
     surface = rough(2)
     patches = PatchGrid(grid=(4, 4), lengths=surface.lengths)
     _, _, few = table_of(surface, patches, tolerance=1e-6, most_rows=40)
     _, _, more = table_of(surface, patches, tolerance=1e-6, most_rows=120)
-    assert max(law.approach.size for law in few.laws) <= 40
-    assert max(law.approach.size for law in more.laws) <= 120
+    assert max(len(law.rows) for law in few.laws) <= 40
+    assert max(len(law.rows) for law in more.laws) <= 120
     assert 1e-6 < more.force_error < 0.5 * few.force_error  # of 3e-3 and 4e-4
 
 

@@ -78,8 +78,8 @@ def meshed_force():
     top = ball.scaled(FLAT)
     for shape in shapes:
         block = Block(rough_block_mesh(shape, top, COMM)[0], MATERIAL)
-        obstacle = UnilateralContactProblem(block, top.highest - top.mean_height)
-        forces.append(obstacle.solve(Control(approach=APPROACH * FLAT)).force / FLAT)
+        problem = UnilateralContactProblem(block, top.highest - top.mean_height)
+        forces.append(problem.solve(Control(approach=APPROACH * FLAT)).force / FLAT)
     found = extrapolated(np.array(forces)[:, None], [characteristic_size(s) for s in shapes], 3.0)
     return float(found.value[0]), float(found.error[0])
 

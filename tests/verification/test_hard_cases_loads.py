@@ -14,9 +14,10 @@ from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from micro import influence_matrix
 from multiscale.couplings.dense_newton import DenseNewton
-from multiscale.laws.packed import PatchLaws
+from multiscale.laws.files import repaired_law
+from multiscale.laws.law_table import PatchLaws
 from multiscale.laws.patch_law import PatchLaw
-from multiscale.laws.repair import evened_law
+from multiscale.laws.rows import LawRows
 from multiscale.run import Run
 
 every_kind = pytest.mark.parametrize("kind", KINDS)
@@ -67,7 +68,7 @@ def test_a_step_a_hundred_times_too_large_and_back(kind):
     assert there.force_N[0] == pytest.approx(slow.force_N[-1], rel=1e-5)
 
 
-def test_a_patch_alone_at_full_contact_on_the_mesh_is_told():
+def test_a_patch_alone_at_full_contact_on_the_mesh_is_refused():
     # hard: the pressure stops being a function of closure, and no smaller step helps
     with pytest.raises(
         NotConverged, match=r"stops being a function.*coupling.newton = 'condensed'"
@@ -111,10 +112,11 @@ def test_a_gap_shifted_by_a_ten_thousandth(kind):
 def law(closure, pressure, shift=0.0):
     closure, pressure = np.array(closure) + shift, np.array(pressure)
     zero = np.zeros(len(closure))
-    return PatchLaw(
+    rows = LawRows(
         closure=closure, pressure=pressure, approach=closure, contact_area_fraction=zero,
-        contacts=zero.astype(int), relief=zero, touch=float(closure[0]), reach=0.02,
+        contacts=zero.astype(int), unresolved_displacement=zero,
     )  # fmt: skip
+    return PatchLaw(rows=rows, first_touch=float(closure[0]), initial_separation=0.02)
 
 
 STEEP = np.array([0.0, 1e-3, 1e-3 + 1e-9, 9e-3])
@@ -161,7 +163,7 @@ def test_sixteen_patches_with_such_laws(name, by_force):
         noise = np.random.default_rng(4).normal(0.0, 0.3, len(pressure))
         pressure = np.abs(pressure * (1.0 + noise))
     laws = [law(closure, pressure, shift) for shift in np.linspace(0.0, 4e-3, 16)]
-    laws = laws if name != "noisy" else list(map(evened_law, laws))
+    laws = laws if name != "noisy" else list(map(repaired_law, laws))
     patches = PatchGrid(grid=(4, 4), lengths=(1.0, 1.0))
     yields = influence_matrix(patches) / (np.pi * 4092.0)
     newton = DenseNewton(PatchLaws(laws), yields, patches)
@@ -239,7 +241,9 @@ def test_a_plane_on_nothing_but_its_own_law_counts_from_rounding():
             dclosure=np.ones(2), dpressure=1.5e5 * np.sqrt(depth),
         )  # fmt: skip
 
-    newton = DenseNewton(SimpleNamespace(touch=touch, along=along), np.diag([1e-6, 1e-6]), patches)
+    newton = DenseNewton(
+        SimpleNamespace(first_touch=touch, along=along), np.diag([1e-6, 1e-6]), patches
+    )
     state = newton.solve(Control(approach=1e-6, tilt=(0.0, 0.0)))
     depth = brentq(lambda s: s + 1e-6 * 1e5 * s**1.5 - 1e-6, 0.0, 1e-6, xtol=1e-20, rtol=1e-14)
     assert state.pressure[0] == pytest.approx(1e5 * depth**1.5, rel=1e-6)

@@ -47,7 +47,7 @@ def test_facets_of_a_hexahedron_are_affine_squares():
 def test_compiling_leaves_logging_as_it_was():
     root = logging.getLogger()
     before = root.level, root.manager.disable, list(root.handlers)
-    with compat._quiet_compiler():
+    with compat.quiet_compiler():
         root.setLevel(logging.DEBUG)
         assert not logging.getLogger("any").isEnabledFor(logging.INFO)
     assert (root.level, root.manager.disable, list(root.handlers)) == before

@@ -20,7 +20,7 @@ FLAT = Surface(heights=np.zeros((8, 8)), lengths=(1.0, 1.0))
 SHAPE = BlockShape(interface=(1.0, 1.0), height=0.5, cells=(8, 8, 3), grading=2.0)
 
 
-def obstacle(shape, method, surface=SPHERE, sides="free", **options):
+def problem(shape, method, surface=SPHERE, sides="free", **options):
     mesh, _ = rough_block_mesh(shape, surface, MPI.COMM_SELF)
     block = Block(mesh, MATERIAL, sides)
     return UnilateralContactProblem(
@@ -32,13 +32,13 @@ def at_points(found, state):
     """Return depths and pressures of the quadrature points."""
     method, displacement = found.method, found.block.stiffness.createVecRight()
     displacement.array[:] = state.displacement
-    closure = method._equilibrium.closure(displacement)
-    return closure - method._law.distance, method._law.pressure(closure)
+    closure = method.equilibrium.closure(displacement)
+    return closure - method.law.distance, method.law.pressure(closure)
 
 
 def forces(shape, control):
     methods = ("active-set", "augmented-lagrangian")
-    return [obstacle(shape, method).solve(control).force for method in methods]
+    return [problem(shape, method).solve(control).force for method in methods]
 
 
 @pytest.mark.parametrize("element", ["Q1", "P1", "Q2", "P2"])
@@ -54,7 +54,7 @@ LIMIT = {"Q1": 1e-5, "P1": 1e-7, "Q2": 2e-3, "P2": 1e-2}
 
 @pytest.mark.parametrize("element", ["Q1", "P2"])
 def test_no_point_penetrates_and_none_is_pulled(element):
-    found = obstacle(replace(SHAPE, cells=(5, 5, 2), element=element), "augmented-lagrangian")
+    found = problem(replace(SHAPE, cells=(5, 5, 2), element=element), "augmented-lagrangian")
     state = found.solve(Control(force=30.0, tilt=None))
     depth, pressure = at_points(found, state)
     assert depth.max() <= PENETRATION[int(element[1])] * np.abs(state.displacement).max()
@@ -67,7 +67,7 @@ def test_no_point_penetrates_and_none_is_pulled(element):
 @pytest.mark.parametrize("element", ["Q1", "P1"])
 def test_no_point_presses_across_a_gap(element):
     shape = replace(SHAPE, height=1.0, cells=(8, 8, 4), grading=1.0, element=element)
-    found = obstacle(shape, "augmented-lagrangian", ROUGH)
+    found = problem(shape, "augmented-lagrangian", ROUGH)
     state = found.solve(Control(approach=0.012))
     depth, pressure = at_points(found, state)
     widest = -depth[pressure > 0.0].min()
@@ -78,16 +78,16 @@ def test_no_point_presses_across_a_gap(element):
 def test_without_force_nothing_touches(element):
     shape = replace(SHAPE, height=1.0, cells=(8, 8, 4), grading=1.0, element=element)
     # beyond the highest node, short of the points of the facets around it
-    state = obstacle(shape, "augmented-lagrangian", ROUGH).solve(Control(approach=6e-3))
+    state = problem(shape, "augmented-lagrangian", ROUGH).solve(Control(approach=6e-3))
     assert (state.force, state.reason) == (0.0, "CONVERGED_NO_CONTACT")
     assert (state.nodes, state.contacts, state.contact_area) == (0, 0, 0.0)
 
 
 def test_error_of_the_penalty_is_its_inverse():
-    exact = obstacle(SHAPE, "augmented-lagrangian").solve(Control(approach=0.02)).force
+    exact = problem(SHAPE, "augmented-lagrangian").solve(Control(approach=0.02)).force
     stiff = np.array([1e7, 1e8, 1e9])
     found = [
-        obstacle(SHAPE, "penalty", penalty=k).solve(Control(approach=0.02)).force for k in stiff
+        problem(SHAPE, "penalty", penalty=k).solve(Control(approach=0.02)).force for k in stiff
     ]
     errors = 1.0 - np.array(found) / exact
     assert np.all(errors > 0.0)  # points sink in: too soft
@@ -98,7 +98,7 @@ def test_error_of_the_penalty_is_its_inverse():
 @pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2"])
 def test_flat_top_on_rollers_is_a_column(element):
     shape = replace(SHAPE, cells=(4, 4, 2), element=element)
-    state = obstacle(shape, "augmented-lagrangian", FLAT, "roller").solve(Control(approach=1e-3))
+    state = problem(shape, "augmented-lagrangian", FLAT, "roller").solve(Control(approach=1e-3))
     # uniform strain on every mesh; the last penetration is 1e-8 of the approach
     assert state.force == pytest.approx(MATERIAL.confined_modulus * 1e-3 / 0.5, rel=1e-7)
     assert state.contact_area == pytest.approx(1.0, rel=1e-12)
@@ -106,8 +106,8 @@ def test_flat_top_on_rollers_is_a_column(element):
 
 
 def test_history_does_not_matter():
-    found = obstacle(SHAPE, "augmented-lagrangian")
+    found = problem(SHAPE, "augmented-lagrangian")
     for approach in (0.01, 0.02, 0.04, 0.015):
         state = found.solve(Control(approach=approach))
-    direct = obstacle(SHAPE, "augmented-lagrangian").solve(Control(force=state.force))
+    direct = problem(SHAPE, "augmented-lagrangian").solve(Control(force=state.force))
     assert direct.approach == pytest.approx(0.015, rel=1e-6)  # penetration of 1e-8 on both sides

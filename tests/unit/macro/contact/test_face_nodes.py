@@ -25,7 +25,7 @@ def test_areas_tile_the_top(element):
     assert area.sum() == pytest.approx(6.0, rel=1e-12)
     every = np.ones(len(top.x), dtype=bool)
     assert top.covered_area(every, top.area, 0.0 * top.x) == pytest.approx(6.0, rel=1e-12)
-    x, y = top.spread(top.x, top.y)
+    x, y = top.with_ghosts(top.x, top.y)
     # edges lie opposite the corners
     a, b = triangles[:, 1], triangles[:, 2]
     np.testing.assert_allclose(top.edges[:, 0], np.hypot(x[a] - x[b], y[a] - y[b]), rtol=1e-12)

@@ -67,7 +67,7 @@ def test_open_interface_is_solved_at_once(interface):
 def test_linear_laws_take_one_newton_step(interface, mode):
     pressed = LawContactProblem(interface.block, interface, [Spring()] * 4, mode)
     pressed.newton.snes.ksp.setTolerances(rtol=1e-12)
-    pressed.newton._forcing = False
+    pressed.newton.forcing = False
     assert pressed.solve(Control(approach=5e-3)).newton_iterations == 1
 
 
@@ -82,11 +82,11 @@ def test_failure_is_named_and_keeps_what_was_known(interface):
     laws = [Spring(k=1e3 * (i + 1), touch=1e-3 * i) for i in range(4)]
     pressed = LawContactProblem(interface.block, interface, laws)
     before = pressed.solve(Control(approach=2e-3))
-    known = len(pressed._basis)
+    known = len(pressed.basis)
     pressed.newton.snes.setTolerances(max_it=1)
     with pytest.raises(NotConverged, match=r"approach 0\.008 mm .* DIVERGED_MAX_IT after 1"):
         pressed.solve(Control(approach=8e-3))
-    assert len(pressed._basis) == known
+    assert len(pressed.basis) == known
     pressed.newton.snes.setTolerances(max_it=20)
     assert pressed.solve(Control(approach=2e-3)).force == pytest.approx(before.force, rel=1e-9)
 
@@ -140,7 +140,7 @@ def test_basis_is_orthonormal_limited_and_ignores_what_it_knows(interface):
     for load in (*loads, loads[-1]):
         load.array[:] = interface.block.solve(load.copy()).x.array
         basis.add(load)
-        overlap = basis._vectors @ basis._forces.T
+        overlap = basis.vectors @ basis.forces.T
         np.testing.assert_allclose(overlap, np.eye(len(basis)), atol=1e-9)  # two passes
     assert len(basis) == 3
 

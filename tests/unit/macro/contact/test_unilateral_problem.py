@@ -26,20 +26,20 @@ def block_below(surface, sides, shape, material):
     return Block(mesh, material, sides=sides)
 
 
-def obstacle(surface=SURFACE, sides="free", shape=SHAPE, material=MATERIAL, **options):
+def problem(surface=SURFACE, sides="free", shape=SHAPE, material=MATERIAL, **options):
     block = block_below(surface, sides, shape, material)
     return UnilateralContactProblem(block, surface.highest - surface.mean_height, **options)
 
 
 def test_top_is_the_surface():
-    found = obstacle()
+    found = problem()
     expected = SURFACE.height_at(found.top.x, found.top.y) - SURFACE.mean_height
     np.testing.assert_allclose(found.top.height, expected, atol=1e-12)
     assert found.top.area.sum() == pytest.approx(1.0, rel=1e-12)
 
 
 def test_contact_conditions_and_balance():
-    found = obstacle()
+    found = problem()
     state = found.solve(Control(approach=10e-3))
     gap = SURFACE.highest - SURFACE.mean_height - 10e-3 - found.top.height
     moved = state.displacement[found.top.dofs]
@@ -54,7 +54,7 @@ def test_contact_conditions_and_balance():
 
 
 def test_unloading_and_direct_loading_lead_to_the_same_contact():
-    one, other = obstacle(), obstacle()
+    one, other = problem(), problem()
     for approach in (4e-3, 12e-3, 8e-3):
         state = one.solve(Control(approach=approach, tilt=(2e-3, -1e-3)))
     direct = other.solve(Control(approach=8e-3, tilt=(2e-3, -1e-3)))
@@ -63,9 +63,9 @@ def test_unloading_and_direct_loading_lead_to_the_same_contact():
 
 
 def test_plane_apart_finds_nothing():
-    found = obstacle()
+    found = problem()
     found.solve(Control(approach=10e-3))
-    for block in (obstacle(), found):
+    for block in (problem(), found):
         state = block.solve(Control(approach=-1e-3))
         assert (state.force, state.nodes, state.contact_area) == (0.0, 0, 0.0)
         assert not state.displacement.any()
@@ -75,7 +75,7 @@ def test_plane_apart_finds_nothing():
 def test_flat_top_on_rollers_is_a_column(element):
     flat = Surface(heights=np.zeros((8, 8)), lengths=(1.0, 1.0))
     # on quadratic triangles a uniform pressure has no force at the vertices
-    state = obstacle(
+    state = problem(
         flat, sides="roller", shape=replace(SHAPE, cells=(6, 5, 3), element=element)
     ).solve(Control(approach=1e-3))
     # uniform strain: exact for any mesh
@@ -85,7 +85,7 @@ def test_flat_top_on_rollers_is_a_column(element):
 
 def test_force_and_approach_are_two_ways_to_the_same_contact():
     lean = (5e-3, 0.0)  # 5 µm per mm
-    by_approach, by_force = obstacle(), obstacle()
+    by_approach, by_force = problem(), problem()
     iterations = np.zeros(2)
     for approach in (4e-3, 6e-3, 12e-3, 3e-3):
         one = by_approach.solve(Control(approach=approach, tilt=lean))
@@ -99,7 +99,7 @@ def test_force_and_approach_are_two_ways_to_the_same_contact():
 
 
 def test_a_small_force_after_a_large_one_is_met():
-    found = obstacle()
+    found = problem()
     for force in (20.0, 1e-6):
         state = found.solve(Control(force=force))
         # solves are converged to 1e-10 of the contact forces found, not of those before
@@ -108,22 +108,22 @@ def test_a_small_force_after_a_large_one_is_met():
 
 
 def test_free_plane_turns_until_there_is_no_moment():
-    found = obstacle()
+    found = problem()
     for force in (1e-6, 0.5, 4.0):
         state = found.solve(Control(force=force, tilt=None))
         assert state.force == pytest.approx(force, rel=1e-9)
         assert state.reaction == pytest.approx(force, rel=1e-9)
         np.testing.assert_allclose(state.moment, 0.0, atol=1e-9 * force)
         assert state.nodes >= 3  # fewer cannot hold a plane
-    held = obstacle().solve(Control(approach=state.approach, tilt=state.tilt))
+    held = problem().solve(Control(approach=state.approach, tilt=state.tilt))
     assert held.force == pytest.approx(force, rel=1e-8)
-    turned = obstacle().solve(Control(approach=state.approach, tilt=None))
+    turned = problem().solve(Control(approach=state.approach, tilt=None))
     assert turned.force == pytest.approx(force, rel=1e-8)
 
 
 @pytest.mark.parametrize("method", ["active-set", "augmented-lagrangian", "penalty"])
 def test_no_force_is_first_touch(method):
-    found = obstacle(method=method)
+    found = problem(method=method)
     touch = SURFACE.highest - SURFACE.mean_height - found.top.height.max()
     for control in (Control(force=0.0), Control(force=1.0), Control(force=0.0)):
         state = found.solve(control)
@@ -137,7 +137,7 @@ def test_no_force_is_first_touch(method):
 @pytest.mark.parametrize("poisson_ratio", [0.15, 0.49])
 def test_one_step_to_merged_contacts(poisson_ratio):
     material = replace(MATERIAL, poisson_ratio=poisson_ratio)
-    found, slow = obstacle(material=material), obstacle(material=material)
+    found, slow = problem(material=material), problem(material=material)
     state = found.solve(Control(approach=25e-3))
     for approach in (10e-3, 18e-3, 25e-3):
         small = slow.solve(Control(approach=approach))
@@ -147,13 +147,13 @@ def test_one_step_to_merged_contacts(poisson_ratio):
     # far back in one step
     back = found.solve(Control(approach=2e-3))
     assert back.force == pytest.approx(
-        obstacle(material=material).solve(Control(approach=2e-3)).force, rel=1e-8
+        problem(material=material).solve(Control(approach=2e-3)).force, rel=1e-8
     )
 
 
 def test_patches_share_force_area_and_closure():
     patches = PatchGrid(grid=(4, 2), lengths=(1.0, 1.0))
-    found = obstacle(patches=patches)
+    found = problem(patches=patches)
     state = found.solve(Control(approach=12e-3, tilt=(2e-3, 1e-3)))
     assert state.patch_force.shape == (8,)
     assert state.patch_force.sum() == pytest.approx(state.force, rel=1e-12)
@@ -163,7 +163,7 @@ def test_patches_share_force_area_and_closure():
     np.testing.assert_allclose(state.patch_closure, 12e-3 + lean - sag, rtol=1e-12)
     # what the whole top moves is the mean over equal patches
     assert state.patch_closure.mean() == pytest.approx(
-        obstacle().solve(Control(approach=12e-3, tilt=(2e-3, 1e-3))).patch_closure[0], rel=1e-9
+        problem().solve(Control(approach=12e-3, tilt=(2e-3, 1e-3))).patch_closure[0], rel=1e-9
     )
     # gap and displacement of the top make up the separation
     rest = (
@@ -173,7 +173,7 @@ def test_patches_share_force_area_and_closure():
 
 
 def test_failed_step_changes_nothing():
-    found = obstacle()
+    found = problem()
     found.solve(Control(approach=4e-3))
     most, found.method.most_solves = found.method.most_solves, 1
     message = r"the contact of the rough block at approach 0\.02 mm did not .*: ACTIVE_SET"
@@ -181,16 +181,16 @@ def test_failed_step_changes_nothing():
         found.solve(Control(approach=20e-3))
     found.method.most_solves = most
     again = found.solve(Control(approach=8e-3))
-    assert again.force == pytest.approx(obstacle().solve(Control(approach=8e-3)).force, rel=1e-8)
+    assert again.force == pytest.approx(problem().solve(Control(approach=8e-3)).force, rel=1e-8)
 
 
 def test_wrong_input_is_refused():
     with pytest.raises(InputError, match=r"unknown contact of the reference.*active-set, augm"):
-        obstacle(method="barrier")
+        problem(method="barrier")
     with pytest.raises(InputError, match="the penalty must be positive"):
-        obstacle(method="penalty", penalty=0.0)
+        problem(method="penalty", penalty=0.0)
     with pytest.raises(InputError, match=r"patches reach beyond the top.*inside .*1\.0, 1\.0"):
-        obstacle(patches=PatchGrid(grid=(2, 2), lengths=(1.0, 1.1)))
+        problem(patches=PatchGrid(grid=(2, 2), lengths=(1.0, 1.1)))
     wide = block_mesh(replace(SHAPE, cells=(2, 2, 1), margin=0.5, margin_cells=1), MPI.COMM_SELF)
     with pytest.raises(InputError, match=r"^0\.5: the plane presses on the whole top"):
         UnilateralContactProblem(Block(wide, MATERIAL), 0.0)
@@ -198,7 +198,7 @@ def test_wrong_input_is_refused():
 
 def test_a_patch_without_a_node_is_closed_like_the_nearest():
     patches = PatchGrid(grid=(40, 1), lengths=(1.0, 1.0))  # on 16 cells
-    found = obstacle(patches=patches)
+    found = problem(patches=patches)
     state = found.solve(Control(approach=10e-3))
     assert state.patch_force.sum() == pytest.approx(state.force, rel=1e-12)
     # a node on a border belongs to both sides

@@ -106,7 +106,7 @@ def test_transfers_reproduce_trilinear_displacements(element):
 def test_held_unknowns_stay_apart_on_every_grid(sides):
     block = make(sides, cells=(8, 8, 4))
     held = np.flatnonzero(block.free.array_r == 0.0)
-    coarse = coarser_grids(block._lattice, block.stiffness, block.free)[0].matrix
+    coarse = coarser_grids(block.lattice, block.stiffness, block.free)[0].matrix
     dense = dense_of(coarse)
     np.testing.assert_allclose(dense, dense.T, atol=1e-12 * dense.max())
     one = np.flatnonzero((dense.diagonal() == 1.0) & (np.count_nonzero(dense, axis=1) == 1))

@@ -66,7 +66,7 @@ def test_compiled_forms_serve_lattices_and_meshes_of_gmsh():
     )
     material = Material(young_modulus=1.0, poisson_ratio=0.3)
     lattice, refined = (Block(block_mesh(shape, MPI.COMM_SELF), material) for shape in shapes)
-    assert lattice._form.signature() == refined._form.signature()
+    assert lattice.form.signature() == refined.form.signature()
 
 
 @pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2"])

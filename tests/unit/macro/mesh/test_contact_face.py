@@ -7,7 +7,7 @@ from mpi4py import MPI
 from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid
 from macro import block_mesh, compat
-from macro.mesh.contact_face import _areas, _cut, facet_quadrature
+from macro.mesh.contact_face import cut_triangles, facet_quadrature, triangle_areas
 
 
 def points_on(patches, degree=2, **changes):
@@ -56,8 +56,8 @@ def test_cutting_keeps_the_area_and_separates_the_sides(border, axis):
         [random.uniform(0.0, 1.0, (200, 3, 2)), [[[0, 0], [1, 1], [0.5, 0.5 + 0.25]]]]
     )
     facet = np.arange(201)
-    pieces, owner = _cut(triangles, facet, axis, border, 1e-12)
-    areas = np.bincount(owner, weights=_areas(pieces))
-    np.testing.assert_allclose(areas, _areas(triangles), rtol=1e-9, atol=1e-15)  # round-off
+    pieces, owner = cut_triangles(triangles, facet, axis, border, 1e-12)
+    areas = np.bincount(owner, weights=triangle_areas(pieces))
+    np.testing.assert_allclose(areas, triangle_areas(triangles), rtol=1e-9, atol=1e-15)  # round-off
     height = pieces[:, :, axis] - border
     assert ((height > -1e-12).all(axis=1) | (height < 1e-12).all(axis=1)).all()

@@ -9,7 +9,7 @@ from geometry.errors import InputError
 from micro import BodyModes, FiniteSlopes, FreeSides
 from multiscale import Scene, make_setup
 from multiscale.costs.prediction import solution_work
-from multiscale.couplings.blocks import contact_model, free_sides, patch_displacements
+from multiscale.couplings.blocks import contact_model, patch_displacements, scene_body
 
 
 def setup(
@@ -50,7 +50,7 @@ def test_cells_know_the_free_sides_of_their_block(kind, coupling):
     found = setup(kind, coupling=coupling)
     # a quarter of the block's height, its shortest side
     expected = FreeSides(lengths=(1.0, 1.0), poisson_ratio=0.15, decay_length=0.2)
-    assert free_sides(found) == expected
+    assert scene_body(found).side_term == expected
     model = contact_model(found, None)
     assert model.sides == expected
     assert isinstance(model.body, BodyModes)
@@ -64,7 +64,7 @@ def test_cells_know_the_free_sides_of_their_block(kind, coupling):
 )
 def test_other_bodies_have_their_sides_in_the_body_term(given):
     found = setup(slopes=False, **given)
-    assert free_sides(found) is None
+    assert scene_body(found).side_term is None
     model = contact_model(found, None)
     assert isinstance(model.body, BodyModes)
     assert getattr(model, "sides", None) is None
@@ -112,6 +112,6 @@ def test_displacements_of_patches_are_those_of_the_macro_model(way):
 def test_blocks_too_flat_for_their_modes_are_refused(key, block):
     with pytest.raises(
         InputError, match=r"so flat a block, in \d+ modes a side, needs about"
-    ) as told:
+    ) as caught:
         contact_model(setup(approach=1e-6, **block), None)
-    assert told.value.key == key
+    assert caught.value.key == key

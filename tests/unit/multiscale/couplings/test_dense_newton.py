@@ -16,10 +16,10 @@ class HertzLaws:
     """p = k w^(3/2) over the local approach, closure = approach − own compliance × p."""
 
     def __init__(self, touch, stiffness=1e5, own=0.0):
-        self.touch, self.stiffness, self.own = np.asarray(touch, float), stiffness, own
+        self.first_touch, self.stiffness, self.own = np.asarray(touch, float), stiffness, own
 
     def along(self, approach):
-        depth = np.maximum(approach - self.touch, 0.0)
+        depth = np.maximum(approach - self.first_touch, 0.0)
         pressure = self.stiffness * depth**1.5
         rise = 1.5 * self.stiffness * np.sqrt(depth)
         return SimpleNamespace(
@@ -71,7 +71,7 @@ def test_many_patches_agree_with_another_solver():
     state = DenseNewton(laws, matrix, PATCHES).solve(Control(approach=8e-3, tilt=tilt))
 
     def gap(closure):
-        depth = np.maximum(closure - laws.touch, 0.0)
+        depth = np.maximum(closure - laws.first_touch, 0.0)
         return closure + matrix @ (1e5 * depth**1.5) - 8e-3 - LEVERS @ tilt
 
     # at 1e-14 some releases of scipy stop for want of progress, with success False
@@ -159,7 +159,9 @@ def test_no_force_is_first_touch():
     laws = HertzLaws(touches())
     newton = DenseNewton(laws, compliance(), PATCHES)
     state = newton.solve(Control(force=0.0, tilt=(1e-3, 0.0)))
-    assert state.plane[0] == pytest.approx(np.min(laws.touch - 1e-3 * LEVERS[:, 0]), rel=1e-12)
+    assert state.plane[0] == pytest.approx(
+        np.min(laws.first_touch - 1e-3 * LEVERS[:, 0]), rel=1e-12
+    )
     assert state.load[0] < 1e-12  # the touch's rounding of 1e-18 mm
 
 

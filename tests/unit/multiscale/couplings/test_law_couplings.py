@@ -1,6 +1,5 @@
 """Load steps of the embedded coupling: what is read off the laws, and their ranges."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,25 +8,25 @@ import pytest
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from multiscale.couplings.load_steps import EmbeddedCoupling
-from multiscale.laws.files import LawTable
+from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
+from multiscale.laws.rows import LawRows
 from multiscale.loading.stepper import BeyondLaws
 
 PATCHES = PatchGrid(grid=(2, 1), lengths=(1.0, 0.5))
 
 
-def law(end=1.0):
+def law(end=1.0, **columns):
     closure = np.linspace(0.0, end, 11)
-    return PatchLaw(
-        closure=closure,
-        pressure=closure**1.5,
-        approach=closure,
-        contact_area_fraction=0.1 * closure,
-        contacts=np.arange(11),
-        relief=0.01 * closure,
-        touch=0.0,
-        reach=2.0,
-    )
+    rows = {
+        "closure": closure,
+        "pressure": closure**1.5,
+        "approach": closure,
+        "contact_area_fraction": 0.1 * closure,
+        "contacts": np.arange(11),
+        "unresolved_displacement": 0.01 * closure,
+    }
+    return PatchLaw(rows=LawRows(**(rows | columns)), first_touch=0.0, initial_separation=2.0)
 
 
 class EasyBlock:
@@ -56,14 +55,16 @@ class EasyBlock:
 
 def embedded(*laws):
     table = LawTable(patches=PATCHES, laws=laws or (law(), law()), made_by={})
-    return EmbeddedCoupling(EasyBlock(), table)
+    return EmbeddedCoupling(EasyBlock(), table, interface=None)
 
 
 def test_steps_read_the_laws_at_their_closures():
     step = embedded().press(Control(approach=0.45, tilt=(1e-3, 0.0)))
     assert step.contacts == 8
     assert step.contact_area_fraction == pytest.approx(0.045, rel=1e-12)  # a straight line
-    assert step.mean_separation_mm == pytest.approx(1.5545, rel=1e-12)  # reach − c + relief
+    assert step.mean_separation_mm == pytest.approx(
+        1.5545, rel=1e-12
+    )  # initial separation − closure + unresolved displacement
     assert step.mean_pressure_MPa == pytest.approx(0.45**1.5, rel=1e-12)  # force over area
     assert step.imbalance == pytest.approx(1e-11, rel=1e-4)  # of a difference of near equals
     assert (step.tilt_x, step.tilt_y) == (1e-3, 0.0)
@@ -84,10 +85,9 @@ def test_closure_beyond_a_law_is_refused_and_the_state_stays():
 
 @pytest.mark.parametrize(("falls", "remedy"), [(False, "kind = 'conc"), (True, "newton = 'conde")])
 def test_remedy_beyond_a_consistent_law_fits_what_is_wrong(falls, remedy):
-    closure = law(end=0.5).closure
-    bent = (
-        replace(law(end=0.5), closure=np.append(closure[:-1], closure[-3])) if falls else law(0.5)
-    )
+    closure = law(end=0.5).rows.closure
+    falling = {"closure": np.append(closure[:-1], closure[-3])} if falls else {}
+    bent = law(0.5, **falling)
     table = LawTable(patches=PATCHES, laws=(law(), bent), made_by={"coupling": "consistent"})
     with pytest.raises(BeyondLaws, match=f"LAW_RANGE: .*: take coupling.{remedy}"):
-        EmbeddedCoupling(EasyBlock(), table).press(Control(approach=0.8))
+        EmbeddedCoupling(EasyBlock(), table, interface=None).press(Control(approach=0.8))

@@ -74,7 +74,7 @@ def test_finest_mesh_is_the_history_and_meshes_differ(history):
     assert np.all(record.force.error > 0.0)
 
 
-def test_error_bar_is_told_everywhere(history):
+def test_error_bar_is_reported_everywhere(history):
     label = history.reference.label
     assert re.fullmatch(r"± [\d.e+]+ %", label)
     header, rows = history.table()
@@ -291,12 +291,12 @@ def test_the_blocks_cells_are_not_the_references():
 
 def test_plan_of_hexahedra():
     setup = make_setup(scene("reference.meshes=1", "block.grading=1"))
-    statements, told = dict(plan.statements(setup)), " ".join(plan.warnings(setup))
+    statements, warnings = dict(plan.statements(setup)), " ".join(plan.warnings(setup))
     assert "one mesh of 12 × 12 × 4 hexahedra (Q1)" in statements["block"]
     assert f"{3 * 13 * 13 * 5} unknowns" in statements["block"]
-    assert "no error bar" in told
-    assert "larger block.grading" in told
-    assert "refine reference.cells" in told
+    assert "no error bar" in warnings
+    assert "larger block.grading" in warnings
+    assert "refine reference.cells" in warnings
 
 
 REFUSED = {

@@ -1,15 +1,15 @@
 """Consistent laws on the half-space give back the solution that they were made from."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from geometry import PatchGrid, Spectrum, patch_means, synthesise
 from geometry.rigid_plane import Control
 from micro import influence_matrix, micro_model
-from multiscale.couplings.condensed import CondensedCoupling
-from multiscale.couplings.free_tilt import TurningCoupling
-from multiscale.laws.consistent import consistent_laws
-from multiscale.laws.whole_surface import WholeSurface
+from multiscale.couplings.condensed import CondensedCoupling, FreePlaneCoupling
+from multiscale.laws.consistent import WholeSurface, consistent_laws
 
 MODULUS = 4000.0
 END = 9e-3
@@ -37,8 +37,8 @@ def parts(surface, grid, name="circular", tolerance=1e-4):
 @pytest.mark.parametrize("grid", [(1, 1), (3, 2), (8, 8)])
 def test_whole_surface_comes_back(surface, grid, name):
     model, patches, means, table, coupling = parts(surface, grid, name, 1e-3)
-    law = max(table.laws, key=lambda one: len(one.approach))
-    rows = law.approach[[len(law.approach) // 2, -1]]
+    law = max(table.laws, key=lambda one: len(one.rows))
+    rows = law.rows.approach[[len(law.rows) // 2, -1]]
     for approach in (*rows, 0.537 * END):
         step = coupling.press(Control(approach=approach))
         whole = model.respond([approach], patches=patches, mean_heights=means)
@@ -105,7 +105,7 @@ def test_any_macro_model_finds_the_rows_again(surface, macro, tilt):
     )
     coupling, start = CondensedCoupling(table, compliance), None
     if tilt is None:
-        coupling = TurningCoupling(table, lambda pressures: pressures @ compliance.T)
+        coupling = FreePlaneCoupling(table, lambda pressures: pressures @ compliance.T)
     assert table.made_by["tilt"] == ("free" if tilt is None else f"{tilt[0]:g}, {tilt[1]:g}")
     for force in (0.2, 0.7, 1.3, 2.0):
         control = Control(force=force, tilt=tilt)
@@ -127,7 +127,7 @@ def test_any_macro_model_finds_the_rows_again(surface, macro, tilt):
 
 def table_touch(table):
     """Return an approach below which nothing is in contact."""
-    return min(law.approach[0] for law in table.laws if not law.is_open)
+    return min(law.rows.approach[0] for law in table.laws if not law.is_open)
 
 
 def test_rows_where_a_patch_falls_behind_are_left_out(surface):
@@ -143,7 +143,8 @@ def test_rows_where_a_patch_falls_behind_are_left_out(surface):
     )
     approaches = np.linspace(0.1, 0.9, 6) * END
     rows = whole.rows(approaches)
-    rows[3, 1, :2] = rows[1, 1, :2]
-    kept, fell = whole.laws(rows)
-    assert len(fell.approach) == len(kept.approach) - 1
-    assert np.all(np.diff(fell.approach) > 0.0)
+    approach, closure = rows.approach.copy(), rows.closure.copy()
+    approach[3, 1], closure[3, 1] = approach[1, 1], closure[1, 1]
+    kept, fell = whole.laws(replace(rows, approach=approach, closure=closure))
+    assert len(fell.rows) == len(kept.rows) - 1
+    assert np.all(np.diff(fell.rows.approach) > 0.0)

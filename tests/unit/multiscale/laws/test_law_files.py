@@ -8,11 +8,16 @@ import pytest
 
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
-from multiscale.laws.files import LawTable, read_laws, write_laws
+from multiscale.laws.files import read_laws, write_laws
+from multiscale.laws.law_table import LawTable, PlanePath
 from multiscale.laws.patch_law import PatchLaw
-from multiscale.laws.plane_path import PlanePath
+from multiscale.laws.rows import LawRows
 from multiscale.storage.serialisation import checksum, checksummed
 
+SCALARS = (
+    "first_touch", "initial_separation", "interpolation_error", "stiffness_error",
+    "warning_pressure", "repaired",
+)  # fmt: skip
 COLUMNS = ("closure", "pressure", "approach", "contact_area_fraction", "contacts", "relief")
 
 
@@ -23,18 +28,21 @@ def table():
     def law(rows):
         rising = np.sort(random.random((5, rows)), axis=1)
         rising[1, :1] = 0.0
-        return PatchLaw(
+        columns = LawRows(
             closure=rising[0],
             pressure=rising[1],
             approach=rising[2],
             contact_area_fraction=rising[3],
             contacts=np.arange(rows),
-            relief=rising[4],
-            touch=rising[0, 0] if rows else np.inf,
-            reach=random.random(),
+            unresolved_displacement=rising[4],
+        )
+        return PatchLaw(
+            rows=columns,
+            first_touch=rising[0, 0] if rows else np.inf,
+            initial_separation=random.random(),
             interpolation_error=1 / 3,
             stiffness_error=1 / 7,
-            warned_from=1 / 11,
+            warning_pressure=1 / 11,
         )
 
     patches = PatchGrid(grid=(2, 3), lengths=(0.1, 1 / 3))
@@ -55,9 +63,9 @@ def test_round_trip_is_exact(table, tmp_path):
     assert back.patches == table.patches
     assert (back.made_by, back.force_error) == (table.made_by, table.force_error)
     for law, copy in zip(table.laws, back.laws, strict=True):
-        for name in COLUMNS:
-            assert getattr(law, name).tobytes() == getattr(copy, name).tobytes()
-        for name in ("touch", "reach", "interpolation_error", "stiffness_error", "warned_from"):
+        for (name, column), (_, again) in zip(law.rows.columns(), copy.rows.columns(), strict=True):
+            assert column.tobytes() == again.tobytes(), name
+        for name in SCALARS:
             assert getattr(law, name) == getattr(copy, name)
     for name in ("approach", "tilt", "force", "moment"):
         assert getattr(table.path, name).tobytes() == getattr(back.path, name).tobytes()

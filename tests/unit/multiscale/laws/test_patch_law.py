@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from geometry.errors import InputError
-from multiscale.laws.patch_law import ExtendedLaw, PatchLaw
+from multiscale.laws.patch_law import PatchLaw
+from multiscale.laws.rows import LawRows, SolvedRows
 
 
 def law_of(form, *, touch=1e-3, end=9e-3, rows=12, **changes):
@@ -15,11 +16,10 @@ def law_of(form, *, touch=1e-3, end=9e-3, rows=12, **changes):
         "approach": closure,
         "contact_area_fraction": 3.0 * (closure - touch),
         "contacts": np.arange(rows),
-        "relief": 0.5 * (closure - touch),
-        "touch": touch,
-        "reach": 0.02,
+        "unresolved_displacement": 0.5 * (closure - touch),
     }
-    return PatchLaw(**(columns | changes))
+    made = LawRows(**(columns | changes))
+    return PatchLaw(rows=made, first_touch=touch, initial_separation=0.02)
 
 
 def hertz(indentation):
@@ -29,7 +29,7 @@ def hertz(indentation):
 def test_hertz_law_is_exact_between_rows():
     law = law_of(hertz)
     closure = np.linspace(1e-3, 9e-3, 357)
-    pressure, stiffness = law.at(closure)
+    pressure, stiffness, *_ = law.at(closure)
     # p^(2/3) is a straight line: only round-off remains
     np.testing.assert_allclose(pressure, hertz(closure - 1e-3), rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(stiffness, 6e3 * np.sqrt(closure - 1e-3), rtol=1e-12, atol=1e-9)
@@ -38,20 +38,20 @@ def test_hertz_law_is_exact_between_rows():
 def test_stiffness_is_the_derivative_of_the_interpolant():
     law = law_of(lambda w: 4e3 * w**1.5 + 6e3 * np.maximum(w - 2e-3, 0) ** 1.5)
     closure, h = np.linspace(1.05e-3, 8.95e-3, 211), 1e-8
-    difference = (law.at(closure + h)[0] - law.at(closure - h)[0]) / (2 * h)
+    difference = (law.pressure(closure + h) - law.pressure(closure - h)) / (2 * h)
     # second-order differences of a C¹ function: h times the jump of its second derivative
-    np.testing.assert_allclose(law.at(closure)[1], difference, rtol=2e-5)
+    np.testing.assert_allclose(law.stiffness(closure), difference, rtol=2e-5)
 
 
 def test_interpolant_never_decreases():
     law = law_of(lambda w: 4e3 * w**1.5 + 1e4 * np.maximum(w - 2e-3, 0) ** 1.5, rows=7)
-    pressure, stiffness = law.at(np.linspace(0, 9e-3, 4001))
+    pressure, stiffness, *_ = law.at(np.linspace(0, 9e-3, 4001))
     assert np.all(np.diff(pressure) >= 0)
     assert np.all(stiffness >= 0)
 
 
 def test_zero_before_touch():
-    pressure, stiffness = law_of(hertz).at(np.array([-1.0, 0.0, 1e-3]))
+    pressure, stiffness, *_ = law_of(hertz).at(np.array([-1.0, 0.0, 1e-3]))
     assert not pressure.any()
     assert not stiffness.any()
 
@@ -62,28 +62,18 @@ def test_beyond_the_table_raises_with_the_range():
 
 
 def test_extension_continues_the_tangent():
-    law = ExtendedLaw(law_of(hertz))
+    law = law_of(hertz)
     closure = np.array([0.02, 0.5, 3.0])  # far beyond: Newton's first iterate may be anywhere
     np.testing.assert_allclose(law.pressure(closure), hertz(closure - 1e-3), rtol=1e-10)
     np.testing.assert_allclose(law.stiffness(closure), 6e3 * np.sqrt(closure - 1e-3), rtol=1e-10)
 
 
 def test_open_patch():
-    empty = np.empty(0)
-    law = law_of(
-        hertz,
-        closure=empty,
-        pressure=empty,
-        approach=empty,
-        contact_area_fraction=empty,
-        contacts=np.empty(0, dtype=np.int64),
-        relief=empty,
-        touch=5e-3,
-    )
+    law = PatchLaw(rows=SolvedRows.none(), first_touch=5e-3, initial_separation=0.02)
     assert law.is_open
-    assert not law.at(np.array([0.0, 5e-3]))[0].any()
-    assert law.area_fraction_at(1e-3) == 0.0
-    assert law.contacts_at(1e-3) == 0
+    assert not law.at(np.array([0.0, 5e-3])).pressure.any()
+    assert law.at(1e-3).contact_area_fraction == 0.0
+    assert law.at(1e-3).contacts == 0
     message = r"closure beyond the end of the patch law.*first touch at 0.005 mm"
     with pytest.raises(InputError, match=message):
         law.at(6e-3)
@@ -91,15 +81,15 @@ def test_open_patch():
 
 def test_contacts_are_those_of_the_row_before():
     law = law_of(hertz)
-    spacing = law.closure[1] - law.closure[0]
-    assert law.contacts_at([0.0, 1e-3, 1e-3 + 1.5 * spacing, 9e-3]).tolist() == [0, 0, 1, 11]
+    spacing = law.rows.closure[1] - law.rows.closure[0]
+    assert law.at([0.0, 1e-3, 1e-3 + 1.5 * spacing, 9e-3]).contacts.tolist() == [0, 0, 1, 11]
 
 
 def test_area_and_separation():
-    law = law_of(hertz)
+    found = law_of(hertz).at([0, 4e-3])
     # a straight line through the rows: only round-off
-    np.testing.assert_allclose(law.area_fraction_at([0, 4e-3]), [0.0, 9e-3], rtol=1e-12)
-    np.testing.assert_allclose(law.separation_at([0, 4e-3]), [0.02, 0.0175], rtol=1e-12)
+    np.testing.assert_allclose(found.contact_area_fraction, [0.0, 9e-3], rtol=1e-12)
+    np.testing.assert_allclose(found.separation, [0.02, 0.0175], rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -121,7 +111,7 @@ def test_impossible_tables_are_refused(changes, text):
 
 
 def test_a_single_row_is_no_law():
-    one = {name: np.zeros(1) for name in ("closure", "pressure", "approach", "relief")}
-    one |= {"contact_area_fraction": np.zeros(1), "contacts": np.ones(1, int)}
+    names = ("closure", "pressure", "approach", "contact_area_fraction", "unresolved_displacement")
+    one = {name: np.zeros(1) for name in names} | {"contacts": np.ones(1, int)}
     with pytest.raises(InputError, match=r"a patch law needs no row .open patch. or at least two"):
         law_of(hertz, **one)

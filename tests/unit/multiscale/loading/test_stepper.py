@@ -1,4 +1,4 @@
-"""Load programmes: legs, halving where a step fails or changes the force by too much."""
+"""Load histories: legs, halving where a step fails or changes the force by too much."""
 
 import numpy as np
 import pytest
@@ -90,8 +90,8 @@ def test_end_of_a_law_is_not_approached_by_halves():
 
 @pytest.mark.parametrize("quantity", ["approach", "force"])
 def test_force_changes_by_no_more_than_asked(quantity):
-    drive = load_history(1.0, 0.1, quantity=quantity, steps=2, force_change=0.2)
-    steps = list(load_steps(Spring(), drive))
+    loads = load_history(1.0, 0.1, quantity=quantity, steps=2, force_change=0.2)
+    steps = list(load_steps(Spring(), loads))
     force = np.array([step.force_N for step in steps])
     largest = np.maximum.accumulate(force)
     changes = np.abs(np.diff(force)) / largest[1:]
@@ -99,10 +99,10 @@ def test_force_changes_by_no_more_than_asked(quantity):
     assert [step.step for step in steps] == list(range(1, len(steps) + 1))
     # no finer than halving makes it: two steps of a half would have been too much
     assert len(steps) < 2 * (1.0 + 1.0) / 0.1
-    told = np.array([getattr(step, "force_N" if quantity == "force" else "approach_mm")
+    reached = np.array([getattr(step, "force_N" if quantity == "force" else "approach_mm")
                      for step in steps])  # fmt: skip
-    for target in drive.targets:
-        assert np.abs(told - target).min() < 1e-12
+    for target in loads.targets:
+        assert np.abs(reached - target).min() < 1e-12
 
 
 def test_first_step_from_nothing_may_be_any():

@@ -137,7 +137,7 @@ def resumed(folder, changed):
     found = find_checkpoint(folder, changed)
     if found is None:
         return None
-    run = Run(changed, settled=found.resolved)
+    run = Run(changed, resolved=found.resolved)
     go_on(run, found, folder)
     return run
 
@@ -430,7 +430,7 @@ def test_a_plan_stands_though_another_machine_would_choose_otherwise(tmp_path, m
     ticks, predicted = iter(range(1, 1000)), accuracy.predicted_cost
     monkeypatch.setattr(accuracy, "predicted_cost", reversed_costs)
     assert Run(left_open).scene != whole.scene  # the plan would be another one here
-    again = Run(left_open, settled=kept.resolved)
+    again = Run(left_open, resolved=kept.resolved)
     assert again.scene == whole.scene
     assert again.setup.micro.surface.grid == whole.setup.micro.surface.grid
     again.resume(kept.steps, kept.position, kept.state, kept.laws)

@@ -62,16 +62,19 @@ def test_laws_know_from_where_on_they_were_warned_of(parts, coupling):
         alone = (model.of_patch(PATCHES, index) for index in range(PATCHES.count))
         models = [(*one, means[[index]]) for index, one in enumerate(alone)]
     for law, (micro, patches, heights) in zip(table.laws, models, strict=True):
-        row = int(np.searchsorted(law.pressure, law.warned_from))
-        assert law.pressure[row] == law.warned_from
-        told = micro.respond(law.approach[1:], patches=patches, mean_heights=heights).warning != ""
+        row = int(np.searchsorted(law.rows.pressure, law.warning_pressure))
+        assert law.rows.pressure[row] == law.warning_pressure
+        told = (
+            micro.respond(law.rows.approach[1:], patches=patches, mean_heights=heights).warning
+            != ""
+        )
         assert told[row - 1] and not told[: row - 1].any()
 
 
 def test_steps_are_counted_from_the_first_patch_beyond_its_law(parts):
     _, model, means = parts
     table = consistent_laws(model, PATCHES, mean_heights=means, largest=LARGEST, tolerance=0.1)
-    limit = np.array([law.warned_from for law in table.laws])
+    limit = np.array([law.warning_pressure for law in table.laws])
     below = 0.99 * limit
     beyond = np.where(np.arange(4) < 3, limit, below)
     assert noted([step(1, *below)], table) == []
@@ -84,5 +87,5 @@ def test_models_that_see_cells_have_no_range(parts):
     surface, _, means = parts
     model = micro_model("half-space", surface, contact_modulus=4000.0)
     table = consistent_laws(model, PATCHES, mean_heights=means, largest=LARGEST, tolerance=0.1)
-    assert all(law.warned_from == np.inf for law in table.laws)
-    assert noted([step(1, *(law.pressure[-1] for law in table.laws))], table) == []
+    assert all(law.warning_pressure == np.inf for law in table.laws)
+    assert noted([step(1, *(law.rows.pressure[-1] for law in table.laws))], table) == []

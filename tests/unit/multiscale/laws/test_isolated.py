@@ -39,24 +39,24 @@ def test_rows_are_the_micro_model_and_love(surface, model, whole, love, factor):
     patch = IsolatedPatch(model=model, patch=whole.patch, mean_height=whole.mean_height, love=love)
     law = patch.law(10e-3, TOLERANCE, ROWS)
     response = model.respond(
-        law.approach, patches=whole.patch, mean_heights=np.array([whole.mean_height])
+        law.rows.approach, patches=whole.patch, mean_heights=np.array([whole.mean_height])
     )
     # the same solver from another start: its tolerance of 1e-10
-    np.testing.assert_allclose(law.pressure, response.mean_pressure, rtol=1e-8, atol=1e-12)
-    correction = factor(0.5, 0.5) * law.pressure / (np.pi * MODULUS)  # eq. 31
-    np.testing.assert_allclose(law.closure, law.approach - correction, rtol=1e-12)
-    np.testing.assert_array_equal(law.contacts[1:], response.contacts[1:])
+    np.testing.assert_allclose(law.rows.pressure, response.mean_pressure, rtol=1e-8, atol=1e-12)
+    correction = factor(0.5, 0.5) * law.rows.pressure / (np.pi * MODULUS)  # eq. 31
+    np.testing.assert_allclose(law.rows.closure, law.rows.approach - correction, rtol=1e-12)
+    np.testing.assert_array_equal(law.rows.contacts[1:], response.contacts[1:])
     if love == "mean":  # the law's closure is the block's: the mean gap is the micro model's
-        gap = law.separation_at(law.closure)
+        gap = law.at(law.rows.closure).separation
         np.testing.assert_allclose(gap[1:], response.mean_separation[1:], rtol=1e-9)
 
 
 def test_interpolation_error_is_what_the_law_says(whole, model):
     law = whole.law(10e-3, TOLERANCE, ROWS)
-    approach = np.random.default_rng(1).uniform(law.approach[0], law.approach[-1], 300)
-    _, closure, pressure, *_ = whole.rows(np.sort(approach)).T
-    scale = np.maximum(pressure, 0.01 * law.pressure[-1])
-    error = (np.abs(law.at(closure)[0] - pressure) / scale).max()
+    approach = np.random.default_rng(1).uniform(law.rows.approach[0], law.rows.approach[-1], 300)
+    rows = whole.rows(np.sort(approach))
+    scale = np.maximum(rows.pressure, 0.01 * law.rows.pressure[-1])
+    error = (np.abs(law.at(rows.closure).pressure - rows.pressure) / scale).max()
     assert law.interpolation_error <= TOLERANCE
     # the law's own figure is measured half-way between rows; elsewhere it may be a little more
     assert error <= 3 * TOLERANCE
@@ -64,7 +64,7 @@ def test_interpolation_error_is_what_the_law_says(whole, model):
 
 def test_tighter_tolerance_gives_more_rows_and_less_error(whole):
     loose, tight = whole.law(10e-3, 1e-2), whole.law(10e-3, 1e-5, ROWS)
-    assert len(tight.closure) > len(loose.closure)
+    assert len(tight.rows.closure) > len(loose.rows.closure)
     assert tight.interpolation_error < 1e-5
 
 
@@ -80,8 +80,8 @@ def test_patch_is_open_when_out_of_reach(surface, model, whole):
     patch = IsolatedPatch(model=model, patch=whole.patch, mean_height=0.0)
     law = patch.law(4e-3, TOLERANCE, ROWS)
     assert law.is_open
-    assert law.touch == pytest.approx(patch.touch, rel=1e-15)  # the same number
-    assert not patch.law(1.5 * patch.touch, TOLERANCE, ROWS).is_open
+    assert law.first_touch == pytest.approx(patch.first_touch, rel=1e-15)  # the same number
+    assert not patch.law(1.5 * patch.first_touch, TOLERANCE, ROWS).is_open
 
 
 def test_stiff_patch_goes_on_where_closure_falls(surface, model):
@@ -94,12 +94,12 @@ def test_stiff_patch_goes_on_where_closure_falls(surface, model):
     )
     law = patch.law(60e-3, TOLERANCE, ROWS)
     assert not law.is_function
-    assert law.range[1] == law.closure.max() < 60e-3
-    assert law.approach[-1] >= 60e-3
+    assert law.range[1] == law.rows.closure.max() < 60e-3
+    assert law.rows.approach[-1] >= 60e-3
     local = np.linspace(1e-3, 60e-3, 50)
     response = model.respond(local, patches=patch.patch, mean_heights=[surface.mean_height])
     # the tolerance, of the pressure or a hundredth of the last, is measured half-way between rows
-    scale = np.maximum(response.mean_pressure, 0.01 * law.pressure[-1])
+    scale = np.maximum(response.mean_pressure, 0.01 * law.rows.pressure[-1])
     assert np.all(np.abs(law.along(local).pressure - response.mean_pressure) < 3e-4 * scale)
     assert law.along(local).dclosure.min() < -0.5
 
@@ -112,10 +112,10 @@ def test_surface_models_make_laws_too(surface, name):
     alone, patch = model.of_patch(patches, 0)
     law = IsolatedPatch(model=alone, patch=patch, mean_height=surface.mean_height).law(8e-3, 1e-3)
     response = model.respond(
-        law.approach[1:], patches=patches, mean_heights=np.array([surface.mean_height])
+        law.rows.approach[1:], patches=patches, mean_heights=np.array([surface.mean_height])
     )
     # the same solver from other starts: its tolerance of 1e-8 (half-space), 1e-6 (islands)
-    np.testing.assert_allclose(law.pressure[1:], response.mean_pressure, rtol=1e-5)
+    np.testing.assert_allclose(law.rows.pressure[1:], response.mean_pressure, rtol=1e-5)
 
 
 def test_patches_of_the_half_space_press_alone(surface):
@@ -162,5 +162,5 @@ def test_all_laws_of_a_grid(surface, model):
     for index, law in enumerate(table.laws):
         own = model.asperities.z[owner == index]
         touch = model.asperities.highest - own.max() if own.size else np.inf
-        assert law.touch == pytest.approx(touch, rel=1e-12, abs=1e-15)  # the same subtraction
+        assert law.first_touch == pytest.approx(touch, rel=1e-12, abs=1e-15)  # the same subtraction
         assert law.is_open == (touch >= 10e-3)

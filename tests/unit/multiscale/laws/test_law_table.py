@@ -4,37 +4,27 @@ import numpy as np
 import pytest
 
 from geometry.errors import InputError
-from multiscale.laws.packed import PatchLaws
+from multiscale.laws.law_table import PatchLaws
 from multiscale.laws.patch_law import PatchLaw
+from multiscale.laws.rows import LawRows, SolvedRows
 
 
-def law(touch=1e-3, rows=12, own=0.0, stiffness=4e3, reach=0.02):
+def law(touch=1e-3, rows=12, own=0.0, stiffness=4e3):
     approach = np.linspace(touch, 9e-3, rows)
     pressure = stiffness * (approach - touch) ** 1.5
-    return PatchLaw(
+    columns = LawRows(
         closure=approach - own * pressure,
         pressure=pressure,
         approach=approach,
         contact_area_fraction=3.0 * (approach - touch),
         contacts=np.arange(rows),
-        relief=0.5 * (approach - touch),
-        touch=touch,
-        reach=reach,
+        unresolved_displacement=0.5 * (approach - touch),
     )
+    return PatchLaw(rows=columns, first_touch=touch, initial_separation=0.02)
 
 
 def open_law(touch=5e-3):
-    none = np.empty(0)
-    return PatchLaw(
-        closure=none,
-        pressure=none,
-        approach=none,
-        contact_area_fraction=none,
-        contacts=np.empty(0, dtype=np.int64),
-        relief=none,
-        touch=touch,
-        reach=0.03,
-    )
+    return PatchLaw(rows=SolvedRows.none(), first_touch=touch, initial_separation=0.03)
 
 
 LAWS = [law(), law(2e-3, 7, own=2e-4), open_law(), law(own=6e-3, rows=40), open_law(np.inf)]
@@ -52,14 +42,15 @@ def test_packed_laws_are_the_laws(common):
     ):
         np.testing.assert_array_equal(together, np.array(each).ravel())
     closure = packed.along(local).closure
+    contact = packed.contact(local)
     for index in (0, 1):  # those whose pressure is a function of closure
-        values = [function(closure[index], extend=True) for function in
-                  (LAWS[index].area_fraction_at, LAWS[index].separation_at)]  # fmt: skip
-        found = packed.area_fraction(local)[index], packed.separation(local)[index]
-        np.testing.assert_allclose(values, found, rtol=1e-11, atol=1e-14)  # the inversion's
-    rows = [np.searchsorted(one.approach, s, side="right") - 1
+        values = LAWS[index].at(closure[index], extend=True)
+        found = contact.area_fraction[index], contact.separation[index]
+        expected = values.contact_area_fraction, values.separation
+        np.testing.assert_allclose(expected, found, rtol=1e-11, atol=1e-14)  # the inversion's
+    rows = [np.searchsorted(one.rows.approach, s, side="right") - 1
             for one, s in zip(LAWS, local, strict=True)]  # fmt: skip
-    assert packed.contacts(local).tolist() == [max(row, 0) for row in rows]
+    assert contact.contacts.tolist() == [max(row, 0) for row in rows]
 
 
 def test_derivatives_are_exact():
@@ -86,8 +77,8 @@ def test_falling_closure_is_kept_along_the_approach():
 def test_falling_closure_ends_the_law_over_closure():
     start, end = FALLING.range
     assert start == 1e-3
-    assert end == FALLING.closure.max()
-    pressure, stiffness = FALLING.at(np.linspace(start, end, 50))
+    assert end == FALLING.rows.closure.max()
+    pressure, stiffness, *_ = FALLING.at(np.linspace(start, end, 50))
     assert np.all(np.diff(pressure) > 0.0)
     assert np.all(stiffness >= 0.0)
     with pytest.raises(InputError, match=r"beyond the end .* stops being a function of closure"):
@@ -97,13 +88,13 @@ def test_falling_closure_ends_the_law_over_closure():
 def test_newton_may_look_beyond_where_closure_turns():
     """The law over closure goes on steeply there, and never onto the branch that falls."""
     _, end = FALLING.range
-    turn = FALLING.pressure[np.argmax(FALLING.closure)]
+    turn = FALLING.rows.pressure[np.argmax(FALLING.rows.closure)]
     beyond = end + np.array([0.0, 1e-9, 1e-8, 1e-3])
-    pressure, stiffness = FALLING.at(beyond, extend=True)
+    pressure, stiffness = FALLING.pressure(beyond), FALLING.stiffness(beyond)
     assert pressure[0] == pytest.approx(turn, rel=1e-12)
     assert np.all(np.diff(pressure) > 0.0)
     h = 1e-3 * (beyond[1:] - end)
-    higher, lower = (FALLING.at(beyond[1:] + way * h, extend=True)[0] for way in (1, -1))
+    higher, lower = (FALLING.pressure(beyond[1:] + way * h) for way in (1, -1))
     # second-order differences of a power of 3/2
     np.testing.assert_allclose(stiffness[1:], (higher - lower) / (2 * h), rtol=1e-5)
 
@@ -112,7 +103,7 @@ def test_newton_may_look_beyond_where_closure_turns():
 def test_law_over_closure_is_the_law_along_the_approach(one):
     local = np.random.default_rng(2).uniform(0.0, 10e-3, 500)
     point = one.along(local)
-    pressure, stiffness = one.at(point.closure, extend=True)
+    pressure, stiffness, *_ = one.at(point.closure, extend=True)
     # the inversion ends at the rounding of the closure: 1e-16 over the distance from touch
     np.testing.assert_allclose(pressure, point.pressure, rtol=1e-9, atol=1e-15)
     np.testing.assert_allclose(stiffness, point.dpressure / point.dclosure, rtol=1e-8, atol=1e-9)
@@ -120,5 +111,5 @@ def test_law_over_closure_is_the_law_along_the_approach(one):
 
 def test_ends_and_touches():
     packed = PatchLaws(LAWS)
-    np.testing.assert_array_equal(packed.touch, [1e-3, 2e-3, 5e-3, 1e-3, np.inf])
+    np.testing.assert_array_equal(packed.first_touch, [1e-3, 2e-3, 5e-3, 1e-3, np.inf])
     np.testing.assert_allclose(packed.end, [9e-3, 9e-3, 5e-3, 9e-3, np.inf], rtol=1e-15)

@@ -1,0 +1,191 @@
+"""Rows of patch laws: their columns, declared once, their first touch and their repair."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.errors import InputError
+
+Array = NDArray[np.float64]
+
+_NOISE = 1e-3
+"""Fall of a closure, relative to the range of closures, that counts as noise."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LawRows:
+    """Rows of one patch law, or rows of the laws of N patches at the same load steps.
+
+    Every column has the shape (m,) for one law, or (m, N) for N laws. Its metadata are the unit
+    and, where it is another one, the name in law files.
+
+    Attributes:
+        approach: Local rigid approach [mm]. Where the plane was free to turn it is the approach at
+            the middle of the interface.
+        closure: Local rigid approach minus the displacement of the patch in the macro model [mm].
+        pressure: Mean pressure of the patch [MPa].
+        contact_area_fraction: Real over nominal contact area of the patch.
+        contacts: Number of contacts in the patch.
+        unresolved_displacement: Mean displacement of the patch in the contact problem, less its
+            displacement in the macro model [mm].
+
+    Raises:
+        InputError: When the columns have different shapes, or a number is not finite.
+    """
+
+    approach: Array = field(metadata={"unit": "mm"})
+    closure: Array = field(metadata={"unit": "mm"})
+    pressure: Array = field(metadata={"unit": "MPa"})
+    contact_area_fraction: Array = field(metadata={"unit": "1"})
+    contacts: NDArray[np.int64] = field(metadata={"unit": "1", "kind": np.int64})
+    unresolved_displacement: Array = field(metadata={"unit": "mm", "stored": "relief"})
+
+    def __post_init__(self) -> None:
+        for name, column in self.columns():
+            if column.shape != self.closure.shape:
+                raise InputError("a patch law needs columns of one length", value=name)
+            if not np.all(np.isfinite(column)):
+                raise InputError(f"a patch law needs a finite {name}")
+
+    def __len__(self) -> int:
+        return len(self.approach)
+
+    def __getitem__(self, index: Any) -> Self:
+        return self.mapped(lambda column: column[index])
+
+    def columns(self) -> list[tuple[str, NDArray[Any]]]:
+        """Return the names and values of all columns."""
+        return [(one.name, getattr(self, one.name)) for one in fields(self)]
+
+    def mapped(self, function: Callable[[NDArray[Any]], NDArray[Any]]) -> Self:
+        """Return rows whose columns are a function of the columns of these.
+
+        Args:
+            function: Takes and returns a column; all columns become the same shape.
+        """
+        return type(self)(**{name: function(column) for name, column in self.columns()})
+
+    def joined(self, later: Self) -> Self:
+        """Return these rows followed by others.
+
+        Args:
+            later: Rows of the same laws.
+        """
+        columns = zip(self.columns(), later.columns(), strict=True)
+        return type(self)(**{name: np.concatenate((a, b)) for (name, a), (_, b) in columns})
+
+    def with_rising_pressure(self) -> tuple[Self, float]:
+        """Return rows of a patch alone whose pressure rises with the approach.
+
+        A rigid plane that comes nearer to a patch alone cannot lose force: pressures that fall are
+        an unevenness of a micro model or the noise of a measurement. They become the nearest rising
+        sequence in least squares. The displacement behind a closure is scaled with its pressure.
+
+        Returns:
+            The rows, and the largest change relative to the largest pressure.
+
+        Source:
+            Barlow, Bartholomew, Bremner & Brunk 1972, Statistical inference under order
+            restrictions, ch. 1 (pool adjacent violators).
+        """
+        before = self.pressure
+        pressure = _rising(before)
+        largest = float(before.max(initial=0.0)) or 1.0
+        change = float(np.abs(pressure - before).max(initial=0.0)) / largest
+        if change:
+            scale = np.divide(pressure, before, out=np.ones(len(self)), where=before > 0.0)
+            closure = self.approach - scale * (self.approach - self.closure)
+            return replace(self, closure=closure, pressure=pressure), change
+        return self, change
+
+    def rising(self) -> tuple[Self, float]:
+        """Return rows of a patch alone that rise, without those that then carry no information.
+
+        Of rows of equal pressure the first is kept. A closure that falls for good is kept, because
+        the patch's stiffness has outgrown that of its own half-space. One that lies a little below
+        those before it is left out.
+
+        Returns:
+            The rows that are kept, and the largest change: of a pressure relative to the largest,
+            or of a closure relative to the range.
+        """
+        rows, change = self.with_rising_pressure()
+        closure, pressure = map(np.maximum.accumulate, (rows.closure, rows.pressure))
+        fall, span = closure - rows.closure, float(np.ptp(rows.closure))
+        noise = (fall > 0.0) & (fall < _NOISE * span)
+        noise |= np.concatenate(([False], (np.diff(closure) == 0.0) & (fall[1:] == 0.0)))
+        noise &= np.arange(len(rows)) < np.argmax(rows.closure)
+        rising = np.concatenate(([True], pressure[1:] > pressure[:-1]))
+        left_out = float(fall[noise].max(initial=0.0)) / (span or 1.0)
+        return rows[rising & ~noise], max(change, left_out)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SolvedRows(LawRows):
+    """Rows as a micro model gave them.
+
+    Attributes:
+        outside_range: Whether the micro model warned that it is outside its range of validity.
+    """
+
+    outside_range: NDArray[np.bool_] = field(metadata={"kind": np.bool_})
+
+    @classmethod
+    def none(cls) -> Self:
+        """Return the rows of a patch that stays open."""
+        return cls(**{one.name: np.zeros(0, one.metadata.get("kind")) for one in fields(cls)})
+
+    @property
+    def warning_pressure(self) -> float:
+        """Pressure of the first row of one law outside the range [MPa]; infinite without any."""
+        return float(np.append(self.pressure[self.outside_range], np.inf)[0])
+
+    def from_first_touch(self) -> Self:
+        """Return the rows of one law from first touch on; none of a patch that stays open.
+
+        First touch lies between the last open row and the first one in contact, at the approach
+        where the straight line of p^(2/3) through the first two rows in contact vanishes (Hertz'
+        law). Closure and displacement are interpolated between the open row and the first one in
+        contact.
+
+        Where contacts join, the displacement of a block may grow so fast that the local approach
+        of a patch decreases while the plane comes nearer: such rows are left out.
+        """
+        largest_before = np.maximum.accumulate(self.approach)[:-1]
+        rows = self[np.append(True, self.approach[1:] > largest_before)]
+        loaded = np.flatnonzero(rows.pressure > 0.0)
+        if not loaded.size:
+            return rows[:0]
+        first = max(int(loaded[0]), 1)
+        before, contact = rows[first - 1 : first], rows[first : first + 2]
+        share = 0.0
+        if len(contact) == 2 and contact.pressure[1] > contact.pressure[0]:
+            power, later = contact.pressure ** (2 / 3)
+            back = power / (later - power) * np.diff(contact.approach)[0]
+            step = contact.approach[0] - before.approach[0]
+            share = float(np.clip(1.0 - back / step, 0.0, 0.99))
+        start = before.mapped(np.zeros_like)
+        columns: dict[str, Any] = {"outside_range": before.outside_range}
+        for name in ("approach", "closure", "unresolved_displacement"):
+            column = getattr(before, name)
+            columns[name] = column + share * (getattr(contact, name)[:1] - column)
+        return replace(start, **columns).joined(rows[first:])
+
+
+def _rising(values: Array) -> Array:
+    """Return the rising sequence nearest to values in least squares."""
+    means: list[float] = []
+    counts: list[int] = []
+    for value in values.tolist():
+        means.append(value)
+        counts.append(1)
+        while len(means) > 1 and means[-2] > means[-1]:
+            count, mean = counts.pop(), means.pop()
+            means[-1] = (counts[-1] * means[-1] + count * mean) / (counts[-1] + count)
+            counts[-1] += count
+    return np.repeat(means, counts)
