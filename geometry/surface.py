@@ -30,7 +30,8 @@ class Surface:
     The sample [ix, iy] lies at x = (ix + ½) Lx/nx, y = (iy + ½) Ly/ny.
 
     Args:
-        heights: Heights, shape (nx, ny) [mm]; kept as a read-only float64 copy.
+        heights: Heights, shape (nx, ny) [mm]; kept as a read-only float64 copy. Heights that
+            differ by rounding alone become one height.
         lengths: Sides (Lx, Ly) of the rectangle [mm].
         periodic: Whether the heights continue periodically in both directions.
         source: Where the heights came from, for reports.
@@ -254,6 +255,8 @@ def _checked_heights(heights: ArrayLike) -> Array:
             value=float(array[first]),
             allowed=f"finite heights in mm, within ±{LARGEST:g}",
         )
+    if is_level(array):  # summits of rounding are none
+        return frozen_array(np.full(array.shape, array[0, 0]))
     return array
 
 

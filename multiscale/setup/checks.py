@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
+
+import numpy as np
 
 from geometry.errors import InputError
 from geometry.files import BYTES_PER_HEIGHT
@@ -27,6 +30,8 @@ BYTES_PER_STATE, BYTES_PER_STEP = 24, 1000
 LAW_BLOCK_CELLS, FIELD_CELLS = (40, 40, 25), (20, 20, 12)
 """Cells of a block that carries laws on its mesh, those of Waddad et al. 2016, and of one that is
 meshed after the load for its fields alone."""
+_ROUNDING = 16.0 * sys.float_info.epsilon
+"""Approach over the largest height below which it does not change where the plane is."""
 PROVISIONAL_PATCHES = (4, 4)
 """Patches that stand for ``"auto"`` until they are chosen."""
 
@@ -139,10 +144,19 @@ def check_patches(scene: Scene, surface: Surface) -> None:
 
 
 def check_load(scene: Scene, surface: Surface) -> None:
-    """Refuse loads that would press a linear elastic block to nothing."""
+    """Refuse loads lost in the rounding of heights, or that press the block to nothing."""
+    block, loading = scene.block, scene.loading
+    resolved = _ROUNDING * float(np.abs(surface.heights).max())
+    if loading.approach is not None and 0.0 < max(loading.approach) < resolved:
+        raise InputError(
+            "is lost in the rounding of the heights",
+            key="load.approach",
+            value=list(loading.approach),
+            allowed=f"at least {resolved:.3g} mm, for heights of this size",
+            file=scene.file,
+        )
     if scene.coupling.kind == "analytic":
         return
-    block, loading = scene.block, scene.loading
     if loading.force is not None:
         key, points = "load.force", loading.force
         most, named, unit = block.young_modulus * surface.area, "E times area", "N"

@@ -216,3 +216,13 @@ def test_rounding_is_no_roughness(order, size):
     assert not plane.detrended(order).heights.any()
     rough = Surface(heights=plane.heights + 1e-9 * size * np.cos(9 * x), lengths=(1.0, 1.0))
     assert rough.detrended(order).heights.any()
+
+
+def test_rounding_makes_no_summits():
+    noise = 1.0 + 1e-16 * np.random.default_rng(0).normal(size=(20, 12))
+    assert np.ptp(noise) > 0.0
+    level = Surface(heights=noise, lengths=(2.0, 0.3))
+    assert np.ptp(level.heights) == 0.0
+    rough = noise.copy()
+    rough[3, 4] += 1e-9
+    assert np.ptp(Surface(heights=rough, lengths=(2.0, 0.3)).heights) > 5e-10

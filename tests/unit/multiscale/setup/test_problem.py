@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from geometry import InputError
 from geometry.errors import NotConverged
 from multiscale import Scene, make_setup, run
 from multiscale.couplings.load_steps import ContactCoupling
@@ -135,3 +136,18 @@ def test_a_block_is_as_high_as_the_shorter_side_unless_told(given, height):
     assert made.shape.height == pytest.approx(height, rel=1e-12)
     said = dict(statements(made))["block"]
     assert f"0.04 × 0.02 mm and {height:g} mm high, free sides" in said
+
+
+def test_approaches_below_the_rounding_of_heights_are_refused(tmp_path):
+    heights = np.zeros((8, 8))
+    heights[::2, 1::2] = heights[1::2, ::2] = 1e9
+    np.save(tmp_path / "heights.npy", heights)
+    given = {
+        "surface": {"file": str(tmp_path / "heights.npy"), "lengths": [1.0, 1.0]},
+        "block": {"young_modulus": 4000.0, "poisson_ratio": 0.3},
+        "coupling": {"kind": "analytic"},
+        "load": {"approach": 1e-9},
+    }
+    with pytest.raises(InputError, match="is lost in the rounding of the heights") as told:
+        make_setup(Scene.from_dict(given))
+    assert told.value.key == "load.approach"
