@@ -41,6 +41,7 @@ def test_demo_is_a_narrative_that_asserts_a_number(demo):
     assert len(text.splitlines()) <= 130
 
 
+@pytest.mark.long
 def test_demo_runs_under_mpi(mpirun, tmp_path):
     done = mpirun(2, "demos/paper_block.py", "--quick", "--out", tmp_path)
     assert done.returncode == 0, done.stderr

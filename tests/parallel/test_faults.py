@@ -38,6 +38,7 @@ def test_bug_on_one_rank_ends_all(mpirun, tmp_path, rank, place):
     assert done.stderr.count("RuntimeError: something broke") == 1, done.stderr
 
 
+@pytest.mark.long
 def test_error_that_one_rank_alone_meets_ends_all(mpirun, tmp_path):
     """Errors of ours come on all ranks alike; one that does not must not leave the others."""
     done = mpirun(2, SCRIPT, 1, "one-sided", "load step", *WORDS, tmp_path / "out", timeout=100)
@@ -78,7 +79,13 @@ def undisturbed(mpirun, tmp_path_factory):
     return out
 
 
-@pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGUSR1], ids=["SIGTERM", "SIGUSR1"])
+@pytest.mark.parametrize(
+    "sent",
+    [
+        pytest.param(signal.SIGTERM, id="SIGTERM", marks=pytest.mark.long),
+        pytest.param(signal.SIGUSR1, id="SIGUSR1"),
+    ],
+)
 def test_mpirun_that_is_told_to_end_loses_no_load_step(mpirun, root, tmp_path, undisturbed, sent):
     """It hands SIGUSR1 on and waits; after SIGTERM it kills the ranks within a second or two."""
     command = ["mpirun", "-n", "2", sys.executable, SCRIPT, "1", "slow", "load step", *LONG]

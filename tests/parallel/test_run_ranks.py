@@ -94,8 +94,13 @@ def alone(root, tmp_path_factory):
     return found
 
 
+LONG = {"cells for an accuracy", "concurrent, islands", "concurrent, asperities"}
+
+
 @pytest.mark.parametrize("ranks", RANKS)
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize(
+    "scene", [pytest.param(name, marks=[pytest.mark.long] * (name in LONG)) for name in SCENES]
+)
 def test_same_numbers_on_any_number_of_ranks(mpirun, alone, tmp_path, scene, ranks):
     words = ("-m", "multiscale", "run", PAPER, "--out", tmp_path, "--set", *SMALL, *SCENES[scene])
     done = mpirun(ranks, *words)
@@ -139,12 +144,32 @@ def test_a_rank_may_own_nothing_of_the_interface(mpirun):
     ("override", "text"),
     [
         ("block.young=3", "block.young: unknown key; did you mean 'young_modulus'?"),
-        ("patches.grid=[50, 4]", "patches.grid = [50, 4]: more patches than cells"),
+        pytest.param(
+            "patches.grid=[50, 4]",
+            "patches.grid = [50, 4]: more patches than cells",
+            marks=pytest.mark.long,
+        ),
         ("surface.spectrum.waves=[2, 200]", "the grid is too coarse"),
-        ("block.young_modulus='-4 GPa'", "block.young_modulus = '-4 GPa': must be greater than 0"),
-        ("block.poisson_ratio=0.5", "block.poisson_ratio = 0.5: must be less than 0.5"),
-        ("load.approach='8 kg'", "load.approach = '8 kg': has the wrong unit"),
-        ("surface.grid=[1, 256]", "surface.grid.0 = 1: must be greater than or equal to 4"),
+        pytest.param(
+            "block.young_modulus='-4 GPa'",
+            "block.young_modulus = '-4 GPa': must be greater than 0",
+            marks=pytest.mark.long,
+        ),
+        pytest.param(
+            "block.poisson_ratio=0.5",
+            "block.poisson_ratio = 0.5: must be less than 0.5",
+            marks=pytest.mark.long,
+        ),
+        pytest.param(
+            "load.approach='8 kg'",
+            "load.approach = '8 kg': has the wrong unit",
+            marks=pytest.mark.long,
+        ),
+        pytest.param(
+            "surface.grid=[1, 256]",
+            "surface.grid.0 = 1: must be greater than or equal to 4",
+            marks=pytest.mark.long,
+        ),
     ],
 )
 def test_wrong_input_ends_all_ranks_with_one_message(mpirun, tmp_path, override, text):
@@ -156,7 +181,16 @@ def test_wrong_input_ends_all_ranks_with_one_message(mpirun, tmp_path, override,
     assert not out.exists()
 
 
-@pytest.mark.parametrize("content", [None, np.zeros((1, 64)), np.full((8, 8), np.nan)])
+@pytest.mark.parametrize(
+    "content",
+    [
+        None,
+        *(
+            pytest.param(heights, marks=pytest.mark.long)
+            for heights in (np.zeros((1, 64)), np.full((8, 8), np.nan))
+        ),
+    ],
+)
 def test_bad_heights_end_all_ranks(mpirun, root, tmp_path, content):
     text = (root / PAPER).read_text(encoding="utf-8").replace("spectrum = {", 'file = "h.npy" # {')
     (tmp_path / "scene.toml").write_text(text.replace("grid = [256, 256]", ""), encoding="utf-8")
