@@ -25,7 +25,7 @@ from typing import Any
 
 from geometry import Control
 from geometry.collective import on_root
-from micro import BodyModes, FiniteSlopes, HalfSpaceModel, HalfSpaceState, resampled
+from micro import BodyModes, FiniteSlopes, HalfSpaceModel, HalfSpaceState
 from multiscale.couplings.blocks import SLOPES, OnBody
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import LoadHistory
@@ -201,9 +201,7 @@ class _Problems:
         return self._states[grid, order]
 
     def _model(self, grid: tuple[int, int], order: int) -> HalfSpaceModel:
-        model = self._probe.model
-        surface = resampled(model.surface, grid)
-        model = replace(model, surface=surface, highest=model.reference_height)
+        model = self._probe.model.resampled(grid)
         return replace(self._probe.on_body(model, order), tolerance=_RESIDUAL)
 
 

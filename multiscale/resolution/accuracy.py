@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from geometry.errors import InputError, NotConverged
-from micro import HalfSpaceModel, resampled
+from micro import HalfSpaceModel
 from multiscale.costs.prediction import predicted_cost
 from multiscale.couplings.blocks import SLOPES, OnBody, on_body
 from multiscale.measured_errors import error_probe
@@ -100,10 +100,9 @@ class _Search(MeshSearch):
         for trial in range(TRIALS):
             if new_surface:
                 surface = make_surface(with_value(setup.scene, "surface.grid", cells))
-                highest = surface.highest
+                model = replace(model, surface=surface, highest=surface.highest)
             else:
-                surface, highest = resampled(setup.surface, cells), setup.surface.highest
-            model = replace(model, surface=surface, highest=highest)
+                model = replace(model, surface=setup.surface).resampled(cells)
             errors = self._measured(setup, model, body)
             others = sum(errors.values()) - errors["grid"]
             allowed = max(_SPARE * self.accuracy - others, 0.5 * others)

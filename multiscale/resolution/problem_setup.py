@@ -22,7 +22,6 @@ from micro import (
     MicroModel,
     choose,
     micro_model,
-    resampled,
 )
 from multiscale.couplings.load_steps import ContactCoupling
 from multiscale.loading.stepper import Coupling, LoadHistory, load_steps
@@ -117,8 +116,7 @@ def _setup(scene: Scene, nodes: ClusterNodes, known: Any = None) -> ProblemSetup
         seconds["micro choice"] = time.perf_counter() - made
     model = choice.model if choice else stated_model(scene, surface)
     if isinstance(known, list) and isinstance(model, HalfSpaceModel):
-        cells = resampled(surface, (int(known[0]), int(known[1])))
-        model = replace(model, surface=cells, highest=surface.highest)
+        model = model.resampled((int(known[0]), int(known[1])))
     if not math.isfinite(model.first_touch):
         raise InputError(
             "the surface has no summit that could carry load",
@@ -174,8 +172,8 @@ def plane_at_largest_load(
 def _estimated_plane(scene: Scene, surface: Surface) -> RigidPlane:
     """Return the rigid plane at the largest load on a half-space of few cells."""
     x, y = surface.grid
-    cells = resampled(surface, (min(x, _ESTIMATE_CELLS), min(y, _ESTIMATE_CELLS)))
-    model = HalfSpaceModel(surface=cells, contact_modulus=_modulus(scene), highest=surface.highest)
+    fine = HalfSpaceModel(surface, contact_modulus=_modulus(scene))
+    model = fine.resampled((min(x, _ESTIMATE_CELLS), min(y, _ESTIMATE_CELLS)))
     whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
     coupling = ContactCoupling(model, whole, patch_means(surface, whole))
     return plane_at_largest_load(scene.loading.load_history, coupling, surface)
