@@ -3,9 +3,12 @@
 import json
 from pathlib import Path
 
+import pytest
+
 SCRIPT = Path(__file__).with_name("body_ranks_script.py")
 
 
+@pytest.mark.long
 def test_compliance_in_modes_is_the_same_on_any_ranks(mpirun, monkeypatch, tmp_path):
     results = {}
     for ranks in (1, 2, 3):

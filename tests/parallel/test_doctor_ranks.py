@@ -2,6 +2,8 @@
 
 import json
 
+import pytest
+
 
 def test_doctor_tells_ranks_and_hosts_once(mpirun):
     done = mpirun(3, "-m", "multiscale", "doctor", "--json", timeout=100)
@@ -11,6 +13,7 @@ def test_doctor_tells_ranks_and_hosts_once(mpirun):
     assert findings["test solve"]["state"] == "ok"
 
 
+@pytest.mark.long
 def test_a_check_that_fails_on_one_rank_fails_for_all(mpirun):
     code = (
         "import sys; from mpi4py import MPI; from multiscale.cli import doctor, main\n"
@@ -26,6 +29,7 @@ def test_a_check_that_fails_on_one_rank_fails_for_all(mpirun):
     assert done.stderr.count("not fit to run: BLAS") == 1
 
 
+@pytest.mark.long
 def test_forms_are_compiled_ahead_by_a_job_too(mpirun):
     # PETSc starts on all ranks together: rank 0 alone would bring the others down
     done = mpirun(2, "-m", "multiscale", "warm", "--element", "Q1", timeout=100)

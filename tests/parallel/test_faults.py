@@ -46,6 +46,7 @@ def test_error_that_one_rank_alone_meets_ends_all(mpirun, tmp_path):
     assert done.stderr.count("did not converge: DIVERGED after 1 iterations") == 1
 
 
+@pytest.mark.long
 def test_full_disk_ends_all_with_5(mpirun, tmp_path):
     """Files of dolfinx that cannot be closed end a process that drops them."""
     out = tmp_path / "out"
@@ -79,13 +80,8 @@ def undisturbed(mpirun, tmp_path_factory):
     return out
 
 
-@pytest.mark.parametrize(
-    "sent",
-    [
-        pytest.param(signal.SIGTERM, id="SIGTERM", marks=pytest.mark.long),
-        pytest.param(signal.SIGUSR1, id="SIGUSR1"),
-    ],
-)
+@pytest.mark.long
+@pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGUSR1], ids=["SIGTERM", "SIGUSR1"])
 def test_mpirun_that_is_told_to_end_loses_no_load_step(mpirun, root, tmp_path, undisturbed, sent):
     """It hands SIGUSR1 on and waits; after SIGTERM it kills the ranks within a second or two."""
     command = ["mpirun", "-n", "2", sys.executable, SCRIPT, "1", "slow", "load step", *LONG]

@@ -7,14 +7,8 @@ import pytest
 SCRIPT = Path(__file__).with_name("memory_ranks_script.py")
 
 
-@pytest.mark.parametrize(
-    "kind, ranks",
-    [
-        ("isolated", 1),
-        pytest.param("reference", 2, marks=pytest.mark.long),
-        pytest.param("concurrent", 1, marks=pytest.mark.long),
-    ],
-)
+@pytest.mark.long
+@pytest.mark.parametrize("kind, ranks", [("isolated", 1), ("reference", 2), ("concurrent", 1)])
 def test_blocks_of_earlier_runs_are_freed(mpirun, kind, ranks):
     done = mpirun(ranks, SCRIPT, kind)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -5,15 +5,15 @@ from conftest import MPI_ENVIRONMENT
 from killed_runs import Runs, campaign
 
 
-@pytest.mark.parametrize("kills", [3, pytest.param(10, marks=pytest.mark.long)])
-def test_kills_change_nothing(tmp_path, root, kills):
+@pytest.mark.long
+def test_twenty_kills_change_nothing(tmp_path, root):
     """Two couplings here; the benchmark ``kill_campaign.py`` does all, any number of times."""
     runs, resumed = Runs(root, MPI_ENVIRONMENT), 0
     for scene in ("half-space alone, balanced", "on the mesh"):
         folder = tmp_path / scene.replace(" ", "_")
         folder.mkdir()
-        worst, count = campaign(runs, scene, kills, folder, seed=1, every=5)
+        worst, count = campaign(runs, scene, 10, folder, seed=1, every=5)
         # nothing but the tolerance of the Newton iteration on the mesh, and the ranks' rounding
         assert worst <= 1e-10, scene
         resumed += count
-    assert resumed or kills < 10  # not all kills came before the first step
+    assert resumed  # not all kills came before the first step

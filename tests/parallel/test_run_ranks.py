@@ -94,7 +94,12 @@ def alone(root, tmp_path_factory):
     return found
 
 
-LONG = {"cells for an accuracy", "concurrent, islands", "concurrent, asperities"}
+LONG = {
+    "cells for an accuracy",
+    "concurrent, asperities",
+    "concurrent, islands",
+    "consistent, decomposed, free to turn",
+}
 
 
 @pytest.mark.parametrize("ranks", RANKS)

@@ -3,9 +3,12 @@
 import json
 from pathlib import Path
 
+import pytest
+
 SCRIPT = Path(__file__).with_name("stage_ranks_script.py")
 
 
+@pytest.mark.long
 def test_every_rank_gets_the_stage_of_one(mpirun):
     shown = [mpirun(ranks, SCRIPT) for ranks in (1, 3)]
     assert all(done.returncode == 0 for done in shown), shown[-1].stderr

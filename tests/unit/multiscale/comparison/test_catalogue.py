@@ -84,6 +84,7 @@ def test_heights_from_a_file_are_taken_as_they_are(tmp_path):
     assert not before & {one.key for one in configurations(scene)}  # other heights, other results
 
 
+@pytest.mark.long
 def test_other_scenes_have_other_keys():
     keys = {one.key for one in small()}
     assert not keys & {one.key for one in small("surface.spectrum.seed=2")}
@@ -111,6 +112,7 @@ def test_pressures_are_compared_on_multiples_of_the_patches(grid, common):
     assert pressure_grid(Scene.load(PAPER, [f"patches.grid={list(grid)}"])) == common
 
 
+@pytest.mark.long
 def test_load_by_force_or_free_tilt_has_configurations_too():
     for overrides in (["load.tilt=free"], ["load.force=3 N"]):
         scene = Scene.load(PAPER, ["surface.grid=[64, 64]"]).model_dump(
