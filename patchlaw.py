@@ -36,13 +36,15 @@ if TYPE_CHECKING:  # what `_HOMES` says, for editors and type checkers
         make_setup,
         read_laws,
         run,
+        sweep,
     )
 
 _NAMES = {
     "geometry": "Control InputError NotConverged PatchGrid Spectrum Surface read_surface "
     "synthesise",
     "micro": "HalfSpaceModel",
-    "multiscale": "Comparison History LawTable LoadStep Run Scene compare make_setup read_laws run",
+    "multiscale": "Comparison History LawTable LoadStep Run Scene compare make_setup read_laws run "
+    "sweep",
 }
 _HOMES = {name: package for package, names in _NAMES.items() for name in names.split()}
 

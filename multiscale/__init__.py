@@ -30,6 +30,8 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time `_HOMES` says wh
     from multiscale.results.history import History
     from multiscale.run import Run, run
     from multiscale.scene.scene import Scene
+    from multiscale.sweeps.sweep import sweep
+    from multiscale.sweeps.sweep_results import SweepResults
 
 _MODULES = {
     "comparison.compare": "compare",
@@ -48,6 +50,8 @@ _MODULES = {
     "results.history": "History",
     "run": "Run run",
     "scene.scene": "Scene",
+    "sweeps.sweep": "sweep",
+    "sweeps.sweep_results": "SweepResults",
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names.split()}
 """Module of every public name, which is imported with the first use of the name, for speed."""

@@ -187,6 +187,27 @@ def parser() -> argparse.ArgumentParser:
         metavar="N",
         help="processes of each configuration, under mpirun",
     )
+    sweep = command(
+        "sweep", "Run a scene for many values of its keys; write all load steps, means and bands."
+    )
+    _add_scene(sweep, ending="-sweep")
+    sweep.add_argument(
+        "--vary",
+        action="append",
+        required=True,
+        metavar="KEY=VALUES",
+        help="values of a key, such as surface.spectrum.seed=0..19 or "
+        "block.young_modulus='1 GPa, 4 GPa'; several keys make all combinations",
+    )
+    sweep.add_argument(
+        "--part",
+        metavar="K/N",
+        type=sweep_part,
+        help="run the K-th of N parts of the cases; by default the task of a Slurm array",
+    )
+    sweep.add_argument(
+        "--overwrite", action="store_true", help="begin anew where another sweep's results are"
+    )
     _add_scene(command("laws", "Tabulate the patch laws of a scene; write and draw them."))
     _add_scene(command("surface", "Describe and draw the surface of a scene."))
     command("schema", "Print the JSON Schema of scene files.")
@@ -218,6 +239,21 @@ def wall_time(text: str) -> float:
         return parse_duration(text)
     except ValueError as error:
         raise argparse.ArgumentTypeError(f"{text!r}: {error}") from None
+
+
+def sweep_part(text: str) -> tuple[int, int]:
+    """Return the part of a sweep that a text ``K/N`` names.
+
+    Args:
+        text: Number of the part, from 1, and number of parts.
+
+    Raises:
+        argparse.ArgumentTypeError: When the text is nothing of this kind.
+    """
+    which, _, parts = text.partition("/")
+    if which.isdecimal() and parts.isdecimal() and 1 <= int(which) <= int(parts):
+        return int(which), int(parts)
+    raise argparse.ArgumentTypeError(f"{text!r} is no part of a sweep; it is K/N, such as 2/8")
 
 
 def _add_scene(command: argparse.ArgumentParser, *, folder: str = "", ending: str = "") -> None:

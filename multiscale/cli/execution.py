@@ -20,6 +20,7 @@ _COMMANDS = {
     "plan": "describe.plan_scene",
     "laws": "describe.tabulate_laws",
     "surface": "describe.describe_surface",
+    "sweep": "sweep.sweep_scene",
     "schema": "describe.print_schema",
     "compare": "compare.compare_scene",
     "doctor": "doctor.examine_machine",

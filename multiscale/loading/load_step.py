@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -130,22 +130,23 @@ class LoadStep:
             **other,
         )
 
-    @property
-    def tilt_x(self) -> float:
-        """Slope of the approach along x."""
-        return self.tilt[0]
+    def with_modulus(self, ratio: float) -> LoadStep:
+        """Return the load step of a body whose Young's modulus is another, at the same approach.
 
-    @property
-    def tilt_y(self) -> float:
-        """Slope of the approach along y."""
-        return self.tilt[1]
-
-    @property
-    def moment_x_N_mm(self) -> float:
-        """First moment of the forces along x [N mm]."""
-        return self.moment_N_mm[0]
-
-    @property
-    def moment_y_N_mm(self) -> float:
-        """First moment of the forces along y [N mm]."""
-        return self.moment_N_mm[1]
+        Args:
+            ratio: The other modulus over that of this load step's body. Forces and pressures are
+                proportional to it.
+        """
+        mx, my = self.moment_N_mm
+        patches = replace(self.patches, pressure_MPa=ratio * self.patches.pressure_MPa)
+        force_error = self.force_error_N
+        return replace(
+            self,
+            force_N=ratio * self.force_N,
+            mean_pressure_MPa=ratio * self.mean_pressure_MPa,
+            moment_N_mm=(ratio * mx, ratio * my),
+            force_error_N=None if force_error is None else ratio * force_error,
+            errors=tuple((cause, ratio * error) for cause, error in self.errors),
+            meshes=tuple((approach, ratio * force, area) for approach, force, area in self.meshes),
+            patches=patches,
+        )

@@ -174,14 +174,7 @@ class History:
         Raises:
             ImportError: When pandas, which patchlaw does not require, is not installed.
         """
-        try:
-            from pandas import DataFrame
-        except ImportError as error:
-            raise ImportError(
-                "History.to_dataframe needs pandas (pip install pandas); History.records gives "
-                "the same rows without it"
-            ) from error
-        return DataFrame(self.records(), columns=[column.name for column in COLUMNS])
+        return data_frame(self.records())
 
     def table(self) -> Table:
         """Return headings and rows of the table that reports and terminals show.
@@ -201,6 +194,25 @@ class History:
 
 COLUMNS = tuple(value for value in vars(History).values() if isinstance(value, Column))
 """The columns of ``history.csv``, in their order."""
+
+
+def data_frame(records: list[dict[str, Any]]) -> Any:
+    """Return records as a pandas data frame, with a column for each of their keys.
+
+    Args:
+        records: The rows.
+
+    Raises:
+        ImportError: When pandas, which patchlaw does not require, is not installed.
+    """
+    try:
+        from pandas import DataFrame
+    except ImportError as error:
+        raise ImportError(
+            "a data frame needs pandas (Debian: apt install python3-pandas); `records` gives the "
+            "same rows without it"
+        ) from error
+    return DataFrame(records)
 
 
 def with_error(value: float, error: float | None, *, shown: str) -> str:

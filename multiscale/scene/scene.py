@@ -5,11 +5,11 @@ from __future__ import annotations
 import difflib
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field, PrivateAttr, ValidationError
 
 from geometry.errors import InputError
 from multiscale.scene.coupling_sections import CouplingSection, LoadSection, ReferenceSection
@@ -28,6 +28,14 @@ MOST_BYTES = 64 * 1024
 
 _OF_NUMBER = re.compile(r"[0-9]\.[0-9]+(?!\.)")
 _DEEPEST = 100  # sections within sections
+_EXCLUSIVE = {
+    "approach": ("force",),
+    "force": ("approach",),
+    "file": ("spectrum", "heights"),
+    "spectrum": ("file", "heights"),
+    "heights": ("file", "spectrum"),
+}
+"""Keys that one key replaces, as a section may have only one of them."""
 
 
 class Scene(Section):
@@ -52,6 +60,7 @@ class Scene(Section):
     loading: Annotated[LoadSection, Field(alias="load")]
     output: OutputSection = OutputSection()
     _source: Path | None = None
+    _data: dict[str, Any] = PrivateAttr(default_factory=dict)
 
     @classmethod
     def load(cls, path: str | Path, overrides: Sequence[str] = ()) -> Scene:
@@ -68,7 +77,7 @@ class Scene(Section):
         path = Path(path)
         data = read_scene_file(path)
         for text in overrides:
-            override(data, text)
+            data = overridden(data, text)
         return cls.from_dict(data, source=path)
 
     @classmethod
@@ -86,8 +95,25 @@ class Scene(Section):
             scene = cls.model_validate(data)
         except ValidationError as error:
             raise _first_problem(error, cls).located(file=str(source) if source else None) from None
-        scene._source = source
+        scene._source, scene._data = source, data
         return scene
+
+    def with_(self, changes: Mapping[str, Any]) -> Scene:
+        """Return a scene that differs in some keys.
+
+        A key that excludes another replaces it: ``load.force`` replaces ``load.approach``.
+
+        Args:
+            changes: Values as in a scene file, by dotted key, as ``{"block.young_modulus": "70
+                GPa"}``.
+
+        Raises:
+            InputError: When a key is none, or the scene would be wrong.
+        """
+        data = self._data
+        for key, value in changes.items():
+            data = changed(data, key, value)
+        return Scene.from_dict(data, self._source)
 
     @property
     def name(self) -> str:
@@ -186,25 +212,41 @@ def _content(path: Path) -> bytes:
     raise InputError("cannot be read: it is not a regular file", file=str(path))
 
 
-def override(data: dict[str, Any], text: str) -> None:
-    """Set one dotted key in nested dictionaries.
+def overridden(data: dict[str, Any], text: str) -> dict[str, Any]:
+    """Return what a scene file says, with one key set from the command line.
 
     Args:
-        data: The dictionaries, changed in place.
+        data: The sections; they stay what they are.
         text: ``key=value``; a value is TOML, or else a plain string.
 
     Raises:
         InputError: When it is no override, or a section in its key is none.
     """
     key, equals, value = (part.strip() for part in text.partition("="))
-    *sections, name = key.split(".")
-    if not equals or not key or len(sections) > _DEEPEST:
+    if not equals or not key or key.count(".") >= _DEEPEST:
         raise InputError("is not an override", value=text, allowed="--set key=value")
-    for section in sections:
-        data = data.setdefault(section, {})
-        if not isinstance(data, dict):
-            raise InputError(f"'{section}' is not a section", value=text, key=key)
-    data[name] = _overriding(value)
+    return changed(data, key, _overriding(value))
+
+
+def changed(data: dict[str, Any], key: str, value: Any) -> dict[str, Any]:
+    """Return nested dictionaries with one key set, without the keys that it excludes.
+
+    Args:
+        data: The dictionaries; they stay what they are.
+        key: The dotted key.
+        value: Its value.
+
+    Raises:
+        InputError: When a section in the key is none.
+    """
+    first, _, rest = key.partition(".")
+    if not rest:
+        excluded = _EXCLUSIVE.get(first, ())
+        return {name: old for name, old in data.items() if name not in excluded} | {first: value}
+    section = data.get(first, {})
+    if not isinstance(section, dict):
+        raise InputError(f"'{first}' is not a section", key=key, value=value)
+    return data | {first: changed(section, rest, value)}
 
 
 def _overriding(text: str) -> Any:

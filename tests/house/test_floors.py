@@ -55,7 +55,7 @@ FLOORS = {
         "notes resolution",
         "planning run",
         "output restart",
-        "comparison",
+        "comparison sweeps",
         "cli",
         "__main__",
     ],

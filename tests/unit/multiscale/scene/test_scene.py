@@ -11,7 +11,7 @@ import pytest
 
 from geometry.errors import InputError
 from multiscale.resolution.problem_setup import make_setup
-from multiscale.scene.scene import Scene
+from multiscale.scene.scene import Scene, read_scene_file
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 
@@ -52,12 +52,10 @@ REFUSED = {
     "no first leg": ("load.approach=[0, '8 um']", "load.approach = [0, '8 um']: must be greater"),
     "no leg": ("load.approach=[1, 1]", "load.approach = [1, 1]: repeats a turning point"),
     "approach as force": ("load.force='8 um'", "load.force = '8 um': has the wrong unit"),
-    "two loads": ("load.force=1", "load: needs exactly one load (allowed: either 'approach' or"),
     "no tilt": ("load.tilt=fre", "load.tilt = 'fre': is not a tilt (allowed: two slopes"),
     "half a tilt": ("load.tilt=[0.1]", "load.tilt = [0.1]: is not a tilt"),
     "tilt in kg": ("load.tilt=['1 kg', 0]", "load.tilt = ['1 kg', 0]: has the wrong unit"),
     "change of force": ("load.force_change=0", "load.force_change = 0: must be greater than"),
-    "two sources": ("surface.file='a.npy'", "surface: needs exactly one source"),
     "two amplitudes": ("surface.spectrum.rms_height=1", "surface.spectrum: "),
     "empty band": ("surface.spectrum.waves=[10, 2]", "waves is not a band"),
 }
@@ -266,3 +264,37 @@ def test_byte_order_mark_of_some_editors_is_passed_over(tmp_path):
     path = tmp_path / "marked.toml"
     path.write_bytes(b"\xef\xbb\xbf" + PAPER.read_bytes())
     assert Scene.load(path).model_dump() == Scene.load(PAPER).model_dump()
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "value", "problem"),
+    [
+        ("load", "force", 1.0, "load: needs exactly one load"),
+        ("surface", "file", "a.npy", "surface: needs exactly one source"),
+    ],
+)
+def test_a_file_with_two_of_one_is_refused(section, key, value, problem):
+    data = read_scene_file(PAPER)
+    data[section][key] = value
+    with pytest.raises(InputError, match=problem):
+        Scene.from_dict(data)
+
+
+def test_a_key_replaces_the_one_that_it_excludes():
+    scene = Scene.load(PAPER, ["load.force=2 N"])
+    assert (scene.loading.approach, scene.loading.force) == (None, (2.0,))
+    scene = scene.with_({"load.approach": "4 um", "surface.file": "scan.npy"})
+    assert (scene.loading.approach, scene.loading.force) == ((4e-3,), None)
+    assert (scene.surface.spectrum, scene.surface_path) == (None, PAPER.parent / "scan.npy")
+
+
+def test_with_leaves_the_scene_what_it_was():
+    scene = Scene.load(PAPER)
+    other = scene.with_({"block.young_modulus": "70 GPa", "surface.spectrum.seed": 7})
+    assert (other.block.young_modulus, other.surface.spectrum.seed) == (7e4, 7)
+    assert other.name == scene.name
+    assert scene == Scene.load(PAPER)
+    with pytest.raises(InputError, match=r"'spectrum' is not a section|is not a section"):
+        scene.with_({"accuracy.spectrum": 1, "accuracy.spectrum.seed": 2})
+    with pytest.raises(InputError, match="did you mean 'seed'"):
+        scene.with_({"surface.spectrum.sed": 7})

@@ -1,0 +1,246 @@
+"""Sweeps: all combinations, shared among ranks, gone on with after an interruption."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from geometry.errors import InputError, NotConverged
+from multiscale import run, sweep
+from multiscale.cli.command_line import main
+from multiscale.run import Run
+from multiscale.scene.scene import Scene
+from multiscale.sweeps.cases import sweep_cases, values_from_text
+
+SCENE = """
+[surface]
+spectrum = { hurst = 0.95, waves = [2, 5], rms_slope = 0.215, seed = 1 }
+grid = [16, 16]
+lengths = ["1 mm", "1 mm"]
+[block]
+young_modulus = "4 GPa"
+poisson_ratio = 0.15
+[micro]
+model = "half-space"
+[coupling]
+kind = "analytic"
+[load]
+approach = "8 um"
+steps = 2
+[output]
+check = "none"
+"""
+SEED, MODULUS = "surface.spectrum.seed", "block.young_modulus"
+VARY = {MODULUS: ["1 GPa", "4 GPa"], SEED: range(3)}
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE)
+    return path
+
+
+@pytest.fixture
+def scene(file):
+    return Scene.load(file)
+
+
+def rows(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_cases_are_all_combinations_the_last_key_fastest(scene):
+    cases = sweep_cases(scene, VARY)
+    assert [case.values[SEED] for case in cases] == [0, 1, 2, 0, 1, 2]
+    assert [case.scene.block.young_modulus for case in cases] == 3 * [1e3] + 3 * [4e3]
+    assert [case.scene.surface.spectrum.seed for case in cases] == [0, 1, 2, 0, 1, 2]
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    {
+        "a.b=2..5": [2, 3, 4, 5],
+        "a.b = -1..1": [-1, 0, 1],
+        "a.b=1 GPa, 4 GPa": ["1 GPa", "4 GPa"],
+        "a.b=0.5,1": [0.5, 1],
+        "a.b=true": [True],
+        "a.b=[[16, 16], [32, 32]]": [[16, 16], [32, 32]],
+        'a.b="x, y", z': ['"x', 'y"', "z"],
+    }.items(),
+)
+def test_values_are_ranges_lists_or_texts(text, values):
+    assert values_from_text(text) == ("a.b", values)
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    {
+        "a.b": "varies no key",
+        "=1": "varies no key",
+        "a.b=": "varies no key",
+        "a.b=5..2": r"--vary a.b = '5..2': is no range",
+        "a.b=0..10000000": "is no range",
+        "a.b=[1, 2": "is no list of values",
+        "a.b=[]": "is no list of values",
+        "a.b=1,,2": "is no list of values",
+    }.items(),
+)
+def test_what_varies_nothing_is_refused(text, problem):
+    with pytest.raises(InputError, match=problem):
+        values_from_text(text)
+
+
+@pytest.mark.parametrize(
+    ("vary", "problem"),
+    [
+        ({}, "varies nothing"),
+        ({SEED: []}, "has no values"),
+        ({SEED: [1, 1]}, "takes a value twice"),
+        ({SEED: [1, -1]}, r"surface.spectrum.seed = -1"),
+        ({"surface.sed": [1]}, "did you mean 'seed'|unknown key"),
+        ({"block.height": range(2000), SEED: range(2000)}, "make 4000000 cases"),
+    ],
+)
+def test_wrong_cases_are_refused_before_any_runs(scene, vary, problem):
+    with pytest.raises(InputError, match=problem):
+        sweep(scene, vary)
+
+
+def test_cases_are_what_runs_of_their_own_are(scene):
+    found = sweep(scene, VARY)
+    for case, forces in zip(found.cases, found.force_N, strict=True):
+        alone = run(scene.with_(case.values))
+        # the modulus scales pressures that were found with another one: rounding differs
+        np.testing.assert_allclose(forces, alone.force_N, rtol=1e-12)
+    assert found.force_N.shape == (6, 2)
+    assert found.unfinished == 0
+    assert found.failures == {}
+
+
+def test_other_moduli_are_not_solved_again_under_approaches(scene, monkeypatch):
+    solved = []
+    whole = Run.load_steps
+    monkeypatch.setattr(Run, "load_steps", lambda run: (solved.append(1), whole(run))[1])
+    sweep(scene, VARY)
+    assert len(solved) == 3
+    solved.clear()
+    sweep(scene.with_({"load.force": "0.5 N"}), VARY)
+    assert len(solved) == 6
+
+
+def test_means_and_bands_are_over_the_seeds_of_each_ensemble(scene):
+    found = sweep(scene, VARY)
+    (soft, part), (stiff, other) = found.ensembles()
+    assert (soft, stiff) == ({MODULUS: "1 GPa"}, {MODULUS: "4 GPa"})
+    np.testing.assert_allclose(part.mean("force_N"), found.force_N[:3].mean(axis=0), rtol=1e-14)
+    np.testing.assert_allclose(4.0 * part.mean("force_N"), other.mean("force_N"), rtol=1e-12)
+    low, high = part.band("force_N", (0.0, 1.0))
+    np.testing.assert_array_equal(low, found.force_N[:3].min(axis=0))
+    np.testing.assert_array_equal(high, found.force_N[:3].max(axis=0))
+    with pytest.raises(InputError, match="no case of the sweep has these values"):
+        found.where({SEED: 7})
+
+
+def test_a_sweep_goes_on_after_the_cases_that_are_done(scene, tmp_path):
+    first, again = [], []
+    whole = sweep(scene, VARY, folder=tmp_path, observe=lambda case, result: first.append(case))
+    (journal,) = (tmp_path / "cases").glob("*.jsonl")
+    lines = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(b"".join(lines[:4]) + lines[4][:20])  # as a killed process leaves it
+    rest = sweep(scene, VARY, folder=tmp_path, observe=lambda case, result: again.append(case))
+    assert (len(first), len(again)) == (6, 3)
+    np.testing.assert_allclose(rest.force_N, whole.force_N, rtol=1e-12)
+    assert [json.loads(line)["case"] for line in journal.read_text().splitlines()[1:]]
+
+
+def test_cases_of_another_scene_are_not_mixed_in(scene, tmp_path):
+    sweep(scene, {SEED: [1]}, folder=tmp_path)
+    with pytest.raises(InputError, match=r"holds the cases of another scene.*--overwrite"):
+        sweep(scene.with_({"load.steps": 3}), {SEED: [1]}, folder=tmp_path)
+
+
+def test_parts_make_the_whole(scene, tmp_path):
+    one = sweep(scene, {SEED: range(5)}, folder=tmp_path, part=(1, 2))
+    assert one.unfinished == 2
+    both = sweep(scene, {SEED: range(5)}, folder=tmp_path, part=(2, 2))
+    np.testing.assert_array_equal(both.force_N, sweep(scene, {SEED: range(5)}).force_N)
+    with pytest.raises(InputError, match="is no part of a sweep"):
+        sweep(scene, {SEED: range(5)}, part=(3, 2))
+
+
+def test_a_case_that_fails_does_not_end_the_others(scene, tmp_path, monkeypatch):
+    whole = Run.load_steps
+
+    def failing(run):
+        yield next(whole(run))
+        if run.scene.surface.spectrum.seed == 1:
+            raise NotConverged("load step 2", reason="LOST", iterations=3, remedy="smaller steps")
+        yield from whole(run)
+
+    monkeypatch.setattr(Run, "load_steps", failing)
+    found = sweep(scene, {SEED: range(3)})
+    (name,) = found.failures
+    assert json.loads(name) == {SEED: 1}
+    assert np.isnan(found.force_N).tolist() == [[False, False], [False, True], [False, False]]
+    assert found.mean("force_N")[1] == pytest.approx(np.mean(found.force_N[[0, 2], 1]), rel=1e-14)
+    assert [record["status"][:11] for record in found.case_records()] == [
+        "done", "load step 2", "done"
+    ]  # fmt: skip
+
+
+def test_command_says_which_cases_failed(file, tmp_path, capsys, monkeypatch):
+    def failing(run):
+        raise NotConverged("load step 1", reason="LOST", iterations=3, remedy="smaller steps")
+
+    monkeypatch.setattr(Run, "load_steps", failing)
+    out = tmp_path / "out"
+    assert main(["sweep", str(file), "--vary", f"{SEED}=0..1", "--out", str(out)]) == 3
+    assert "2 of 2 cases, the first with" in capsys.readouterr().err
+    assert all("LOST" in case["status"] for case in rows(out / "cases.csv"))
+
+
+def test_command_writes_cases_histories_and_ensembles(file, tmp_path, capsys, monkeypatch):
+    out = tmp_path / "out"
+    words = ["sweep", str(file), "--vary", f"{SEED}=0..2", "--out", str(out)]
+    assert main(words) == 0
+    assert "3 of 3 cases are done" in capsys.readouterr().out
+    cases, steps, bands = (rows(out / f"{name}.csv") for name in ("cases", "history", "ensembles"))
+    assert [case["status"] for case in cases] == 3 * ["done"]
+    assert len(steps) == 6
+    mean = np.mean([float(case["force_N"]) for case in cases])
+    assert float(bands[-1]["force_N"]) == pytest.approx(mean, rel=1e-14)
+    assert (out / "sweep.png").read_bytes().startswith(b"\x89PNG")
+    assert main([*words, "--set", "load.steps=1"]) == 2
+    assert "--overwrite" in capsys.readouterr().err
+    assert main([*words, "--set", "load.steps=1", "--overwrite"]) == 0
+    assert len(rows(out / "history.csv")) == 3
+
+
+def test_command_runs_the_part_of_a_slurm_task(file, tmp_path, capsys, monkeypatch):
+    words = ["sweep", str(file), "--vary", f"{SEED}=0..2", "--out", str(tmp_path / "out")]
+    for task in ("4", "6"):
+        environment = {"ID": task, "MIN": "4", "COUNT": "2", "STEP": "2"}
+        for name, value in environment.items():
+            monkeypatch.setenv(f"SLURM_ARRAY_TASK_{name}", value)
+        assert main(words) == 0
+    shown = capsys.readouterr().out
+    assert "1 of 3 cases are left to other parts" in shown
+    assert "3 of 3 cases are done" in shown
+
+
+@pytest.mark.parametrize(
+    ("words", "problem"),
+    [
+        (["--part", "3/2"], "is no part of a sweep"),
+        (["--part", "x"], "is no part of a sweep"),
+        (["--vary", "surface.spectrum.seed=-3..-1"], "surface.spectrum.seed"),
+    ],
+)
+def test_wrong_words_write_nothing(file, tmp_path, capsys, words, problem):
+    out = tmp_path / "out"
+    assert main(["sweep", str(file), "--vary", f"{MODULUS}=1,2", "--out", str(out), *words]) == 2
+    assert problem in capsys.readouterr().err
+    assert not out.exists()
