@@ -21,8 +21,7 @@ from multiscale.laws.files import law_bytes, read_laws
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling, LoadPosition, LoadStepper, Restorable
-from multiscale.machine.mpi_job import large_object_comm
-from multiscale.machine.nodes import cluster_nodes
+from multiscale.machine import cluster_nodes, large_object_comm
 from multiscale.measured_errors import checked, error_probe
 from multiscale.notes import noted_history
 from multiscale.resolution.auto_keys import resolved_keys

@@ -14,8 +14,7 @@ from multiscale.cli.inputs import scene_and_folder
 from multiscale.costs.prediction import Cost, predicted_cost
 from multiscale.couplings.blocks import load_finite_elements
 from multiscale.laws.files import write_laws
-from multiscale.machine.mpi_job import large_object_comm
-from multiscale.machine.nodes import cluster_nodes
+from multiscale.machine import cluster_nodes, large_object_comm
 from multiscale.output import terminal
 from multiscale.output.results import write_figure
 from multiscale.planning import plan

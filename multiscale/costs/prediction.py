@@ -16,7 +16,7 @@ from micro.choice.cost import contact_box_share, solution_seconds
 from multiscale.costs.work import Machine, Work, this_machine
 from multiscale.couplings.newton_choice import CYCLES_PER_PATCH, full_cycles, newton_choice
 from multiscale.loading.stepper import LoadHistory
-from multiscale.machine.nodes import peak_memory
+from multiscale.machine import peak_memory
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import ReferenceMeshes, mesh_unknowns
 

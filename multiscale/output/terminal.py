@@ -16,7 +16,7 @@ from geometry.errors import PatchlawError
 from multiscale.costs.prediction import Cost
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import LoadHistory
-from multiscale.machine.nodes import peak_memory
+from multiscale.machine import peak_memory
 from multiscale.planning import plan
 from multiscale.results.history import History
 from multiscale.setup.problem import ProblemSetup

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from geometry.meshes.block import BlockShape, alignment
-from multiscale.machine.nodes import ClusterNodes
+from multiscale.machine import ClusterNodes
 from multiscale.setup.checks import memory_requests
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import ReferenceMeshes, reference_requests

@@ -25,7 +25,7 @@ from micro import (
 )
 from multiscale.couplings.load_steps import ContactCoupling
 from multiscale.loading.stepper import Coupling, LoadHistory, load_steps
-from multiscale.machine.nodes import ClusterNodes
+from multiscale.machine import ClusterNodes
 from multiscale.resolution.accuracy import setup_by_accuracy
 from multiscale.resolution.auto_keys import (
     accuracy_of,

@@ -48,7 +48,7 @@ FLOORS = {
     "multiscale": [
         "machine storage",
         "doctor laws loading",
-        "results scene",
+        "compiled_forms results scene",
         "setup",
         "couplings",
         "costs measured_errors",

@@ -9,7 +9,7 @@ import pytest
 
 from geometry.errors import InputError
 from multiscale import Scene, make_setup
-from multiscale.machine.nodes import ClusterNodes
+from multiscale.machine import ClusterNodes
 from multiscale.planning.plan import statements, warnings
 from multiscale.resolution.auto_keys import auto_keys, couplings, resolved_keys
 

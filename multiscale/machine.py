@@ -1,17 +1,126 @@
-"""The memory of the nodes that a run has, and whether what a scene requests fits into it."""
+"""The machine that a run is on: its MPI job, and the memory of its nodes."""
 
 from __future__ import annotations
 
 import math
 import os
 import resource
-import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from geometry.checks import address_space
+import numpy as np
+
+from geometry.checks import PROGRAM, address_space
+from geometry.errors import InputError
+
+_LEAST_DATA = 0.5e9
+"""Address space that a small run takes beside the program: 64 × 64 heights do with 0.3 GB [B]."""
+
+_SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS")
+"""Variables by which launchers tell processes how many they are. The first that is set counts.
+They belong to Open MPI's mpirun; to Hydra (MPICH, Intel MPI) and others that use PMI; to Hydra on
+one node; to Slurm's srun, inside which the others may have been started."""
+
+
+def keep_petsc_from_signals() -> None:
+    """Keep PETSc from handling SIGHUP and SIGTERM, which end a run in time.
+
+    Its handlers would end the process with exit code 59. Call this before PETSc is imported.
+    """
+    option, given = "-no_signal_handler", os.environ.get("PETSC_OPTIONS", "")
+    if option not in given.split():
+        os.environ["PETSC_OPTIONS"] = f"{given} {option}".strip()
+
+
+def check_address_space() -> None:
+    """Refuse to start where the address space is too small for MPI and matrix products.
+
+    OpenBLAS allocates its buffers at the first product, and waits for ever where there is no memory
+    left. A product here makes it allocate them before data fill the address space.
+
+    Raises:
+        InputError: When the limit of the address space is too low.
+    """
+    left = address_space()
+    if left < _LEAST_DATA:
+        raise InputError(
+            "the address space of a process is limited to less than this program needs",
+            key="ulimit -v",
+            value=round((left + PROGRAM) / 1024.0),
+            allowed=f"at least {round((_LEAST_DATA + PROGRAM) / 1024.0)} kB, or unlimited",
+        )
+    if left < math.inf:
+        some = np.ones((512, 512))
+        np.matmul(some, some)
+
+
+def world() -> Any:
+    """Return the communicator of an MPI job, or None for a process on its own.
+
+    Raises:
+        InputError: When this user has no home, without which neither Open MPI nor dolfinx starts.
+    """
+    try:
+        Path.home()
+    except RuntimeError:
+        raise InputError(
+            "this user has no home folder, and MPI does not start without",
+            key="HOME",
+            allowed="set it to any folder",
+        ) from None
+    from mpi4py import MPI
+
+    return MPI.COMM_WORLD if MPI.COMM_WORLD.size > 1 else None
+
+
+def large_object_comm(comm: Any) -> Any:
+    """Return a communicator for pickled objects that may exceed the 2 GB of an MPI message.
+
+    Large arrays are sent beside the pickle, so that neither end holds them twice. Small objects
+    take longer than through the communicator itself.
+
+    Args:
+        comm: MPI communicator; None for a process on its own.
+    """
+    if comm is None:
+        return None
+    from mpi4py.util import pkl5
+
+    return pkl5.Intracomm(comm)
+
+
+def detached_processes() -> tuple[str, int] | None:
+    """Find out whether a launcher started several processes that are no MPI job.
+
+    Returns:
+        The launcher's variable with the number of processes, and this number; None for an MPI job
+        or a process on its own.
+    """
+    if world() is not None:
+        return None
+    for name in _SIZES:
+        if (text := os.environ.get(name, "")).isdigit():
+            return (name, int(text)) if int(text) > 1 else None
+    return None
+
+
+def refuse_detached_processes() -> None:
+    """Refuse several processes that are no MPI job, each of which would compute the whole scene.
+
+    Raises:
+        InputError: When the launcher is not that of the MPI that mpi4py was built with.
+    """
+    if found := detached_processes():
+        name, count = found
+        raise InputError(
+            f"this is one of {count} processes, but each stands alone and would compute the whole "
+            "scene: the launcher is not that of mpi4py's MPI; start with the mpirun that `patchlaw "
+            f"doctor` names. For {count} independent runs, unset {name}",
+            key=name,
+            value=count,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,10 +140,10 @@ class MemoryRequest:
     shared: float = 0.0
     per_rank: float = 0.0
     root_only: float = 0.0
-    key: str = field(default="", compare=False)
-    value: Any = field(default=None, compare=False)
-    purpose: str = field(default="", compare=False)
-    alternative: str = field(default="", compare=False)
+    key: str = ""
+    value: Any = None
+    purpose: str = ""
+    alternative: str = ""
 
     @property
     def total(self) -> float:
@@ -44,8 +153,7 @@ class MemoryRequest:
     @property
     def sentence(self) -> str:
         """How much memory is needed, and for what."""
-        need = f"needs about {self.total / 1e9:.3g} GB of memory"
-        return f"{self.purpose} {need}" if self.purpose else need
+        return f"{self.purpose} needs about {self.total / 1e9:.3g} GB of memory".lstrip()
 
 
 def memory_of_this_node(groups: Iterable[tuple[float, float]] | None = None) -> float:
@@ -61,8 +169,7 @@ def memory_of_this_node(groups: Iterable[tuple[float, float]] | None = None) -> 
 
 def peak_memory() -> float:
     """Return the largest memory of this process so far [B]."""
-    unit = 1 if sys.platform == "darwin" else 1024
-    return float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit)
+    return 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,21 +223,21 @@ class ClusterNodes:
         """
         ranks = max(self.ranks)
         text = f"{len(self.ranks)} nodes" if len(self.ranks) > 1 else "one node"
-        text += f" of {self.memory / 1e9:.3g} GB"
-        text += f" with {ranks} ranks" if ranks > 1 else ""
+        text += f" of {self.memory / 1e9:.3g} GB{f' with {ranks} ranks' if ranks > 1 else ''}"
         if self.process < self.memory:
             text += f", {max(self.process, 0.0) / 1e9:.3g} GB for a process (ulimit -v)"
         enough = self.nodes_needed(request)
         if enough is not None:
-            text += f"; {enough} such nodes would do, filled evenly by mpirun over several hosts"
-            return text
-        if request.root_only + request.per_rank > self.process or not request.per_rank:
-            return text
-        left = self.memory - request.root_only - request.shared / len(self.ranks)
-        fewer = int(left / request.per_rank)
-        if fewer < 1:
-            return text
-        return f"{text}; {fewer} rank{'s' * (fewer > 1)} on a node would do, for each holds it all"
+            return (
+                f"{text}; {enough} such nodes would do, filled evenly by mpirun over several hosts"
+            )
+        fewer = 0
+        if 0.0 < request.per_rank <= self.process - request.root_only:
+            left = self.memory - request.root_only - request.shared / len(self.ranks)
+            fewer = int(left / request.per_rank)
+        if fewer > 0:
+            text += f"; {fewer} rank{'s' * (fewer > 1)} on a node would do, for each holds it all"
+        return text
 
 
 def cluster_nodes(comm: Any) -> ClusterNodes:
