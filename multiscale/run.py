@@ -29,7 +29,7 @@ from multiscale.resolution.problem_setup import make_setup
 from multiscale.results.history import History
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
-from multiscale.storage.serialisation import Arrays, digest
+from multiscale.storage import Arrays, digest
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import Interface

@@ -24,7 +24,7 @@ from multiscale.restart.folder_lock import locked
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
-from multiscale.storage.whole_files import write_whole
+from multiscale.storage import write_whole
 
 
 def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:

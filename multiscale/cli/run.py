@@ -11,10 +11,10 @@ from multiscale.cli.inputs import scene_and_folder
 from multiscale.output import terminal
 from multiscale.output.field_files import write_fields
 from multiscale.output.results import write_results
-from multiscale.restart.checkpoint import Checkpoint
+from multiscale.restart.checkpoint import Checkpoint, CheckpointWriter
 from multiscale.restart.folder_lock import locked
 from multiscale.restart.interruption import Interruption, Stopped
-from multiscale.restart.resuming import CheckpointWriter, find_checkpoint, go_on, is_finished
+from multiscale.restart.resuming import find_checkpoint, go_on, is_finished
 from multiscale.run import Run
 
 

@@ -21,7 +21,7 @@ from multiscale.comparison.run_result import RunResult
 from multiscale.resolution.auto_keys import auto_keys, provisional, resolved_keys, with_resolved
 from multiscale.resolution.problem_setup import make_setup
 from multiscale.scene.scene import Scene
-from multiscale.storage.whole_files import write_json
+from multiscale.storage import write_json
 
 AGAINST = {"reference": "reference", "concurrent": "concurrent", "half-space": "analytic"}
 """Coupling of each kind of measure; the best kind is the first."""

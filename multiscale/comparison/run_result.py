@@ -25,7 +25,7 @@ from multiscale.machine import world
 from multiscale.results.history import History
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
-from multiscale.storage.whole_files import write_json
+from multiscale.storage import write_json
 
 Status = Literal["done", "not converged", "refused", "failed", "over budget", "not started"]
 

@@ -17,10 +17,15 @@ from multiscale import Run, Scene
 from multiscale.cli.command_line import main
 from multiscale.output.field_files import write_fields
 from multiscale.resolution import accuracy
-from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
+from multiscale.restart.checkpoint import (
+    CheckpointWriter,
+    checkpoint_of,
+    read_checkpoint,
+    write_checkpoint,
+)
 from multiscale.restart.folder_lock import FolderLock
-from multiscale.restart.resuming import CheckpointWriter, find_checkpoint, go_on
-from multiscale.storage.serialisation import checksum
+from multiscale.restart.resuming import find_checkpoint, go_on
+from multiscale.storage import checksum
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 ALONE = {"coupling": {"kind": "analytic"}, "micro": {"model": "half-space"}}
@@ -196,7 +201,7 @@ def test_damaged_checkpoint_is_refused_and_stays(tmp_path, ended, capsys, damage
 
 def flip(path):
     with h5py.File(path, "r+") as file:
-        file["position/structure"][3] ^= 1
+        file["run/structure"][3] ^= 1
 
 
 def relabel(path):
