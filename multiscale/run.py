@@ -24,8 +24,8 @@ from multiscale.loading.stepper import Coupling, LoadPosition, LoadStepper, Rest
 from multiscale.machine import cluster_nodes, large_object_comm
 from multiscale.measured_errors import checked, error_probe
 from multiscale.notes import noted_history
-from multiscale.resolution.auto_keys import resolved_keys
-from multiscale.resolution.problem_setup import make_setup
+from multiscale.planning.auto_keys import resolved_keys
+from multiscale.planning.problem_setup import make_setup
 from multiscale.results.history import History
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup

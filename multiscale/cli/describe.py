@@ -11,7 +11,6 @@ from typing import Any
 from geometry.collective import on_root
 from geometry.statistics import roughness
 from multiscale.cli.inputs import scene_and_folder
-from multiscale.costs.prediction import Cost, predicted_cost
 from multiscale.couplings.blocks import load_finite_elements
 from multiscale.laws.files import write_laws
 from multiscale.machine import cluster_nodes, large_object_comm
@@ -19,7 +18,8 @@ from multiscale.output import terminal
 from multiscale.output.results import write_figure
 from multiscale.planning import plan
 from multiscale.planning.block_plan import memory_warnings
-from multiscale.resolution.problem_setup import make_setup
+from multiscale.planning.costs import Cost, predicted_cost
+from multiscale.planning.problem_setup import make_setup
 from multiscale.restart.folder_lock import locked
 from multiscale.run import Run
 from multiscale.scene.scene import Scene

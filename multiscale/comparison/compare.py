@@ -18,8 +18,8 @@ from multiscale.comparison.error_breakdown import error_breakdowns
 from multiscale.comparison.error_measures import ErrorMeasures, error_measures, uncertainty
 from multiscale.comparison.launching import Launch, check_launchable, run_all
 from multiscale.comparison.run_result import RunResult
-from multiscale.resolution.auto_keys import auto_keys, provisional, resolved_keys, with_resolved
-from multiscale.resolution.problem_setup import make_setup
+from multiscale.planning.auto_keys import auto_keys, provisional, resolved_keys, with_resolved
+from multiscale.planning.problem_setup import make_setup
 from multiscale.scene.scene import Scene
 from multiscale.storage import write_json
 

@@ -16,7 +16,7 @@ from geometry.errors import InputError, NotWritten
 from multiscale import Run, Scene
 from multiscale.cli.command_line import main
 from multiscale.output.field_files import write_fields
-from multiscale.resolution import accuracy
+from multiscale.planning import accuracy
 from multiscale.restart.checkpoint import (
     CheckpointWriter,
     checkpoint_of,

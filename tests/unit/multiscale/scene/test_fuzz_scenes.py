@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scene_inputs import BASE, KEYS, damaged, odd_text, planned, put, ran, scenes, toml
 
 from geometry.errors import InputError
-from multiscale.resolution.problem_setup import make_setup
+from multiscale.planning.problem_setup import make_setup
 from multiscale.scene.scene import MOST_BYTES, Scene, parsed
 
 few = settings(

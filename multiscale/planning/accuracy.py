@@ -14,10 +14,9 @@ from dataclasses import replace
 
 from geometry.errors import InputError, NotConverged
 from micro import HalfSpaceModel
-from multiscale.costs.prediction import predicted_cost
 from multiscale.couplings.blocks import SLOPES, OnBody, on_body
 from multiscale.measured_errors import error_probe
-from multiscale.resolution.auto_keys import (
+from multiscale.planning.auto_keys import (
     MOST_HEIGHTS,
     auto_keys,
     couplings,
@@ -25,7 +24,8 @@ from multiscale.resolution.auto_keys import (
     on_waves,
     with_value,
 )
-from multiscale.resolution.mesh_accuracy import (
+from multiscale.planning.costs import predicted_cost
+from multiscale.planning.mesh_accuracy import (
     TRIALS,
     Build,
     Errors,

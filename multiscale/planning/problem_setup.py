@@ -26,8 +26,8 @@ from micro import (
 from multiscale.couplings.load_steps import ContactCoupling
 from multiscale.loading.stepper import Coupling, LoadHistory, load_steps
 from multiscale.machine import ClusterNodes
-from multiscale.resolution.accuracy import setup_by_accuracy
-from multiscale.resolution.auto_keys import (
+from multiscale.planning.accuracy import setup_by_accuracy
+from multiscale.planning.auto_keys import (
     accuracy_of,
     auto_keys,
     is_measured,
@@ -36,7 +36,7 @@ from multiscale.resolution.auto_keys import (
     with_resolved,
     with_value,
 )
-from multiscale.resolution.mesh_accuracy import MeshError, measured_mesh_error
+from multiscale.planning.mesh_accuracy import MeshError, measured_mesh_error
 from multiscale.scene.scene import Scene
 from multiscale.setup.checks import check_load, check_memory, check_patches, patch_grid
 from multiscale.setup.problem import ProblemSetup

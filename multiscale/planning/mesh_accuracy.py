@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from geometry.errors import InputError
 from multiscale.couplings.reference import make_reference
-from multiscale.resolution.auto_keys import accuracy_of, with_value
+from multiscale.planning.auto_keys import accuracy_of, with_value
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
 

@@ -10,8 +10,8 @@ import pytest
 from geometry.errors import InputError
 from multiscale import Scene, make_setup
 from multiscale.machine import ClusterNodes
+from multiscale.planning.auto_keys import auto_keys, couplings, resolved_keys
 from multiscale.planning.plan import statements, warnings
-from multiscale.resolution.auto_keys import auto_keys, couplings, resolved_keys
 
 
 def scene(source=None, **sections):
