@@ -165,10 +165,8 @@ def blas(comm: Any, libraries: Sequence[dict[str, Any]] | None = None) -> CheckR
         comm: MPI communicator, or None.
         libraries: What threadpoolctl finds of loaded libraries; by default those of this process.
     """
-    if libraries is None:
-        importlib.import_module("scipy.linalg")  # loads it
-        libraries = threadpoolctl.threadpool_info()
-    for library in libraries:
+    importlib.import_module("scipy.linalg")  # loads it
+    for library in threadpoolctl.threadpool_info() if libraries is None else libraries:
         if library["user_api"] == "blas":
             name = Path(library["filepath"]).name
             return CheckResult("ok", f"{name}, {library['num_threads']} thread(s)")
@@ -193,8 +191,7 @@ def launcher(comm: Any) -> CheckResult:
         return CheckResult("ok", library)
     shown = ""
     if command := shutil.which("mpirun"):
-        words = [command, "--version"]
-        done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=30)
+        done = subprocess.run([command, "--version"], capture_output=True, text=True, timeout=30)
         shown = " ".join(done.stdout.split())[:200]
     return launcher_of(library, shown)
 

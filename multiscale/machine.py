@@ -6,6 +6,7 @@ import math
 import os
 import resource
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -274,11 +275,7 @@ def control_group_memory(
         own: File that lists the groups of the process, as Linux gives it.
         groups: Folder of all groups.
     """
-    try:
-        lines = own.read_text(encoding="utf-8").splitlines()
-    except OSError:  # this is not Linux
-        return
-    for line in lines:
+    for line in own.read_text(encoding="utf-8").splitlines() if own.exists() else ():
         _, controllers, path = line.split(":", 2)
         if not controllers:
             top, names = groups, ("memory.max", "memory.current")
@@ -288,10 +285,6 @@ def control_group_memory(
             continue
         group = top / path.strip("/")
         for folder in (group, *group.parents):
-            if not folder.is_relative_to(top):
-                break
-            try:
-                limit, used = (float((folder / n).read_text(encoding="utf-8")) for n in names)
-            except (OSError, ValueError):  # another namespace's group, or its limit is "max"
-                continue
-            yield limit, used
+            with suppress(OSError, ValueError):  # above all groups, or the limit is "max"
+                limit, used = (float((folder / name).read_text("utf-8")) for name in names)
+                yield limit, used

@@ -20,7 +20,7 @@ from multiscale.planning import plan
 from multiscale.planning.block_plan import memory_warnings
 from multiscale.planning.costs import Cost, predicted_cost
 from multiscale.planning.problem_setup import make_setup
-from multiscale.restart.folder_lock import locked
+from multiscale.restart.results_folder import locked
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup

@@ -25,19 +25,14 @@ from multiscale.planning.auto_keys import (
     with_value,
 )
 from multiscale.planning.costs import predicted_cost
-from multiscale.planning.mesh_accuracy import (
-    TRIALS,
-    Build,
-    Errors,
-    MeshError,
-    MeshSearch,
-    refinement,
-)
+from multiscale.planning.mesh_accuracy import Build, Errors, MeshError, MeshSearch, refinement
 from multiscale.scene.scene import Scene
 from multiscale.setup.decision import Alternative, Decision
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.surface import make_surface
 
+_TRIALS = 6
+"""Most trials of a grid."""
 _SPARE = 0.8
 """Share of the accuracy that errors at the largest load may take; errors at other loads differ."""
 _ORDER = 1.5
@@ -97,7 +92,7 @@ class _Search(MeshSearch):
         if may_refine and not new_surface:
             cells = _scaled(cells, 1.0 / _FIRST_CELLS)
         body = on_body(setup, None, half_space=not setup.has_block)
-        for trial in range(TRIALS):
+        for trial in range(_TRIALS):
             if new_surface:
                 surface = make_surface(with_value(setup.scene, "surface.grid", cells))
                 model = replace(model, surface=surface, highest=surface.highest)
@@ -106,7 +101,7 @@ class _Search(MeshSearch):
             errors = self._measured(setup, model, body)
             others = sum(errors.values()) - errors["grid"]
             allowed = max(_SPARE * self.accuracy - others, 0.5 * others)
-            last = trial == TRIALS - 1 or max(cells) >= MOST_HEIGHTS
+            last = trial == _TRIALS - 1 or max(cells) >= MOST_HEIGHTS
             if not may_refine or last or errors["grid"] <= allowed:
                 break
             cells = _scaled(cells, refinement(errors["grid"] / allowed, _ORDER))
@@ -140,7 +135,9 @@ class _Search(MeshSearch):
         if not self._may_be_meshed or (keeps and _seconds(setup) < _NOTHING_TO_SAVE):
             return self.decided(setup, errors, others)
         try:
-            meshed = self.with_first_meshes(self.build(_meshed(setup.scene)))
+            reference = type(setup.scene.coupling)(kind="reference")
+            scene = setup.scene.model_copy(update={"coupling": reference})
+            meshed = self.with_first_meshes(self.build(scene))
             if keeps and _seconds(meshed) > _CHEAPER * _seconds(setup):
                 return self.decided(setup, errors, [*others, _alternative(meshed)])
             meshed, mesh_errors = self.with_refined_meshes(meshed)
@@ -154,9 +151,9 @@ class _Search(MeshSearch):
     def _coupled(self, setup: ProblemSetup) -> Iterator[ProblemSetup]:
         """Yield the problem with every coupling that may be chosen."""
         chosen = "coupling.kind" in auto_keys(self.given)
+        tolerance = {"table_tolerance": 0.1 * self.accuracy}
         for section in couplings(self.given) if chosen else iter([setup.scene.coupling]):
             if section.kind == "consistent" and section.table_tolerance is None:
-                tolerance = {"table_tolerance": 0.1 * self.accuracy}
                 section = section.model_copy(update=tolerance)
             yield replace(setup, scene=setup.scene.model_copy(update={"coupling": section}))
 
@@ -191,11 +188,6 @@ def _scaled(cells: tuple[int, int], factor: float) -> tuple[int, int]:
         for count in cells
     )
     return x, y
-
-
-def _meshed(scene: Scene) -> Scene:
-    """Return a scene as a reference."""
-    return scene.model_copy(update={"coupling": type(scene.coupling)(kind="reference")})
 
 
 def _seconds(setup: ProblemSetup) -> float:

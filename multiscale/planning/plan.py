@@ -98,10 +98,10 @@ def surface_statement(setup: ProblemSetup) -> str:
 
 def _contact(setup: ProblemSetup) -> str:
     if setup.uses_summits:
-        reached, rest = int(setup.interfering_summits.sum()), "; the others cost nothing"
-        return f"{len(setup.asperities)} summits, {reached} within the largest approach{rest}"
-    reached = int((setup.cell_interference > 0.0).sum())
-    return f"{setup.surface.heights.size} cells, {reached} within the largest approach"
+        within = f"{int(setup.interfering_summits.sum())} within the largest approach"
+        return f"{len(setup.asperities)} summits, {within}; the others cost nothing"
+    within = f"{int((setup.cell_interference > 0.0).sum())} within the largest approach"
+    return f"{setup.surface.heights.size} cells, {within}"
 
 
 def _model(setup: ProblemSetup) -> str:
@@ -110,17 +110,12 @@ def _model(setup: ProblemSetup) -> str:
     if setup.choice is not None:
         return f"auto: {setup.choice.sentence}"
     micro = setup.scene.micro
-    solver = f", solved by {micro.solver}" if micro.model in _INTERACTING else ""
-    of_summits = micro.model in MODELS
-    used = {"solver": solver, "curvature": of_summits, "border": of_summits}
-    fields = type(micro).model_fields
-    unused = [
-        f"micro.{key}"
-        for key in used
-        if not used[key] and getattr(micro, key) != fields[key].default
-    ]
-    no_use = f"; it has no use for {', '.join(unused)}" if unused else ""
-    return setup.model.name + solver + no_use
+    text, default = setup.model.name, type(micro)()
+    text += f", solved by {micro.solver}" if micro.model in _INTERACTING else ""
+    useless: tuple[str, ...] = () if micro.model in _INTERACTING else ("solver",)
+    useless += () if micro.model in MODELS else ("curvature", "border")
+    stated = [key for key in useless if getattr(micro, key) != getattr(default, key)]
+    return text + (f"; it has no use for micro.{', micro.'.join(stated)}" if stated else "")
 
 
 def _coupling(setup: ProblemSetup) -> str:
