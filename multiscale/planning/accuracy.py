@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 from geometry.errors import InputError, NotConverged
@@ -130,23 +131,21 @@ class _Search(MeshSearch):
         A reference is tried where the errors exceed the accuracy, or to save time.
         """
         by_cost = sorted(self._coupled(setup), key=_seconds)
-        setup, others = by_cost[0], [_alternative(other) for other in by_cost[1:]]
+        taken, others, missed = by_cost[0], by_cost[1:], None
         keeps = sum(errors.values()) <= self.accuracy
-        if not self._may_be_meshed or (keeps and _seconds(setup) < _NOTHING_TO_SAVE):
-            return self.decided(setup, errors, others)
-        try:
-            reference = type(setup.scene.coupling)(kind="reference")
-            scene = setup.scene.model_copy(update={"coupling": reference})
+        if not self._may_be_meshed or (keeps and _seconds(taken) < _NOTHING_TO_SAVE):
+            return self.decided(taken, errors, others)
+        with suppress(InputError, NotConverged):  # the block or the memory may not allow meshes
+            reference = type(taken.scene.coupling)(kind="reference")
+            scene = taken.scene.model_copy(update={"coupling": reference})
             meshed = self.with_first_meshes(self.build(scene))
-            if keeps and _seconds(meshed) > _CHEAPER * _seconds(setup):
-                return self.decided(setup, errors, [*others, _alternative(meshed)])
+            if keeps and _seconds(meshed) > _CHEAPER * _seconds(taken):
+                return self.decided(taken, errors, [*others, meshed])
             meshed, mesh_errors = self.with_refined_meshes(meshed)
-        except (InputError, NotConverged):  # the block or the memory does not allow meshes
-            return self.decided(setup, errors, others)
-        if not keeps and sum(mesh_errors.values()) > sum(errors.values()):
-            return self.decided(setup, errors, others)
-        others = [_alternative(setup), *others]
-        return self.decided(meshed, mesh_errors, others, missed={} if keeps else errors)
+            if keeps or sum(mesh_errors.values()) <= sum(errors.values()):
+                missed = None if keeps else errors
+                taken, others, errors = meshed, by_cost, mesh_errors
+        return self.decided(taken, errors, others, missed)
 
     def _coupled(self, setup: ProblemSetup) -> Iterator[ProblemSetup]:
         """Yield the problem with every coupling that may be chosen."""
@@ -167,7 +166,7 @@ class _Search(MeshSearch):
         self,
         setup: ProblemSetup,
         errors: Errors,
-        others: Sequence[Alternative] = (),
+        others: Sequence[ProblemSetup] = (),
         missed: Errors | None = None,
     ) -> ProblemSetup:
         """Return the problem with what was decided for it."""
@@ -175,7 +174,7 @@ class _Search(MeshSearch):
             accuracy=self.accuracy,
             taken=_alternative(setup),
             errors=errors,
-            others=tuple(others),
+            others=tuple(map(_alternative, others)),
             missed=missed or {},
         )
         return replace(setup, decision=decision)

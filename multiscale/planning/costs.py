@@ -27,10 +27,9 @@ from multiscale.setup.checks import memory_requests
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import ReferenceMeshes, mesh_unknowns, reference_requests
 
-_TRANSFORM, _PRODUCT = 0.51e-3, 2.8e-3
-"""Times of the two benchmarks of `Machine` where all other times were measured [s]."""
-_REPETITIONS = 30
-"""Repetitions of a benchmark. The shortest counts, so that other programs hardly matter."""
+_TRANSFORM, _PRODUCT, _REPETITIONS = 0.51e-3, 2.8e-3, 30
+"""Times of the two benchmarks of `Machine` where all other times were measured [s], and how often
+they are repeated. The shortest time counts, so that other programs hardly matter."""
 
 # contact problems
 ROWS = {"cells": 56, "summits": 70}
@@ -50,7 +49,7 @@ _PATCH_SUMS = 4e-6
 
 # times on one core [s]
 _SURFACE, _SURFACE_HEIGHT = 6.5e-3, 0.22e-6
-_MICRO_CHOICE, _MICRO_CHOICE_HEIGHT = 0.05, 6e-6
+_CHOICE, _CHOICE_HEIGHT = 0.05, 6e-6
 """Time of choosing a micro model, and of it per height of the surface."""
 _IMPORT, _BODY = 0.7, 0.065
 """Times of importing dolfinx, PETSc and gmsh, and of the body correction of a cube. Thin blocks
@@ -70,17 +69,15 @@ _ENTRIES = {"Q1": 81.0, "P1": 45.0, "Q2": 190.0, "P2": 85.0}
 _SET_UP, _CYCLE, _CYCLE_OVERHEAD = 250.0, 6.6, 0.13e-3
 """Products with the stiffness that mesh, stiffness and multigrid take as long as; those of a
 multigrid cycle; and the time of a cycle besides [s]."""
-_REFERENCE_CYCLES = {"Q1": 15, "Q2": 60, "P1": 40, "P2": 60}
+_REFERENCE_CYCLES = {"Q1": 15.0, "Q2": 60.0, "P1": 40.0, "P2": 60.0}
 """Multigrid cycles of a load step of a reference. 15 to 22, 31 to 44 and 51 to 76 were counted with
 Q1, P1 and P2. Q2 is taken to be like P2."""
 _FREE_TILT = 1.4
 """Factor of these cycles where the plane is free to tilt: up to 90 were counted with P2."""
 
 # memory [B]
-_BYTES_PER_CELL = 700.0
-"""Memory of the half-space per cell."""
-_FINITE_ELEMENTS, _PICTURES = 95e6, 60e6
-"""Memory of the libraries for finite elements, and of matplotlib."""
+_BYTES_PER_CELL, _FINITE_ELEMENTS, _PICTURES = 700.0, 95e6, 60e6
+"""Memory of the half-space per cell, of the libraries for finite elements, and of matplotlib."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,13 +136,11 @@ def predicted_cost(setup: ProblemSetup, machine: Machine = THIS_MACHINE) -> Cost
     seconds = {"surface": machine.arrays * (_SURFACE + _SURFACE_HEIGHT * heights)}
     on_mesh = setup.uses_laws and not newton_choice(setup).condensed
     if setup.choice is not None:
-        choice = _MICRO_CHOICE + _MICRO_CHOICE_HEIGHT * heights
-        seconds["micro choice"] = machine.arrays * choice
+        seconds["micro choice"] = machine.arrays * (_CHOICE + _CHOICE_HEIGHT * heights)
     if setup.uses_laws:
         seconds["laws"] = machine.arrays * _law_seconds(setup)
     if setup.meshes is not None:
-        free_tilt = scene.loading.tilt == "free"
-        seconds |= reference_seconds(setup.meshes, steps, machine, free_tilt=free_tilt)
+        seconds |= _reference_seconds(setup, setup.meshes, steps, machine)
     else:
         seconds |= _contact_seconds(setup, steps, machine, on_mesh=on_mesh)
     if isinstance(setup.micro, HalfSpaceModel) and output.check != "none":
@@ -159,20 +154,15 @@ def predicted_cost(setup: ProblemSetup, machine: Machine = THIS_MACHINE) -> Cost
     return Cost(seconds=seconds, memory=_memory(setup))
 
 
-def reference_seconds(
-    meshes: ReferenceMeshes, steps: int, machine: Machine, *, free_tilt: bool = False
+def _reference_seconds(
+    setup: ProblemSetup, meshes: ReferenceMeshes, steps: int, machine: Machine
 ) -> dict[str, float]:
-    """Return the time of meshing a rough block and of its load steps by active sets, by phase [s].
-
-    Args:
-        meshes: The meshes.
-        steps: Load steps.
-        machine: How fast the machine is.
-        free_tilt: Whether the plane is free to tilt.
-    """
+    """Return the time of meshing a rough block and of its load steps by active sets, by phase."""
     element = ("Q" if meshes.hexahedral else "P") + str(meshes.degree)
     product = machine.sparse * _ENTRY * _ENTRIES[element] * sum(meshes.unknowns)
-    cycles = steps * _REFERENCE_CYCLES[element] * (_FREE_TILT if free_tilt else 1.0)
+    cycles = steps * _REFERENCE_CYCLES[element]
+    if setup.scene.loading.tilt == "free":
+        cycles *= _FREE_TILT
     made = machine.arrays * (_REFERENCE_MESH + _unless_imported("dolfinx", _IMPORT))
     return {
         "block": made + _SET_UP * product,
@@ -213,10 +203,8 @@ def step_count(load_history: LoadHistory) -> int:
     Args:
         load_history: The loads, whose steps may be halved by a largest change of the force.
     """
-    if load_history.force_change is None:
-        return load_history.count
-    halved = math.ceil(len(load_history.points) / load_history.force_change)
-    return max(load_history.count, halved)
+    change = load_history.force_change or math.inf
+    return max(load_history.count, math.ceil(len(load_history.points) / change))
 
 
 def _law_seconds(setup: ProblemSetup) -> float:

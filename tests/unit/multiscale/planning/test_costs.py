@@ -15,7 +15,6 @@ from multiscale.planning.costs import (
     ROWS,
     Machine,
     predicted_cost,
-    reference_seconds,
     step_count,
 )
 from multiscale.setup.reference_meshes import mesh_unknowns
@@ -102,15 +101,10 @@ def test_work_grows_with_what_is_asked():
     assert total(output={"figures": True}) > total()
     assert total(kind="analytic") < total()
     meshes = [{"mesh": "hexahedra", "cells": [n, n, n // 2]} for n in (16, 32)]
-    coarse, fine = (make_setup(scene("reference", reference=mesh)).meshes for mesh in meshes)
     costs = [total(kind="reference", reference=mesh) for mesh in meshes]
     assert costs[0] < costs[1]
-    seconds = reference_seconds(fine, 8, Reference())
-    assert seconds["block"] > reference_seconds(coarse, 8, Reference())["block"]
-    half = reference_seconds(fine, 4, Reference())
-    assert seconds["load steps"] == pytest.approx(2.0 * half["load steps"], rel=1e-12)
-    tilting = reference_seconds(fine, 8, Reference(), free_tilt=True)
-    assert tilting["load steps"] > seconds["load steps"]
+    tilting = {"approach": 0.008, "tilt": "free", "steps": 4}
+    assert total(kind="reference", reference=meshes[0], load=tilting) > costs[0]
 
 
 def test_steps_that_may_be_halved_are_counted():
