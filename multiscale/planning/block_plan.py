@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 
 from geometry.meshes.block import BlockShape, alignment
 from multiscale.machine import ClusterNodes
-from multiscale.planning.costs import memory_needs
+from multiscale.planning.costs import run_memory_requests
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import ReferenceMeshes
 
@@ -88,7 +88,7 @@ def memory_warnings(setup: ProblemSetup, nodes: ClusterNodes) -> Iterator[str]:
         setup: The problem.
         nodes: The nodes there are.
     """
-    for request in memory_needs(setup):
+    for request in run_memory_requests(setup):
         if not nodes.fits(request):
             key = "" if request.value is None else f"{request.key} = {request.value}: "
             yield f"{key}{request.sentence}; there is {nodes.remedy(request)}"

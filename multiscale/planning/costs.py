@@ -248,7 +248,7 @@ def _unless_imported(module: str, cost: float) -> float:
     return 0.0 if module in sys.modules else cost
 
 
-def memory_needs(setup: ProblemSetup) -> list[MemoryRequest]:
+def run_memory_requests(setup: ProblemSetup) -> list[MemoryRequest]:
     """Return what a run needs memory for, key by key of its scene.
 
     Args:
@@ -265,5 +265,5 @@ def _memory(setup: ProblemSetup) -> float:
         half_space = _BYTES_PER_CELL * setup.micro.surface.heights.size
     libraries = setup.has_block * _unless_imported("dolfinx", _FINITE_ELEMENTS)
     pictures = setup.scene.output.figures * _unless_imported("matplotlib", _PICTURES)
-    needs = sum(need.total for need in memory_needs(setup))
+    needs = sum(need.total for need in run_memory_requests(setup))
     return peak_memory() + needs + max(half_space, libraries) + pictures

@@ -110,12 +110,12 @@ def _model(setup: ProblemSetup) -> str:
     if setup.choice is not None:
         return f"auto: {setup.choice.sentence}"
     micro = setup.scene.micro
-    text, default = setup.model.name, type(micro)()
-    text += f", solved by {micro.solver}" if micro.model in _INTERACTING else ""
-    useless: tuple[str, ...] = () if micro.model in _INTERACTING else ("solver",)
-    useless += () if micro.model in MODELS else ("curvature", "border")
-    stated = [key for key in useless if getattr(micro, key) != getattr(default, key)]
-    return text + (f"; it has no use for micro.{', micro.'.join(stated)}" if stated else "")
+    interacts, of_summits = micro.model in _INTERACTING, micro.model in MODELS
+    uses = {"solver": interacts, "curvature": of_summits, "border": of_summits}
+    stated = {key for key in uses if getattr(micro, key) != getattr(type(micro)(), key)}
+    unused = ", ".join(f"micro.{key}" for key in uses if key in stated and not uses[key])
+    text = f"{setup.model.name}, solved by {micro.solver}" if interacts else setup.model.name
+    return f"{text}; it has no use for {unused}" if unused else text
 
 
 def _coupling(setup: ProblemSetup) -> str:
@@ -183,5 +183,5 @@ def _error(setup: ProblemSetup) -> str:
     if check == "none":
         return "not measured (output.check = 'none')"
     which = "every load step" if check == "all" else "the last load step"
-    body = ", body" if setup.has_block else "; a block is not thought of"
+    body = ", body" if setup.has_block else "; there is no block"
     return f"measured at {which}, by cause: grid, slopes{body}{' and laws' * setup.uses_laws}"
