@@ -195,10 +195,8 @@ class ClusterNodes:
         Args:
             request: The memory that is needed.
         """
-        process = request.shared / sum(self.ranks) + request.per_rank
-        node = max(self.ranks) * process + request.root_only
-        fits = node <= self.memory and process + request.root_only <= self.process
-        return fits or (self.extensible and self.nodes_needed(request) is not None)
+        nodes, filled = sum(self.ranks) / max(self.ranks), self._nodes_filled(request)
+        return filled <= nodes or (self.extensible and math.isfinite(filled))
 
     def nodes_needed(self, request: MemoryRequest) -> int | None:
         """Return the least number of nodes like the fullest that a request fits into.
@@ -209,12 +207,17 @@ class ClusterNodes:
         Returns:
             The number; None where the request fits into no number of such nodes.
         """
+        filled = self._nodes_filled(request)
+        return max(math.ceil(filled), 1) if math.isfinite(filled) else None
+
+    def _nodes_filled(self, request: MemoryRequest) -> float:
+        """Return how many nodes a request fills; infinity where what is not shared does not fit."""
         ranks = max(self.ranks)
         left = min(
             self.memory - ranks * request.per_rank - request.root_only,
             ranks * (self.process - request.per_rank - request.root_only),
         )
-        return max(math.ceil(request.shared / left), 1) if left > 0.0 else None
+        return request.shared / left if left > 0.0 else math.inf
 
     def remedy(self, request: MemoryRequest) -> str:
         """Say what memory there is, and which nodes or ranks would do.
