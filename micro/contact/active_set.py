@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import NotConverged
-from micro.compliance.cells import Cells
+from micro.compliance.half_space_grid import Cells
 from micro.contact.conjugate_gradients import ContactCells
 from micro.contact.problem import ContactPressures, ContactProblem
+from micro.contact.start import admissible_start
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -69,30 +70,28 @@ class ActiveSet:
         self._constrained: Indices = np.zeros(0, np.intp)  # cells at a bound that have no gap
         self._set: Flags = np.zeros(problem.interference.shape, bool)
         self._yielding: Flags | None = None
-        pressure, self.motion = problem.started(start)
+        pressure, self.motion = admissible_start(problem, start)
         self._accept(pressure)
 
     def _accept(self, pressure: Array) -> None:
         """Evaluate admissible pressures."""
         problem, self.pressure = self.problem, pressure
-        gap = problem.compliance.displacement(pressure)
+        gap = problem.grid.displacement(pressure)
         twice_elastic = float(np.vdot(pressure, gap))
         self._energy = twice_elastic - 2.0 * float(np.vdot(pressure, problem.interference))
         gap -= problem.interference
-        interference = problem.interference
-        if problem.motions is not None:
-            if pressure.any():
-                self.motion = problem.motions.closing(self._weights(pressure), gap)
-            nearer = problem.motions.displacement(self.motion)
-            gap -= nearer
-            interference = interference + nearer
+        if problem.motions.count and pressure.any():
+            self.motion = problem.motions.closing(self._weights(pressure), gap)
+        nearer = problem.motions.displacement(self.motion)
+        gap -= nearer
+        interference = problem.interference + nearer
         self.gap = gap  # in the memory of the displacement
         self.scale = float(interference.max())
         elastic = gap if problem.upper == np.inf else gap[pressure < problem.upper]
         worst = max(-float(elastic.min(initial=0.0)), float(gap[pressure > 0.0].max(initial=0.0)))
         self.residual = max(0.0, worst) / self.scale if self.scale > 0.0 else 0.0
         self.rounding = 0.0
-        if problem.turns and self.scale > 0.0:
+        if problem.motions.turns and self.scale > 0.0:
             self.rounding = _ROUNDING * float(np.abs(interference).max()) / self.scale
 
     def _weights(self, pressure: Array) -> Array:
@@ -112,12 +111,12 @@ class ActiveSet:
             tolerance: Largest residual wanted.
             cautious: Whether no step may raise the energy.
         """
-        few = self.problem.turns and np.count_nonzero(self.pressure) <= _FEW
+        few = self.problem.motions.turns and np.count_nonzero(self.pressure) <= _FEW
         if not self._one_by_one and not few:
             old = self.pressure
             if self._step_together(tolerance, cautious=cautious or self.problem.unloaded):
                 return
-            if not self.problem.turns:
+            if not self.problem.motions.turns:
                 return
             self._one_by_one = True
             self._accept(old)
@@ -166,7 +165,7 @@ class ActiveSet:
             first, part = _first_bounds(pressure, change, upper)
             if part > 0.0:
                 pressure = np.clip(pressure + part * change, 0.0, upper)
-                displaced = self.problem.compliance.apply_compliance(contact.cells, change)
+                displaced = self.problem.grid.apply_compliance(contact.cells, change)
                 gap = gap + part * displaced
             if part == 1.0:
                 break
@@ -204,9 +203,8 @@ class ActiveSet:
 
     def _among(self, flat: Indices) -> ContactCells:
         """Return the linear problem of some cells by their flat indices."""
-        cells, motions = Cells.of(flat, self.gap.shape), self.problem.motions
-        levers = np.empty((0, flat.size)) if motions is None else motions.levers_of(flat)
-        return ContactCells.among(self.problem.compliance, cells, levers)
+        cells, levers = Cells.of(flat, self.gap.shape), self.problem.motions.levers_of(flat)
+        return ContactCells.among(self.problem.grid, cells, levers)
 
 
 def _first_bounds(pressure: Array, change: Array, upper: float) -> tuple[Indices, float]:
@@ -248,16 +246,16 @@ def solve(
         Hintermüller, Ito & Kunisch 2002, doi 10.1137/S1052623401383558; Polonsky & Keer 1999,
         doi 10.1016/S0043-1648(99)00113-1.
     """
-    used = problem.compliance.products
+    used = problem.grid.products
     search = ActiveSet(problem, start)
     for steps in range(most_steps):
         if search.residual <= max(tolerance, search.rounding):
-            products = problem.compliance.products - used
+            products = problem.grid.products - used
             return ContactPressures(search.pressure, search.motion, search.residual, products)
         search.step(tolerance, cautious=steps >= _TRUSTING_STEPS)
     raise NotConverged(
         f"the contact pressure (residual {search.residual:.1e}, asked {tolerance:.1e})",
         reason="set of cells in contact not found",
-        iterations=problem.compliance.products - used,
+        iterations=problem.grid.products - used,
         remedy="raise the tolerance or take smaller steps of the approach",
     )

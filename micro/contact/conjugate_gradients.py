@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from micro.compliance.cells import Cells
 from micro.compliance.grid_compliance import GridCompliance
+from micro.compliance.half_space_grid import Cells
 
 Array = NDArray[np.float64]
 

@@ -20,22 +20,19 @@ Theory: demos/theory.md, section 3.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import NotConverged
-from micro.compliance.grid_compliance import GridCompliance
-from micro.contact.clear_plane import clearance
-from micro.contact.rigid_motions import Motions
+from micro.compliance.grid_compliance import Compliance, GridCompliance
+from micro.contact.rigid_motions import Box, Motions, coarsened
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-
-_LEAST_EVEN, _MOST_EVEN = 1e-3, 1e6
-"""Shares of uniform pressure that are added to a start which cannot meet the loads."""
 
 
 class ContactPressures(NamedTuple):
@@ -54,32 +51,60 @@ class ContactPressures(NamedTuple):
     iterations: int = 0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class ContactProblem:
-    """Contact on the cells of one grid.
+    """Contact of a rigid body with a rectangle of cells of a surface.
 
     Args:
         compliance: The elastic body.
+        spacing: Sides of a cell [mm].
         interference: Overlap d of the undeformed bodies at zero free motions, negative where they
             are apart, shape (nx, ny) [mm].
-        motions: Free rigid motions of the body with their loads; none when not given.
+        motions: Free rigid motions of the body, if there are any, with their loads.
         upper: Upper bound H of the pressures / E*.
+        corner: Corner of the first cell on the surface [mm].
+        coarse: Whether these are no cells of the surface but coarser ones, where free sides are
+            left out.
     """
 
-    compliance: GridCompliance
+    compliance: Compliance
+    spacing: tuple[float, float]
     interference: Array
-    motions: Motions | None = None
+    motions: Motions
     upper: float = np.inf
+    corner: tuple[float, float] = (0.0, 0.0)
+    coarse: bool = False
 
-    @property
-    def turns(self) -> bool:
-        """Whether slopes of the body are free."""
-        return self.motions is not None and self.motions.turns
+    @cached_property
+    def grid(self) -> GridCompliance:
+        """Compliance of these cells, without finite slopes."""
+        shape = self.interference.shape
+        return self.compliance.on_grid(shape, self.spacing, self.corner, coarse=self.coarse)
 
     @property
     def unloaded(self) -> bool:
         """Whether no free motion has a load: the approach is prescribed and the tilt is free."""
-        return self.motions is not None and not self.motions.loads.any()
+        return self.motions.turns and not self.motions.loads.any()
+
+    def on(self, box: Box) -> ContactProblem:
+        """Return the problem of a box of these cells, those of a surface, which carries all loads.
+
+        Args:
+            box: Rows and columns of the box.
+        """
+        x, y = (part.start * step for part, step in zip(box, self.spacing, strict=True))
+        interference = np.ascontiguousarray(self.interference[box])
+        return replace(self, interference=interference, motions=self.motions.on(box), corner=(x, y))
+
+    def coarsened(self, factors: Sequence[int]) -> ContactProblem:
+        """Return the problem on coarse cells of so many fine ones along x and y."""
+        return replace(
+            self,
+            interference=coarsened(self.interference, factors),
+            motions=self.motions.coarsened(factors),
+            spacing=(self.spacing[0] * factors[0], self.spacing[1] * factors[1]),
+            coarse=True,
+        )
 
     def admissible(self, pressure: Array, fixed: Flags | None = None) -> Array | None:
         """Return pressures near given ones that lie within the bounds and meet the loads.
@@ -91,54 +116,9 @@ class ContactProblem:
         Returns:
             The pressures, zero where they were; None where no such pressures meet the loads.
         """
-        if self.motions is None:
-            return pressure if self.upper == np.inf else np.minimum(pressure, self.upper)
+        if not self.motions.count:
+            return np.minimum(pressure, self.upper)
         found = None
         if fixed is not None:
             found = self.motions.scaled_to_loads(pressure, self.upper, fixed)
         return self.motions.scaled_to_loads(pressure, self.upper) if found is None else found
-
-    def started(self, pressure: Array) -> tuple[Array, Array]:
-        """Return admissible pressures near given ones, and the free motions if nothing touches.
-
-        Args:
-            pressure: Pressures / E* ≥ 0, shape (nx, ny).
-
-        Raises:
-            NotConverged: When no pressures within the bounds meet the loads.
-        """
-        if self.unloaded:
-            return self._started_unloaded(pressure)
-        share = 0.0
-        while share <= _MOST_EVEN:
-            even = share * (float(pressure.max()) or 1.0)
-            found = self.admissible(pressure + even if share else pressure)
-            if found is not None:
-                return found, np.zeros(0 if self.motions is None else len(self.motions.loads))
-            share = 10.0 * share or _LEAST_EVEN
-        raise NotConverged(
-            "the pressures to start from",
-            reason="no pressures within their bounds meet the loads on these cells",
-            iterations=0,
-            remedy="give a smaller force",
-        )
-
-    def _started_unloaded(self, pressure: Array) -> tuple[Array, Array]:
-        """Start a body that turns without load from pressures of negative energy.
-
-        The energy without pressure is zero. A body that cannot turn clear must not come to that
-        point, for no single contact can carry it from there. Steps that lower the energy never do.
-        """
-        assert self.motions is not None
-        still = np.zeros(len(self.motions.loads))
-        found = self.admissible(pressure)
-        if found is None or float(np.vdot(found, self.interference)) <= 0.0:
-            clear = clearance(self.interference, self.motions)
-            if clear.interference <= 0.0:
-                return np.zeros(pressure.shape), clear.motion
-            found = clear.support
-        twice_elastic = float(np.vdot(found, self.compliance.displacement(found)))
-        factor = float(np.vdot(found, self.interference)) / twice_elastic  # of the least energy
-        found = found * min(factor, self.upper / float(found.max()))
-        balanced = self.admissible(found)
-        return found if balanced is None else balanced, still

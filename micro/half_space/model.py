@@ -17,8 +17,6 @@ from geometry.errors import InputError
 from micro.compliance.body_modes import BodyModes
 from micro.compliance.free_sides import FreeSides
 from micro.compliance.grid_compliance import Compliance, SlopeTerm
-from micro.contact.solver import ContactSolver
-from micro.half_space.patch_sums import response_row
 from micro.half_space.plane_contact import LEVEL, PlaneContact
 from micro.half_space.state import HalfSpaceState
 from micro.model import checked_approaches, checked_patches, whole_patch
@@ -193,9 +191,8 @@ class HalfSpaceModel:
             InputError: When a periodic surface is pressed to full contact or by a tilted plane.
             NotConverged: When the contact conditions cannot be met to the tolerance.
         """
-        if start is None:
-            return self._contact.equilibrium(control, None, None)
-        return self._contact.equilibrium(control, start.pressure, start.plane)
+        known = (None, None) if start is None else (start.pressure, start.plane)
+        return self._contact.equilibrium(control, *known)
 
     def respond(
         self,
@@ -215,13 +212,14 @@ class HalfSpaceModel:
         rows: dict[int, dict[str, Any]] = {}
         before = last = None
         for index in np.argsort(given, kind="stable"):
-            plane = self._contact.plane(float(given[index]), tilt)
+            approach = float(given[index])
             start = None if last is None else last.pressure
             if last is not None and before is not None and last.approach > before.approach:
-                ahead = (plane.approach - last.approach) / (last.approach - before.approach)
+                ahead = (approach - last.approach) / (last.approach - before.approach)
                 start = np.maximum(last.pressure + ahead * (last.pressure - before.pressure), 0.0)
-            before, last = last, self._contact.at(plane, start)
-            rows[int(index)] = self._row(last, patches, means)
+            control = Control(approach=approach, tilt=tilt)
+            before, last = last, self._contact.equilibrium(control, start)
+            rows[int(index)] = last.row(patches, means)
         ordered = [rows[index] for index in range(len(given))]
         return Response.of(ordered, self.name, self.contact_modulus, patches)
 
@@ -236,12 +234,9 @@ class HalfSpaceModel:
         """Solve one load step; see `MicroModel.press`."""
         patches, means = checked_patches(self.surface, patches, mean_heights)
         state = self._contact.equilibrium(control, *(start or (None, None)))
-        rows = [self._row(state, patches, means)]
+        rows = [state.row(patches, means)]
         response = Response.of(rows, self.name, self.contact_modulus, patches)
         return Pressed(response, state.plane, (state.pressure, state.plane))
-
-    def _row(self, state: HalfSpaceState, patches: Partition, means: Array) -> dict[str, Any]:
-        return response_row(self.surface, state, patches, means, self.reference_height)
 
     @cached_property
     def _contact(self) -> PlaneContact:
@@ -252,14 +247,12 @@ class HalfSpaceModel:
             body=self.body,
             slopes=self.slopes,
         )
-        solver = ContactSolver(
-            compliance=compliance,
-            spacing=self.surface.spacing,
-            tolerance=self.tolerance,
-            upper=self.upper / self.contact_modulus,
-        )
         return PlaneContact(
-            surface=self.surface, reference_height=self.reference_height, solver=solver
+            surface=self.surface,
+            reference_height=self.reference_height,
+            compliance=compliance,
+            tolerance=self.tolerance,
+            upper=self.upper,
         )
 
 
