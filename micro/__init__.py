@@ -33,7 +33,7 @@ from micro.compliance.side_cells import SideStresses, side_stresses
 from micro.factory import MODEL_NAMES, START_KINDS, micro_model
 from micro.half_space.contact_spots import Contacts, find_contacts
 from micro.half_space.model import HalfSpaceModel, resampled
-from micro.half_space.state import HalfSpaceState
+from micro.half_space.plane_contact import HalfSpaceState
 from micro.islands.model import IslandModel
 from micro.islands.shapes import IslandState
 from micro.model import MicroModel

@@ -18,7 +18,7 @@ from scipy.sparse import csr_array
 
 from geometry import Partition
 from geometry.errors import InputError
-from micro.compliance.quarter_space import quarter_space
+from micro.compliance.quarter_space import side_compliance, side_stresses
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -82,9 +82,8 @@ class FreeSides:
         Returns:
             Shape (w, n, n); symmetric.
         """
-        space = quarter_space(self.poisson_ratio)
-        numbers = self._wave_numbers(axis, waves, self.decay_length)
-        return np.stack([space.compliance(distances, number) for number in numbers])
+        nu, numbers = self.poisson_ratio, self._wave_numbers(axis, waves, self.decay_length)
+        return np.stack([side_compliance(nu, distances, number) for number in numbers])
 
     def stresses(self, axis: int, distances: Array, waves: Indices) -> Array:
         """Return the stresses that one side adds at distances by line loads at distances.
@@ -100,15 +99,15 @@ class FreeSides:
         Returns:
             Normal to the side, along it, and in shear, shape (3, w, n, n), the loads last [1/mm].
         """
-        space = quarter_space(self.poisson_ratio)
+        nu = self.poisson_ratio
         numbers = self._wave_numbers(axis, waves, _STRESS_DECAY * self.decay_length)
-        found = np.stack([space.stresses(distances, number) for number in numbers], axis=1)
+        found = np.stack([side_stresses(nu, distances, number) for number in numbers], axis=1)
         apart = np.add.outer(distances, distances)
         cut_off, full = (
             number[:, None, None] * np.exp(-np.multiply.outer(number, apart))
             for number in (numbers, np.pi * waves / self.lengths[1 - axis])
         )
-        rest = (0.5 - self.poisson_ratio) * (cut_off - full)
+        rest = (0.5 - nu) * (cut_off - full)
         found[0] += rest
         found[2] -= rest
         return found

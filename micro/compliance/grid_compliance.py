@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from micro.compliance.body_modes import BodyModes, ModesOnCells
+from micro.compliance.finite_slopes import FiniteSlopes
 from micro.compliance.free_sides import FreeSides
 from micro.compliance.half_space_grid import Cells, HalfSpaceGrid
 from micro.compliance.side_cells import side_cells
@@ -39,14 +40,6 @@ class ComplianceTerm(Protocol):
 
     def among(self, rows: Indices, columns: Indices, /) -> Self:
         """Return the same for some of these rows and columns, by ascending indices."""
-        ...
-
-
-class SlopeTerm(Protocol):
-    """What finite slopes add: a small part of the compliance, on the whole surface."""
-
-    def displacement(self, pressure: Array, /) -> Array:
-        """Return the displacements by pressures on all cells, shape (nx, ny), [MPa] to [mm]."""
         ...
 
 
@@ -123,7 +116,7 @@ class Compliance:
     modulus: float = 1.0
     sides: FreeSides | None = None
     body: BodyModes | None = None
-    slopes: SlopeTerm | None = None
+    slopes: FiniteSlopes | None = None
     _last: tuple[Array, Array] | None = field(default=None, init=False)
 
     def __getstate__(self) -> dict[str, Any]:

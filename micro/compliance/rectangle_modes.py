@@ -194,16 +194,15 @@ def _by_two(sides: FreeSides, axis: int, count: int, *, stress: bool) -> Array:
     length, waves = sides.lengths[axis], np.arange(_WAVES * count)
     nodes = distance_nodes(_NEAREST * length / count**2, length)
     loads = _integrals(nodes, length, count)
-    if not stress:
-        lines = loads @ sides.compliance(axis, nodes, waves) @ loads.T
-        return _along(sides, axis, lines, far=1.0)[None]
-    lines = loads @ sides.stresses(axis, nodes, waves) @ loads.T
-    signs = 1.0, 1.0, -1.0
-    parts = [_along(sides, axis, part, far=far) for part, far in zip(lines, signs, strict=True)]
-    return np.stack(parts)
+    if stress:
+        kernels = sides.stresses(axis, nodes, waves)
+    else:
+        kernels = sides.compliance(axis, nodes, waves)[None]
+    lines = zip(loads @ kernels @ loads.T, (1.0, 1.0, -1.0), strict=False)
+    return np.stack([_along(sides, axis, part, far) for part, far in lines])
 
 
-def _along(sides: FreeSides, axis: int, lines: Array, *, far: float) -> Array:
+def _along(sides: FreeSides, axis: int, lines: Array, far: float) -> Array:
     """Sum waves along two opposite sides.
 
     Args:

@@ -33,6 +33,7 @@ from micro.contact.rigid_motions import Box, Motions, coarsened
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Indices = NDArray[np.intp]
 
 
 class ContactPressures(NamedTuple):
@@ -61,6 +62,7 @@ class ContactProblem:
         interference: Overlap d of the undeformed bodies at zero free motions, negative where they
             are apart, shape (nx, ny) [mm].
         motions: Free rigid motions of the body, if there are any, with their loads.
+        tolerance: Largest residual of a solution.
         upper: Upper bound H of the pressures / E*.
         corner: Corner of the first cell on the surface [mm].
         coarse: Whether these are no cells of the surface but coarser ones, where free sides are
@@ -71,6 +73,7 @@ class ContactProblem:
     spacing: tuple[float, float]
     interference: Array
     motions: Motions
+    tolerance: float
     upper: float = np.inf
     corner: tuple[float, float] = (0.0, 0.0)
     coarse: bool = False
@@ -96,13 +99,19 @@ class ContactProblem:
         interference = np.ascontiguousarray(self.interference[box])
         return replace(self, interference=interference, motions=self.motions.on(box), corner=(x, y))
 
-    def coarsened(self, factors: Sequence[int]) -> ContactProblem:
-        """Return the problem on coarse cells of so many fine ones along x and y."""
+    def coarsened(self, factors: Sequence[int], tolerance: float) -> ContactProblem:
+        """Return the problem on coarse cells, with a tolerance of its own.
+
+        Args:
+            factors: Fine cells along x and y in a coarse one.
+            tolerance: Largest residual of a solution.
+        """
         return replace(
             self,
             interference=coarsened(self.interference, factors),
             motions=self.motions.coarsened(factors),
             spacing=(self.spacing[0] * factors[0], self.spacing[1] * factors[1]),
+            tolerance=tolerance,
             coarse=True,
         )
 
@@ -122,3 +131,22 @@ class ContactProblem:
         if fixed is not None:
             found = self.motions.scaled_to_loads(pressure, self.upper, fixed)
         return self.motions.scaled_to_loads(pressure, self.upper) if found is None else found
+
+    def first_at_bounds(self, pressure: Array, change: Array) -> tuple[Indices, float]:
+        """Return which cells a change drives out of the bounds first, and the part it may do.
+
+        Of cells that are at their bound already, it is the half that is driven most.
+
+        Args:
+            pressure: Pressures / E* of some cells, within the bounds, shape (n,).
+            change: Their change, shape (n,).
+        """
+        distance = np.where(change < 0.0, pressure, self.upper - pressure)
+        size = np.abs(change)
+        stuck = np.flatnonzero((distance <= 0.0) & (size > 0.0))
+        if stuck.size:
+            most = np.argsort(-size[stuck], kind="stable")[: (stuck.size + 1) // 2]
+            return stuck[most], 0.0
+        parts = np.divide(distance, size, out=np.full_like(change, np.inf), where=size > 0.0)
+        first = int(np.argmin(parts))
+        return np.array([first]), min(1.0, float(parts[first]))

@@ -72,13 +72,12 @@ class AndersonMixing:
 
 
 def solve_contact(
-    problem: ContactProblem, tolerance: float, start: ContactPressures | None = None
+    problem: ContactProblem, start: ContactPressures | None = None
 ) -> ContactPressures:
     """Solve a contact on all cells of a surface, with the displacements by its finite slopes.
 
     Args:
         problem: The contact problem; with the finite slopes of its compliance, if there are any.
-        tolerance: Largest residual, as that of `micro.contact.active_set.solve`.
         start: A solution nearby, its motion that of the solution where the approach is free.
 
     Raises:
@@ -86,16 +85,17 @@ def solve_contact(
             finite slopes do not agree with the pressures.
     """
     compliance, interference = problem.compliance, problem.interference
+    tolerance = problem.tolerance
     if compliance.slopes is None:
-        return solve_on_surface(problem, start, tolerance)
+        return solve_on_surface(problem, start)
     mixing, displaced = AndersonMixing(), np.zeros(interference.shape)
     if start is not None and start.pressure.any():
         displaced = compliance.slope_displacement(start.pressure)
     accuracy, iterations, left = max(tolerance, _FIRST), 0, np.inf
     last = max(_CONVERGED, 10.0 * tolerance)
     for _ in range(_MOST_SOLUTIONS):
-        lowered = replace(problem, interference=interference - displaced)
-        found = start = solve_on_surface(lowered, start, accuracy)
+        lowered = replace(problem, interference=interference - displaced, tolerance=accuracy)
+        found = start = solve_on_surface(lowered, start)
         iterations += found.iterations
         touching = found.pressure > 0.0
         if not touching.any():

@@ -38,15 +38,12 @@ _ESTIMATE = 1e-2
 """Residual of the solution on a coarse grid that the approach is estimated from."""
 
 
-def solve_on_surface(
-    problem: ContactProblem, start: ContactPressures | None, tolerance: float
-) -> ContactPressures:
+def solve_on_surface(problem: ContactProblem, start: ContactPressures | None) -> ContactPressures:
     """Solve one contact without finite slopes.
 
     Args:
         problem: The contact problem of all cells of a surface.
         start: A solution nearby, its motion that of the solution where the approach is free.
-        tolerance: Largest residual, as that of `micro.contact.active_set.solve`.
 
     Raises:
         NotConverged: When the contact conditions or the loads cannot be met.
@@ -54,17 +51,15 @@ def solve_on_surface(
     interference, motions = problem.interference, problem.motions
     pressure = None if start is None else start.pressure
     if motions.turns:
-        return _solve_on(problem, _whole(interference), pressure, tolerance)
+        return _solve_on(problem, _whole(interference), pressure)
     if motions.count:
-        return _solve_under_force(problem, start, tolerance)
+        return _solve_under_force(problem, start)
     if interference.max() <= 0.0:
         return ContactPressures(np.zeros(interference.shape))
-    return _solve_growing(problem, _box(problem, interference), pressure, tolerance)
+    return _solve_growing(problem, _box(problem, interference), pressure)
 
 
-def _solve_under_force(
-    problem: ContactProblem, start: ContactPressures | None, tolerance: float
-) -> ContactPressures:
+def _solve_under_force(problem: ContactProblem, start: ContactPressures | None) -> ContactPressures:
     """Solve with a free approach; the box follows from an estimate of it."""
     top = float(problem.interference.max())
     level = problem.interference - top  # the approach counts from first touch of a cell
@@ -76,10 +71,10 @@ def _solve_under_force(
         # summits of a coarse grid are lower: the estimate errs upwards
         bits = _FEW_CELLS.bit_length() - 1
         factors = [1 << max(0, (n - 1).bit_length() - bits) for n in level.shape]
-        most = _MARGIN * float(_solve_nested(problem.coarsened(factors), _ESTIMATE).motion[0])
+        most = _MARGIN * float(_solve_nested(problem.coarsened(factors, _ESTIMATE)).motion[0])
     while True:
         box = _box(problem, level + max(most, float(np.finfo(float).tiny)))
-        found = _solve_growing(problem, box, first, tolerance)
+        found = _solve_growing(problem, box, first)
         approach = float(found.motion[0])
         if approach <= most or box == _whole(level):
             return found._replace(motion=found.motion - top)
@@ -93,18 +88,16 @@ def _box(problem: ContactProblem, interference: Array) -> Box:
     return box_around(interference > 0.0)
 
 
-def _solve_growing(
-    problem: ContactProblem, box: Box, start: Array | None, tolerance: float
-) -> ContactPressures:
+def _solve_growing(problem: ContactProblem, box: Box, start: Array | None) -> ContactPressures:
     """Solve on a box, and on a larger one while cells outside are lifted into contact."""
-    found = _solve_on(problem, box, start, tolerance)
+    found = _solve_on(problem, box, start)
     while problem.compliance.body is not None and box != _whole(problem.interference):
         nearer = problem.interference + problem.motions.displacement(found.motion)
         lifted = _lifted(problem, box, nearer, found.pressure)
         if not lifted.any():
             break
         box = box_around((found.pressure > 0.0) | (nearer > 0.0) | lifted)
-        again = _solve_on(problem, box, found.pressure, tolerance)
+        again = _solve_on(problem, box, found.pressure)
         found = again._replace(iterations=found.iterations + again.iterations)
     return found
 
@@ -123,21 +116,19 @@ def _lifted(problem: ContactProblem, box: Box, interference: Array, pressure: Ar
     return np.asarray(outside & (problem.grid.displacement(pressure) < interference))
 
 
-def _solve_on(
-    problem: ContactProblem, box: Box, start: Array | None, tolerance: float
-) -> ContactPressures:
+def _solve_on(problem: ContactProblem, box: Box, start: Array | None) -> ContactPressures:
     """Solve on the cells of a box, from coarser grids where there is no start."""
     part = problem.on(box)
     first = nested_start(part) if start is None or not start[box].any() else start[box]
-    found = solve(part, first, tolerance)
+    found = solve(part, first)
     pressure = np.zeros(problem.interference.shape)
     pressure[box] = found.pressure
     return found._replace(pressure=pressure)
 
 
-def _solve_nested(problem: ContactProblem, tolerance: float) -> ContactPressures:
+def _solve_nested(problem: ContactProblem) -> ContactPressures:
     """Solve on the cells of a problem from nothing, by way of coarser grids."""
-    return solve(problem, nested_start(problem), tolerance)
+    return solve(problem, nested_start(problem))
 
 
 def nested_start(problem: ContactProblem) -> Array:
@@ -152,7 +143,7 @@ def nested_start(problem: ContactProblem) -> Array:
     factors = [1 + (n > _FEW_CELLS) for n in shape]
     if max(factors) > 1:
         try:
-            found = _solve_nested(problem.coarsened(factors), _ROUGH)
+            found = _solve_nested(problem.coarsened(factors, _ROUGH))
             return refined(found.pressure, factors)[: shape[0], : shape[1]]
         except NotConverged:  # a bad start only costs time
             pass

@@ -18,8 +18,8 @@ from micro.contact.rigid_motions import Motions
 
 Array = NDArray[np.float64]
 
-_LEAST_EVEN, _MOST_EVEN = 1e-3, 1e6
-"""Shares of uniform pressure that are added to a start which cannot meet the loads."""
+_EVEN_SHARES = 0.0, *np.logspace(-3.0, 6.0, 10)
+"""Shares of uniform pressure that are added, one after the other, until a start meets the loads."""
 _MOST_CONDITIONS = 500
 _MOST_MOTION = 100.0
 """Bound of the motions, relative to the largest interference; it counts while cells are few."""
@@ -38,13 +38,10 @@ def admissible_start(problem: ContactProblem, pressure: Array) -> tuple[Array, A
     """
     if problem.unloaded:
         return _unloaded_start(problem, pressure)
-    share = 0.0
-    while share <= _MOST_EVEN:
-        even = share * (float(pressure.max()) or 1.0)
-        found = problem.admissible(pressure + even if share else pressure)
+    for share in _EVEN_SHARES:
+        found = problem.admissible(pressure + share * (float(pressure.max()) or 1.0))
         if found is not None:
             return found, np.zeros(problem.motions.count)
-        share = 10.0 * share or _LEAST_EVEN
     raise NotConverged(
         "the pressures to start from",
         reason="no pressures within their bounds meet the loads on these cells",

@@ -3,5 +3,5 @@
 HalfSpaceModel           surface, E* and what the body adds    `model`
   └ PlaneContact         a plane, prescribed or free           `plane_contact`
       └ solve_contact    the contact problem on the cells      `micro.contact`
-HalfSpaceState           pressures, gaps, sums over patches    `state`, `contact_spots`
+HalfSpaceState           pressures, gaps, sums over patches    `plane_contact`, `contact_spots`
 """

@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 from geometry import Control, Partition, PatchGrid, Surface
 from geometry.errors import InputError
 from micro.compliance.body_modes import BodyModes
+from micro.compliance.finite_slopes import FiniteSlopes
 from micro.compliance.free_sides import FreeSides
-from micro.compliance.grid_compliance import Compliance, SlopeTerm
-from micro.half_space.plane_contact import LEVEL, PlaneContact
-from micro.half_space.state import HalfSpaceState
+from micro.compliance.grid_compliance import Compliance
+from micro.half_space.plane_contact import LEVEL, HalfSpaceState, PlaneContact
 from micro.model import checked_approaches, checked_patches, whole_patch
 from micro.response import Pressed, Response
 
@@ -67,7 +67,7 @@ class HalfSpaceModel:
     highest: float | None = None
     sides: FreeSides | None = None
     body: BodyModes | None = None
-    slopes: SlopeTerm | None = None
+    slopes: FiniteSlopes | None = None
     upper: float = np.inf
 
     def __post_init__(self) -> None:

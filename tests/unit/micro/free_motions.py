@@ -26,17 +26,20 @@ def still(grid):
     return Motions.of_plane(x, y, np.zeros(3, bool), np.zeros(3))
 
 
-def contact_problem(interference, spacing, motions=None, *, periodic=False, upper=np.inf):
+def contact_problem(
+    interference, spacing, motions=None, *, tolerance=1e-11, periodic=False, upper=np.inf
+):
     """Return a contact problem on the half-space, by default of a body that does not move."""
     return ContactProblem(
         compliance=Compliance(periodic=periodic),
         spacing=spacing,
         interference=interference,
         motions=still(interference.shape) if motions is None else motions,
+        tolerance=tolerance,
         upper=upper,
     )
 
 
-def solved(*given, tolerance=1e-11, **options):
+def solved(*given, **options):
     """Solve a `contact_problem`."""
-    return solve_contact(contact_problem(*given, **options), tolerance)
+    return solve_contact(contact_problem(*given, **options))

@@ -94,8 +94,8 @@ def test_cells_lifted_into_contact_are_found(control, lower):
     # the same on all cells at once, where no box can hide any
     interference = state.interference
     body = Compliance(periodic=False, modulus=E_STAR, body=seesaw(3e-3))
-    problem = replace(contact_problem(interference, SPACING), compliance=body)
-    every = solve(problem, np.zeros(GRID), 1e-10)
+    problem = replace(contact_problem(interference, SPACING, tolerance=1e-10), compliance=body)
+    every = solve(problem, np.zeros(GRID))
     assert state.pressure / E_STAR == pytest.approx(every.pressure, abs=1e-6 * every.pressure.max())
 
 

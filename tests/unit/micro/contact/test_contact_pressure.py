@@ -129,9 +129,9 @@ def test_coarse_start_saves_products_on_the_fine_grid():
     n = 128
     x = (np.arange(n) + 0.5) / n - 0.5
     interference = 0.02 - 0.5 * (x[:, None] ** 2 + x**2)
-    problem = contact_problem(interference, (1 / n, 1 / n))
-    cold = solve(problem, np.zeros((n, n)), 1e-8)
-    nested = solve(problem, nested_start(problem), 1e-8)
+    problem = contact_problem(interference, (1 / n, 1 / n), tolerance=1e-8)
+    cold = solve(problem, np.zeros((n, n)))
+    nested = solve(problem, nested_start(problem))
     assert nested.iterations < 0.8 * cold.iterations
     assert nested.pressure.sum() == pytest.approx(cold.pressure.sum(), rel=1e-7)  # 2 ε dlnF/dlnδ
 
@@ -148,6 +148,6 @@ def test_coarse_grids():
 
 def test_gives_up_with_a_reason():
     interference = np.random.default_rng(0).random((8, 8))
-    problem = contact_problem(interference, (1.0, 1.0))
+    problem = contact_problem(interference, (1.0, 1.0), tolerance=1e-9)
     with pytest.raises(NotConverged, match=r"contact pressure \(residual .*, asked 1.0e-09\)"):
-        solve(problem, np.zeros((8, 8)), 1e-9, most_steps=2)
+        solve(problem, np.zeros((8, 8)), most_steps=2)
