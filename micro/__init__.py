@@ -32,7 +32,7 @@ from micro.compliance.rectangle_modes import (
 from micro.compliance.side_cells import SideStresses, side_stresses
 from micro.factory import MODEL_NAMES, START_KINDS, micro_model
 from micro.half_space.contact_spots import Contacts, find_contacts
-from micro.half_space.model import HalfSpaceModel, resampled
+from micro.half_space.model import HalfSpaceModel
 from micro.half_space.plane_contact import HalfSpaceState
 from micro.islands.model import IslandModel
 from micro.islands.shapes import IslandState
@@ -76,7 +76,6 @@ __all__ = [
     "half_space_stress_modes",
     "influence_matrix",
     "micro_model",
-    "resampled",
     "side_modes",
     "side_stress_modes",
     "side_stresses",

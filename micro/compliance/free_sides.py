@@ -26,7 +26,6 @@ Indices = NDArray[np.intp]
 _STEP = 0.4
 """Distance of the nodes, in the logarithm of the distance from a side; cubics between them err by
 1e-3 of 1/(x + x')."""
-_GAUSS = np.polynomial.legendre.leggauss(4)
 _SHORTEST = 8.0
 """Waves on the narrowest patch along a side."""
 _NEAREST = 1.0 / 256.0
@@ -63,13 +62,11 @@ class FreeSides:
     def __post_init__(self) -> None:
         given = (*self.lengths, self.decay_length)
         if not (np.all(np.isfinite(given)) and min(given) > 0.0):
-            raise InputError(
-                "lengths and decay length must be positive", value=given, allowed="> 0 mm, finite"
-            )
-        if not -1.0 < self.poisson_ratio < 0.5:
-            raise InputError(
-                "Poisson's ratio is out of range", value=self.poisson_ratio, allowed="−1 < ν < ½"
-            )
+            problem = "lengths and decay length must be positive"
+            raise InputError(problem, value=given, allowed="> 0 mm, finite")
+        nu = self.poisson_ratio
+        if not -1.0 < nu < 0.5:
+            raise InputError("Poisson's ratio is out of range", value=nu, allowed="−1 < ν < ½")
 
     def compliance(self, axis: int, distances: Array, waves: Indices) -> Array:
         """Return what one side adds at distances by line loads at distances, for E* = 1.
@@ -197,9 +194,23 @@ def means_over(nodes: Array, borders: Array) -> csr_array:
     """
     inside = nodes[(nodes > borders[0]) & (nodes < borders[-1])]
     ends = np.union1d(borders, inside)  # the interpolation bends at the nodes
-    half = 0.5 * np.diff(ends)[:, None]
-    points = (0.5 * (ends[1:] + ends[:-1])[:, None] + half * _GAUSS[0]).ravel()
+    points, weights = gauss_points(ends, 4)
     owner = np.searchsorted(borders, points) - 1
-    weights = (half * _GAUSS[1]).ravel() / np.diff(borders)[owner]
-    sums = csr_array((weights, (owner, np.arange(points.size))))
+    sums = csr_array((weights / np.diff(borders)[owner], (owner, np.arange(points.size))))
     return csr_array(sums @ values_at(nodes, points))
+
+
+def gauss_points(ticks: Array, count: int) -> tuple[Array, Array]:
+    """Return points and weights of Gauss' rule on each interval between ticks.
+
+    Args:
+        ticks: Ends of the n intervals, ascending, shape (n + 1,).
+        count: Points on an interval.
+
+    Returns:
+        Two arrays of shape (n count,).
+    """
+    points, weights = np.polynomial.legendre.leggauss(count)
+    half = 0.5 * np.diff(ticks)[:, None]
+    middle = 0.5 * (ticks[1:] + ticks[:-1])[:, None]
+    return (middle + half * points).ravel(), (half * weights).ravel()

@@ -26,6 +26,10 @@ from micro.compliance.side_cells import side_cells
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
+Grid = tuple[int, ...]
+"""Numbers of cells (nx, ny)."""
+Pair = tuple[float, float]
+"""Lengths along x and y [mm]."""
 
 _MOST_GRIDS = 24
 """Half-spaces that are cached: three sizes of box with their coarse grids."""
@@ -125,12 +129,7 @@ class Compliance:
         return {name: value for name, value in vars(self).items() if name not in caches}
 
     def on_grid(
-        self,
-        grid: tuple[int, ...],
-        spacing: tuple[float, float],
-        corner: tuple[float, float] = (0.0, 0.0),
-        *,
-        coarse: bool = False,
+        self, grid: Grid, spacing: Pair, corner: Pair = (0.0, 0.0), *, coarse: bool = False
     ) -> GridCompliance:
         """Return the compliance of cells of the surface.
 
@@ -152,12 +151,7 @@ class Compliance:
             terms.append(self.body_on(grid, spacing, corner))
         return GridCompliance(self.half_space((grid[0], grid[1]), spacing), terms)
 
-    def body_on(
-        self,
-        grid: tuple[int, ...],
-        spacing: tuple[float, float],
-        corner: tuple[float, float] = (0.0, 0.0),
-    ) -> ModesOnCells:
+    def body_on(self, grid: Grid, spacing: Pair, corner: Pair = (0.0, 0.0)) -> ModesOnCells:
         """Return what the finite body, which must be given, adds on cells; see `on_grid`."""
         assert self.body is not None
         x, y = (
@@ -167,7 +161,7 @@ class Compliance:
         return self.body.on(x, y, modulus=self.modulus)
 
     @cached_property
-    def half_space(self) -> Callable[[tuple[int, int], tuple[float, float]], HalfSpaceGrid]:
+    def half_space(self) -> Callable[[tuple[int, int], Pair], HalfSpaceGrid]:
         """Function from numbers of cells and their sides to the half-space on them, cached."""
         return lru_cache(maxsize=_MOST_GRIDS)(partial(HalfSpaceGrid, periodic=self.periodic))
 

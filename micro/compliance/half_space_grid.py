@@ -119,7 +119,7 @@ class Convolution:
         spectrum: Real half spectrum of the kernel, shape (mx, my // 2 + 1).
         grid: Cells (nx, ny) of the fields.
         padded: Cells (mx, my) of the grid on which the convolution is circular.
-        work: Complex array of the spectrum's shape and precision; overwritten by every call.
+        work: Complex array, as large as the spectrum at least; overwritten by every call.
     """
 
     def __init__(
@@ -127,7 +127,8 @@ class Convolution:
     ) -> None:
         self.grid, self.padded = grid, padded
         self._factors = np.repeat(spectrum, 2, axis=1)  # of real and imaginary parts
-        self._work = work
+        parts = work.ravel().view(np.result_type(spectrum.dtype, np.complex64))
+        self._work = parts[: spectrum.size].reshape(spectrum.shape)
 
     def __call__(self, field: Field, rows: Indices | None = None) -> Field:
         """Convolve a field in place.
@@ -200,17 +201,12 @@ class HalfSpaceGrid:
             padded, period = _good(2 * n - 1 for n in grid), _good(grid)
             spectrum = padded_spectrum(padded, spacing)
             waves = periodic_spectrum(period, spacing)
-        rough = spectrum.astype(np.float32)
         # at the mean of a period, where the compliance vanishes, its largest value counts
         inverse = 1.0 / np.where(waves > 0.0, waves, waves.max() or 1.0)
         work = np.empty(spectrum.shape, complex)  # one for all: they take turns
-        single = work.ravel().view(np.complex64)
-        part = single[: inverse.size].reshape(inverse.shape)
         self.compliance = Convolution(spectrum, grid, padded, work)
-        self.rough_compliance = Convolution(
-            rough, grid, padded, single[: rough.size].reshape(rough.shape)
-        )
-        self.inverse = Convolution(inverse.astype(np.float32), grid, period, part)
+        self.rough_compliance = Convolution(spectrum.astype(np.float32), grid, padded, work)
+        self.inverse = Convolution(inverse.astype(np.float32), grid, period, work)
 
 
 def _good(counts: Iterable[int]) -> tuple[int, int]:

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.special import spherical_jn
 
 from geometry.legendre_modes import mode_slopes, mode_values
-from micro.compliance.free_sides import FreeSides, distance_nodes, values_at
+from micro.compliance.free_sides import FreeSides, distance_nodes, gauss_points, values_at
 
 Array = NDArray[np.float64]
 Part = Callable[[Array, float, int], Array]
@@ -97,10 +97,11 @@ def _integrated(
     """
     total = np.zeros(4 * (count,))
     for along, across, flip in ((0, 1, False), (1, 0, True)):
-        # s = L u, t = s v, ρ = s √(1 + v²), ds dt / ρ = ds dv / √(1 + v²) = ds dw
+        # s = L u, t = s v, ρ = s √(1 + v²), ds dt / ρ = ds dv / √(1 + v²) = ds dw;
+        # the integrand is of degree 4 K − 2 in s
         steep = np.arcsinh(lengths[across] / lengths[along])
-        s, weights = _gauss(lengths[along], 2 * count)  # of degree 4 K − 2 in s
-        w, others = _gauss(steep, count + _MORE)
+        s, weights = gauss_points(np.array([0.0, lengths[along]]), 2 * count)
+        w, others = gauss_points(np.array([0.0, steep]), count + _MORE)
         direction = 1.0 / np.cosh(w), np.tanh(w)
         others = others * weight(*(reversed(direction) if flip else direction))
         first = _part(parts[along](s, lengths[along], count), sign) * weights[:, None, None]
@@ -141,11 +142,6 @@ def _overlaps(
     first = mode_values(x.ravel(), length, count).reshape(shape).transpose(1, 0, 2)
     second = there((x + shifts[:, None]).ravel(), length, count).reshape(shape)
     return np.asarray((first * (half * weights)[:, None]) @ second.transpose(1, 2, 0))
-
-
-def _gauss(length: float, count: int) -> tuple[Array, Array]:
-    nodes, weights = legendre.leggauss(count)
-    return 0.5 * length * (1.0 + nodes), 0.5 * length * weights
 
 
 def side_modes(sides: FreeSides, count: int) -> Array:
@@ -243,8 +239,6 @@ def _waves(waves: NDArray[np.intp], count: int) -> Array:
 def _integrals(nodes: Array, length: float, count: int) -> Array:
     """Return the integrals of modes times the interpolation from nodes, shape (K, nodes) [mm]."""
     ticks = np.concatenate([[0.0], nodes[nodes < length], [length]])
-    points, weights = legendre.leggauss(count // 2 + 4)
-    half = 0.5 * np.diff(ticks)[:, None]
-    x = (0.5 * (ticks[1:] + ticks[:-1])[:, None] + half * points).ravel()
-    modes = mode_values(x, length, count) * (half * weights).ravel()
+    x, weights = gauss_points(ticks, count // 2 + 4)
+    modes = mode_values(x, length, count) * weights
     return np.asarray((values_at(nodes, x).T @ modes.T).T)

@@ -208,7 +208,7 @@ class ActiveSet:
     def _among(self, flat: Indices) -> ContactCells:
         """Return the linear problem of some cells by their flat indices."""
         cells, levers = Cells.of(flat, self.gap.shape), self.problem.motions.levers_of(flat)
-        return ContactCells.among(self.problem.grid, cells, levers)
+        return ContactCells(self.problem.grid, cells, levers)
 
 
 def solve(problem: ContactProblem, start: Array, *, most_steps: int = 200) -> ContactPressures:

@@ -71,14 +71,13 @@ class AndersonMixing:
         return moved
 
 
-def solve_contact(
-    problem: ContactProblem, start: ContactPressures | None = None
-) -> ContactPressures:
+def solve_contact(problem: ContactProblem, start: ContactPressures | None) -> ContactPressures:
     """Solve a contact on all cells of a surface, with the displacements by its finite slopes.
 
     Args:
         problem: The contact problem; with the finite slopes of its compliance, if there are any.
-        start: A solution nearby, its motion that of the solution where the approach is free.
+        start: A solution nearby, its motion that of the solution where the approach is free; None
+            starts from coarser grids.
 
     Raises:
         NotConverged: When the contact conditions or the loads cannot be met, or displacements by

@@ -77,20 +77,16 @@ class HalfSpaceModel:
                 problem = f"the {what.replace('_', ' ')} must be positive and finite"
                 raise InputError(problem, value=value, allowed="> 0")
         if not self.upper > 0.0:
-            raise InputError(
-                "the upper bound of the pressures must be positive", value=self.upper, allowed="> 0"
-            )
+            problem = "the upper bound of the pressures must be positive"
+            raise InputError(problem, value=self.upper, allowed="> 0")
         source, lengths, sides = self.surface.source, self.surface.lengths, self.sides
         if self.periodic and not self.surface.periodic:
             raise InputError("a periodic half-space needs a periodic surface", value=source)
         if self.periodic and sides is not None:
             raise InputError("a periodic half-space has no free sides", value=sides)
         if sides is not None and not np.allclose(sides.lengths, lengths, rtol=1e-9, atol=0.0):
-            raise InputError(
-                "the free sides are not those of the surface",
-                value=sides.lengths,
-                allowed=f"{lengths} mm",
-            )
+            problem = "the free sides are not those of the surface"
+            raise InputError(problem, value=sides.lengths, allowed=f"{lengths} mm")
 
     @property
     def name(self) -> str:
@@ -127,7 +123,14 @@ class HalfSpaceModel:
         Args:
             grid: Cells in x and y.
         """
-        surface = resampled(self.surface, grid)
+        surface = self.surface
+        if grid != surface.grid:
+            x, y = (
+                (np.arange(n) + 0.5) * (size / n)
+                for n, size in zip(grid, surface.lengths, strict=True)
+            )
+            heights = surface.height_at(*np.meshgrid(x, y, indexing="ij"))
+            surface = replace(surface, heights=heights)
         return replace(self, surface=surface, highest=self.reference_height, slopes=None)
 
     def solve(
@@ -240,35 +243,16 @@ class HalfSpaceModel:
 
     @cached_property
     def _contact(self) -> PlaneContact:
-        compliance = Compliance(
-            periodic=self.periodic,
-            modulus=self.contact_modulus,
-            sides=self.sides,
-            body=self.body,
-            slopes=self.slopes,
-        )
         return PlaneContact(
             surface=self.surface,
             reference_height=self.reference_height,
-            compliance=compliance,
+            compliance=Compliance(
+                periodic=self.periodic,
+                modulus=self.contact_modulus,
+                sides=self.sides,
+                body=self.body,
+                slopes=self.slopes,
+            ),
             tolerance=self.tolerance,
             upper=self.upper,
         )
-
-
-def resampled(surface: Surface, grid: tuple[int, int]) -> Surface:
-    """Return the interpolant of a surface at the centres of other cells.
-
-    Its own highest point differs a little: models that are to be compared count the approach from
-    that of the original, as `HalfSpaceModel.resampled` does.
-
-    Args:
-        surface: The surface.
-        grid: Cells in x and y.
-    """
-    if grid == surface.grid:
-        return surface
-    x, y = (
-        (np.arange(n) + 0.5) * (size / n) for n, size in zip(grid, surface.lengths, strict=True)
-    )
-    return replace(surface, heights=surface.height_at(*np.meshgrid(x, y, indexing="ij")))

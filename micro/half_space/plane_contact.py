@@ -65,11 +65,9 @@ class PlaneContact:
         interference = self.interference(RigidPlane.moved(surface, motion))
         if self.compliance.periodic:
             _check_periodic(control, float(interference.mean()))
-        unit = motion_units(0.5 * float(np.hypot(*surface.lengths)))
-        x, y = (
-            (at - 0.5 * length) * unit[-1]
-            for at, length in zip((surface.x, surface.y), surface.lengths, strict=True)
-        )
+        lx, ly = surface.lengths
+        unit = motion_units(0.5 * float(np.hypot(lx, ly)))
+        x, y = (surface.x - 0.5 * lx) * unit[1], (surface.y - 0.5 * ly) * unit[2]
         cell = surface.spacing[0] * surface.spacing[1]
         problem = ContactProblem(
             compliance=self.compliance,

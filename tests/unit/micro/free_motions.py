@@ -42,4 +42,4 @@ def contact_problem(
 
 def solved(*given, **options):
     """Solve a `contact_problem`."""
-    return solve_contact(contact_problem(*given, **options))
+    return solve_contact(contact_problem(*given, **options), None)

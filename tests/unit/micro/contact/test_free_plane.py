@@ -173,7 +173,7 @@ def test_what_motions_take_up_leaves_no_gap():
     grid = Compliance(periodic=False).on_grid((20, 20), (0.05, 0.05))
     flat = np.array([43, 310])
     levers = turning(np.linspace(-0.7, 0.7, 20), np.linspace(-0.6, 0.6, 20), None)
-    contact = ContactCells.among(grid, Cells.of(flat, (20, 20)), levers.levers_of(flat))
+    contact = ContactCells(grid, Cells.of(flat, (20, 20)), levers.levers_of(flat))
     assert contact.balanced(np.array([1.0, -0.3])) == pytest.approx(0.0, abs=1e-13)
 
 
