@@ -26,7 +26,7 @@ from typing import Any
 from geometry import Control
 from geometry.collective import on_root
 from micro import BodyModes, FiniteSlopes, HalfSpaceModel, HalfSpaceState
-from multiscale.couplings.blocks import SLOPES, OnBody
+from multiscale.couplings.contact import SLOPES, OnBody
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import LoadHistory
 from multiscale.setup.problem import ProblemSetup

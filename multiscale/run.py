@@ -14,17 +14,25 @@ from numpy.typing import NDArray
 from geometry.collective import on_root
 from geometry.errors import NotConverged
 from micro import HalfSpaceModel, MicroModel
-from multiscale.couplings import blocks
-from multiscale.couplings.assembly import assemble, make_table, meshed_blocks
-from multiscale.couplings.load_steps import EmbeddedCoupling
+from multiscale.couplings.assembly import (
+    approximation_notes,
+    assemble,
+    free_blocks,
+    load_finite_elements,
+    make_table,
+    meshed_blocks,
+)
+from multiscale.couplings.body import embedding
+from multiscale.couplings.contact import OnBody, contact_model, on_body
+from multiscale.couplings.law_couplings import EmbeddedCoupling
+from multiscale.couplings.reference import ReferenceCoupling
 from multiscale.laws.files import law_bytes, read_laws
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling, LoadPosition, LoadStepper, Restorable
 from multiscale.machine.mpi_job import large_object_comm
 from multiscale.machine.nodes import cluster_nodes
-from multiscale.measured_errors import checked, error_probe
-from multiscale.notes import noted_history
+from multiscale.measured_errors import checked, error_notes, error_probe
 from multiscale.resolution.auto_keys import resolved_keys
 from multiscale.resolution.problem_setup import make_setup
 from multiscale.results.history import History
@@ -67,24 +75,24 @@ class Run:
         self.coupling: Coupling | None = None
         self._start: Arrays = {}
         self._notes: list[str] = []
-        self._on_body: blocks.OnBody | None = None
-        blocks.load_finite_elements(scene, comm)
+        self._on_body: OnBody | None = None
+        load_finite_elements(scene, comm)
         nodes, large = cluster_nodes(comm), large_object_comm(comm)
         self.setup: ProblemSetup = on_root(large, lambda: make_setup(scene, resolved, nodes))
         self.scene, self.seconds = self.setup.scene, dict(self.setup.seconds)
 
-    def make_body(self) -> blocks.OnBody | None:
+    def make_body(self) -> OnBody | None:
         """Make what puts the half-space model on its body, once; None for other micro models."""
         if self._on_body is None and isinstance(self.setup.micro, HalfSpaceModel):
             with self.phase("block"):
-                self._on_body = blocks.on_body(self.setup, self.comm)
+                self._on_body = on_body(self.setup, self.comm)
         return self._on_body
 
     def make_model(self) -> MicroModel:
         """Make the micro model that contacts are solved with, on the body unless isolated."""
         body = None if self.scene.coupling.kind == "isolated" else self.make_body()
         with self.phase("block"):
-            return blocks.contact_model(self.setup, self.comm, body)
+            return contact_model(self.setup, self.comm, body)
 
     def make_laws(self) -> LawTable:
         """Tabulate the laws of all patches, once."""
@@ -178,14 +186,18 @@ class Run:
 
     def history(self) -> History:
         """Return the load steps accepted so far, with times and notes."""
-        return noted_history(
-            self.setup,
-            self.steps,
-            coupling=self.coupling,
-            table=self.table,
-            accuracy=self.given.accuracy,
-            seconds=self.seconds,
-            notes=self._notes,
+        steps, record = self.steps, None
+        notes = [*approximation_notes(self.setup, self.table, steps), *self._notes]
+        notes += error_notes(steps, self.given.accuracy)
+        if isinstance(self.coupling, ReferenceCoupling):
+            record = self.coupling.record(steps)
+            notes += self.coupling.notes(record, steps)
+        return History(
+            steps=tuple(record.with_errors(steps) if record else steps),
+            patches=self.setup.patches,
+            seconds=dict(self.seconds),
+            notes=tuple(notes),
+            reference=record,
         )
 
     @property
@@ -202,7 +214,10 @@ class Run:
         if isinstance(self.coupling, EmbeddedCoupling):
             return self.coupling.interface, self.coupling.displacement
         with self.phase("field"):
-            return blocks.field_under(self.setup, self.steps[-1].patches.pressure_MPa, self.comm)
+            interface = embedding(self.setup, self.comm)
+            load = interface.load(self.steps[-1].patches.pressure_MPa)
+            displacement = interface.block.solve(load).x.array[: interface.block.owned_dofs]
+            return interface, displacement.copy()
 
     def close(self) -> None:
         """Free the blocks. Accepted load steps stay, fields are gone.
@@ -211,7 +226,7 @@ class Run:
             Collective.
         """
         meshed, self.coupling = meshed_blocks(self.coupling), None
-        blocks.free_blocks(meshed)
+        free_blocks(meshed)
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:

@@ -13,7 +13,7 @@ from geometry import BlockShape, PatchGrid
 from geometry.rigid_plane import Control
 from macro import Block, Material, block_mesh
 from micro import influence_matrix
-from multiscale.couplings.dense_newton import DenseNewton
+from multiscale.couplings.condensed import DenseNewton
 from multiscale.laws.files import repaired_law
 from multiscale.laws.law_table import PatchLaws
 from multiscale.laws.patch_law import PatchLaw

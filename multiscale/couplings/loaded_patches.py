@@ -38,7 +38,7 @@ class DenseState:
         point: The laws at s.
         residual: Closures by plane and displacements less those of the laws, shape (N,) [mm].
         load: Force [N] and its first moments about the middle [N mm], shape (3,).
-        residuals: Relative residual before every Newton step and at the end, see `TOLERANCE`.
+        iterations: Newton steps that led to it.
     """
 
     local: Array
@@ -46,22 +46,7 @@ class DenseState:
     point: LawPoint
     residual: Array
     load: Array
-    residuals: tuple[float, ...] = ()
-
-    @property
-    def closure(self) -> Array:
-        """Closures, shape (N,) [mm]."""
-        return self.point.closure
-
-    @property
-    def pressure(self) -> Array:
-        """Pressures, shape (N,) [MPa]."""
-        return self.point.pressure
-
-    @property
-    def iterations(self) -> int:
-        """Newton steps."""
-        return len(self.residuals) - 1
+    iterations: int = 0
 
 
 class LoadedPatches:
@@ -154,8 +139,12 @@ class LoadedPatches:
             loads / max(force, of_force / TOLERANCE),
         )
 
-    def at_first_touch(self, plane: Array) -> Control:
-        """Return what stands for a force of zero: the plane where its first patch is touched."""
+    def first_touch(self, plane: Array) -> Control:
+        """Return what stands for a force of zero: the plane where its first patch is touched.
+
+        Args:
+            plane: A plane, whose slopes hold where the load prescribes none.
+        """
         plane = self.control.prescribed(plane)
         tilted = self.levers.matrix[:, 1:] @ plane[1:]
         approach = float(np.min(self.laws.first_touch - tilted))

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from geometry.errors import InputError
 from geometry.rigid_plane import Control
-from multiscale.couplings.blocks import block_material
 from multiscale.loading.load_step import LoadStep
 from multiscale.results.reference_record import ReferenceRecord, reference_record
 from multiscale.setup.problem import ProblemSetup
+from multiscale.setup.surface_and_block import block_material
 from multiscale.storage.serialisation import Arrays, packed, unpacked
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
@@ -184,7 +184,7 @@ def make_reference(setup: ProblemSetup, comm: Any) -> ReferenceCoupling:
         except InputError as error:
             raise error.located(key="surface", file=scene.file) from None
         problem = UnilateralContactProblem(
-            Block(mesh, block_material(setup), sides=scene.block.sides),
+            Block(mesh, block_material(scene), sides=scene.block.sides),
             surface.highest - surface.mean_height,
             method=scene.reference.method,
             patches=setup.patches if finest else None,

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator
 
 from geometry.meshes.block import BlockShape, alignment
 from multiscale.machine.nodes import ClusterNodes
-from multiscale.setup.checks import memory_requests
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import ReferenceMeshes, reference_requests
+from multiscale.setup.surface_and_block import memory_requests
 
 LOCKING_FROM = 0.45
 """Poisson's ratio above which linear elements lock. Two by two patches on 8 × 8 × 6 trilinear

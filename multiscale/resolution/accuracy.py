@@ -15,7 +15,7 @@ from dataclasses import replace
 from geometry.errors import InputError, NotConverged
 from micro import HalfSpaceModel
 from multiscale.costs.prediction import predicted_cost
-from multiscale.couplings.blocks import SLOPES, OnBody, on_body
+from multiscale.couplings.contact import SLOPES, OnBody, on_body
 from multiscale.measured_errors import error_probe
 from multiscale.resolution.auto_keys import (
     MOST_HEIGHTS,
@@ -34,9 +34,8 @@ from multiscale.resolution.mesh_accuracy import (
     refinement,
 )
 from multiscale.scene.scene import Scene
-from multiscale.setup.decision import Alternative, Decision
-from multiscale.setup.problem import ProblemSetup
-from multiscale.setup.surface import make_surface
+from multiscale.setup.problem import Alternative, Decision, ProblemSetup
+from multiscale.setup.surface_and_block import make_surface
 
 _SPARE = 0.8
 """Share of the accuracy that errors at the largest load may take; errors at other loads differ."""

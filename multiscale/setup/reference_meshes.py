@@ -20,7 +20,7 @@ from geometry.rigid_plane import RigidPlane
 from geometry.surface import Surface
 from multiscale.machine.nodes import ClusterNodes, MemoryRequest
 from multiscale.scene.scene import Scene
-from multiscale.setup.checks import check_memory
+from multiscale.setup.surface_and_block import check_memory
 
 Array = NDArray[np.float64]
 Shape: TypeAlias = BlockShape | RefinedShape

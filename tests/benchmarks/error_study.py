@@ -21,7 +21,8 @@ import numpy as np
 from geometry.rigid_plane import Control
 from geometry.spectrum import synthesise
 from multiscale import Run, Scene
-from multiscale.couplings.blocks import SLOPES, on_body, scene_body
+from multiscale.couplings.body import scene_body
+from multiscale.couplings.contact import SLOPES, on_body
 
 SCENES, MESHED = 40, 4
 MORE_MODES, FINER, MOST_CELLS = 4, 4, 512

@@ -52,7 +52,7 @@ FLOORS = {
         "setup",
         "couplings",
         "costs measured_errors",
-        "notes resolution",
+        "resolution",
         "planning run",
         "output restart",
         "comparison",

@@ -13,7 +13,7 @@ from geometry.errors import NotConverged
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from micro import influence_matrix
-from multiscale.couplings.dense_newton import DenseNewton
+from multiscale.couplings.condensed import DenseNewton
 from multiscale.laws.files import repaired_law
 from multiscale.laws.law_table import PatchLaws
 from multiscale.laws.patch_law import PatchLaw
@@ -190,7 +190,7 @@ def test_sixteen_patches_with_such_laws(name, by_force):
         if np.abs(found - before).max() <= 1e-11 * found.max():
             break
     # at the wall a rounding of closures, 1e-18 mm, is 1e-7 MPa
-    np.testing.assert_allclose(state.pressure, found, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(state.point.pressure, found, rtol=1e-6, atol=1e-6)
 
 
 LAPS = {
@@ -248,5 +248,5 @@ def test_a_plane_on_nothing_but_its_own_law_counts_from_rounding():
     )
     state = newton.solve(Control(approach=1e-6, tilt=(0.0, 0.0)))
     depth = brentq(lambda s: s + 1e-6 * 1e5 * s**1.5 - 1e-6, 0.0, 1e-6, xtol=1e-20, rtol=1e-14)
-    assert state.pressure[0] == pytest.approx(1e5 * depth**1.5, rel=1e-6)
-    assert state.pressure[1] == 0.0
+    assert state.point.pressure[0] == pytest.approx(1e5 * depth**1.5, rel=1e-6)
+    assert state.point.pressure[1] == 0.0

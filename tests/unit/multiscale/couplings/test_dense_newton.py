@@ -9,7 +9,7 @@ from scipy.optimize import brentq, root
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
-from multiscale.couplings.dense_newton import DenseNewton
+from multiscale.couplings.condensed import DenseNewton
 
 
 class HertzLaws:
@@ -78,8 +78,8 @@ def test_many_patches_agree_with_another_solver():
     other = root(gap, np.full(16, 6e-3), method="hybr", options={"xtol": 1e-12})
     assert other.success
     # MINPACK's own convergence
-    np.testing.assert_allclose(state.closure, other.x, rtol=1e-9)
-    assert np.any(state.pressure == 0.0)
+    np.testing.assert_allclose(state.point.closure, other.x, rtol=1e-9)
+    assert np.any(state.point.pressure == 0.0)
 
 
 CONTROLS = {
@@ -110,7 +110,7 @@ def test_every_load_is_met_from_nothing(given, tilt, own):
         assert np.abs(state.load[1:]).max() < 1e-11 * state.load[0]
     else:
         np.testing.assert_array_equal(state.plane[1:], tilt)
-    moments = LEVERS.T @ state.pressure * PATCHES.area
+    moments = LEVERS.T @ state.point.pressure * PATCHES.area
     np.testing.assert_allclose(state.load[1:], moments, atol=1e-12)  # rounding of sums of ~1
 
 
@@ -121,7 +121,7 @@ def test_force_and_approach_are_two_views_of_one_state(tilt):
     first = newton.solve(Control(approach=7e-3, tilt=tilt))
     again = newton.solve(Control(force=float(first.load[0]), tilt=tilt))
     np.testing.assert_allclose(again.plane, first.plane, atol=1e-13)  # residuals of 1e-14 mm
-    np.testing.assert_allclose(again.pressure, first.pressure, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(again.point.pressure, first.point.pressure, rtol=1e-9, atol=1e-12)
 
 
 def test_path_does_not_matter():
@@ -131,14 +131,16 @@ def test_path_does_not_matter():
     for approach in (*np.linspace(0.1e-3, 12e-3, 30), 0.5e-3, 8e-3):
         state = newton.solve(Control(approach=approach), state)
     fresh = newton.solve(Control(approach=8e-3))
-    np.testing.assert_allclose(state.pressure, fresh.pressure, rtol=1e-10, atol=1e-12)  # 1e-12
+    np.testing.assert_allclose(
+        state.point.pressure, fresh.point.pressure, rtol=1e-10, atol=1e-12
+    )  # 1e-12
 
 
 def test_free_plane_rests_on_three_patches_at_least():
     """At a small force the plane turns until its supports surround the middle."""
     laws, matrix = HertzLaws(touches()), compliance()
     state = DenseNewton(laws, matrix, PATCHES).solve(Control(force=1e-4, tilt=None))
-    assert np.sum(state.pressure > 0.0) >= 3
+    assert np.sum(state.point.pressure > 0.0) >= 3
     assert np.abs(state.load[1:]).max() < 1e-15
 
 
@@ -168,8 +170,8 @@ def test_no_force_is_first_touch():
 def test_plane_that_touches_nothing_carries_nothing():
     laws = HertzLaws(np.full(16, 5e-3))
     state = DenseNewton(laws, compliance(), PATCHES).solve(Control(approach=4e-3, tilt=None))
-    assert not state.pressure.any()
-    np.testing.assert_allclose(state.closure, 4e-3, rtol=1e-12)  # the iteration's residual
+    assert not state.point.pressure.any()
+    np.testing.assert_allclose(state.point.closure, 4e-3, rtol=1e-12)  # the iteration's residual
 
 
 def test_force_on_open_patches_is_refused():

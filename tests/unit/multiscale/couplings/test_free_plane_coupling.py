@@ -6,7 +6,7 @@ import pytest
 from geometry import InputError, NotConverged, PatchGrid, Spectrum, patch_means, synthesise
 from geometry.rigid_plane import Control
 from micro import influence_matrix, micro_model
-from multiscale.couplings.condensed import FreePlaneCoupling
+from multiscale.couplings.law_couplings import FreePlaneCoupling
 from multiscale.laws.consistent import consistent_laws
 from multiscale.laws.law_table import LawTable, PlanePath
 from multiscale.laws.patch_law import PatchLaw

@@ -1,16 +1,23 @@
-"""Refuses scenes that could never fit: too much memory, too many patches, too large loads."""
+"""Makes the surface and the block of a scene, and refuses what could never fit.
+
+Refused are too much memory, too many patches and too large loads, before anything is allocated.
+"""
 
 from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from geometry.errors import InputError
-from geometry.files import BYTES_PER_HEIGHT
+from geometry.files import BYTES_PER_HEIGHT, read_surface
+from geometry.materials import Material
+from geometry.meshes.block import BlockShape
+from geometry.spectrum import synthesise
 from geometry.surface import Surface
 from multiscale.machine.nodes import ClusterNodes, MemoryRequest
 from multiscale.scene.scene import Scene
@@ -34,6 +41,54 @@ _ROUNDING = 16.0 * sys.float_info.epsilon
 """Approach over the largest height below which it does not change where the plane is."""
 PROVISIONAL_PATCHES = (4, 4)
 """Patches that stand for ``"auto"`` until they are chosen."""
+_DETREND_ORDER = {"mean": 0, "plane": 1, "quadratic": 2}
+
+
+def make_surface(scene: Scene) -> Surface:
+    """Make or read the surface of a scene.
+
+    Raises:
+        InputError: When it cannot be made or read; names file and key.
+    """
+    section = scene.surface
+    extent: dict[str, Any] = {"grid": section.grid, "lengths": section.lengths}
+    if section.spectrum is not None:
+        spectrum = section.spectrum.spectrum()
+        surface = _located(scene, "surface.spectrum", lambda: synthesise(spectrum, **extent))
+    else:
+        path = scene.surface_path or Path()
+        extent["missing"] = section.missing
+        surface = _located(scene, "surface.file", lambda: read_surface(path, **extent))
+    if section.detrend == "none":
+        return surface
+    return surface.detrended(_DETREND_ORDER[section.detrend])
+
+
+def make_shape(scene: Scene, surface: Surface) -> BlockShape:
+    """Return the shape and cells of a scene's block under its surface.
+
+    Raises:
+        InputError: When they do not fit together or the coupling; names file and key.
+    """
+    block = scene.block
+    given: dict[str, Any] = {
+        "interface": surface.lengths,
+        "height": block.height_under(surface.lengths),
+        "cells": block_cells(scene),
+        "element": block.element,
+        "grading": block.grading,
+        "margin": block.margin,
+        "margin_cells": block.margin_cells if block.margin else 0,
+        "margin_grading": block.margin_grading if block.margin else 1.0,
+    }
+    shape: BlockShape = _located(scene, "block", lambda: BlockShape(**given))
+    return shape
+
+
+def block_material(scene: Scene) -> Material:
+    """Return the elastic constants of a scene's block."""
+    block = scene.block
+    return Material(young_modulus=block.young_modulus, poisson_ratio=block.poisson_ratio)
 
 
 def block_cells(scene: Scene) -> tuple[int, int, int]:
@@ -171,3 +226,11 @@ def check_load(scene: Scene, surface: Surface) -> None:
             allowed=f"at most {named}, {most:.6g} {unit}",
             file=scene.file,
         )
+
+
+def _located(scene: Scene, key: str, make: Callable[[], Any]) -> Any:
+    """Make something; an error gets the scene's file and the key."""
+    try:
+        return make()
+    except InputError as error:
+        raise error.located(key=key, file=scene.file) from None

@@ -9,7 +9,8 @@ from geometry.errors import InputError
 from micro import BodyModes, FiniteSlopes, FreeSides
 from multiscale import Scene, make_setup
 from multiscale.costs.prediction import solution_work
-from multiscale.couplings.blocks import contact_model, patch_displacements, scene_body
+from multiscale.couplings.body import patch_displacements, scene_body
+from multiscale.couplings.contact import contact_model
 
 
 def setup(
