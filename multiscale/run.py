@@ -26,8 +26,7 @@ from multiscale.couplings.body import embedding
 from multiscale.couplings.contact import OnBody, contact_model, on_body
 from multiscale.couplings.law_couplings import EmbeddedCoupling
 from multiscale.couplings.reference import ReferenceCoupling
-from multiscale.laws.files import law_bytes, read_laws
-from multiscale.laws.law_table import LawTable
+from multiscale.laws.law_table import LawTable, law_bytes, read_laws
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling, LoadPosition, LoadStepper, Restorable
 from multiscale.machine.mpi_job import large_object_comm

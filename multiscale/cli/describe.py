@@ -13,7 +13,7 @@ from geometry.statistics import roughness
 from multiscale.cli.inputs import scene_and_folder
 from multiscale.costs.prediction import Cost, predicted_cost
 from multiscale.couplings.assembly import load_finite_elements
-from multiscale.laws.files import write_laws
+from multiscale.laws.law_table import write_laws
 from multiscale.machine.mpi_job import large_object_comm
 from multiscale.machine.nodes import cluster_nodes
 from multiscale.output import terminal

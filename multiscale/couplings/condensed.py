@@ -18,7 +18,8 @@ from geometry.rigid_plane import Control
 from multiscale.couplings.law_couplings import ROUNDING, beyond_law
 from multiscale.couplings.loaded_patches import TOLERANCE, DenseState, LoadedPatches
 from multiscale.laws.interpolation import LawPoint
-from multiscale.laws.law_table import LawTable, PatchLaws
+from multiscale.laws.law_table import LawTable
+from multiscale.laws.patch_law import PatchLaws
 from multiscale.loading.load_step import LoadStep
 from multiscale.storage.serialisation import Arrays, packed, unpacked
 
@@ -68,7 +69,9 @@ class CondensedCoupling:
             load=state.load,
             closure=state.point.closure,
             pressure=state.point.pressure,
-            **self._laws.contact(state.local)._asdict(),
+            area_fraction=state.point.contact_area_fraction,
+            separation=state.point.separation,
+            contacts=state.point.contacts,
             newton_iterations=state.iterations,
         )
 

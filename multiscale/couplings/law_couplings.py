@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from geometry.errors import InputError, NotConverged
 from geometry.rigid_plane import Control, RigidPlane
 from multiscale.couplings.body import Displacements
-from multiscale.laws.law_table import LawTable, PatchLaws
+from multiscale.laws.law_table import LawTable
+from multiscale.laws.patch_law import PatchLaws
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import BeyondLaws
 from multiscale.storage.serialisation import Arrays, packed, unpacked
@@ -176,7 +177,9 @@ class FreePlaneCoupling:
             load=(self._force(approach), *path.moment_at(approach)),
             closure=closure,
             pressure=point.pressure,
-            **self._laws.contact(everywhere)._asdict(),
+            area_fraction=point.contact_area_fraction,
+            separation=point.separation,
+            contacts=point.contacts,
             newton_iterations=evaluations,
         )
 

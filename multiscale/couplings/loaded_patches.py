@@ -12,7 +12,7 @@ from geometry.errors import NotConverged
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control, PlaneLevers
 from multiscale.laws.interpolation import LawPoint, Tangent
-from multiscale.laws.law_table import PatchLaws
+from multiscale.laws.patch_law import PatchLaws
 
 Array = NDArray[np.float64]
 

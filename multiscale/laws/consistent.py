@@ -13,10 +13,10 @@ from geometry.collective import on_root, shared
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from micro import MicroModel, Response, RigidPlane, influence_matrix
-from multiscale.laws.law_table import LawTable, PlanePath
+from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.refinement import MOST_ROWS, refined
-from multiscale.laws.rows import SolvedRows
+from multiscale.laws.rows import PlanePath, SolvedRows
 
 Array = NDArray[np.float64]
 Displacements = Callable[[Array], Array]

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multiscale.laws.interpolation import LawPoint, Tangent
-from multiscale.laws.law_table import PATCH_FACTOR, PatchLaws
-from multiscale.laws.patch_law import PatchLaw
+from multiscale.laws.law_table import PATCH_FACTOR
+from multiscale.laws.patch_law import PatchLaw, PatchLaws
 from multiscale.laws.rows import SolvedRows
 
 Array = NDArray[np.float64]

@@ -29,7 +29,7 @@ from multiscale.storage.serialisation import (
 )
 from multiscale.storage.whole_files import write_bytes
 
-FORMAT = "patchlaw checkpoint 3"
+FORMAT = "patchlaw checkpoint 4"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -14,9 +14,8 @@ from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from micro import influence_matrix
 from multiscale.couplings.condensed import DenseNewton
-from multiscale.laws.files import repaired_law
-from multiscale.laws.law_table import PatchLaws
-from multiscale.laws.patch_law import PatchLaw
+from multiscale.laws.law_table import repaired_law
+from multiscale.laws.patch_law import PatchLaw, PatchLaws
 from multiscale.laws.rows import LawRows
 from multiscale.run import Run
 

@@ -8,9 +8,9 @@ from geometry.rigid_plane import Control
 from micro import influence_matrix, micro_model
 from multiscale.couplings.law_couplings import FreePlaneCoupling
 from multiscale.laws.consistent import consistent_laws
-from multiscale.laws.law_table import LawTable, PlanePath
+from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
-from multiscale.laws.rows import SolvedRows
+from multiscale.laws.rows import PlanePath, SolvedRows
 
 MODULUS = 4000.0
 APPROACH = np.linspace(1.0, 3.0, 9)
