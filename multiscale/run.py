@@ -11,17 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
+from geometry import NotConverged
 from geometry.collective import on_root
-from geometry.errors import NotConverged
 from micro import HalfSpaceModel, MicroModel
-from multiscale.couplings.assembly import (
-    approximation_notes,
-    assemble,
-    free_blocks,
-    load_finite_elements,
-    make_table,
-    meshed_blocks,
-)
+from multiscale.couplings import assembly
 from multiscale.couplings.body import embedding
 from multiscale.couplings.contact import OnBody, contact_model, on_body
 from multiscale.couplings.law_couplings import EmbeddedCoupling
@@ -31,7 +24,7 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling, LoadPosition, LoadStepper, Restorable
 from multiscale.machine.mpi_job import large_object_comm
 from multiscale.machine.nodes import cluster_nodes
-from multiscale.measured_errors import checked, error_notes, error_probe
+from multiscale.measured_errors import checked, error_notes
 from multiscale.resolution.auto_keys import resolved_keys
 from multiscale.resolution.problem_setup import make_setup
 from multiscale.results.history import History
@@ -75,7 +68,7 @@ class Run:
         self._start: Arrays = {}
         self._notes: list[str] = []
         self._on_body: OnBody | None = None
-        load_finite_elements(scene, comm)
+        assembly.load_finite_elements(scene, comm)
         nodes, large = cluster_nodes(comm), large_object_comm(comm)
         self.setup: ProblemSetup = on_root(large, lambda: make_setup(scene, resolved, nodes))
         self.scene, self.seconds = self.setup.scene, dict(self.setup.seconds)
@@ -98,15 +91,17 @@ class Run:
         if self.table is None:
             model = self.make_model()
             with self.phase("laws"):
-                self.table = make_table(self.setup, model, self.comm)
+                self.table = assembly.make_table(self.setup, model, self.comm)
         return self.table
 
     def make_coupling(self) -> Coupling:
         """Make what finds the load steps, once, and what it needs."""
         if self.coupling is None:
             with self.phase("block"):
-                make = self.make_laws if self.setup.uses_laws else self.make_model
-                coupling = assemble(self.setup, make, self.comm)
+                made: LawTable | MicroModel | None = None
+                if self.setup.micro is not None:
+                    made = self.make_laws() if self.setup.uses_laws else self.make_model()
+                coupling = assembly.assemble(self.setup, made, self.comm)
                 if self._start and isinstance(coupling, Restorable):
                     coupling.restore(self._start)
                 self.coupling = coupling
@@ -133,8 +128,7 @@ class Run:
             return step
         with self.phase("check"):
             try:
-                probe, loads = error_probe(self.setup, body), self.scene.loading.load_history
-                return checked(step, probe, loads, self.comm)
+                return checked(step, self.setup, body, self.comm)
             except NotConverged as error:
                 self._notes.append(f"errors of load step {step.step} not measured: {error}")
                 return step
@@ -186,7 +180,7 @@ class Run:
     def history(self) -> History:
         """Return the load steps accepted so far, with times and notes."""
         steps, record = self.steps, None
-        notes = [*approximation_notes(self.setup, self.table, steps), *self._notes]
+        notes = [*assembly.approximation_notes(self.setup, self.table, steps), *self._notes]
         notes += error_notes(steps, self.given.accuracy)
         if isinstance(self.coupling, ReferenceCoupling):
             record = self.coupling.record(steps)
@@ -202,7 +196,7 @@ class Run:
     @property
     def unknowns(self) -> int | None:
         """Degrees of freedom of the mesh that load steps are solved on, where there is one."""
-        meshed = meshed_blocks(self.coupling)
+        meshed = assembly.meshed_blocks(self.coupling)
         return meshed[-1].dofs if meshed else None
 
     def last_field(self) -> tuple[Interface, NDArray]:
@@ -224,8 +218,8 @@ class Run:
         Note:
             Collective.
         """
-        meshed, self.coupling = meshed_blocks(self.coupling), None
-        free_blocks(meshed)
+        meshed, self.coupling = assembly.meshed_blocks(self.coupling), None
+        assembly.free_blocks(meshed)
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from geometry.errors import InputError
+from geometry import InputError
 from micro import MicroModel
 from multiscale.couplings.body import embedding, patch_compliance, patch_displacements
 from multiscale.couplings.condensed import CondensedCoupling
@@ -138,21 +138,20 @@ def make_table(setup: ProblemSetup, model: MicroModel, comm: Any) -> LawTable:
     )
 
 
-def assemble(setup: ProblemSetup, make: Callable[[], LawTable | MicroModel], comm: Any) -> Coupling:
+def assemble(setup: ProblemSetup, made: LawTable | MicroModel | None, comm: Any) -> Coupling:
     """Put micro and macro model together as the scene asks.
 
     Args:
         setup: The problem set up from the scene.
-        make: Makes the patch laws, of couplings that use them, or else the micro model on the body;
-            not called for a reference.
+        made: The patch laws, of couplings that use them, or else the micro model on the body; None
+            for a reference.
         comm: MPI communicator; None for this process alone.
 
     Note:
         Collective.
     """
-    if setup.micro is None:
+    if made is None:
         return make_reference(setup, comm)
-    made = make()
     if not isinstance(made, LawTable):
         return ContactCoupling(made, setup.patches, setup.mean_heights, comm)
     condensed = newton_choice(setup, made).condensed

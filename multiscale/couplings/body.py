@@ -17,9 +17,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Material, Surface
+from geometry import InputError, Material, Surface
 from geometry.checks import process_memory
-from geometry.errors import InputError
 from micro import (
     BodyModes,
     BodyStresses,

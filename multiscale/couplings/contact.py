@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import PatchGrid
+from geometry import Control, PatchGrid
 from geometry.collective import on_root
-from geometry.rigid_plane import Control
 from micro import START_KINDS, FiniteSlopes, HalfSpaceModel, MicroModel
 from multiscale.couplings.body import scene_body
 from multiscale.loading.load_step import LoadStep

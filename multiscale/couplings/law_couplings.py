@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import InputError, NotConverged
-from geometry.rigid_plane import Control, RigidPlane
+from geometry import Control, InputError, NotConverged, RigidPlane
 from multiscale.couplings.body import Displacements
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaws

@@ -102,20 +102,15 @@ class LawCurves:
     def packed(cls, curves: Sequence[LawCurves]) -> LawCurves:
         """Return the curves of many laws as one."""
         rows = max(one.knots.shape[1] for one in curves)
-
-        def padded(name: str, length: int, fill: float) -> Array:
-            parts = [getattr(one, name)[0] for one in curves]
-            whole = np.full((len(parts), length, *parts[0].shape[1:]), fill)
-            for row, part in zip(whole, parts, strict=True):
-                row[: len(part)] = part
-            return whole
-
-        pieces = rows + 1
-        return cls(
-            padded("knots", rows, np.inf),
-            padded("origins", pieces, 0.0),
-            padded("coefficients", pieces, 0.0),
-        )
+        knots = np.full((len(curves), rows), np.inf)
+        origins = np.zeros((len(curves), rows + 1))
+        pieces = np.zeros((len(curves), rows + 1, *curves[0].coefficients.shape[2:]))
+        for law, one in enumerate(curves):
+            own = one.knots.shape[1]
+            knots[law, :own] = one.knots[0]
+            origins[law, : own + 1] = one.origins[0]
+            pieces[law, : own + 1] = one.coefficients[0]
+        return cls(knots, origins, pieces)
 
     def cut(self, rows: int) -> LawCurves:
         """Return the curves of a single law through its first rows, with their tangents beyond."""

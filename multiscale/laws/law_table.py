@@ -6,7 +6,7 @@ Theory: demos/theory.md, section 10.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from pathlib import Path
@@ -16,8 +16,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
-from geometry.patches import PatchGrid
+from geometry import InputError, PatchGrid
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.rows import LawRows, PlanePath
 from multiscale.storage.serialisation import checksummed, stored_numbers, verified
@@ -188,9 +187,9 @@ def repaired_law(law: PatchLaw) -> PatchLaw:
 
 def _table(file: Any) -> LawTable:
     patches = PatchGrid(
-        grid=_pair(file.attrs["patch_grid"], int),
-        lengths=_pair(file.attrs["lengths_mm"], float),
-        origin=_pair(file.attrs["origin_mm"], float),
+        grid=tuple(file.attrs["patch_grid"]),
+        lengths=tuple(file.attrs["lengths_mm"]),
+        origin=tuple(file.attrs["origin_mm"]),
     )
     if math.prod(patches.grid) > len(file):
         raise InputError("lacks laws", value=patches.grid, allowed=f"{len(file)} groups")
@@ -202,15 +201,13 @@ def _table(file: Any) -> LawTable:
     laws = [_law(file[_group_name(patches, index)]) for index in range(patches.count)]
     if made_by.get("coupling") != "consistent":
         laws = [repaired_law(law) for law in laws]
-    path = None
-    if _PATH in file:
-        path = PlanePath(**{name: stored_numbers(file[_PATH][name]) for name in _PATH_UNITS})
+    path = {name: stored_numbers(file[_PATH][name]) for name in _PATH_UNITS if _PATH in file}
     return LawTable(
         patches=patches,
         laws=tuple(laws),
         made_by=made_by,
         force_error=float(file.attrs["force_error"]),
-        path=path,
+        path=PlanePath(**path) if path else None,
     )
 
 
@@ -223,8 +220,3 @@ def _law(group: Any) -> PatchLaw:
 def _group_name(patches: PatchGrid, index: int) -> str:
     ix, iy = patches.unravel(index)
     return f"patch_{ix}_{iy}"
-
-
-def _pair(values: Sequence[Any], kind: type) -> Any:
-    first, second = values
-    return kind(first), kind(second)

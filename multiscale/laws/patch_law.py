@@ -12,9 +12,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry.errors import InputError
+from geometry import InputError
 from multiscale.laws.interpolation import LawCurves, LawPoint
-from multiscale.laws.rows import LawRows
+from multiscale.laws.rows import LawRows, SolvedRows
 
 Array = NDArray[np.float64]
 
@@ -58,6 +58,22 @@ class PatchLaw:
     stiffness_error: float = float("nan")
     warning_pressure: float = np.inf
     repaired: float = 0.0
+
+    @classmethod
+    def of(cls, rows: SolvedRows, first_touch: float, initial_separation: float) -> PatchLaw:
+        """Return the law through rows as a micro model gave them, from first touch on.
+
+        Args:
+            rows: The rows; none of a patch that stays open.
+            first_touch: Closure at first touch [mm].
+            initial_separation: Mean separation at zero approach [mm].
+        """
+        return cls(
+            rows=rows,
+            first_touch=float(first_touch),
+            initial_separation=float(initial_separation),
+            warning_pressure=rows.warning_pressure,
+        )
 
     def __post_init__(self) -> None:
         if len(self.rows) == 1:

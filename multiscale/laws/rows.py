@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
-from geometry.errors import InputError
+from geometry import InputError
 
 Array = NDArray[np.float64]
 

@@ -12,12 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
-from geometry.errors import InputError
-from geometry.meshes.block import BlockShape
-from geometry.meshes.families import characteristic_size, contact_radius, reference_shapes
-from geometry.meshes.refined_block import RefinedShape
-from geometry.rigid_plane import RigidPlane
-from geometry.surface import Surface
+from geometry import (
+    BlockShape,
+    InputError,
+    RefinedShape,
+    RigidPlane,
+    Surface,
+    characteristic_size,
+    reference_shapes,
+)
+from geometry.meshes.families import contact_radius
 from multiscale.machine.nodes import ClusterNodes, MemoryRequest
 from multiscale.scene.scene import Scene
 from multiscale.setup.surface_and_block import check_memory
@@ -108,7 +112,8 @@ def reference_meshes(
         InputError: When they cannot be made or would not fit into memory; names file and key.
     """
     _check_block(scene)
-    hexahedral, fine = scene.reference.hexahedral, scene.reference.fine
+    block, reference = scene.block, scene.reference
+    hexahedral, fine = reference.hexahedral, reference.fine
     approach, tilt = plane_at_largest_load.approach, plane_at_largest_load.tilt
     prescribed = scene.loading.force is None and scene.loading.tilt != "free"
     largest = approach if prescribed else (1.0 + _RESERVE) * approach
@@ -117,9 +122,17 @@ def reference_meshes(
             plane = RigidPlane.above(surface, largest, tilt)
             least = _least_bytes(surface, plane, fine)
             check_memory(scene, nodes, [_request(scene, "the reference", shared=least)])
-        height = scene.block.height_under(surface.lengths)
         shapes = reference_shapes(
-            surface, largest, height, count=scene.reference.meshes, tilt=tilt, **_mesh_keys(scene)
+            surface,
+            largest,
+            block.height_under(surface.lengths),
+            count=reference.meshes,
+            fine=fine,
+            tilt=tilt,
+            mesh="hexahedra" if hexahedral else "tetrahedra",
+            cells=reference.cells,
+            grading=block.grading,
+            element=block.element if block.element[0] == ("Q" if hexahedral else "P") else None,
         )
         radius = contact_radius(surface, approach, tilt=tilt)
     except InputError as error:
@@ -159,20 +172,6 @@ def _request(scene: Scene, purpose: str, **sizes: Any) -> MemoryRequest:
 
 def _key(hexahedral: bool) -> str:
     return "reference.cells" if hexahedral else "reference.fine"
-
-
-def _mesh_keys(scene: Scene) -> dict[str, Any]:
-    """Return what the scene says of the cells of its meshes."""
-    block, reference = scene.block, scene.reference
-    if reference.hexahedral:
-        return {
-            "mesh": "hexahedra",
-            "cells": reference.cells,
-            "grading": block.grading,
-            "element": block.element,
-        }
-    element = block.element if block.element.startswith("P") else None
-    return {"mesh": "tetrahedra", "fine": reference.fine, "element": element}
 
 
 def _check_block(scene: Scene) -> None:

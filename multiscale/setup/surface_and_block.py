@@ -13,12 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from geometry.errors import InputError
-from geometry.files import BYTES_PER_HEIGHT, read_surface
-from geometry.materials import Material
-from geometry.meshes.block import BlockShape
-from geometry.spectrum import synthesise
-from geometry.surface import Surface
+from geometry import BlockShape, InputError, Material, Surface, read_surface, synthesise
+from geometry.files import BYTES_PER_HEIGHT
 from multiscale.machine.nodes import ClusterNodes, MemoryRequest
 from multiscale.scene.scene import Scene
 
