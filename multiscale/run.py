@@ -15,7 +15,6 @@ from geometry import NotConverged
 from geometry.collective import on_root
 from micro import HalfSpaceModel, MicroModel
 from multiscale.couplings import assembly
-from multiscale.couplings.body import embedding
 from multiscale.couplings.contact import OnBody, contact_model, on_body
 from multiscale.couplings.law_couplings import EmbeddedCoupling
 from multiscale.couplings.reference import ReferenceCoupling
@@ -206,11 +205,9 @@ class Run:
         """
         if isinstance(self.coupling, EmbeddedCoupling):
             return self.coupling.interface, self.coupling.displacement
+        pressure = self.steps[-1].patches.pressure_MPa
         with self.phase("field"):
-            interface = embedding(self.setup, self.comm)
-            load = interface.load(self.steps[-1].patches.pressure_MPa)
-            displacement = interface.block.solve(load).x.array[: interface.block.owned_dofs]
-            return interface, displacement.copy()
+            return assembly.field_under(self.setup, pressure, self.comm)
 
     def close(self) -> None:
         """Free the blocks. Accepted load steps stay, fields are gone.

@@ -6,6 +6,9 @@ import gc
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from geometry import InputError
 from micro import MicroModel
 from multiscale.couplings.body import embedding, patch_compliance, patch_displacements
@@ -23,7 +26,9 @@ from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import Block
+    from macro import Block, Interface
+
+Array = NDArray[np.float64]
 
 MOST_CYCLES_PER_STEP = 12
 """Multigrid cycles that a load step of the full Newton takes at most, when it starts from earlier
@@ -176,6 +181,22 @@ def meshed_blocks(coupling: Coupling | None) -> list[Block]:
     if isinstance(coupling, ReferenceCoupling | EmbeddedCoupling):
         return coupling.blocks
     return []
+
+
+def field_under(setup: ProblemSetup, pressure: Array, comm: Any) -> tuple[Interface, Array]:
+    """Return the meshed block and its displacements under pressures that are uniform on patches.
+
+    Args:
+        setup: The problem set up from the scene.
+        pressure: Pressures of the patches, shape (N,) [MPa].
+        comm: MPI communicator; None for this process alone.
+
+    Note:
+        Collective.
+    """
+    interface = embedding(setup, comm)
+    function = interface.block.solve(interface.load(pressure))
+    return interface, function.x.array[: interface.block.owned_dofs].copy()
 
 
 def free_blocks(blocks: list[Block]) -> None:

@@ -156,9 +156,9 @@ class FreePlaneCoupling:
         if approach > end + ROUNDING * abs(end):
             problem = f"the plane at an approach of {approach:.6g} mm (allowed: up to {end:.6g} mm)"
             raise beyond_law(control, problem, self._table)
-        everywhere, tilt = np.full(patches.count, approach), path.tilt_at(approach)
-        point = self._laws.along(everywhere)
-        local = RigidPlane.above(patches, approach, tilt).means(patches)
+        tx, ty, *moment = map(float, path.at(approach))
+        point = self._laws.along(np.full(patches.count, approach))
+        local = RigidPlane.above(patches, approach, (tx, ty)).means(patches)
         closure = local - self._displacements(point.pressure[None])[0]
         residual = np.abs(np.where(point.pressure > 0.0, closure - point.closure, 0.0)).max()
         residual /= float(np.abs(local).max()) or 1.0
@@ -172,8 +172,8 @@ class FreePlaneCoupling:
             )
         return LoadStep.of_patches(
             patches,
-            plane=(approach, *tilt),
-            load=(self._force(approach), *path.moment_at(approach)),
+            plane=(approach, tx, ty),
+            load=(self._force(approach), *moment),
             closure=closure,
             pressure=point.pressure,
             area_fraction=point.contact_area_fraction,

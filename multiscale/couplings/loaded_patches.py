@@ -145,11 +145,11 @@ class LoadedPatches:
             plane: A plane, whose slopes hold where the load prescribes none.
         """
         plane = self.control.prescribed(plane)
-        tilted = self.levers.matrix[:, 1:] @ plane[1:]
-        approach = float(np.min(self.laws.first_touch - tilted))
+        approach = self.levers.first_touch(self.laws.first_touch, plane[1:])
         if not np.isfinite(approach):
             raise self.failure("NO_CONTACT", 0)
-        largest = max(self._largest_touch(), float(np.abs(approach + tilted).max()))
+        closures = approach + self.levers.matrix[:, 1:] @ plane[1:]
+        largest = max(self._largest_touch(), float(np.abs(closures).max()))
         approach -= 2.0 * TOLERANCE * largest  # so that a residual is not a contact
         return Control(approach=approach, tilt=(float(plane[1]), float(plane[2])))
 

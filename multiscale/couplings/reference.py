@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Control, InputError
+from geometry import Control
 from multiscale.loading.load_step import LoadStep
 from multiscale.results.reference_record import ReferenceRecord, reference_record
 from multiscale.setup.problem import ProblemSetup
-from multiscale.setup.surface_and_block import block_material
+from multiscale.setup.surface_and_block import block_material, located
 from multiscale.storage.serialisation import Arrays, packed, unpacked
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
@@ -172,10 +172,8 @@ def make_reference(setup: ProblemSetup, comm: Any) -> ReferenceCoupling:
     scene, surface, problems, qualities = setup.scene, setup.surface, [], []
     for shape in setup.meshes.shapes:
         finest = shape is setup.meshes.shapes[-1]
-        try:
+        with located(scene, "surface"):
             mesh, quality = rough_block_mesh(shape, surface, comm or MPI.COMM_SELF)
-        except InputError as error:
-            raise error.located(key="surface", file=scene.file) from None
         problem = UnilateralContactProblem(
             Block(mesh, block_material(scene), sides=scene.block.sides),
             surface.highest - surface.mean_height,

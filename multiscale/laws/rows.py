@@ -216,13 +216,17 @@ class PlanePath:
         if np.any(np.diff(self.approach) <= 0.0):
             raise InputError("a path needs a strictly increasing approach")
 
-    def tilt_at(self, approach: float) -> tuple[float, float]:
-        """Return the slopes at an approach; beyond both ends they are those of the end."""
-        return self._interpolated(self.tilt, approach)
+    def at(self, approach: float) -> Array:
+        """Return slopes and moments at an approach, shape (4,); beyond both ends those of the end.
 
-    def moment_at(self, approach: float) -> tuple[float, float]:
-        """Return the moments at an approach [N mm]."""
-        return self._interpolated(self.moment, approach)
+        Args:
+            approach: The approach at the middle [mm].
+        """
+        values = np.column_stack((self.tilt, self.moment))
+        if len(values) == 1:
+            return values[0]
+        within = np.clip(approach, self.approach[0], self.approach[-1])
+        return np.asarray(PchipInterpolator(self.approach, values)(within))
 
     def approach_under(self, force: float, force_at: Callable[[float], float]) -> tuple[float, int]:
         """Return the approach under a force [mm], and the number of evaluations of the force.
@@ -247,13 +251,6 @@ class PlanePath:
             full_output=True,
         )
         return float(found), report.function_calls + 1
-
-    def _interpolated(self, values: Array, approach: float) -> tuple[float, float]:
-        x, y = values[0]
-        if len(self.approach) > 1:
-            within = np.clip(approach, self.approach[0], self.approach[-1])
-            x, y = PchipInterpolator(self.approach, values)(within)
-        return float(x), float(y)
 
 
 def _rising(values: Array) -> Array:

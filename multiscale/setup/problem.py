@@ -20,10 +20,10 @@ Array = NDArray[np.float64]
 CLOSURE_RESERVE = 0.15
 """Closure that laws are made for beyond the largest approach, relative to the largest interference.
 The surface of a bent block may rise between the loads of its patches."""
-TABLE_TOLERANCE = {"cells": 5e-4, "summits": 1e-4}
+_CELLS_TOLERANCE, _SUMMITS_TOLERANCE = 5e-4, 1e-4
 """Interpolation error of laws by default. Finer tables would trace the steps of single cells."""
-TABLE_ROWS = {"cells": MOST_ROWS, "summits": 400}
-"""Most rows of laws. Each row costs a solution, which is dear on cells."""
+_SUMMITS_ROWS = 400
+"""Most rows of laws by summits. On cells a row costs a solution, which is dear."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,16 +173,13 @@ class ProblemSetup:
     @property
     def table_tolerance(self) -> float:
         """Interpolation error that laws are tabulated to."""
-        return self.scene.coupling.table_tolerance or TABLE_TOLERANCE[self._seen]
+        default = _SUMMITS_TOLERANCE if self.uses_summits else _CELLS_TOLERANCE
+        return self.scene.coupling.table_tolerance or default
 
     @property
     def table_rows(self) -> int:
         """Most rows of a table of laws."""
-        return TABLE_ROWS[self._seen]
-
-    @property
-    def _seen(self) -> str:
-        return "summits" if self.uses_summits else "cells"
+        return _SUMMITS_ROWS if self.uses_summits else MOST_ROWS
 
     def interference(self, x: Array, y: Array, z: Array) -> Array:
         """Return how far points lie above the undeformed plane at the largest load [mm].
@@ -224,11 +221,10 @@ class ProblemSetup:
     @property
     def interfering_patches(self) -> int:
         """Number of patches that the largest closures of their laws bring into contact."""
-        if self.ignores_border:
-            x, y, z = self.asperities.x, self.asperities.y, self.asperities.z
-        else:
-            grid = np.meshgrid(self.surface.x, self.surface.y, indexing="ij")
-            x, y, z = (part.ravel() for part in (*grid, self.surface.heights))
+        x, y, z = self.asperities.x, self.asperities.y, self.asperities.z
+        if not self.ignores_border:
+            x, y = (part.ravel() for part in np.meshgrid(self.surface.x, self.surface.y))
+            z = self.surface.heights.T.ravel()
         owner = self.patches.index_of(x, y)
         closes = self.largest_closures[owner] > self.surface.highest - z
         return int(np.unique(owner[closes]).size)

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -49,12 +50,12 @@ def make_surface(scene: Scene) -> Surface:
     section = scene.surface
     extent: dict[str, Any] = {"grid": section.grid, "lengths": section.lengths}
     if section.spectrum is not None:
-        spectrum = section.spectrum.spectrum()
-        surface = _located(scene, "surface.spectrum", lambda: synthesise(spectrum, **extent))
+        with located(scene, "surface.spectrum"):
+            surface = synthesise(section.spectrum.spectrum(), **extent)
     else:
-        path = scene.surface_path or Path()
-        extent["missing"] = section.missing
-        surface = _located(scene, "surface.file", lambda: read_surface(path, **extent))
+        with located(scene, "surface.file"):
+            path = scene.surface_path or Path()
+            surface = read_surface(path, missing=section.missing, **extent)
     if section.detrend == "none":
         return surface
     return surface.detrended(_DETREND_ORDER[section.detrend])
@@ -67,18 +68,17 @@ def make_shape(scene: Scene, surface: Surface) -> BlockShape:
         InputError: When they do not fit together or the coupling; names file and key.
     """
     block = scene.block
-    given: dict[str, Any] = {
-        "interface": surface.lengths,
-        "height": block.height_under(surface.lengths),
-        "cells": block_cells(scene),
-        "element": block.element,
-        "grading": block.grading,
-        "margin": block.margin,
-        "margin_cells": block.margin_cells if block.margin else 0,
-        "margin_grading": block.margin_grading if block.margin else 1.0,
-    }
-    shape: BlockShape = _located(scene, "block", lambda: BlockShape(**given))
-    return shape
+    with located(scene, "block"):
+        return BlockShape(
+            interface=surface.lengths,
+            height=block.height_under(surface.lengths),
+            cells=block_cells(scene),
+            element=block.element,
+            grading=block.grading,
+            margin=block.margin,
+            margin_cells=block.margin_cells if block.margin else 0,
+            margin_grading=block.margin_grading if block.margin else 1.0,
+        )
 
 
 def block_material(scene: Scene) -> Material:
@@ -224,9 +224,15 @@ def check_load(scene: Scene, surface: Surface) -> None:
         )
 
 
-def _located(scene: Scene, key: str, make: Callable[[], Any]) -> Any:
-    """Make something; an error gets the scene's file and the key."""
+@contextmanager
+def located(scene: Scene, key: str) -> Iterator[None]:
+    """Give errors of the input that occur within the scene's file and a key.
+
+    Args:
+        scene: The scene.
+        key: The key.
+    """
     try:
-        return make()
+        yield
     except InputError as error:
         raise error.located(key=key, file=scene.file) from None

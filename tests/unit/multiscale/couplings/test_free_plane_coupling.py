@@ -27,9 +27,9 @@ def path(**other):
 
 
 def test_slopes_are_those_of_the_rows_and_stay_beyond_them():
-    assert path().tilt_at(2.25) == pytest.approx((0.25, 0.225), rel=1e-12)
-    assert path().tilt_at(0.0) == pytest.approx((0.0, 0.1))
-    assert path().tilt_at(9.0) == pytest.approx((0.4, 0.3))
+    assert path().at(2.25)[:2] == pytest.approx((0.25, 0.225), rel=1e-12)
+    assert path().at(0.0)[:2] == pytest.approx((0.0, 0.1))
+    assert path().at(9.0)[:2] == pytest.approx((0.4, 0.3))
 
 
 def test_force_is_found_and_beyond_the_path_an_approach_beyond():
