@@ -17,7 +17,6 @@ from micro import HalfSpaceModel, MicroModel
 from multiscale.couplings import assembly
 from multiscale.couplings.contact import OnBody, contact_model, on_body
 from multiscale.couplings.law_couplings import EmbeddedCoupling
-from multiscale.couplings.reference import ReferenceCoupling
 from multiscale.laws.law_table import LawTable, law_bytes, read_laws
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling, LoadPosition, LoadStepper, Restorable
@@ -178,17 +177,13 @@ class Run:
 
     def history(self) -> History:
         """Return the load steps accepted so far, with times and notes."""
-        steps, record = self.steps, None
-        notes = [*assembly.approximation_notes(self.setup, self.table, steps), *self._notes]
-        notes += error_notes(steps, self.given.accuracy)
-        if isinstance(self.coupling, ReferenceCoupling):
-            record = self.coupling.record(steps)
-            notes += self.coupling.notes(record, steps)
+        steps, record, mesh_notes = assembly.with_mesh_errors(self.coupling, self.steps)
+        notes = [*assembly.approximation_notes(self.setup, self.table, self.steps), *self._notes]
         return History(
-            steps=tuple(record.with_errors(steps) if record else steps),
+            steps=steps,
             patches=self.setup.patches,
             seconds=dict(self.seconds),
-            notes=tuple(notes),
+            notes=(*notes, *error_notes(self.steps, self.given.accuracy), *mesh_notes),
             reference=record,
         )
 

@@ -21,6 +21,7 @@ from multiscale.laws.isolated import isolated_laws
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling
+from multiscale.results.reference_record import ReferenceRecord
 from multiscale.results.validity import range_notes
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
@@ -261,3 +262,18 @@ def approximation_notes(
     if imbalances:
         yield f"force against the support's reaction: equal to {max(imbalances):.1e}"
     yield from range_notes(steps, table)
+
+
+def with_mesh_errors(
+    coupling: Coupling | None, steps: Sequence[LoadStep]
+) -> tuple[tuple[LoadStep, ...], ReferenceRecord | None, list[str]]:
+    """Return load steps with the errors of a reference's meshes, its record, and notes on it.
+
+    Args:
+        coupling: The coupling; others than a reference leave the steps as they are.
+        steps: The load steps.
+    """
+    if not isinstance(coupling, ReferenceCoupling):
+        return tuple(steps), None, []
+    record = coupling.record(steps)
+    return record.with_errors(steps), record, list(coupling.notes(record, steps))
