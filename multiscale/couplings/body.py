@@ -115,13 +115,12 @@ class Body:
             count = max(count, _LEAST_WITH_SIDES)
         return math.ceil(round(count, 6))
 
-    def face(self, comm: Any, *, modes: int | None = None, coarse: bool = False) -> FaceCompliance:
+    def face(self, comm: Any, *, modes: int | None = None) -> FaceCompliance:
         """Return the compliance of the top in modes, from finite elements.
 
         Args:
             comm: MPI communicator; None for this process alone.
             modes: Modes along a side; by default those of the shape.
-            coarse: Whether to take coarser elements; the difference bounds the error.
 
         Raises:
             InputError: When the modes of so flat a block do not fit into memory.
@@ -152,7 +151,6 @@ class Body:
             self.sides,
             count,
             comm or MPI.COMM_SELF,
-            coarse=coarse,
             use_cache=True,
         )
 

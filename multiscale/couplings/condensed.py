@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Control, InputError, NotConverged, PatchGrid
+from geometry import Control, NotConverged, PatchGrid
 from geometry.plane_equilibrium import UNSUPPORTED, plane_failure
 from multiscale.couplings.law_couplings import ROUNDING, beyond_law
 from multiscale.couplings.loaded_patches import TOLERANCE, DenseState, LoadedPatches
@@ -37,32 +37,27 @@ class CondensedCoupling:
         table: The laws.
         compliance: Mean displacement of patch i of the block by unit pressure on patch j, shape
             (N, N) [mm/MPa].
-
-    Raises:
-        InputError: When the compliance does not fit the patches.
     """
 
     def __init__(self, table: LawTable, compliance: Array) -> None:
         self._table, self._laws = table, PatchLaws(table.laws)
-        self._newton = DenseNewton(self._laws, compliance, table.patches)
+        self._compliance = compliance
         self._last: DenseState | None = None
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `Coupling.press`."""
-        state = self._newton.solve(control, self._last)
-        end = self._laws.end
-        beyond = state.local > end * (1.0 + ROUNDING)
-        if beyond.any():
-            worst = int(np.argmax(np.where(beyond, state.local - end, -np.inf)))
-            patch = self._table.patches.unravel(worst)
+        patches, end = self._table.patches, self._laws.end
+        state = equilibrium(self._laws, self._compliance, patches, control, self._last)
+        worst = int(np.argmax(state.local - end * (1.0 + ROUNDING)))
+        if state.local[worst] > end[worst] * (1.0 + ROUNDING):
             problem = (
-                f"patch {patch} at a local approach of {state.local[worst]:.6g} mm (allowed: up to "
-                f"{end[worst]:.6g} mm)"
+                f"patch {patches.unravel(worst)} at a local approach of {state.local[worst]:.6g} "
+                f"mm (allowed: up to {end[worst]:.6g} mm)"
             )
             raise beyond_law(control, problem, self._table)
         self._last = state
         return LoadStep.of_patches(
-            self._table.patches,
+            patches,
             plane=state.plane,
             load=state.load,
             closure=state.point.closure,
@@ -82,8 +77,14 @@ class CondensedCoupling:
         self._last = unpacked(state, (DenseState, LawPoint))
 
 
-class DenseNewton:
-    """Solves closure_i(s_i) = δ_i − Σ_j C_ij p_j(s_j) for the local approaches s of all patches.
+def equilibrium(
+    laws: PatchLaws,
+    compliance: Array,
+    patches: PatchGrid,
+    control: Control,
+    start: DenseState | None = None,
+) -> DenseState:
+    """Solve closure_i(s_i) = δ_i − Σ_j C_ij p_j(s_j) for the local approaches s of all patches.
 
     The laws are given over the local approach, so that it does not matter whether their pressure
     is a function of closure. Where the plane's force is prescribed, or its moment is zero, its
@@ -96,46 +97,28 @@ class DenseNewton:
         compliance: C, mean displacement of patch i of the block by unit pressure on patch j, shape
             (N, N) [mm/MPa].
         patches: The partition.
+        control: What the load step prescribes.
+        start: A solution nearby.
 
     Raises:
         InputError: When the compliance is not a finite matrix of the size of the partition.
+        NotConverged: When neither the start nor one common approach of all laws leads to a
+            solution.
     """
-
-    def __init__(self, laws: PatchLaws, compliance: Array, patches: PatchGrid) -> None:
-        count = patches.count
-        if compliance.shape != (count, count) or not np.all(np.isfinite(compliance)):
-            raise InputError(
-                "the compliance does not fit the patches",
-                value=compliance.shape,
-                allowed=f"a finite matrix of shape {(count, count)}",
-            )
-        self._laws, self._compliance, self._patches = laws, compliance, patches
-
-    def solve(self, control: Control, start: DenseState | None = None) -> DenseState:
-        """Find the equilibrium of one load step.
-
-        Args:
-            control: What the step prescribes.
-            start: A solution nearby.
-
-        Raises:
-            NotConverged: When neither the start nor one common approach of all laws leads to a
-                solution.
-        """
-        problem = LoadedPatches(self._laws, self._compliance, self._patches, control)
-        plane = np.zeros(3) if start is None else start.plane
-        if control.force == 0.0:
-            problem.control = problem.first_touch(plane)
-        plane = problem.control.prescribed(plane)
-        if start is not None:
-            try:
-                return _equilibrium(problem, start.local, plane)
-            except NotConverged:  # a law has a kink in between: try without the earlier solution
-                pass
-        return _equilibrium(problem, *problem.initial_guess(plane))
+    problem = LoadedPatches(laws, compliance, patches, control)
+    plane = np.zeros(3) if start is None else start.plane
+    if control.force == 0.0:
+        problem.control = problem.first_touch(plane)
+    plane = problem.control.prescribed(plane)
+    if start is not None:
+        try:
+            return _iterated(problem, start.local, plane)
+        except NotConverged:  # a law has a kink in between: try without the earlier solution
+            pass
+    return _iterated(problem, *problem.initial_guess(plane))
 
 
-def _equilibrium(problem: LoadedPatches, local: Array, plane: Array) -> DenseState:
+def _iterated(problem: LoadedPatches, local: Array, plane: Array) -> DenseState:
     now = problem.at(local, plane)
     recent: deque[float] = deque(maxlen=_MEMORY)
     for iterations in range(_MOST_STEPS):

@@ -116,8 +116,6 @@ def on_body(
     comm: Any,
     *,
     half_space: bool = False,
-    modes: int | None = None,
-    coarse: bool = False,
     face: FaceCompliance | None = None,
 ) -> OnBody:
     """Return what puts half-space models on a scene's body, which is solved for once.
@@ -126,8 +124,6 @@ def on_body(
         setup: The problem set up from the scene, with a half-space model.
         comm: MPI communicator; None for this process alone.
         half_space: Whether the body is a half-space even where the scene has a block.
-        modes: Modes of the body along a side; by default those of its shape.
-        coarse: Whether to take coarser elements for the body.
         face: Compliance of the body's top, where that was solved for; then it is not collective.
 
     Returns:
@@ -139,7 +135,7 @@ def on_body(
     """
     body = None if half_space or not setup.has_block else scene_body(setup)
     if body is not None and face is None:
-        face = body.face(comm, modes=modes, coarse=coarse)
+        face = body.face(comm)
     material = block_material(setup.scene)
 
     def put(model: HalfSpaceModel, order: int) -> HalfSpaceModel:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from geometry import Control, NotConverged, PatchGrid
+from geometry import Control, InputError, NotConverged, PatchGrid
 from geometry.rigid_plane import PlaneLevers
 from multiscale.laws.interpolation import LawPoint, Tangent
 from multiscale.laws.patch_law import PatchLaws
@@ -58,6 +58,9 @@ class LoadedPatches:
         patches: The partition.
         control: What is prescribed of the plane.
 
+    Raises:
+        InputError: When the compliance is not a finite matrix of the size of the partition.
+
     Attributes:
         levers: How the plane's motions move the patches.
         area: Area of a patch [mm²].
@@ -67,6 +70,13 @@ class LoadedPatches:
     def __init__(
         self, laws: PatchLaws, compliance: Array, patches: PatchGrid, control: Control
     ) -> None:
+        shape = patches.count, patches.count
+        if compliance.shape != shape or not np.all(np.isfinite(compliance)):
+            raise InputError(
+                "the compliance does not fit the patches",
+                value=compliance.shape,
+                allowed=f"a finite matrix of shape {shape}",
+            )
         self.laws, self.compliance, self.control = laws, compliance, control
         self.area = patches.area
         x, y = patches.centres.T

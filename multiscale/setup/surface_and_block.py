@@ -179,12 +179,12 @@ def memory_requests(scene: Scene) -> Iterator[MemoryRequest]:
 
 def check_patches(scene: Scene, surface: Surface) -> None:
     """Refuse more patches than heights of the surface or cells of the interface."""
-    limits: list[tuple[str, Sequence[int]]] = [("heights of the surface", surface.grid)]
+    limits: dict[str, Sequence[int]] = {"heights of the surface": surface.grid}
     if meshes_block(scene):
-        limits.append(("cells of the interface (block.cells)", block_cells(scene)[:2]))
+        limits["cells of the interface (block.cells)"] = block_cells(scene)[:2]
     grid = patch_grid(scene)
-    for what, limit in limits:
-        if any(patches > most for patches, most in zip(grid, limit, strict=True)):
+    for what, limit in limits.items():
+        if np.any(np.greater(grid, limit)):
             raise InputError(
                 f"more patches than {what}",
                 key="patches.grid",

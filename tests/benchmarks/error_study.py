@@ -80,8 +80,9 @@ def meshed_force(data):
 def finer_force(run):
     """Return the force on more cells and with more modes, under the last load step's plane [N]."""
     setup, step = run.setup, run.steps[-1]
-    modes = scene_body(setup).modes + MORE_MODES
-    body = on_body(setup, None, half_space=not setup.has_block, modes=modes)
+    block = scene_body(setup) if setup.has_block else None
+    face = block and block.face(None, modes=block.modes + MORE_MODES)
+    body = on_body(setup, None, half_space=block is None, face=face)
     grid = [min(FINER * count, MOST_CELLS) for count in setup.model.surface.grid]
     spectrum = setup.scene.surface.spectrum.spectrum()
     surface = synthesise(spectrum, grid=tuple(grid), lengths=setup.surface.lengths)
