@@ -14,6 +14,8 @@ was within the measured one on 95 %, which was 3.4 × the true one.
 The factors of finite slopes were set against three meshes of the rough block. The force was off by
 0.02 to 0.3 % on Sets 1 and 2 of Waddad et al. 2016 and on a cap in the middle and near a side,
 where error bars were so small, and by 1.4 % on a cap that a side cuts in half.
+
+Theory: demos/theory.md, section 13.
 """
 
 from __future__ import annotations

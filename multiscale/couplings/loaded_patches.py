@@ -1,4 +1,7 @@
-"""The equations of patch laws on the compliance of a block, under one load of the plane."""
+"""The equations of patch laws on the compliance of a block, under one load of the plane.
+
+Theory: demos/theory.md, section 11.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The reference among the couplings: the rough surface itself is meshed and pressed."""
+"""The reference among the couplings: the rough surface itself is meshed and pressed.
+
+Theory: demos/theory.md, section 12.
+"""
 
 from __future__ import annotations
 

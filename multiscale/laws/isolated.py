@@ -1,4 +1,7 @@
-"""Makes the isolated patch laws: each patch's asperities alone, as Waddad et al. 2016 do."""
+"""Makes the isolated patch laws: each patch's asperities alone, as Waddad et al. 2016 do.
+
+Theory: demos/theory.md, section 10.
+"""
 
 from __future__ import annotations
 

@@ -7,6 +7,8 @@ load step. Halving an interval leaves less than half of its error, also at a kin
 begins or two join, and half of it is recorded. Elsewhere between rows it may be more: on random
 surfaces of 256² cells, in 1 to 256 patches, the force erred by up to 1.7 times and a patch's
 pressure by up to 3 times the largest recorded.
+
+Theory: demos/theory.md, section 10.
 """
 
 from __future__ import annotations

@@ -6,7 +6,6 @@ Refused are too much memory, too many patches and too large loads, before anythi
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -34,7 +33,7 @@ BYTES_PER_STATE, BYTES_PER_STEP = 24, 1000
 LAW_BLOCK_CELLS, FIELD_CELLS = (40, 40, 25), (20, 20, 12)
 """Cells of a block that carries laws on its mesh, those of Waddad et al. 2016, and of one that is
 meshed after the load for its fields alone."""
-_ROUNDING = 16.0 * sys.float_info.epsilon
+_ROUNDING = 16.0 * float(np.finfo(float).eps)
 """Approach over the largest height below which it does not change where the plane is."""
 PROVISIONAL_PATCHES = (4, 4)
 """Patches that stand for ``"auto"`` until they are chosen."""
