@@ -96,18 +96,15 @@ def consistent_laws(
     )
     first, end, tilt = on_root(comm, lambda: whole.range_up_to(largest))
     end += (_POINTWISE_RESERVE if pointwise else _RESERVE) * max(end - first, 0.0)
-    if end <= first:
-        laws, error = whole.laws(whole.rows(np.array([end]))), 0.0
-    else:
-        laws, error = refined(
-            whole.rows,
-            whole.laws,
-            first,
-            end,
-            compliance=compliance,
-            tolerance=tolerance,
-            most_rows=most_rows,
-        )
+    laws, error = refined(
+        whole.rows,
+        whole.laws,
+        first,
+        end,
+        compliance=compliance,
+        tolerance=tolerance,
+        most_rows=most_rows,
+    )
     return LawTable(
         patches=patches,
         laws=tuple(laws),
