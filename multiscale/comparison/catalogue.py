@@ -28,8 +28,7 @@ from multiscale.comparison.configuration import (
 from multiscale.planning.costs import Machine, predicted_cost
 from multiscale.planning.problem_setup import make_setup
 from multiscale.scene.scene import Scene
-from multiscale.setup.checks import LAW_BLOCK_CELLS, patch_grid
-from multiscale.setup.surface import make_surface
+from multiscale.setup.surface_and_block import LAW_BLOCK_CELLS, make_surface, patch_grid
 
 SMALL_SLOPES = ", small slopes"
 """End of the name of a configuration that differs from another by neglecting finite slopes."""

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from multiscale.scene.scene import Scene
-from multiscale.setup.checks import patch_grid
+from multiscale.setup.surface_and_block import patch_grid
 
 Content: TypeAlias = dict[str, Any]
 Grid: TypeAlias = tuple[int, int]

@@ -52,7 +52,7 @@ FLOORS = {
         "setup",
         "couplings",
         "measured_errors",
-        "notes planning",
+        "planning",
         "run",
         "output restart",
         "comparison",

@@ -15,7 +15,7 @@ from multiscale.comparison.error_measures import Curves
 from multiscale.comparison.run_result import RunResult
 from multiscale.planning.auto_keys import auto_keys
 from multiscale.scene.scene import Scene
-from multiscale.setup.checks import LAW_BLOCK_CELLS
+from multiscale.setup.surface_and_block import LAW_BLOCK_CELLS
 
 COLUMNS = (
     "approach", "force", "area", "separation", "approach_error", "force_error", "area_error",
