@@ -103,9 +103,10 @@ class _Catalogue:
         # Every key of a configuration is stated, so that no accuracy chooses one.
         self._accuracy = content.pop("accuracy", None)
         # Only laws need a mesh of the block.
-        cells = content["block"].pop("cells", None)
-        self._own_cells = cells if scene.coupling.on_mesh else None
-        self._cells: tuple[int, ...] = tuple(cells or LAW_BLOCK_CELLS)
+        content["block"].pop("cells", None)
+        stated = scene.block.cells if isinstance(scene.block.cells, tuple) else None
+        self._own_cells = stated if scene.coupling.on_mesh else None
+        self._cells = stated or LAW_BLOCK_CELLS
         self._base = content | {"patches": {"grid": list(pressure_grid(scene))}}
         nx, ny = content["surface"].get("grid") or make_surface(scene).grid
         self._grids = coarser_grids((nx, ny), scene)

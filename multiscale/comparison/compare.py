@@ -114,13 +114,14 @@ def resolved_scene(scene: Scene, folder: Path) -> Scene:
     if auto <= {"micro.model"}:
         return scene
     path, given = folder / AUTO_VALUES, scene.model_dump(by_alias=True, mode="json")
-    stored = {}
-    with suppress(OSError, ValueError):
+    values = None
+    with suppress(OSError, ValueError, KeyError, TypeError):
         stored = json.loads(path.read_text(encoding="utf-8"))
-    if stored.get("scene") != given:
-        stored = {"scene": given, "values": resolved_keys(make_setup(scene), scene)}
-        write_json(path, stored)
-    return provisional(with_resolved(scene, stored["values"]), auto & {"micro.model"})
+        values = stored["values"] if stored["scene"] == given else None
+    if values is None:
+        values = resolved_keys(make_setup(scene), scene)
+        write_json(path, {"scene": given, "values": values})
+    return provisional(with_resolved(scene, values), auto & {"micro.model"})
 
 
 def run_all(
