@@ -122,7 +122,8 @@ def _first_problem(error: ValidationError, model: type[BaseModel]) -> InputError
     path = [str(part) for part in problem["loc"]]
     if problem["type"] == "extra_forbidden":
         return _unknown_key(path, model)
-    key = ".".join(path) or None
+    # of a grid that may be "auto", pydantic also names the type that its values do not fit
+    key = ".".join(part for part in path if "[" not in part) or None
     if problem["type"] == "missing":
         return InputError("is required and missing", key=key)
     if problem["type"] == "model_type":
@@ -160,30 +161,28 @@ def read_scene_file(path: Path) -> dict[str, Any]:
         InputError: When it is no regular file, cannot be read, is too large or no TOML.
     """
     content = _content(path)
-    if len(content) > MOST_BYTES:
-        raise InputError(
-            f"cannot be read: it is larger than any scene (allowed: {MOST_BYTES} bytes)",
-            file=str(path),
-        )
     try:
         return parsed(content.decode("utf-8-sig"))  # some editors put a mark before the text
     except UnicodeDecodeError as error:
-        raise InputError(f"is not UTF-8 text: {error}", file=str(path)) from None
+        problem = f"is not UTF-8 text: {error}"
     except ValueError as error:
-        raise InputError(f"is not valid TOML: {error}", file=str(path)) from None
+        problem = f"is not valid TOML: {error}"
+    raise InputError(problem, file=str(path))
 
 
 def _content(path: Path) -> bytes:
-    """Return the bytes of a file, if it has an end; no more than a scene and one."""
+    """Return the bytes of a regular file, which has an end, if a scene can be that large."""
     try:
-        regular = path.is_file() or not path.exists()  # what does not exist has a better error
-        if regular:
-            with path.open("rb") as file:
-                return file.read(MOST_BYTES + 1)
-    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
+        if path.exists() and not path.is_file():
+            raise ValueError("it is not a regular file")
+        with path.open("rb") as file:
+            content = file.read(MOST_BYTES + 1)
+        if len(content) > MOST_BYTES:
+            raise ValueError(f"it is larger than any scene (allowed: {MOST_BYTES} bytes)")
+    except (OSError, ValueError) as error:  # ValueError: also a zero byte in the name
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"cannot be read: {reason}", file=str(path)) from None
-    raise InputError("cannot be read: it is not a regular file", file=str(path))
+    return content
 
 
 def override(data: dict[str, Any], text: str) -> None:
