@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from io import BytesIO
-from itertools import islice, zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from geometry.collective import on_root, together
+from geometry.collective import on_root, shared
 from multiscale.laws.files import write_laws
 from multiscale.output.provenance import provenance
 from multiscale.output.report import report_html
@@ -37,9 +36,6 @@ FILES = (
 
 DOTS_PER_INCH = 130
 """Resolution of the figures."""
-
-MOST_FIGURES = 4
-"""Ranks beyond this number draw nothing, and do not load matplotlib."""
 
 
 class Drawing(NamedTuple):
@@ -73,7 +69,10 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
     drawings: Sequence[Drawing] = ()
     if run.scene.output.figures and run.steps:
         with run.phase("output"):
-            drawings = _drawings(run)
+            captions = list(_captions(run).items())
+            drawings = shared(
+                run.comm, len(captions), lambda index: _drawing(run, *captions[index])
+            )
     return on_root(run.comm, lambda: _write(folder, run, drawings, options))
 
 
@@ -110,9 +109,10 @@ def write_tables(folder: Path, history: History) -> list[Path]:
         The files written.
     """
     header = [column.name for column in COLUMNS]
-    rows = ([column.of(step) for column in COLUMNS] for step in history)
     files = [
-        write_csv(folder / "history.csv", header, rows),
+        write_csv(
+            folder / "history.csv", header, [list(row.values()) for row in history.records()]
+        ),
         write_csv(folder / "patches.csv", PATCH_COLUMNS, history.patch_rows()),
     ]
     if history.reference is not None:
@@ -134,41 +134,29 @@ def write_figure(path: Path, figure: Figure) -> Path:
     return write_bytes(path, png(figure))
 
 
-def _drawings(run: Run) -> list[Drawing]:
-    """Return the figures on rank 0; every rank draws its share of them."""
-    comm = run.comm
-    rank, size = (0, 1) if comm is None else (comm.rank, comm.size)
-
-    def draw() -> list[Drawing]:
-        mine = islice(_figures(run), rank, None, size) if rank < MOST_FIGURES else ()
-        return [Drawing(name, caption, png(make())) for name, caption, make in mine]
-
-    mine = together(comm, draw)
-    parts = [mine] if comm is None else comm.gather(mine) or []
-    # Rank k has the figures k, k + size, ….
-    return [one for figures in zip_longest(*parts) for one in figures if one is not None]
+def _captions(run: Run) -> dict[str, str]:
+    """Return what the figures of a run show, by their names."""
+    bands = "" if run.history().reference is None else " Bands: error bars about mesh size zero."
+    captions = {
+        "surface": "The rough surface with its summits and the patches.",
+        "curves": f"Mean pressure, contact area and mean separation.{bands}",
+        "pressures": "Mean pressure of every patch at the last load step.",
+    }
+    return captions if run.table is None else {**captions, "laws": "The patch laws."}
 
 
-def _figures(run: Run) -> Iterator[tuple[str, str, Callable[[], Figure]]]:
-    """Yield file name, caption and function that draws; matplotlib is loaded only here."""
+def _drawing(run: Run, name: str, caption: str) -> Drawing:
+    """Draw one figure; matplotlib is loaded only by ranks that draw."""
     from multiscale.output import figures
 
-    setup, history, table = run.setup, run.history(), run.table
-    yield (
-        "surface",
-        "The rough surface with its summits and the patches.",
-        lambda: figures.surface_figure(setup.surface, setup.asperities, setup.patches),
-    )
-    bands = "" if history.reference is None else " Bands: error bars about mesh size zero."
-    yield (
-        "curves",
-        f"Mean pressure, contact area and mean separation.{bands}",
-        lambda: figures.history_figure({run.scene.coupling.kind: history}),
-    )
-    yield (
-        "pressures",
-        "Mean pressure of every patch at the last load step.",
-        lambda: figures.pressure_figure(history),
-    )
-    if table is not None:
-        yield "laws", "The patch laws.", lambda: figures.law_figure(table)
+    setup, history = run.setup, run.history()
+    if name == "surface":
+        figure = figures.surface_figure(setup.surface, setup.asperities, setup.patches)
+    elif name == "curves":
+        figure = figures.history_figure({run.scene.coupling.kind: history})
+    elif name == "pressures":
+        figure = figures.pressure_figure(history)
+    else:
+        assert run.table is not None
+        figure = figures.law_figure(run.table)
+    return Drawing(name, caption, png(figure))

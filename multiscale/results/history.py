@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, overload
 
@@ -29,7 +29,6 @@ class Column:
     Args:
         meaning: What the column holds; with the unit it is the column's documentation.
         unit: Unit of the values; empty for plain numbers.
-        value: Returns the value of a load step; by default the step's attribute of this name.
         heading: Heading in the table of reports, terminals and notebooks; empty for a column
             that stands in the file alone.
         scale: Factor between the unit of the file and the unit of the heading.
@@ -48,7 +47,6 @@ class Column:
         meaning: str,
         unit: str = "",
         *,
-        value: Callable[[LoadStep], Any] | None = None,
         heading: str = "",
         scale: float = 1.0,
         shown: str = ".0f",
@@ -56,7 +54,7 @@ class Column:
     ) -> None:
         self.__doc__ = f"{meaning} [{unit}]." if unit else f"{meaning}."
         self.heading = heading
-        self._value, self._scale, self._shown, self._error = value, scale, shown, error
+        self._scale, self._shown, self._error = scale, shown, error
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
@@ -74,8 +72,8 @@ class Column:
         return np.array([np.nan if value is None else value for value in values])
 
     def of(self, step: LoadStep) -> Any:
-        """Return the value of a load step; None where it was not measured."""
-        return getattr(step, self.name) if self._value is None else self._value(step)
+        """Return the value of a load step, its attribute of this name; None if not measured."""
+        return getattr(step, self.name)
 
     def text(self, step: LoadStep) -> str:
         """Return the value of a load step as it is shown in tables, with its error."""
@@ -120,14 +118,10 @@ class History:
     linear_iterations = Column("Iterations of the linear solver", heading="linear")
     wall_s = Column("Wall time", "s", heading="time [s]", shown=".2f")
     reason = Column("Name of the reason for which the iteration stopped")
-    tilt_x = Column("Slope of the approach along x", "mm/mm", value=lambda step: step.tilt[0])
-    tilt_y = Column("Slope of the approach along y", "mm/mm", value=lambda step: step.tilt[1])
-    moment_x_N_mm = Column(
-        "First moment Σ P (x − xc) of the forces P", "N mm", value=lambda step: step.moment_N_mm[0]
-    )
-    moment_y_N_mm = Column(
-        "First moment Σ P (y − yc) of the forces P", "N mm", value=lambda step: step.moment_N_mm[1]
-    )
+    tilt_x = Column("Slope of the approach along x", "mm/mm")
+    tilt_y = Column("Slope of the approach along y", "mm/mm")
+    moment_x_N_mm = Column("First moment Σ P (x − xc) of the forces P", "N mm")
+    moment_y_N_mm = Column("First moment Σ P (y − yc) of the forces P", "N mm")
     force_error_N = Column("Error of the force; 0 where it is prescribed", "N")
     approach_error_mm = Column("Error of the approach; 0 where it is prescribed", "mm")
 
