@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from multiscale.comparison.comparison import Comparison, Row
 from multiscale.comparison.configuration import OWN
 from multiscale.comparison.error_measures import Curves, on_grid
-from multiscale.output.figure_style import (
+from multiscale.output.figures import (
     COLOURS,
     ERROR_BAND,
     LINE_STYLES,
     MARKERS,
     PRESSURE_LABEL,
+    draw_pressures,
     new_figure,
     panels_above_legend,
 )
-from multiscale.output.figures import draw_pressures
 
 Array = NDArray[np.float64]
 
