@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from geometry.collective import on_root, shared
 from multiscale.laws.files import write_laws
-from multiscale.output.provenance import provenance
-from multiscale.output.report import report_html
+from multiscale.output.report import provenance, report_html
 from multiscale.planning import plan
 from multiscale.results.history import COLUMNS, PATCH_COLUMNS, History
 from multiscale.run import Run
