@@ -10,7 +10,7 @@ from typing import Any
 
 from geometry.collective import on_root
 from geometry.statistics import roughness
-from multiscale.cli.inputs import scene_and_folder
+from multiscale.cli.execution import scene_and_folder
 from multiscale.costs.prediction import Cost, predicted_cost
 from multiscale.couplings.blocks import load_finite_elements
 from multiscale.laws.files import write_laws

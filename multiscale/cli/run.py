@@ -7,7 +7,7 @@ from typing import Any
 
 from geometry.collective import on_root
 from geometry.errors import InputError, NotConverged, PatchlawError
-from multiscale.cli.inputs import scene_and_folder
+from multiscale.cli.execution import scene_and_folder
 from multiscale.output import terminal
 from multiscale.output.field_files import write_fields
 from multiscale.output.results import write_results
