@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from typing import Any, overload
 
 import numpy as np
@@ -21,6 +21,7 @@ PATCH_COLUMNS = ("step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area
 """Columns of ``patches.csv``."""
 
 
+@dataclass(eq=False)
 class Column:
     """A column of ``history.csv``, declared as an attribute of `History`.
 
@@ -40,21 +41,17 @@ class Column:
         name: Name of the column and of the attribute of `History`.
     """
 
-    name: str
+    meaning: str
+    unit: str = ""
+    _: KW_ONLY
+    heading: str = ""
+    scale: float = 1.0
+    shown: str = ".0f"
+    error: str = ""
+    name: str = field(init=False)
 
-    def __init__(
-        self,
-        meaning: str,
-        unit: str = "",
-        *,
-        heading: str = "",
-        scale: float = 1.0,
-        shown: str = ".0f",
-        error: str = "",
-    ) -> None:
-        self.__doc__ = f"{meaning} [{unit}]." if unit else f"{meaning}."
-        self.heading = heading
-        self._scale, self._shown, self._error = scale, shown, error
+    def __post_init__(self) -> None:
+        self.__doc__ = f"{self.meaning} [{self.unit}]." if self.unit else f"{self.meaning}."
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
@@ -77,8 +74,8 @@ class Column:
 
     def text(self, step: LoadStep) -> str:
         """Return the value of a load step as it is shown in tables, with its error."""
-        error = getattr(step, self._error, None) or 0.0
-        return with_error(self._scale * self.of(step), self._scale * error, shown=self._shown)
+        error = getattr(step, self.error, None) or 0.0
+        return with_error(self.scale * self.of(step), self.scale * error, shown=self.shown)
 
 
 @dataclass(frozen=True, kw_only=True)

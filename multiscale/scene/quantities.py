@@ -149,24 +149,6 @@ def parse_turning_points(value: Any, unit: str) -> tuple[float, ...]:
     return points
 
 
-def parse_tilt(value: Any) -> tuple[float, float] | Literal["free"]:
-    """Turn a pair of slopes into numbers, and let ``"free"`` pass.
-
-    Args:
-        value: Two slopes, or ``"free"``.
-
-    Raises:
-        ValueError: When it is neither.
-    """
-    if value == "free":
-        return "free"
-    if not isinstance(value, list | tuple) or len(value) != 2:
-        raise ValueError(
-            'is not a tilt (allowed: two slopes such as ["5 um/mm", "0 um/mm"], or "free")'
-        )
-    return parse_quantity(value[0], ""), parse_quantity(value[1], "")
-
-
 def _named(unit: str) -> str:
     return unit or "a ratio"
 
@@ -203,15 +185,4 @@ SpectralAmplitude = Annotated[float, _parser("mm**4"), _schema("mm**4")]
 Slope = Annotated[float, _parser(""), _schema("")]
 Approaches = Annotated[tuple[float, ...], _points_parser("mm"), _points_schema("mm")]
 Forces = Annotated[tuple[float, ...], _points_parser("N"), _points_schema("N")]
-Tilt = Annotated[
-    tuple[float, float] | Literal["free"],
-    BeforeValidator(parse_tilt),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"const": "free"},
-                {"type": "array", "items": _quantity_schema(""), "minItems": 2, "maxItems": 2},
-            ]
-        }
-    ),
-]
+Tilt = tuple[Slope, Slope] | Literal["free"]

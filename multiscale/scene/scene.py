@@ -122,14 +122,17 @@ def _first_problem(error: ValidationError, model: type[BaseModel]) -> InputError
     path = [str(part) for part in problem["loc"]]
     if problem["type"] == "extra_forbidden":
         return _unknown_key(path, model)
-    # of a grid that may be "auto", pydantic also names the type that its values do not fit
+    # of a key with several types pydantic names the type, and has a problem for each
     key = ".".join(part for part in path if "[" not in part) or None
     if problem["type"] == "missing":
         return InputError("is required and missing", key=key)
     if problem["type"] == "model_type":
         return InputError("must be a section", key=key, value=problem["input"])
     text, _, allowed = problem["msg"].removeprefix("Value error, ").partition(" (allowed: ")
-    text = text.replace("Input should be", "must be")
+    text = text.replace("Input should be", "must be").replace("valid tuple", "list")
+    for other in problems[1:]:
+        if other["type"] == "literal_error" and other["input"] is problem["input"]:
+            text += f", or {other['ctx']['expected']}"
     value = {} if isinstance(problem["input"], dict) else {"value": problem["input"]}
     return InputError(text, key=key, allowed=allowed.rstrip(")") or None, **value)
 

@@ -203,7 +203,7 @@ def test_meshes_are_refined_until_their_error_keeps_the_accuracy():
             {"accuracy": "2 %"},
             r"accuracy = '2 %': must be a valid number",
         ),
-        ({"patches": {"grid": "many"}}, r"patches.grid = 'many': must be a valid tuple"),
+        ({"patches": {"grid": "many"}}, r"patches.grid = 'many': must be a list, or 'auto'"),
         ({"coupling": {"kind": "auto", "love": "centre"}}, r"love = 'centre' does not go with"),
         ({"source": {"spectrum": None, "file": "a.npy", "grid": "auto"}}, r"needs a 'spectrum'"),
     ],
