@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import cycle
 
 from matplotlib.figure import Figure
 
 from micro.response import Response
-from multiscale.output.figures import add_grid_and_legend, curve_styles, new_figure
+from multiscale.output.figures import COLOURS, LINE_STYLES, add_grid_and_legend, new_figure
 
 
 def models_figure(responses: Mapping[str, Response], *, rms_slope: float) -> Figure:
@@ -19,7 +20,9 @@ def models_figure(responses: Mapping[str, Response], *, rms_slope: float) -> Fig
     """
     figure = new_figure(9.6, 7.2)
     (motion, separation), (area, kappa) = figure.subplots(2, 2)
-    for look, response in zip(curve_styles(responses), responses.values(), strict=True):
+    styles = zip(cycle(LINE_STYLES), cycle(COLOURS.values()))
+    for (style, colour), (name, response) in zip(styles, responses.items(), strict=False):
+        look = {"ls": style, "color": colour, "label": name}
         pressure, fraction = response.mean_pressure, 100 * response.contact_area_fraction
         motion.plot(1e3 * response.approach, pressure, **look)
         separation.plot(1e3 * response.mean_separation, pressure, **look)

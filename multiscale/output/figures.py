@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -45,18 +43,6 @@ def new_figure(width: float, height: float) -> Figure:
         height: Height [inch].
     """
     return Figure(figsize=(width, height), layout="constrained")
-
-
-def curve_styles(names: Iterable[str]) -> Iterator[dict[str, Any]]:
-    """Yield line style, colour and label for each of several curves.
-
-    Args:
-        names: Labels of the curves.
-    """
-    for name, style, colour in zip(
-        names, cycle(LINE_STYLES), cycle(COLOURS.values()), strict=False
-    ):
-        yield {"ls": style, "color": colour, "label": name}
 
 
 def add_grid_and_legend(figure: Figure) -> None:
@@ -126,25 +112,25 @@ def draw_surface(
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncol=2, frameon=False)
 
 
-def history_figure(histories: Mapping[str, History]) -> Figure:
-    """Draw force, contact area and mean separation of one or more runs over each other.
+def history_figure(history: History, kind: str) -> Figure:
+    """Draw force, contact area and mean separation of a run.
 
     Args:
-        histories: The runs by the name that the legend shows.
+        history: The run.
+        kind: Its coupling.
     """
     figure = new_figure(11.0, 3.6)
     force, area, gap = figure.subplots(1, 3)
-    for style, history in zip(curve_styles(histories), histories.values(), strict=True):
-        look = style | {"marker": "o", "ms": 3.5}
-        pressure = np.append(0.0, history.mean_pressure_MPa)
-        # The first touch of a tilted plane is not at zero approach of the middle.
-        level = not any(any(step.tilt) for step in history)
-        approach = 1e3 * np.append(0.0 if level else np.nan, history.approach_mm)
-        force.plot(approach, pressure, **look)
-        area.plot(pressure, 100 * np.append(0.0, history.contact_area_fraction), **look)
-        gap.plot(1e3 * history.mean_separation_mm, history.mean_pressure_MPa, **look)
-        if history.reference is not None:
-            draw_error_band(force, area, history, colour=style["color"])
+    look: dict[str, Any] = {"marker": "o", "ms": 3.5, "color": COLOURS[kind], "label": kind}
+    pressure = np.append(0.0, history.mean_pressure_MPa)
+    # The first touch of a tilted plane is not at zero approach of the middle.
+    level = not any(any(step.tilt) for step in history)
+    approach = 1e3 * np.append(0.0 if level else np.nan, history.approach_mm)
+    force.plot(approach, pressure, **look)
+    area.plot(pressure, 100 * np.append(0.0, history.contact_area_fraction), **look)
+    gap.plot(1e3 * history.mean_separation_mm, history.mean_pressure_MPa, **look)
+    if history.reference is not None:
+        draw_error_band(force, area, history, colour=COLOURS[kind])
     force.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]")
     area.set(xlabel="mean pressure [MPa]", ylabel="contact area fraction [%]")
     gap.set(xlabel="mean separation [µm]", ylabel="mean pressure [MPa]")

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import math
 import os
 import platform
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib.metadata import version
 from typing import Any
 
+from pydantic_core import to_jsonable_python
+
 from multiscale.couplings.reference import ReferenceCoupling
 from multiscale.machine.nodes import peak_memory
+from multiscale.planning import plan
 from multiscale.results.history import History, with_error
 from multiscale.results.html_page import Section, page_html
 from multiscale.run import Run
@@ -23,42 +25,28 @@ LIBRARIES = "numpy scipy dolfinx petsc4py mpi4py gmsh h5py pydantic pint matplot
 """Libraries whose versions are recorded."""
 
 
-def report_html(
-    *,
-    title: str,
-    statements: Iterable[tuple[str, str]],
-    warnings: Sequence[str],
-    history: History,
-    figures: Mapping[str, bytes],
-) -> str:
-    """Compose the page.
+def report_html(run: Run, figures: Mapping[str, bytes]) -> str:
+    """Compose the report of a run.
 
     Args:
-        title: Heading.
-        statements: Topics and sentences of the plan.
-        warnings: Sentences on the validity of the results.
-        history: The run.
+        run: The run, finished or stopped.
         figures: PNG images by caption; they become part of the page.
 
     Returns:
         A complete HTML document.
     """
+    history, setup = run.history(), run.setup
+    done = (("topic", "what"), list(plan.statements(setup)))
     times = [(phase, f"{seconds:.2f}") for phase, seconds in history.seconds.items()]
-    return page_html(
-        title,
-        [
-            Section(paragraphs=[_headline(history)], warnings=warnings),
-            Section(
-                heading="What was done",
-                table=(("topic", "what"), list(statements)),
-                text_columns=(1,),
-            ),
-            Section(heading="Force–approach curve", table=history.table(), figures=figures),
-            Section(heading="What it took", table=(("phase", "wall time [s]"), times)),
-            *_errors(history),
-            Section(notes=history.notes),
-        ],
-    )
+    sections = [
+        Section(paragraphs=[_headline(history)], warnings=list(plan.warnings(setup))),
+        Section(heading="What was done", table=done, text_columns=(1,)),
+        Section(heading="Force–approach curve", table=history.table(), figures=figures),
+        Section(heading="What it took", table=(("phase", "wall time [s]"), times)),
+        *_errors(history),
+        Section(notes=history.notes),
+    ]
+    return page_html(f"patchlaw: {run.scene.name}", sections)
 
 
 def _errors(history: History) -> Iterator[Section]:
@@ -109,8 +97,8 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "patchlaw": version("patchlaw"),
         "written": datetime.now(UTC).isoformat(timespec="seconds"),
         "scene_file": run.scene.file,
-        "scene": run.scene.model_dump(by_alias=True, mode="json"),
-        "scene_given": run.given.model_dump(by_alias=True, mode="json"),
+        "scene": run.scene,
+        "scene_given": run.given,
         "units": "mm, N, MPa",
         "surface": {
             "source": setup.surface.source,
@@ -137,16 +125,8 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "versions": _versions(),
         "machine": platform.platform(),
     }
-    return {name: _for_json(value) for name, value in content.items()}
-
-
-def _for_json(value: Any) -> Any:
-    """Return a value with None for every number that is not finite, which JSON cannot hold."""
-    if isinstance(value, Mapping):
-        return {name: _for_json(part) for name, part in value.items()}
-    if isinstance(value, list | tuple):
-        return [_for_json(part) for part in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    known: dict[str, Any] = to_jsonable_python(content, inf_nan_mode="null", fallback=str)
+    return known
 
 
 def _reference(run: Run) -> dict[str, Any] | None:
@@ -162,7 +142,7 @@ def _reference(run: Run) -> dict[str, Any] | None:
         "force_rate": record.force.rate.tolist(),
         "area_rate": record.area.rate.tolist(),
         "error": record.label,
-        "mesh_quality": [asdict(quality) for quality in coupling.qualities],
+        "mesh_quality": coupling.qualities,
     }
 
 
@@ -170,11 +150,9 @@ def _micro_model(setup: ProblemSetup) -> dict[str, Any] | None:
     """Return the micro model and, where it was chosen, the candidates; None without one."""
     if setup.micro is None:
         return None
-    name, choice = {"name": setup.model.name}, setup.choice
-    if choice is None:
-        return name
-    candidates = [asdict(candidate) for candidate in choice.candidates]
-    return {**name, "chosen": asdict(choice.taken), "candidates": candidates}
+    choice = setup.choice
+    chosen = {} if choice is None else {"chosen": choice.taken, "candidates": choice.candidates}
+    return {"name": setup.model.name, **chosen}
 
 
 def _versions() -> dict[str, str]:

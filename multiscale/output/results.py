@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, NamedTuple
 from geometry.collective import on_root, shared
 from multiscale.laws.files import write_laws
 from multiscale.output.report import provenance, report_html
-from multiscale.planning import plan
 from multiscale.results.history import COLUMNS, PATCH_COLUMNS, History
 from multiscale.run import Run
 from multiscale.storage.whole_files import (
@@ -86,13 +85,7 @@ def _write(folder: Path, run: Run, drawings: Sequence[Drawing], options: list[st
     files += [write_bytes(folder / f"{one.name}.png", one.png) for one in drawings]
     files.append(write_json(folder / "provenance.json", provenance(run, options=options)))
     if run.scene.output.report:
-        page = report_html(
-            title=f"patchlaw: {run.scene.name}",
-            statements=plan.statements(run.setup),
-            warnings=list(plan.warnings(run.setup)),
-            history=history,
-            figures={one.caption: one.png for one in drawings},
-        )
+        page = report_html(run, {one.caption: one.png for one in drawings})
         files.append(write_text(folder / "report.html", page))
     return files
 
@@ -152,7 +145,7 @@ def _drawing(run: Run, name: str, caption: str) -> Drawing:
     if name == "surface":
         figure = figures.surface_figure(setup.surface, setup.asperities, setup.patches)
     elif name == "curves":
-        figure = figures.history_figure({run.scene.coupling.kind: history})
+        figure = figures.history_figure(history, run.scene.coupling.kind)
     elif name == "pressures":
         figure = figures.pressure_figure(history)
     else:
