@@ -10,8 +10,7 @@ from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling
 from multiscale.measured_errors import error_notes
-from multiscale.results.history import History
-from multiscale.results.validity import range_notes
+from multiscale.results.history import History, range_notes
 from multiscale.setup.problem import ProblemSetup
 
 

@@ -29,9 +29,7 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
     with Interruption(comm, choice.max_time) as interruption:
         scene, folder = scene_and_folder(choice, comm)
         with locked(folder, comm) as lock:
-            found = None
-            if choice.resume:
-                found = on_root(comm, lambda: find_checkpoint(folder, scene))
+            found = on_root(comm, lambda: find_checkpoint(folder, scene)) if choice.resume else None
             run = Run(scene, comm, None if found is None else found.resolved)
             with CheckpointWriter(folder, run, lock) as checkpoints:
                 if _announce(choice.resume, found, run, checkpoints):

@@ -67,10 +67,8 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
     drawings: Sequence[Drawing] = ()
     if run.scene.output.figures and run.steps:
         with run.phase("output"):
-            captions = list(_captions(run).items())
-            drawings = shared(
-                run.comm, len(captions), lambda index: _drawing(run, *captions[index])
-            )
+            shown = list(_captions(run).items())
+            drawings = shared(run.comm, len(shown), lambda index: _drawing(run, *shown[index]))
     return on_root(run.comm, lambda: _write(folder, run, drawings, options))
 
 
@@ -101,10 +99,9 @@ def write_tables(folder: Path, history: History) -> list[Path]:
         The files written.
     """
     header = [column.name for column in COLUMNS]
+    rows = [list(record.values()) for record in history.records()]
     files = [
-        write_csv(
-            folder / "history.csv", header, [list(row.values()) for row in history.records()]
-        ),
+        write_csv(folder / "history.csv", header, rows),
         write_csv(folder / "patches.csv", PATCH_COLUMNS, history.patch_rows()),
     ]
     if history.reference is not None:

@@ -154,7 +154,7 @@ def _summary(step: LoadStep) -> str:
 
 @contextmanager
 def following(comm: Any) -> Iterator[tuple[Callable[[str], None], Callable[[str], None]]]:
-    """Follow work of many parts: the part under way, where there is a terminal, and those done.
+    """Show which part of a long task is under way, and print a line on every part that is done.
 
     Args:
         comm: MPI communicator, or None.

@@ -1,9 +1,9 @@
-"""The results of a run: a row for every load step, and a row for every patch in it."""
+"""The results of a run: a row for every load step and every patch in it, and notes on them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Any, overload
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.patches import PatchGrid
+from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.results.html_page import Table, table_html
 from multiscale.results.reference_record import ReferenceRecord
@@ -206,3 +207,29 @@ def with_error(value: float, error: float | None, *, shown: str) -> str:
         return f"{value:{shown}}"
     places = max(1 - math.floor(math.log10(error)), 0)
     return f"{value:.{places}f} ± {error:.{places}f}"
+
+
+def range_notes(steps: Sequence[LoadStep], table: LawTable | None) -> Iterator[str]:
+    """Yield a sentence when load steps lie outside the range of validity of the micro model.
+
+    Args:
+        steps: The load steps.
+        table: The patch laws; None where the micro model is solved itself.
+    """
+    outside = {step.step: step.warnings[0] for step in steps if step.warnings}
+    if table is not None:
+        limit = np.array([law.warning_pressure for law in table.laws])
+        for step in steps:
+            pressure = step.patches.pressure_MPa
+            if count := int(np.sum((pressure > 0.0) & (pressure >= limit))):
+                outside[step.step] = (
+                    f"{count} of {limit.size} patches are loaded beyond the range of the model "
+                    f"{table.made_by['model']}"
+                )
+    if outside:
+        first = min(outside)
+        yield (
+            f"load steps outside the micro model's range of validity: {len(outside)} of "
+            f"{len(steps)}; first step {first}: {outside[first]}; micro.model = 'half-space' has "
+            "no such range"
+        )
