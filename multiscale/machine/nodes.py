@@ -60,9 +60,17 @@ def memory_of_this_node(groups: Iterable[tuple[float, float]] | None = None) -> 
 
 
 def peak_memory() -> float:
-    """Return the largest memory of this process so far [B]."""
-    unit = 1 if sys.platform == "darwin" else 1024
-    return float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit)
+    """Return the largest resident memory of this process so far [B].
+
+    Linux counts the memory of the parent at the fork into ``ru_maxrss``. The high-water mark of
+    the process itself starts with the program.
+    """
+    try:
+        status = Path("/proc/self/status").read_text(encoding="utf-8")
+        return 1024.0 * int(status.split("VmHWM:")[1].split()[0])
+    except (OSError, IndexError):
+        unit = 1 if sys.platform == "darwin" else 1024
+        return float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
