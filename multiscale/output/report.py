@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import platform
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -17,7 +17,7 @@ from multiscale.couplings.reference import ReferenceCoupling
 from multiscale.machine.nodes import peak_memory
 from multiscale.planning import plan
 from multiscale.results.history import History, with_error
-from multiscale.results.html_page import Section, page_html
+from multiscale.results.html_page import filled
 from multiscale.run import Run
 from multiscale.setup.problem import ProblemSetup
 
@@ -25,46 +25,23 @@ LIBRARIES = "numpy scipy dolfinx petsc4py mpi4py gmsh h5py pydantic pint matplot
 """Libraries whose versions are recorded."""
 
 
-def report_html(run: Run, figures: Mapping[str, bytes]) -> str:
-    """Compose the report of a run.
+def report_html(run: Run, pictures: Mapping[str, bytes]) -> str:
+    """Return the report of a run: a complete HTML document that needs no network.
 
     Args:
         run: The run, finished or stopped.
-        figures: PNG images by caption; they become part of the page.
-
-    Returns:
-        A complete HTML document.
+        pictures: PNG images by name, see `multiscale.output.results.write_results`.
     """
-    history, setup = run.history(), run.setup
-    done = (("topic", "what"), list(plan.statements(setup)))
-    times = [(phase, f"{seconds:.2f}") for phase, seconds in history.seconds.items()]
-    sections = [
-        Section(paragraphs=[_headline(history)], warnings=list(plan.warnings(setup))),
-        Section(heading="What was done", table=done, text_columns=(1,)),
-        Section(heading="Force–approach curve", table=history.table(), figures=figures),
-        Section(heading="What it took", table=(("phase", "wall time [s]"), times)),
-        *_errors(history),
-        Section(notes=history.notes),
-    ]
-    return page_html(f"patchlaw: {run.scene.name}", sections)
-
-
-def _errors(history: History) -> Iterator[Section]:
-    """Yield a section with the latest errors that were measured, by cause."""
-    measured = [step for step in history if step.errors]
-    if not measured:
-        return
-    step, causes = measured[-1], dict(measured[-1].errors)
-    causes["altogether"] = sum(causes.values())
-    yield Section(
-        heading=f"Error of the force by cause, measured at load step {step.step}",
-        table=(
-            ("cause", "force [N]", "of the force [%]"),
-            [
-                (name, f"{error:.2g}", f"{100 * error / step.force_N:.2g}" if step.force_N else "–")
-                for name, error in causes.items()
-            ],
-        ),
+    history = run.history()
+    return filled(
+        "output/report.jinja",
+        title=f"patchlaw: {run.scene.name}",
+        headline=_headline(history),
+        warnings=list(plan.warnings(run.setup)),
+        statements=list(plan.statements(run.setup)),
+        history=history,
+        measured=next((step for step in reversed(history.steps) if step.errors), None),
+        pictures=pictures,
     )
 
 

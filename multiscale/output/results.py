@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from geometry.collective import on_root, shared
 from multiscale.laws.files import write_laws
@@ -36,20 +35,6 @@ DOTS_PER_INCH = 130
 """Resolution of the figures."""
 
 
-class Drawing(NamedTuple):
-    """A figure of a run.
-
-    Attributes:
-        name: Name of its file, without the ending.
-        caption: What it shows.
-        png: The image.
-    """
-
-    name: str
-    caption: str
-    png: bytes
-
-
 def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
     """Write the files of a run, finished or stopped.
 
@@ -64,15 +49,16 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
     Note:
         Collective: all ranks draw, rank 0 writes.
     """
-    drawings: Sequence[Drawing] = ()
+    pictures: dict[str, bytes] = {}
     if run.scene.output.figures and run.steps:
+        names = ["surface", "curves", "pressures", *["laws"] * (run.table is not None)]
         with run.phase("output"):
-            shown = list(_captions(run).items())
-            drawings = shared(run.comm, len(shown), lambda index: _drawing(run, *shown[index]))
-    return on_root(run.comm, lambda: _write(folder, run, drawings, options))
+            drawn = shared(run.comm, len(names), lambda index: png(_figure(run, names[index])))
+        pictures = dict(zip(names, drawn, strict=True))
+    return on_root(run.comm, lambda: _write(folder, run, pictures, options))
 
 
-def _write(folder: Path, run: Run, drawings: Sequence[Drawing], options: list[str]) -> list[Path]:
+def _write(folder: Path, run: Run, pictures: dict[str, bytes], options: list[str]) -> list[Path]:
     for name in FILES:  # Files of an earlier run must not stand beside those of this one.
         with written(folder / name):
             remove(folder / name)
@@ -80,11 +66,10 @@ def _write(folder: Path, run: Run, drawings: Sequence[Drawing], options: list[st
     files = write_tables(folder, history)
     if table is not None:
         files.append(write_whole(folder / "laws.h5", lambda path: write_laws(path, table)))
-    files += [write_bytes(folder / f"{one.name}.png", one.png) for one in drawings]
+    files += [write_bytes(folder / f"{name}.png", image) for name, image in pictures.items()]
     files.append(write_json(folder / "provenance.json", provenance(run, options=options)))
     if run.scene.output.report:
-        page = report_html(run, {one.caption: one.png for one in drawings})
-        files.append(write_text(folder / "report.html", page))
+        files.append(write_text(folder / "report.html", report_html(run, pictures)))
     return files
 
 
@@ -123,29 +108,16 @@ def write_figure(path: Path, figure: Figure) -> Path:
     return write_bytes(path, png(figure))
 
 
-def _captions(run: Run) -> dict[str, str]:
-    """Return what the figures of a run show, by their names."""
-    bands = "" if run.history().reference is None else " Bands: error bars about mesh size zero."
-    captions = {
-        "surface": "The rough surface with its summits and the patches.",
-        "curves": f"Mean pressure, contact area and mean separation.{bands}",
-        "pressures": "Mean pressure of every patch at the last load step.",
-    }
-    return captions if run.table is None else {**captions, "laws": "The patch laws."}
-
-
-def _drawing(run: Run, name: str, caption: str) -> Drawing:
+def _figure(run: Run, name: str) -> Figure:
     """Draw one figure; matplotlib is loaded only by ranks that draw."""
     from multiscale.output import figures
 
-    setup, history = run.setup, run.history()
+    setup = run.setup
     if name == "surface":
-        figure = figures.surface_figure(setup.surface, setup.asperities, setup.patches)
-    elif name == "curves":
-        figure = figures.history_figure(history, run.scene.coupling.kind)
-    elif name == "pressures":
-        figure = figures.pressure_figure(history)
-    else:
-        assert run.table is not None
-        figure = figures.law_figure(run.table)
-    return Drawing(name, caption, png(figure))
+        return figures.surface_figure(setup.surface, setup.asperities, setup.patches)
+    if name == "curves":
+        return figures.history_figure(run.history(), run.scene.coupling.kind)
+    if name == "pressures":
+        return figures.pressure_figure(run.history())
+    assert run.table is not None
+    return figures.law_figure(run.table)
