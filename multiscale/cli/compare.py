@@ -13,9 +13,10 @@ from geometry.errors import InputError, NotConverged
 from multiscale.cli.command_line import COMPARE_ENDING
 from multiscale.cli.execution import scene_and_folder
 from multiscale.comparison import errors
-from multiscale.comparison.compare import Launch, check_launchable, compare
+from multiscale.comparison.compare import Launch, compare
 from multiscale.comparison.comparison import Comparison
 from multiscale.comparison.configuration import RunResult
+from multiscale.comparison.process import check_launchable
 from multiscale.output import terminal
 from multiscale.output.results import png
 from multiscale.restart.folder_lock import locked

@@ -103,9 +103,10 @@ class _Catalogue:
         # Every key of a configuration is stated, so that no accuracy chooses one.
         self._accuracy = content.pop("accuracy", None)
         # Only laws need a mesh of the block.
-        cells = content["block"].pop("cells", None)
-        self._own_cells = cells if scene.coupling.on_mesh else None
-        self._cells: tuple[int, ...] = tuple(cells or LAW_BLOCK_CELLS)
+        content["block"].pop("cells", None)
+        stated = scene.block.cells if isinstance(scene.block.cells, tuple) else None
+        self._own_cells = stated if scene.coupling.on_mesh else None
+        self._cells = stated or LAW_BLOCK_CELLS
         self._base = content | {"patches": {"grid": list(pressure_grid(scene))}}
         nx, ny = content["surface"].get("grid") or make_surface(scene).grid
         self._grids = coarser_grids((nx, ny), scene)
@@ -114,12 +115,8 @@ class _Catalogue:
 
     def proposals(self) -> Iterator[Configuration]:
         """Yield all proposals, the scene itself first."""
-        made = self._proposal(
-            self._base["coupling"],
-            patches=self._patches,
-            cells=self._own_cells,
-            accuracy=self._accuracy,
-        )
+        own: dict[str, Any] = {"patches": self._patches, "cells": self._own_cells}
+        made = self._proposal(self._base["coupling"], accuracy=self._accuracy, **own)
         yield replace(made, name=f"{OWN}: {made.name}")
         for micro in (*({"model": name} for name in MODEL_NAMES), _FITTED):
             if micro != _HALF_SPACE:
@@ -150,14 +147,12 @@ class _Catalogue:
             content["block"] = content["block"] | {"cells": list(cells)}
         return Configuration(name=_name_of(content), content=content)
 
-    def _half_spaces(
-        self, coupling: Content, patches: Grid | None = None
-    ) -> Iterator[Configuration]:
+    def _half_spaces(self, coupling: Content, **grids: Grid) -> Iterator[Configuration]:
         """Yield half-spaces on every grid, and one of them without finite slopes."""
-        for grid in self._grids:
-            yield self._proposal(coupling, _HALF_SPACE, heights=grid, patches=patches)
+        for heights in self._grids:
+            yield self._proposal(coupling, _HALF_SPACE, heights=heights, **grids)
         small = _HALF_SPACE | {"finite_slopes": False}
-        yield self._proposal(coupling, small, heights=self._law_grid, patches=patches)
+        yield self._proposal(coupling, small, heights=self._law_grid, **grids)
 
     def _laws(self) -> Iterator[Configuration]:
         """Yield couplings by laws, from asperities or islands and from half-spaces."""
@@ -176,7 +171,7 @@ class _Catalogue:
         half_space = partial(self._proposal, micro=_HALF_SPACE, heights=self._law_grid)
         for patches in grids:
             yield half_space(consistent, patches=patches)
-        yield from self._half_spaces(consistent, own)
+        yield from self._half_spaces(consistent, patches=own)
         yield half_space(isolated, patches=own, cells=cells)
         if _carries(cells, own):
             meshed = consistent | {"compliance": "finite-element"}
@@ -208,21 +203,20 @@ class _Catalogue:
 
 def _name_of(content: Content) -> str:
     """Return the name of a scene among its configurations."""
-    micro, reference = content["micro"], content["reference"]
-    kind, model = content["coupling"]["kind"], micro["model"]
-    parts = [kind]
+    micro, reference, surface = (content[name] for name in ("micro", "reference", "surface"))
+    kind, model, cells = content["coupling"]["kind"], micro["model"], content["block"].get("cells")
+    if kind == "reference":
+        meshes, fine = reference["meshes"], reference.get("fine")
+        name = f"reference, {meshes} mesh{'es' * (meshes > 1)}"
+        return f"{name}, {1e3 * fine:.3g} µm" if fine else name
+    name = kind
     if kind in ("isolated", "consistent"):
-        parts.append(f"{_times(content['patches']['grid'])} patches")
-    if kind != "reference":
-        on_grid = f" {_times(content['surface']['grid'])}" if model == "half-space" else ""
-        parts += [model + on_grid, *["fitted"] * (micro == _FITTED)]
-        if content["block"].get("cells"):
-            parts.append(f"{_times(content['block']['cells'])} elements")
-        return ", ".join(parts) + SMALL_SLOPES * (micro.get("finite_slopes") is False)
-    parts.append(f"{reference['meshes']} mesh{'es' * (reference['meshes'] > 1)}")
-    if reference.get("fine"):
-        parts.append(f"{1e3 * reference['fine']:.3g} µm")
-    return ", ".join(parts)
+        name += f", {_times(content['patches']['grid'])} patches"
+    name += f", {model}" + ", fitted" * (micro == _FITTED)
+    if model == "half-space":
+        name += f" {_times(surface['grid'])}"
+    name += f", {_times(cells)} elements" if cells else ""
+    return name + SMALL_SLOPES * (micro.get("finite_slopes") is False)
 
 
 def _carries(cells: tuple[int, ...], patches: Grid) -> bool:

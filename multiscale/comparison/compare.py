@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -12,7 +11,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO, TypeAlias
 
@@ -20,12 +19,8 @@ from geometry.errors import InputError
 from multiscale.comparison import AGAINST
 from multiscale.comparison.catalogue import configurations
 from multiscale.comparison.comparison import Comparison, compared
-from multiscale.comparison.configuration import (
-    Configuration,
-    RunResult,
-    read_result,
-    write_result,
-)
+from multiscale.comparison.configuration import Configuration, RunResult, read_result, write_result
+from multiscale.comparison.process import check_launchable
 from multiscale.resolution.auto_keys import auto_keys, provisional, resolved_keys, with_resolved
 from multiscale.resolution.problem_setup import make_setup
 from multiscale.restart.interruption import ENDING
@@ -43,9 +38,6 @@ TIME_TO_END = 5.0
 
 REPEATABLE = ("done", "refused", "not converged")
 """How runs end that would end in the same way again."""
-
-MPI_JOB = ("OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_SIZE", "PMI_RANK", "SLURM_STEP_TASKS_PER_NODE")
-"""Environment variables that exist inside an MPI job only."""
 
 PROGRAM = (sys.executable, "-m", "multiscale.comparison.process")
 """Words that start the program of a process."""
@@ -122,13 +114,14 @@ def resolved_scene(scene: Scene, folder: Path) -> Scene:
     if auto <= {"micro.model"}:
         return scene
     path, given = folder / AUTO_VALUES, scene.model_dump(by_alias=True, mode="json")
-    stored = {}
-    with suppress(OSError, ValueError):
+    values = None
+    with suppress(OSError, ValueError, KeyError, TypeError):
         stored = json.loads(path.read_text(encoding="utf-8"))
-    if stored.get("scene") != given:
-        stored = {"scene": given, "values": resolved_keys(make_setup(scene), scene)}
-        write_json(path, stored)
-    return provisional(with_resolved(scene, stored["values"]), auto & {"micro.model"})
+        values = stored["values"] if stored["scene"] == given else None
+    if values is None:
+        values = resolved_keys(make_setup(scene), scene)
+        write_json(path, {"scene": given, "values": values})
+    return provisional(with_resolved(scene, values), auto & {"micro.model"})
 
 
 def run_all(
@@ -160,10 +153,10 @@ def run_all(
     end = None if budget_s is None else clock() + budget_s
     for one in configurations:
         path = folder / f"{one.key}.json"
-        stored = read_result(path, one)
+        stored = read_result(path)
         left = None if end is None else end - clock()
         if stored is not None and stored.status in REPEATABLE:
-            yield stored, True
+            yield replace(stored, configuration=one), True
         elif one.refusal:
             yield RunResult(configuration=one, status="refused", message=one.refusal), False
         elif left is not None and one.cost > left:
@@ -178,30 +171,6 @@ def run_all(
             yield result, False
 
 
-def check_launchable(ranks: int, comm: Any = None) -> None:
-    """Check that processes can be launched.
-
-    Args:
-        ranks: Number of processes of one configuration.
-        comm: MPI communicator of this process, or None.
-
-    Raises:
-        InputError: Inside an MPI job, or when more than one rank is wanted and there is no
-            ``mpirun``.
-    """
-    if (comm is not None and comm.size > 1) or any(name in os.environ for name in MPI_JOB):
-        raise InputError(
-            "configurations run in processes of their own, which cannot be launched in an MPI job",
-            key="--ranks",
-            value=ranks,
-            allowed="patchlaw compare SCENE --ranks N, or compare(scene, ranks=N), without mpirun",
-        )
-    if ranks < 1:
-        raise InputError("is no number of processes", key="--ranks", value=ranks, allowed="≥ 1")
-    if ranks > 1 and shutil.which("mpirun") is None:
-        raise InputError("there is no mpirun", key="--ranks", value=ranks, allowed="1")
-
-
 def launch_process(
     configuration: Configuration, seconds: float | None, program: Sequence[str] = PROGRAM
 ) -> RunResult:
@@ -210,21 +179,20 @@ def launch_process(
     Args:
         configuration: The configuration.
         seconds: Wall time after which the process is ended [s]; None for any.
-        program: Words that start the program; it is given the names of two files, that of the
-            configuration and that of the result.
+        program: Words that start the program; it is given the name of a file with the
+            configuration, which it replaces by the result.
     """
     start, ranks = time.monotonic(), configuration.ranks
     mpirun = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
     with tempfile.TemporaryDirectory(prefix="patchlaw-compare-") as name:
-        request, answer, errors = (Path(name) / file for file in ("request", "result", "errors"))
-        request.write_text(json.dumps(asdict(configuration)), encoding="utf-8")
+        file, errors = Path(name) / "result", Path(name) / "errors"
+        write_result(file, RunResult(configuration=configuration, status="not started"))
         with errors.open("wb") as stream:
-            command = [*mpirun, *program, str(request), str(answer)]
-            code = _exit_code(command, stream, seconds)
+            code = _exit_code([*mpirun, *program, str(file)], stream, seconds)
         spent = time.monotonic() - start
-        result = read_result(answer, configuration)
+        result = read_result(file)
         text = errors.read_text(encoding="utf-8", errors="replace")
-    if code is not None and result is not None:
+    if code is not None and result is not None and result.status != "not started":
         return replace(result, start_s=result.start_s + spent)
     result = RunResult(configuration=configuration, status="failed", exit_code=code)
     if code is None:
@@ -241,16 +209,16 @@ def _exit_code(command: list[str], errors: BinaryIO, seconds: float | None) -> i
     The group ends with this function, however it ends. Signals that end this process are blocked
     until the new one is known, so that it cannot be left behind.
     """
+    # os.environ is without variables that MPI has set for this process
+    environment, process = os.environ | {"PATCHLAW_CACHE": "off"}, None
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
-    process = None
     try:
         process = subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=errors,
-            env=os.environ
-            | {"PATCHLAW_CACHE": "off"},  # without variables that MPI has set for this process
+            env=environment,
             start_new_session=True,
             preexec_fn=lambda: signal.pthread_sigmask(signal.SIG_SETMASK, mask),
         )

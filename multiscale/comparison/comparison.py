@@ -13,8 +13,7 @@ import numpy as np
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from multiscale.comparison import AGAINST
-from multiscale.comparison.catalogue import pressure_grid
-from multiscale.comparison.configuration import RunResult
+from multiscale.comparison.configuration import RunResult, pressure_grid
 from multiscale.comparison.errors import (
     ErrorBreakdown,
     ErrorCauses,
@@ -26,8 +25,6 @@ from multiscale.scene.scene import Scene
 
 BUSY = 0.7
 """A machine is called busy when the processes worked less than this share of their wall time."""
-
-_EDGES, _HEIGHTS = 1, 3  # places of what can be refined in `_fineness`
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +53,7 @@ class Row(RunResult):
         record = {
             "name": self.name,
             "kind": self.kind,
-            "model": one.model,
+            "model": self.model,
             "heights": _text(one.heights),
             "patches": _text(one.content["patches"]["grid"]),
             "cells": _text(cells),
@@ -180,35 +177,37 @@ def compared(scene: Scene, results: Sequence[RunResult], against: str | None = N
         results: The results of its configurations.
         against: Kind of the measure; the best kind where it was not reached, or by default.
     """
-    best = {kind: ranked(results, kind) for kind in AGAINST}
+    rows = [Row(**vars(one)) for one in results]
+    best = {kind: ranked(rows, kind) for kind in AGAINST}
     reached = [kind for kind in AGAINST if best[kind]]
     chosen = against if against in reached else next(iter(reached), None)
-    load_history = scene.loading.load_history
-    lengths = next((one.curves.patches.lengths for one in results if one.steps), (1.0, 1.0))
-    common: dict[str, Any] = {
-        "scene": scene.name,
-        "quantity": load_history.quantity,
-        "steps": load_history.count,
-        "grid": PatchGrid(grid=pressure_grid(scene), lengths=lengths),
-        "warnings": tuple(_warnings(results, against, chosen)),
-    }
+    loads = scene.loading.load_history
+    lengths = next((one.curves.patches.lengths for one in rows if one.steps), (1.0, 1.0))
+    found = Comparison(
+        scene=scene.name,
+        rows=tuple(rows),
+        quantity=loads.quantity,
+        steps=loads.count,
+        grid=PatchGrid(grid=pressure_grid(scene), lengths=lengths),
+        against=chosen,
+        warnings=tuple(_warnings(rows, against, chosen)),
+    )
     if chosen is None:
-        return Comparison(rows=tuple(Row(**vars(one)) for one in results), **common)
+        return found
     measure, tops = best[chosen][0], {AGAINST[kind]: best[kind][0] for kind in reached}
-    found = Comparison(rows=(), measure=measure.name, against=chosen, **common)
-    right, refined = measure.curves, refinements(best[chosen])
-    own = uncertainty(right, [(coarse.curves, fine.curves) for coarse, fine in refined], found.grid)
-    causes = ErrorCauses(results, tops, measure, found.response)
-    rows = []
-    for one in results:
-        errors = own if one is measure else error_measures(one.curves, right, found.grid)
-        rows.append(
-            Row(**vars(one), is_measure=one is measure, errors=errors, shares=causes.breakdown(one))
-        )
-    if not math.isfinite(getattr(own, f"{found.response}_max")):
-        exact = f"{measure.name} has no error bar of its own: it is taken as exact"
-        found = replace(found, warnings=(*found.warnings, exact))
-    return replace(found, rows=tuple(rows), uncertainty=own)
+    pairs = [(coarse.curves, fine.curves) for coarse, fine in refinements(best[chosen])]
+    own = uncertainty(measure.curves, pairs, found.grid)
+    causes = ErrorCauses(rows, tops, measure, found.response)
+    for index, row in enumerate(rows):
+        errors = error_measures(row.curves, measure.curves, found.grid)
+        rows[index] = replace(row, errors=errors, shares=causes.breakdown(row))
+        if row is measure:
+            rows[index] = replace(rows[index], errors=own, is_measure=True)
+    found = replace(found, rows=tuple(rows), measure=measure.name, uncertainty=own)
+    if math.isfinite(getattr(own, f"{found.response}_max")):
+        return found
+    exact = f"{measure.name} has no error bar of its own: it is taken as exact"
+    return replace(found, warnings=(*found.warnings, exact))
 
 
 def ranked(results: Sequence[RunResult], against: str) -> list[RunResult]:
@@ -220,14 +219,11 @@ def ranked(results: Sequence[RunResult], against: str) -> list[RunResult]:
         results: All results.
         against: Kind of the measure.
     """
+    ended = [one for one in results if one.kind == AGAINST[against] and one.status == "done"]
     fitting = [
         one
-        for one in results
-        if one.status == "done"
-        and one.steps
-        and one.kind == AGAINST[against]
-        and one.configuration.model in ("", "half-space")
-        and one.configuration.scale == 1.0
+        for one in ended
+        if one.steps and one.configuration.scale == 1.0 and one.model in ("", "half-space")
     ]
     found = sorted(fitting, key=_fineness, reverse=True)
     return [] if against == "reference" and found and _fineness(found[0])[0] < 2 else found
@@ -240,12 +236,8 @@ def _fineness(result: RunResult) -> tuple[float, ...]:
     """
     one = result.configuration
     reference = one.content["reference"] if one.kind == "reference" else {}
-    return (
-        reference.get("meshes", 0),
-        -reference.get("fine", 0.0),
-        result.finite_slopes,
-        math.prod(one.heights),
-    )
+    meshes, edges = reference.get("meshes", 0), reference.get("fine", 0.0)
+    return meshes, -edges, result.finite_slopes, math.prod(one.heights)
 
 
 def refinements(best_first: Sequence[RunResult]) -> Iterator[tuple[RunResult, RunResult]]:
@@ -259,7 +251,7 @@ def refinements(best_first: Sequence[RunResult]) -> Iterator[tuple[RunResult, Ru
     Yields:
         The coarser and the finer result.
     """
-    for refined in (_EDGES, _HEIGHTS):
+    for refined in (1, 3):  # places of edges and heights in `_fineness`
         for fine, coarse in combinations(best_first, 2):
             pairs = enumerate(zip(_fineness(fine), _fineness(coarse), strict=True))
             if [place for place, (one, other) in pairs if one != other] == [refined]:
@@ -267,15 +259,13 @@ def refinements(best_first: Sequence[RunResult]) -> Iterator[tuple[RunResult, Ru
                 break
 
 
-def _warnings(
-    results: Sequence[RunResult], against: str | None, chosen: str | None
-) -> Iterator[str]:
-    if against is not None and chosen != against:
+def _warnings(rows: Sequence[Row], against: str | None, chosen: str | None) -> Iterator[str]:
+    if against not in (None, chosen):
         instead = f"compared against the {chosen} instead" if chosen else "nothing to compare with"
         yield f"no configuration of kind {against} was reached: {instead}"
-    timed = [one for one in results if one.phases]
-    wall = sum(one.configuration.ranks * one.seconds for one in timed)
-    cpu = sum(one.cpu_s for one in timed)
+    timed = [row for row in rows if row.phases]
+    wall = sum(row.configuration.ranks * row.seconds for row in timed)
+    cpu = sum(row.cpu_s for row in timed)
     if cpu < BUSY * wall:
         yield (
             f"the processes worked {cpu:.3g} s in {wall:.3g} s of their wall time: the machine was "

@@ -182,6 +182,11 @@ class RunResult:
         return self.configuration.kind
 
     @property
+    def model(self) -> str:
+        """Micro model of the configuration; empty for an explicit reference."""
+        return self.configuration.model
+
+    @property
     def seconds(self) -> float:
         """Wall time of all phases [s]; NaN where none was begun."""
         return sum(self.phases.values()) if self.phases else float("nan")
@@ -214,18 +219,17 @@ def write_result(path: Path, result: RunResult) -> Path:
     return write_bytes(path, _checksum(content).encode() + b"\n" + content)
 
 
-def read_result(path: Path, configuration: Configuration) -> RunResult | None:
+def read_result(path: Path) -> RunResult | None:
     """Read the result of a configuration; None when the file is missing or damaged.
 
     Args:
         path: The file.
-        configuration: The configuration that it is the result of.
     """
     try:
         checksum, _, content = path.read_bytes().partition(b"\n")
         if checksum.decode() != _checksum(content):
             return None
-        return replace(_RESULTS.validate_json(content), configuration=configuration)
+        return _RESULTS.validate_json(content)
     except (OSError, ValueError, PatchlawError):
         return None
 

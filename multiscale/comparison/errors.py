@@ -241,7 +241,7 @@ class ErrorCauses:
             for one in (result, alone, best.get("analytic"), best.get("concurrent"))
         )
         shares = dict.fromkeys(("micro", "coupling", "block"), 0.0)
-        if result.configuration.model not in ("", "half-space"):
+        if result.model not in ("", "half-space"):
             shares["micro"] = model - half_space
         if result.kind in ("isolated", "consistent"):
             shares["coupling"] = mine - concurrent - (model - half_space)

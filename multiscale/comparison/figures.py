@@ -33,9 +33,12 @@ LEAST_SHARE = 0.2
 NUMBER_SIZE = (14.0, 10.0)
 """Width and height that a number takes [pt]."""
 
-_RING: dict[str, Any] = {"mec": "0.1", "mew": 1.4, "ms": 10.0, "zorder": 5}
-_BEATEN: dict[str, Any] = {"mew": 0.0, "alpha": PALE, "ms": 7.0}
-_EARLY: dict[str, Any] = {"mfc": "none", "alpha": PALE, "ms": 7.0}
+_PLAIN: dict[str, Any] = {"ms": 7.0, "zorder": 4, "ls": "none"}
+_RING = _PLAIN | {"mec": "0.1", "mew": 1.4, "ms": 10.0, "zorder": 5}
+_BEATEN = _PLAIN | {"mew": 0.0, "alpha": PALE, "zorder": 3}
+_EARLY = _PLAIN | {"mfc": "none", "alpha": PALE, "zorder": 3}
+_NUMBER: dict[str, Any] = {"fontsize": 9, "fontweight": "bold", "color": "0.1", "zorder": 6}
+_NUMBER |= {"ha": "center", "va": "center"}
 
 
 def pareto_figure(comparison: Comparison) -> Figure:
@@ -61,12 +64,10 @@ def pareto_figure(comparison: Comparison) -> Figure:
         axes.set_title(title, fontsize=10.5)
     panels[0].set_ylabel("relative to the measure")
     _draw_legend(below, comparison)
-    ahead = [row for error in titles for row in comparison.frontier(error)]
-    names = [
-        f"{number}: {row.name}"
-        for number, row in enumerate(comparison.rows, 1)
-        if row in ahead or row.is_measure
-    ]
+    ahead = {row.name for error in titles for row in comparison.frontier(error)}
+    ahead.add(str(comparison.measure))
+    rows = enumerate(comparison.rows, 1)
+    names = [f"{number}: {row.name}" for number, row in rows if row.name in ahead]
     lines = ["      ".join(names[first : first + 3]) for first in range(0, len(names), 3)]
     figure.supxlabel("\n".join(lines), fontsize=8.5)
     # Numbers are placed beside the points, whose places are known once the figure is laid out.
@@ -77,34 +78,32 @@ def pareto_figure(comparison: Comparison) -> Figure:
     return figure
 
 
-def _point(comparison: Comparison, row: Row, error: str) -> tuple[float, float]:
-    """Return time and error of a row as they are drawn; NaN where one is unknown."""
+def _points(comparison: Comparison, error: str) -> list[tuple[float, float, int, Row]]:
+    """Return time, error as it is drawn, number and row of all configurations that have both."""
     least = max(LEAST_ERROR, np.nan_to_num(LEAST_SHARE * getattr(comparison.uncertainty, error)))
-    # The error of the measure is its own uncertainty.
-    return row.seconds, float(np.maximum(abs(getattr(row.errors, error)), least))
+    points = [
+        # The error of the measure is its own uncertainty.
+        (row.seconds, float(np.maximum(abs(getattr(row.errors, error)), least)), number, row)
+        for number, row in enumerate(comparison.rows, 1)
+    ]
+    return [point for point in points if np.isfinite(point[:2]).all()]
 
 
 def _draw_errors(axes: Any, comparison: Comparison, error: str) -> None:
     """Draw one panel of errors over time without its numbers."""
     frontier, bar = comparison.frontier(error), getattr(comparison.uncertainty, error)
-    for row in comparison.rows:
-        look: dict[str, Any] = {"ms": 7.0, "zorder": 4}
-        if row.is_measure:
-            look = _RING
-        elif row.status != "done":
-            look = _EARLY
-        elif row not in frontier:
-            look = _BEATEN
-        axes.plot(
-            *_point(comparison, row, error), MARKERS[row.kind], color=COLOURS[row.kind], **look
-        )
+    for seconds, size, _, row in _points(comparison, error):
+        look = _PLAIN if row in frontier else _BEATEN
+        if row.is_measure or row.status != "done":
+            look = _RING if row.is_measure else _EARLY
+        axes.plot(seconds, size, MARKERS[row.kind], color=COLOURS[row.kind], **look)
     axes.set(xscale="log", yscale="log", xlabel="wall time [s]")
     axes.margins(0.1)
     axes.grid(alpha=0.25, which="major")
+    axes.autoscale_view()
+    axes.autoscale(False)
     if np.isfinite(bar) and bar > 0.0:
-        limits = axes.get_ylim()
-        axes.axhspan(1e-3 * limits[0], bar, **ERROR_BAND)
-        axes.set_ylim(limits)
+        axes.axhspan(1e-3 * axes.get_ylim()[0], bar, **ERROR_BAND)
     if frontier:
         times = [*(row.seconds for row in frontier), axes.get_xlim()[1]]
         steps = [max(comparison.error(row, error), LEAST_ERROR) for row in frontier]
@@ -112,40 +111,34 @@ def _draw_errors(axes: Any, comparison: Comparison, error: str) -> None:
 
 
 def _draw_numbers(axes: Any, comparison: Comparison, error: str) -> None:
-    """Write the numbers of the frontier and of the measure.
+    """Write the numbers of the frontier and of the measure, from the fastest on.
 
     Below and to the left of a point on the frontier there is no other configuration.
     """
     frontier, placed = comparison.frontier(error), np.empty((0, 2))
-    for number, row in enumerate(comparison.rows, 1):
-        point = _point(comparison, row, error)
-        if not (row in frontier or row.is_measure) or not np.isfinite(point).all():
+    for *point, number, row in sorted(_points(comparison, error), key=lambda point: point[0]):
+        if row not in frontier and not row.is_measure:
             continue
         mark = 72.0 / axes.figure.dpi * axes.transData.transform(point)
         spot = mark - (10.0, 9.0)
         while (np.abs(placed - spot) < NUMBER_SIZE).all(axis=1).any():
             spot[1] -= NUMBER_SIZE[1]
         placed = np.vstack([placed, spot])
-        axes.annotate(
-            str(number), point, spot - mark, textcoords="offset points", ha="center", va="center",
-            fontsize=9, fontweight="bold", color="0.1", zorder=6,
-        )  # fmt: skip
+        axes.annotate(str(number), point, spot - mark, textcoords="offset points", **_NUMBER)
 
 
 def _draw_legend(axes: Any, comparison: Comparison) -> None:
-    shown = [kind for kind in MARKERS if any(row.kind == kind for row in comparison.rows)]
-    entries: list[tuple[str, str, dict[str, Any]]] = [
-        *((kind, MARKERS[kind], {"color": COLOURS[kind], "ms": 7.0}) for kind in shown),
-        ("measure, at its error bar", "o", {"mfc": "none"} | _RING),
-        ("pale: another one is faster and as close", "o", {"color": "0.1"} | _BEATEN),
-    ]
-    if any(row.steps and row.status != "done" for row in comparison.rows):
-        entries.append(("hollow: ended before the last load step", "s", {"mec": "0.1"} | _EARLY))
-    for label, mark, look in entries:
-        axes.plot([], [], mark, label=label, **look)
-    axes.plot([], [], "-", color="0.25", lw=1.2, label="frontier: numbered")
+    for kind, mark in MARKERS.items():
+        if any(row.kind == kind for row in comparison.rows):
+            axes.plot([], [], mark, color=COLOURS[kind], label=kind, **_PLAIN)
+    black: dict[str, Any] = {"color": "0.1"}
+    axes.plot([], [], "o", label="measure, at its error bar", **(black | _RING), mfc="none")
+    axes.plot([], [], "o", label="pale: another one is faster and as close", **black, **_BEATEN)
+    axes.plot([], [], "-", label="frontier: numbered", color="0.25", lw=1.2)
     lowest = f"within the error bar; least drawn: {LEAST_SHARE:g} of it"
     axes.fill_between([], [], [], label=lowest, **ERROR_BAND)
+    if any(row.steps and row.status != "done" for row in comparison.rows):
+        axes.plot([], [], "s", label="hollow: ended before the last load step", **black, **_EARLY)
     axes.legend(loc="center", ncol=4, frameon=False, fontsize=9.5)
 
 
@@ -178,13 +171,11 @@ def curves_figure(comparison: Comparison) -> Figure:
     measure = comparison[comparison.measure].curves if comparison.measure else None
     by_approach, response = comparison.quantity == "approach", comparison.response
     for index, row in enumerate(selected_rows(comparison)):
-        found, colour = row.curves, COLOURS[row.kind]
+        look: dict[str, Any] = {"color": COLOURS[row.kind], "marker": MARKERS[row.kind], "ms": 4.0}
+        look |= {"lw": 1.4, "ls": LINE_STYLES[index % len(LINE_STYLES)]}
         if row.is_measure or row.name.startswith(OWN):
-            colour = "0.1" if row.is_measure else "0.55"
-        style = "-" if row.is_measure else LINE_STYLES[index % len(LINE_STYLES)]
-        look: dict[str, Any] = {"color": colour, "ls": style, "marker": MARKERS[row.kind]}
-        look |= {"ms": 4.0, "lw": 1.4}
-        approach = 1e3 * found.approach
+            look["color"] = "0.1" if row.is_measure else "0.55"
+        found, approach = row.curves, 1e3 * row.curves.approach
         curves.plot(approach, found.force, label=row.name, **look)
         if measure is not None:
             common, right = min(row.steps, measure.force.size), getattr(measure, response)
@@ -201,9 +192,8 @@ def curves_figure(comparison: Comparison) -> Figure:
     )
     for axes in (curves, differences):
         axes.grid(alpha=0.3)
-    below.legend(
-        *curves.get_legend_handles_labels(), loc="center", ncol=2, frameon=False, fontsize=8.5
-    )
+    entries = curves.get_legend_handles_labels()
+    below.legend(*entries, loc="center", ncol=2, frameon=False, fontsize=8.5)
     return figure
 
 
@@ -214,25 +204,20 @@ def maps_figure(comparison: Comparison) -> Figure:
         comparison: The comparison.
     """
     closest = selected_rows(comparison, "pressure_l1", most=6)
-    pressures = {
-        row.name + " (measure)" * row.is_measure: on_grid(
-            row.curves.patch_pressure[-1], row.curves.patches, comparison.grid
-        )
-        for row in closest
-        if row.steps == comparison.steps
-    }
-    across = min(3, max(1, len(pressures)))
-    down = max(1, -(-len(pressures) // across))
-    figure = new_figure(3.9 * across + 0.8, 3.9 * down)
-    panels = figure.subplots(down, across, squeeze=False).ravel()
-    top = max((float(pressure.max()) for pressure in pressures.values()), default=1.0)
-    image = None
-    for axes, (title, pressure) in zip(panels, pressures.items(), strict=False):
+    shown = [row for row in closest if row.steps == comparison.steps]
+    pressures = [
+        on_grid(row.curves.patch_pressure[-1], row.curves.patches, comparison.grid) for row in shown
+    ]
+    down = 1 + (len(shown) > 3)
+    figure = new_figure(12.5, 3.9 * down)
+    panels = figure.subplots(down, 3, squeeze=False).ravel()
+    top = max((float(pressure.max()) for pressure in pressures), default=1.0)
+    for axes, row, pressure in zip(panels, shown, pressures, strict=False):
         image = draw_pressures(figure, axes, comparison.grid, pressure, top=top)
+        title = row.name + " (measure)" * row.is_measure
         axes.set_title(title.replace(", ", "\n", 1), fontsize=8.5)
-        axes.set(xlabel="", ylabel="", xticks=[], yticks=[])
-    for axes in panels[len(pressures) :]:
-        axes.set_visible(False)
-    if image is not None:
+    for axes in panels:
+        axes.axis("off")
+    if shown:
         figure.colorbar(image, ax=list(panels), label=PRESSURE_LABEL, shrink=0.8)
     return figure

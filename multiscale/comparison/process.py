@@ -1,8 +1,9 @@
-"""The program of the process that a configuration is run in."""
+"""The process that a configuration is run in: whether it can be launched, and its program."""
 
 from __future__ import annotations
 
-import json
+import os
+import shutil
 import sys
 import time
 from contextlib import suppress
@@ -13,13 +14,14 @@ from typing import Any
 import numpy as np
 
 from geometry.collective import on_root
-from geometry.errors import PatchlawError
+from geometry.errors import InputError, PatchlawError
 from multiscale.comparison.configuration import (
     Configuration,
     Curves,
     RunResult,
     Status,
     content_of,
+    read_result,
     write_result,
 )
 from multiscale.machine.mpi_job import world
@@ -31,26 +33,55 @@ from multiscale.scene.scene import Scene
 STATUS_OF_EXIT: dict[int, Status] = {0: "done", 2: "refused", 3: "not converged"}
 """Status by exit code of the process; every other exit code means ``failed``."""
 
+MPI_JOB = ("OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_SIZE", "PMI_RANK", "SLURM_STEP_TASKS_PER_NODE")
+"""Environment variables that exist inside an MPI job only."""
 
-def main(request: Path, answer: Path) -> int:
+
+def check_launchable(ranks: int, comm: Any = None) -> None:
+    """Check that processes can be launched.
+
+    Args:
+        ranks: Number of processes of one configuration.
+        comm: MPI communicator of this process, or None.
+
+    Raises:
+        InputError: Inside an MPI job, or when more than one rank is wanted and there is no
+            ``mpirun``.
+    """
+    if (comm is not None and comm.size > 1) or any(name in os.environ for name in MPI_JOB):
+        raise InputError(
+            "configurations run in processes of their own, which cannot be launched in an MPI job",
+            key="--ranks",
+            value=ranks,
+            allowed="patchlaw compare SCENE --ranks N, or compare(scene, ranks=N), without mpirun",
+        )
+    if ranks < 1:
+        raise InputError("is no number of processes", key="--ranks", value=ranks, allowed="≥ 1")
+    if ranks > 1 and shutil.which("mpirun") is None:
+        raise InputError("there is no mpirun", key="--ranks", value=ranks, allowed="1")
+
+
+def main(path: Path) -> int:
     """Run a configuration, and write its result.
 
     Args:
-        request: JSON file with the fields of the configuration.
-        answer: File for the result.
+        path: File of a result, of which only the configuration is read, and which is replaced.
 
     Returns:
-        0 done, 2 refused, 3 not converged.
+        0 done, 1 for a damaged file, 2 refused, 3 not converged.
 
     Note:
         Collective over all processes of the MPI job.
     """
-    configuration = Configuration(**json.loads(request.read_text(encoding="utf-8")))
+    request = read_result(path)
+    if request is None:
+        return 1
+    configuration = request.configuration
     # The micro model alone needs neither MPI nor finite elements.
     comm = None if configuration.kind == "analytic" else world()
     _warm_up(configuration.scene, comm)
     result = run_here(configuration, comm)
-    on_root(comm, lambda: write_result(answer, result))
+    on_root(comm, lambda: write_result(path, result))
     return result.exit_code or 0
 
 
@@ -153,4 +184,4 @@ def _curves(history: History, scale: float) -> Curves:
 
 
 if __name__ == "__main__":
-    sys.exit(main(*map(Path, sys.argv[1:])))
+    sys.exit(main(Path(sys.argv[1])))

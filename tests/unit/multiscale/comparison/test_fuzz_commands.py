@@ -38,9 +38,9 @@ def test_a_damaged_file_is_no_result(tmp_path):
     result = RunResult(configuration=one, status="done", start_s=0.25)
     path = write_result(tmp_path / "a.json", result)
     whole = path.read_text(encoding="utf-8")
-    assert read_result(path, one).start_s == 0.25
+    assert read_result(path).start_s == 0.25
     for damaged in (whole.replace("0.25", "0.35"), whole[:-9], "[" * 10**5, "{}", '"sha256"', ""):
         path.write_text(damaged, encoding="utf-8")
-        assert read_result(path, one) is None
+        assert read_result(path) is None
     path.write_text(whole.partition("\n")[2], encoding="utf-8")
-    assert read_result(path, one) is None
+    assert read_result(path) is None

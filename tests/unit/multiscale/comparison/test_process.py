@@ -10,9 +10,9 @@ import pytest
 
 from geometry.errors import InputError, NotConverged
 from multiscale.comparison.catalogue import configurations
-from multiscale.comparison.compare import check_launchable, launch_process, run_all
+from multiscale.comparison.compare import launch_process, run_all
 from multiscale.comparison.configuration import RunResult, read_result, write_result
-from multiscale.comparison.process import run_here
+from multiscale.comparison.process import check_launchable, run_here
 from multiscale.run import Run, run
 from multiscale.scene.scene import Scene
 
@@ -131,7 +131,7 @@ def test_torn_files_are_run_again(some, tmp_path):
 
 def test_result_survives_its_file(some, tmp_path):
     result = run_here(named(some, "analytic"))
-    again = read_result(write_result(tmp_path / "result.json", result), result.configuration)
+    again = read_result(write_result(tmp_path / "result.json", result))
     plain = {"curves": None, "start_s": 0.0}
     assert replace(again, **plain) == replace(result, **plain)
     assert again.curves.patches == result.curves.patches
