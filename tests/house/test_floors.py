@@ -57,7 +57,6 @@ FLOORS = {
         "output restart",
         "comparison",
         "cli",
-        "__main__",
     ],
 }
 HEAVY = {
