@@ -7,8 +7,13 @@ from petsc4py import PETSc
 
 from geometry import BlockShape
 from macro import Block, Material, block_mesh
-from macro.linear_solvers.constrained import TOLERANCE, ConstrainedSolver, contact_tolerance
-from macro.linear_solvers.constrained_preconditioner import ConstrainedPreconditioner, Projection
+from macro.linear_solvers.constrained import (
+    TOLERANCE,
+    ConstrainedPreconditioner,
+    ConstrainedSolver,
+    Projection,
+    contact_tolerance,
+)
 
 MATERIAL = Material(young_modulus=4e3, poisson_ratio=0.2)
 
