@@ -74,15 +74,15 @@ def _compiling() -> Iterator[None]:
 
 
 @quiet_compiler()
-def mesh_from_gmsh(model: Any, comm: Any) -> tuple[Any, Any]:
-    """Distribute the gmsh model of rank 0 as (mesh, facet tags).
+def mesh_from_gmsh(model: Any, comm: Any) -> Any:
+    """Distribute the gmsh model of rank 0.
 
     Args:
         model: ``gmsh.model`` on rank 0; ignored on other ranks.
         comm: MPI communicator.
 
     Note:
-        Collective. Facet tags may include ghost facets (dolfinx 0.5).
+        Collective. There are ghost cells in dolfinx 0.5, and none later.
     """
     with sigint_untouched():  # the import loads gmsh, which lattices do not need
         try:
@@ -90,7 +90,7 @@ def mesh_from_gmsh(model: Any, comm: Any) -> tuple[Any, Any]:
         except ImportError:
             from dolfinx.io import gmshio as reader
     data = reader.model_to_mesh(model, comm, 0, gdim=3)
-    return (data.mesh, data.facet_tags) if hasattr(data, "mesh") else (data[0], data[2])
+    return data.mesh if hasattr(data, "mesh") else data[0]
 
 
 @quiet_compiler()
