@@ -24,7 +24,7 @@ from macro.contact.initial_guess import ContactSolution
 from macro.contact.plane_over_nodes import PlaneOverNodes
 
 Array = NDArray[np.float64]
-Method = Literal["active-set", "augmented-lagrangian", "penalty"]
+Method = Literal["active-set", "augmented-lagrangian"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -84,18 +84,16 @@ class UnilateralContactProblem:
         reference_height: Height of the highest point of the top, from which the approach counts
             [mm].
         method: ``"active-set"``: no node of the top penetrates; ``"augmented-lagrangian"``: no
-            quadrature point of its facets does; ``"penalty"``: quadrature points penetrate in
-            proportion to their pressure.
+            quadrature point of its facets does.
         patches: Patches on the top, for forces and areas by patch; None: one of the whole top.
-        penalty: Pressure per penetration, for the last two methods [MPa/mm]; None: from the mesh.
 
     Attributes:
         top: Nodes of the top, of this rank.
         method: The method that finds the contact.
 
     Raises:
-        InputError: When there is no such method, the penalty is not positive, the block's top has
-            a margin, or a patch reaches beyond the top.
+        InputError: When there is no such method, the block's top has a margin, or a patch reaches
+            beyond the top.
 
     Note:
         Everything here is collective.
@@ -108,7 +106,6 @@ class UnilateralContactProblem:
         *,
         method: Method = "active-set",
         patches: PatchGrid | None = None,
-        penalty: float | None = None,
     ) -> None:
         if method not in get_args(Method):
             raise InputError(
@@ -116,8 +113,6 @@ class UnilateralContactProblem:
                 value=method,
                 allowed=", ".join(get_args(Method)),
             )
-        if penalty is not None and not 0.0 < penalty < np.inf:
-            raise InputError("the penalty must be positive", value=penalty, allowed="> 0 MPa/mm")
         lengths = block.mesh.shape.interface
         patches = patches or PatchGrid(grid=(1, 1), lengths=lengths)
         _check_top(block, patches)
@@ -125,12 +120,8 @@ class UnilateralContactProblem:
         self._plane = PlaneOverNodes(
             self.top.x, self.top.y, reference_height - self.top.height, lengths, block.mesh.comm
         )
-        self.method: PrimalDualActiveSet | AugmentedLagrangian
-        if method == "active-set":
-            self.method = PrimalDualActiveSet(block, self.top, self._plane)
-        else:
-            exact = method == "augmented-lagrangian"
-            self.method = AugmentedLagrangian(block, self.top, self._plane, penalty, exact=exact)
+        kind = PrimalDualActiveSet if method == "active-set" else AugmentedLagrangian
+        self.method: PrimalDualActiveSet | AugmentedLagrangian = kind(block, self.top, self._plane)
 
     def solve(self, control: Control) -> UnilateralContactState:
         """Find the contact of one load step, with an initial guess from the steps before.
