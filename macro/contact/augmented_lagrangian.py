@@ -22,7 +22,6 @@ from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from macro.block import Block
 from macro.contact.augmented_newton import LOOSEST, SPARE, AugmentedLaw, FacetNewton
-from macro.contact.contact_law import LawContact
 from macro.contact.equilibrium import Equilibrium
 from macro.contact.face_nodes import TopNodes
 from macro.contact.initial_guess import ContactSolution, Extrapolation, Guess
@@ -81,8 +80,7 @@ class AugmentedLagrangian:
         self._tolerance = contact_tolerance()
         self._penetration = PENETRATION[block.degree]
         self.law = AugmentedLaw(np.sum(points.values * distance[points.nodes], axis=1))
-        self._contact = LawContact(interface, sampling, [self.law])
-        self.equilibrium = Equilibrium(block, sampling, self._contact)
+        self.equilibrium = Equilibrium(interface, sampling, [self.law])
         self._newton = FacetNewton(self.equilibrium, self.law, interface, top, plane)
         self._history = Extrapolation(block.owned_dofs, len(points.x))
 
@@ -94,8 +92,8 @@ class AugmentedLagrangian:
                 stay what they were.
         """
         guess = self._history.guess(control)
-        contact, law = self._contact, self.law
-        contact.control, contact.plane = control, self._plane.placed(control, guess.plane)
+        equilibrium, law = self.equilibrium, self.law
+        equilibrium.control, equilibrium.plane = control, self._plane.placed(control, guess.plane)
         law.multiplier = np.maximum(guess.contact, 0.0)
         displacement = self._block.stiffness.createVecRight()
         displacement.array[:] = guess.displacement
@@ -124,7 +122,7 @@ class AugmentedLagrangian:
         raise not_found(control, "MULTIPLIERS", _MOST_UPDATES)
 
     def _converged(self, displacement: PETSc.Vec, steps: int, spent: int) -> ContactSolution:
-        closure, plane = self.equilibrium.closure(displacement), self._contact.plane.copy()
+        closure, plane = self.equilibrium.closure(displacement), self.equilibrium.plane.copy()
         pressure, load = self.law.pressure(closure), displacement.duplicate()
         samples = self._sampling.operator.createVecRight()
         samples.array[:] = pressure

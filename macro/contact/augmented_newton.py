@@ -142,7 +142,7 @@ class FacetNewton:
         points = self._interface.quadrature
         rows, columns = np.nonzero((np.abs(points.values) > _ON) & (slope > 0.0)[:, None])
         loaded = self._top.sum_of_ranks(points.nodes[rows, columns], np.ones(len(rows))) > 0.0
-        free = self._equilibrium.contact.control.free
+        free = self._equilibrium.control.free
         motions = self._plane.levers.scaled(free)[loaded]
         motions = motions @ self._plane.supported_motions(free, loaded)
         self._preconditioner.update(slope / points.weight, self._top.dofs[loaded], motions)

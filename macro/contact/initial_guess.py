@@ -3,7 +3,7 @@
 Two kinds of guesses are needed. A rough top has no smooth energy in a basis of earlier solutions,
 and its guess is extrapolated. Laws on patches have one, and minimising it takes fewer linear
 iterations: over eight load steps extrapolation took 1.8 to 3.2 times as many with 4 patches and one
-closure for each, and 3 to 18 % more with 16 and 64 patches or laws at points.
+closure for each, and 3 to 24 % more with 16 and 64 patches or laws at points.
 
 Theory: sections 11 and 12 of ``demos/theory.md``.
 """
@@ -186,13 +186,13 @@ class DisplacementBasis:
 
     def _projected(self, y: Array) -> tuple[Array, Array]:
         """Return the equilibrium's residual and tangent in the basis."""
-        contact, weight, columns = self._equilibrium.contact, self._sampling.weight, self._sampled
-        closure = contact.closure((y @ columns) / weight)
-        pressure, stiffness = contact.pressure(closure), contact.stiffness(closure)
+        equations, weight, columns = self._equilibrium, self._sampling.weight, self._sampled
+        closure = equations.closure_of((y @ columns) / weight)
+        pressure, stiffness = equations.pressure(closure), equations.stiffness(closure)
         parts = np.vstack([
             -columns @ pressure,
             (columns * (stiffness / weight)) @ columns.T,
-            (columns @ contact.border(stiffness)).T,
+            (columns @ equations.border(stiffness)).T,
         ])  # fmt: skip
         parts = self._sum(parts)
         stiff, border = parts[1 : len(y) + 1], parts[len(y) + 1 :]

@@ -17,7 +17,6 @@ from geometry.errors import InputError
 from geometry.rigid_plane import Control
 from macro import compat
 from macro.block import Block
-from macro.contact.contact_law import LawContact
 from macro.contact.equilibrium import Equilibrium
 from macro.contact.initial_guess import DisplacementBasis
 from macro.contact.law_interface import ContactLaw, Interface, Mode
@@ -97,8 +96,7 @@ class LawContactProblem:
                 "every patch needs a law", value=len(laws), allowed=f"{interface.patches.count}"
             )
         self._interface, self._sampling = interface, interface.sampling(mode)
-        contact = LawContact(interface, self._sampling, laws)
-        self.equilibrium = Equilibrium(block, self._sampling, contact)
+        self.equilibrium = Equilibrium(interface, self._sampling, laws)
         self.newton = NewtonSolver(self.equilibrium, block.solver)
         self.basis = DisplacementBasis(self.equilibrium, self._sampling)
         self._plane: Array = np.zeros(3)
@@ -118,7 +116,7 @@ class LawContactProblem:
                 solutions stay what they were, so that a smaller step can be tried.
         """
         equilibrium = self.equilibrium
-        equilibrium.contact.prescribe(control, self._plane)
+        equilibrium.prescribe(control, self._plane)
         solution = equilibrium.block.stiffness.createVecRight()
         self.basis.write_guess(solution)
         report = self.newton.solve(
@@ -166,11 +164,11 @@ class LawContactProblem:
         return sampling.patch_sums(values) / self._interface.areas
 
     def _state(self, solution: PETSc.Vec, report: NewtonReport) -> LawContactState:
-        contact, sampling = self.equilibrium.contact, self._sampling
-        self._closure = closure = self.equilibrium.closure(solution)
-        self._plane = plane = contact.plane.copy()
-        pressure = contact.pressure(closure)
-        forces, load = sampling.patch_sums(pressure), contact.loads(pressure)
+        equilibrium, sampling = self.equilibrium, self._sampling
+        self._closure = closure = equilibrium.closure(solution)
+        self._plane = plane = equilibrium.plane.copy()
+        pressure = equilibrium.pressure(closure)
+        forces, load = sampling.patch_sums(pressure), equilibrium.loads(pressure)
         areas = self._interface.areas
         return LawContactState(
             approach=float(plane[0]),
@@ -180,7 +178,7 @@ class LawContactProblem:
             pressure=forces / areas,
             force=float(forces.sum()),
             moment=load[1:],
-            reaction=self.equilibrium.block.reaction(solution),
+            reaction=equilibrium.block.reaction(solution),
             newton_iterations=report.iterations,
             linear_iterations=report.linear_iterations,
             residuals=report.residuals,
