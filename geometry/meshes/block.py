@@ -131,35 +131,20 @@ class BlockShape:
         return np.concatenate([before.ticks[:-1], inner, after.ticks[1:]])
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Alignment:
-    """Whether the borders of patches lie on borders of elements.
-
-    Args:
-        x: Whether they do along x.
-        y: Whether they do along y.
-        sentence: What that means, for people.
-    """
-
-    x: bool
-    y: bool
-    sentence: str
-
-    def __bool__(self) -> bool:
-        return self.x and self.y
-
-
-def alignment(shape: BlockShape, patches: PatchGrid) -> Alignment:
-    """Find out whether patch borders lie on element borders, and say so.
+def misalignment(shape: BlockShape, patches: PatchGrid) -> str:
+    """Say where the borders of patches cut elements.
 
     Args:
         shape: The block.
         patches: Patches on its interface.
 
+    Returns:
+        A sentence; empty where all borders of patches lie on borders of elements.
+
     Raises:
         InputError: When a patch reaches beyond the interface.
     """
-    fits, parts = [], []
+    parts = []
     for axis, borders in enumerate((patches.borders_x, patches.borders_y)):
         length, cells, letter = shape.interface[axis], shape.cells[axis], "xy"[axis]
         if borders[0] < -1e-9 * length or borders[-1] > (1.0 + 1e-9) * length:
@@ -169,16 +154,14 @@ def alignment(shape: BlockShape, patches: PatchGrid) -> Alignment:
                 allowed=f"0 … {length} mm",
             )
         position = borders / length * cells
-        fits.append(bool(np.allclose(position, np.round(position), rtol=0.0, atol=1e-6)))
-        if not fits[-1]:
+        if not np.allclose(position, np.round(position), rtol=0.0, atol=1e-6):
             parts.append(f"{letter} ({patches.grid[axis]} patches on {cells} cells)")
     if not parts:
-        return Alignment(x=True, y=True, sentence="patch borders lie on element borders")
-    sentence = (
+        return ""
+    return (
         f"patch borders cut elements along {' and '.join(parts)}; "
         "a multiple of the number of patches would align them"
     )
-    return Alignment(x=fits[0], y=fits[1], sentence=sentence)
 
 
 def _require_at_least(what: str, value: float, least: float, *, strict: bool = False) -> None:

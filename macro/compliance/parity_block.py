@@ -21,7 +21,7 @@ from scipy.sparse import bmat, csr_matrix, kron
 from geometry.materials import Material
 from macro.block import Sides
 from macro.compliance.elements import Line
-from macro.linear_solvers.direct import set_up
+from macro.linear_solvers.options import set_up
 
 Array = NDArray[np.float64]
 Parity = tuple[int, int]

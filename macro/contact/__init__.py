@@ -7,5 +7,5 @@
       └ PrimalDualActiveSet     at its nodes                                 `active_set`
       └ AugmentedLagrangian     at its quadrature points                     `augmented_lagrangian`
 
-`face_nodes` and `facet_area` read results off the top, `initial_guess` starts load steps.
+`face_nodes` and `facet_area` read results off the top.
 """

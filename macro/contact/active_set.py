@@ -29,8 +29,13 @@ from petsc4py import PETSc
 from geometry.rigid_plane import Control
 from macro.block import Block
 from macro.contact.face_nodes import TopNodes
-from macro.contact.initial_guess import ContactSolution, Extrapolation, Guess
-from macro.contact.plane_over_nodes import PlaneOverNodes, not_found
+from macro.contact.node_contact import (
+    ContactSolution,
+    Extrapolation,
+    Guess,
+    PlaneOverNodes,
+    not_found,
+)
 from macro.linear_solvers.constrained import ConstrainedSolver, contact_tolerance
 
 Array = NDArray[np.float64]

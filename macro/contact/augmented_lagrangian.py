@@ -24,9 +24,14 @@ from macro.block import Block
 from macro.contact.augmented_newton import LOOSEST, SPARE, AugmentedLaw, FacetNewton
 from macro.contact.equilibrium import Equilibrium
 from macro.contact.face_nodes import TopNodes
-from macro.contact.initial_guess import ContactSolution, Extrapolation, Guess
 from macro.contact.law_interface import Interface
-from macro.contact.plane_over_nodes import PlaneOverNodes, not_found
+from macro.contact.node_contact import (
+    ContactSolution,
+    Extrapolation,
+    Guess,
+    PlaneOverNodes,
+    not_found,
+)
 from macro.linear_solvers.constrained import contact_tolerance
 
 Array = NDArray[np.float64]

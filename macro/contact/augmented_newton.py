@@ -19,10 +19,10 @@ from macro import compat
 from macro.contact.equilibrium import Equilibrium
 from macro.contact.face_nodes import TopNodes
 from macro.contact.law_interface import Interface
-from macro.contact.plane_over_nodes import PlaneOverNodes, not_found
+from macro.contact.node_contact import PlaneOverNodes, not_found
 from macro.linear_solvers.constrained import ConstrainedPreconditioner, Projection
+from macro.linear_solvers.node_matrices import node_submatrix
 from macro.linear_solvers.options import WeakContext, reason_name
-from macro.linear_solvers.submatrices import node_submatrix
 
 Array = NDArray[np.float64]
 

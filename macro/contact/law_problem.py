@@ -18,9 +18,8 @@ from geometry.rigid_plane import Control
 from macro import compat
 from macro.block import Block
 from macro.contact.equilibrium import Equilibrium
-from macro.contact.initial_guess import DisplacementBasis
 from macro.contact.law_interface import ContactLaw, Interface, Mode
-from macro.contact.newton import NewtonReport, NewtonSolver
+from macro.contact.newton import DisplacementBasis, NewtonReport, NewtonSolver
 
 Array = NDArray[np.float64]
 
@@ -119,9 +118,7 @@ class LawContactProblem:
         equilibrium.prescribe(control, self._plane)
         solution = equilibrium.block.stiffness.createVecRight()
         self.basis.write_guess(solution)
-        report = self.newton.solve(
-            solution, what=f"the block at {control}", remedy="take more load steps (load.steps)"
-        )
+        report = self.newton.solve(solution, control)
         self.basis.add(solution)
         state = self._state(solution, report)
         compat.collect_garbage(solution.comm)

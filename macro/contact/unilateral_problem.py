@@ -20,8 +20,7 @@ from macro.block import Block
 from macro.contact.active_set import PrimalDualActiveSet
 from macro.contact.augmented_lagrangian import AugmentedLagrangian
 from macro.contact.face_nodes import TopNodes
-from macro.contact.initial_guess import ContactSolution
-from macro.contact.plane_over_nodes import PlaneOverNodes
+from macro.contact.node_contact import ContactSolution, PlaneOverNodes
 
 Array = NDArray[np.float64]
 Method = Literal["active-set", "augmented-lagrangian"]

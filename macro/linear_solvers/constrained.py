@@ -14,8 +14,8 @@ from petsc4py import PETSc
 from scipy.sparse import csr_array
 
 from geometry.errors import NotConverged
+from macro.linear_solvers.node_matrices import coupled_nodes, dofs_of, node_submatrix
 from macro.linear_solvers.options import PREFIX, WeakContext, reason_name
-from macro.linear_solvers.submatrices import coupled_nodes, dofs_of, node_submatrix
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

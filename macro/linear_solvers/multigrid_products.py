@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
 
-from macro.linear_solvers.submatrices import coupled_nodes, dofs_of, node_submatrix
+from macro.linear_solvers.node_matrices import coupled_nodes, dofs_of, node_submatrix
 
 Indices = NDArray[np.intp]
 

@@ -26,10 +26,9 @@ from petsc4py import PETSc
 from geometry.materials import Material
 from geometry.meshes.block import BlockShape
 from geometry.meshes.refined_block import RefinedShape
-from macro.linear_solvers.direct import DIRECT_DEFAULTS
 from macro.linear_solvers.multigrid import Lattice, coarser_grids
 from macro.linear_solvers.multigrid_degrees import QUADRATIC_DEFAULTS, vertex_grid
-from macro.linear_solvers.options import PREFIX, CoarserGrid, linear_solver
+from macro.linear_solvers.options import DIRECT_DEFAULTS, PREFIX, CoarserGrid, linear_solver
 
 COMPRESSIBLE = 0.45
 """Largest Poisson's ratio at which multigrid is used without a lattice."""

@@ -9,7 +9,7 @@ from geometry import BlockShape
 from macro import Block, Material, block_mesh
 from macro.linear_solvers.multigrid import coarser_grids, lattice_of, transfers
 from macro.linear_solvers.multigrid_products import galerkin
-from macro.linear_solvers.submatrices import dofs_of, node_submatrix
+from macro.linear_solvers.node_matrices import dofs_of, node_submatrix
 
 
 def make(sides="free", **changes):
