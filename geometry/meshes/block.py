@@ -131,6 +131,26 @@ class BlockShape:
         return np.concatenate([before.ticks[:-1], inner, after.ticks[1:]])
 
 
+def require_inside(interface: tuple[float, float], patches: PatchGrid) -> None:
+    """Refuse patches that reach beyond a contact interface.
+
+    Args:
+        interface: Sides (Lx, Ly) of the interface, which begins at the origin [mm].
+        patches: The patches.
+
+    Raises:
+        InputError: When they do.
+    """
+    low, high = np.array(patches.origin), np.array(patches.origin) + patches.lengths
+    slack = 1e-9 * np.array(interface)
+    if np.any(low < -slack) or np.any(high > interface + slack):
+        raise InputError(
+            "the patches reach beyond the top of the block",
+            value=(patches.origin, patches.lengths),
+            allowed=f"inside the interface {interface} mm",
+        )
+
+
 def misalignment(shape: BlockShape, patches: PatchGrid) -> str:
     """Say where the borders of patches cut elements.
 
@@ -144,16 +164,11 @@ def misalignment(shape: BlockShape, patches: PatchGrid) -> str:
     Raises:
         InputError: When a patch reaches beyond the interface.
     """
+    require_inside(shape.interface, patches)
     parts = []
     for axis, borders in enumerate((patches.borders_x, patches.borders_y)):
-        length, cells, letter = shape.interface[axis], shape.cells[axis], "xy"[axis]
-        if borders[0] < -1e-9 * length or borders[-1] > (1.0 + 1e-9) * length:
-            raise InputError(
-                f"the patches reach beyond the interface along {letter}",
-                value=(float(borders[0]), float(borders[-1])),
-                allowed=f"0 … {length} mm",
-            )
-        position = borders / length * cells
+        cells, letter = shape.cells[axis], "xy"[axis]
+        position = borders / shape.interface[axis] * cells
         if not np.allclose(position, np.round(position), rtol=0.0, atol=1e-6):
             parts.append(f"{letter} ({patches.grid[axis]} patches on {cells} cells)")
     if not parts:

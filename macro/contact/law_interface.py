@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.errors import InputError
+from geometry.meshes.block import require_inside
 from geometry.patches import PatchGrid
 from macro import compat
 from macro.block import Block
@@ -109,12 +110,7 @@ class Interface:
     degree: int | None = None
 
     def __post_init__(self) -> None:
-        if not np.allclose(self.areas, self.patches.area, rtol=1e-6, atol=0.0):
-            raise InputError(
-                "the patches reach beyond the top of the block",
-                value=(self.patches.origin, self.patches.lengths),
-                allowed=f"inside the interface {self.block.mesh.shape.interface} mm",
-            )
+        require_inside(self.block.mesh.shape.interface, self.patches)
 
     @cached_property
     def quadrature(self) -> FacetQuadrature:

@@ -13,6 +13,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from geometry.errors import InputError
+from geometry.meshes.block import require_inside
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from macro import compat
@@ -114,7 +115,13 @@ class UnilateralContactProblem:
             )
         lengths = block.mesh.shape.interface
         patches = patches or PatchGrid(grid=(1, 1), lengths=lengths)
-        _check_top(block, patches)
+        require_inside(lengths, patches)
+        if block.mesh.shape.margin:
+            raise InputError(
+                "the plane presses on the whole top, which has no margin",
+                value=block.mesh.shape.margin,
+                allowed="0 mm",
+            )
         self.block, self.top = block, TopNodes(block, patches)
         self._plane = PlaneOverNodes(
             self.top.x, self.top.y, reference_height - self.top.height, lengths, block.mesh.comm
@@ -139,26 +146,6 @@ class UnilateralContactProblem:
         state = _state(self.block, self.top, self._plane, self.method.solve(control))
         compat.collect_garbage(self.block.stiffness.comm)
         return state
-
-
-def _check_top(block: Block, patches: PatchGrid) -> None:
-    """Refuse a top with a margin, and patches that reach beyond it."""
-    shape = block.mesh.shape
-    if shape.margin:
-        raise InputError(
-            "the plane presses on the whole top, which has no margin",
-            value=shape.margin,
-            allowed="0 mm",
-        )
-    sides = np.array(shape.interface)
-    low, high = np.array(patches.origin), np.array(patches.origin) + patches.lengths
-    slack = 1e-9 * sides
-    if np.any(low < -slack) or np.any(high > sides + slack):
-        raise InputError(
-            "the patches reach beyond the top of the block",
-            value=(patches.origin, patches.lengths),
-            allowed=f"inside the interface {shape.interface} mm",
-        )
 
 
 def _state(

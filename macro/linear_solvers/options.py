@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -112,37 +112,34 @@ class CoarserGrid:
 
 def linear_solver(
     matrix: PETSc.Mat,
-    prefix: str = PREFIX,
-    coarser: Callable[[], Sequence[CoarserGrid]] | None = None,
+    coarser: Sequence[CoarserGrid] | None = None,
     preconditioner: Mapping[str, object] | None = None,
+    *,
+    prefix: str = PREFIX,
 ) -> PETSc.KSP:
     """Return a solver for a symmetric positive definite matrix, its preconditioner set up.
 
     Args:
         matrix: The matrix, with its near-nullspace attached.
-        prefix: Prefix of its PETSc options.
-        coarser: Makes the coarser grids of a multigrid, finest first. It is called unless the user
-            chooses another preconditioner.
+        coarser: Coarser grids of a geometric multigrid, finest first; None for another
+            preconditioner.
         preconditioner: Options of the preconditioner, which override the defaults here.
+        prefix: Prefix of its PETSc options.
 
     Note:
         Collective.
     """
     solver = PETSc.KSP().create(matrix.comm)
     solver.setOptionsPrefix(prefix)
-    geometric = coarser is not None and PETSc.Options(prefix).getString("pc_type", "mg") == "mg"
-    if coarser is not None and geometric:
-        solver.setOperators(matrix)
-        grids = coarser()
+    solver.setOperators(matrix, _pointwise(matrix) if coarser is None else matrix)
+    if coarser is not None:
         solver.pc.setType("mg")
-        solver.pc.setMGLevels(len(grids) + 1)
-        for level, grid in enumerate(reversed(grids)):
+        solver.pc.setMGLevels(len(coarser) + 1)
+        for level, grid in enumerate(reversed(coarser)):
             solver.pc.setMGInterpolation(level + 1, grid.interpolation)
             solver.pc.getMGSmoother(level).setOperators(grid.matrix)
-    else:
-        solver.setOperators(matrix, _pointwise(matrix))
     one_rank = {"mg_coarse_pc_telescope_reduction_factor": matrix.comm.size}
-    usual = {**GEOMETRIC_DEFAULTS, **one_rank} if geometric else ALGEBRAIC_DEFAULTS
+    usual = ALGEBRAIC_DEFAULTS if coarser is None else {**GEOMETRIC_DEFAULTS, **one_rank}
     with default_options(prefix, {**KRYLOV_DEFAULTS, **usual, **(preconditioner or {})}):
         solver.setFromOptions()
         set_up(solver)  # multigrid reads the options of its levels here

@@ -130,5 +130,5 @@ def test_alignment_of_a_single_patch():
     whole = PatchGrid(grid=(4, 4), lengths=(1.0, 2.0))
     shape = BlockShape(**SHAPE)
     assert "along y (" in misalignment(shape, whole.single(0))
-    with pytest.raises(InputError, match="patches reach beyond the interface along x"):
+    with pytest.raises(InputError, match="patches reach beyond the top of the block"):
         misalignment(shape, PatchGrid(grid=(1, 1), lengths=(1.1, 2.0)))
