@@ -30,6 +30,7 @@ from macro.contact.node_contact import (
     Extrapolation,
     Guess,
     PlaneOverNodes,
+    largest,
     not_found,
 )
 from macro.linear_solvers.constrained import contact_tolerance
@@ -102,6 +103,7 @@ class AugmentedLagrangian:
         law.multiplier = np.maximum(guess.contact, 0.0)
         displacement = self._block.stiffness.createVecRight()
         displacement.array[:] = guess.displacement
+        comm = self._block.mesh.comm
         steps, spent, tolerance, before = 0, 0, LOOSEST, np.inf
         law.slope, hardest = self._soft, self._stiff
         for _ in range(_MOST_UPDATES):
@@ -109,11 +111,11 @@ class AugmentedLagrangian:
             steps, spent = steps + more, spent + cycles
             closure = self.equilibrium.closure(displacement)
             # penetration of points without pressure, penetration or gap of points under pressure
-            depth = self._largest((law.pressure(closure) - law.multiplier) / law.slope)
-            allowed = self._penetration * self._largest(displacement.array_r)
+            depth = largest((law.pressure(closure) - law.multiplier) / law.slope, comm)
+            allowed = self._penetration * largest(displacement.array_r, comm)
             ratio = depth / max(allowed, _TINY)
             hard = bool(np.all(law.slope >= self._stiff))
-            hard = bool(self._block.mesh.comm.allreduce(hard, op=MPI.LAND))
+            hard = bool(comm.allreduce(hard, op=MPI.LAND))
             if hard and tolerance <= self._tolerance and ratio <= 1.0:
                 return self._converged(displacement, steps, spent)
             law.multiplier = law.pressure(closure)
@@ -134,10 +136,11 @@ class AugmentedLagrangian:
         self._sampling.operator.mult(samples, load)
         nodal_force = -load.array_r[self._top.dofs]
         gap = -self._plane.penetration(plane, -displacement.array_r[self._top.dofs])
-        largest = self._largest(nodal_force)
-        touching = nodal_force > _NO_FORCE * largest
-        if largest:
-            touching |= gap < self._penetration * self._largest(displacement.array_r)
+        comm = self._block.mesh.comm
+        pressed = largest(nodal_force, comm)
+        touching = nodal_force > _NO_FORCE * pressed
+        if pressed:
+            touching |= gap < self._penetration * largest(displacement.array_r, comm)
         values = displacement.array_r.copy()
         self._history.add(
             Guess(plane, values, pressure), float(self._plane.levers.loads(nodal_force)[0])
@@ -149,12 +152,8 @@ class AugmentedLagrangian:
             touching=touching,
             active_sets=steps,
             linear_iterations=spent,
-            reason="CONVERGED_MULTIPLIERS" if largest else "CONVERGED_NO_CONTACT",
+            reason="CONVERGED_MULTIPLIERS" if pressed else "CONVERGED_NO_CONTACT",
         )
-
-    def _largest(self, values: Array) -> float:
-        largest = float(np.abs(values).max(initial=0.0))
-        return float(self._block.mesh.comm.allreduce(largest, op=MPI.MAX))
 
 
 def _facet_sizes(cell: NDArray[np.int32], weight: Array) -> Array:

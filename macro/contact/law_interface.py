@@ -20,6 +20,7 @@ from geometry.meshes.block import require_inside
 from geometry.patches import PatchGrid
 from macro import compat
 from macro.block import Block
+from macro.linear_solvers.options import solve_linear
 from macro.mesh.contact_face import FacetQuadrature, facet_quadrature
 
 Array = NDArray[np.float64]
@@ -246,8 +247,7 @@ def displacements_under(interface: Interface, pressures: Array) -> Array:
     block, rows = interface.block, []
     work = block.stiffness.createVecRight()
     for row in pressures:
-        displacement = block.solve(interface.load(row))
-        work.array[:] = displacement.x.array[: block.owned_dofs]
+        solve_linear(block.solver, interface.load(row), work)
         rows.append(interface.patch_displacements(work))
         compat.collect_garbage(work.comm)
     return np.array(rows)

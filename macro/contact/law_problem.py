@@ -20,6 +20,7 @@ from macro.block import Block
 from macro.contact.equilibrium import Equilibrium
 from macro.contact.law_interface import ContactLaw, Interface, Mode
 from macro.contact.newton import DisplacementBasis, NewtonReport, NewtonSolver
+from macro.linear_solvers.options import solve_linear
 
 Array = NDArray[np.float64]
 
@@ -137,8 +138,7 @@ class LawContactProblem:
             return
         block = self.equilibrium.block
         displacement = block.stiffness.createVecRight()
-        found = block.solve(self._interface.load(pressure))
-        displacement.array[:] = found.x.array[: block.owned_dofs]
+        solve_linear(block.solver, self._interface.load(pressure), displacement)
         self.basis.add(displacement)
 
     def patch_means(self, functions: Sequence[Callable[[Array], Array]]) -> Array:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 
 from geometry.errors import NotConverged
@@ -203,3 +204,16 @@ class Extrapolation:
         share = float(np.clip(ahead / run, -_LARGEST_STEP, _LARGEST_STEP)) if run else 0.0
         pairs = zip(last, before, strict=True)
         return Guess(*(new + share * (new - old) for new, old in pairs))
+
+
+def largest(values: Array, comm: Any) -> float:
+    """Return the largest size of numbers over all ranks; 0 where there are none.
+
+    Args:
+        values: This rank's numbers.
+        comm: MPI communicator.
+
+    Note:
+        Collective.
+    """
+    return float(comm.allreduce(float(np.abs(values).max(initial=0.0)), op=MPI.MAX))
