@@ -20,7 +20,7 @@ from macro.contact.equilibrium import Equilibrium
 from macro.contact.face_nodes import TopNodes
 from macro.contact.law_interface import Interface
 from macro.contact.node_contact import PlaneOverNodes, not_found
-from macro.linear_solvers.constrained import ConstrainedPreconditioner, Projection
+from macro.linear_solvers.constrained import ConstrainedPreconditioner
 from macro.linear_solvers.node_matrices import node_submatrix
 from macro.linear_solvers.options import WeakContext, reason_name
 
@@ -184,10 +184,9 @@ class StiffPreconditioner:
         self, matrix: PETSc.Mat, preconditioner: PETSc.PC, points_by_dofs: PETSc.Mat, layers: int
     ) -> None:
         self._matrix, self._points = matrix, points_by_dofs
-        self._work, self._projection = matrix.createVecRight(), Projection(matrix.comm.tompi4py())
-        self._constrained = ConstrainedPreconditioner(
-            matrix, preconditioner, self._projection, layers
-        )
+        self._work = matrix.createVecRight()
+        self._constrained = ConstrainedPreconditioner(matrix, preconditioner, layers)
+        self._projection = self._constrained.projection
         self._dofs: NDArray[np.intp] = np.empty(0, dtype=np.intp)
         self._factors: Any = None
         self.pc = PETSc.PC().create(matrix.comm)
@@ -218,8 +217,7 @@ class StiffPreconditioner:
         springs.destroy()
         scaled.destroy()
         self._dofs = dofs
-        self._projection.constrain(dofs, motions)
-        self._constrained.constrain(dofs)
+        self._constrained.constrain(dofs, motions)
         self._factors = splu(csc_array(part)) if len(dofs) else None
 
     def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:

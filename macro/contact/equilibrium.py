@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
@@ -155,7 +154,7 @@ class Equilibrium:
         stretch = samples.array_r
         pressure = self._slope * stretch
         if self._border.shape[1]:
-            pressure -= self._border @ self._comm.allreduce(self._border.T @ stretch, op=MPI.SUM)
+            pressure -= self._border @ self.levers.summed(self._border.T @ stretch)
         samples.array[:] = pressure
         operator.multAdd(samples, y, y)
 

@@ -22,7 +22,7 @@ from macro import compat
 from macro.block import Block
 from macro.contact.facet_area import FacetLattice, covered, facet_lattice
 from macro.mesh.block import TOP
-from macro.mesh.contact_face import top_facets
+from macro.mesh.contact_face import top_facets, triangle_areas
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -77,9 +77,8 @@ class TopNodes:
         """Rank-local nodes of the triangles, shape (m, 3), and their weighted areas (m,) [mm²]."""
         triangles = self.facets[:, self._lattice.corners].reshape(-1, 3)
         place = self._block.space.tabulate_dof_coordinates()[triangles, :2]
-        u, v = place[:, 1] - place[:, 0], place[:, 2] - place[:, 0]
-        weight = np.tile(0.5 * self._lattice.weight, len(self.facets))
-        return triangles, weight * np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+        weight = np.tile(self._lattice.weight, len(self.facets))
+        return triangles, weight * triangle_areas(place)
 
     @cached_property
     def edges(self) -> Array:

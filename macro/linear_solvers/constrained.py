@@ -60,7 +60,6 @@ class ConstrainedSolver:
     """
 
     def __init__(self, matrix: PETSc.Mat, preconditioner: PETSc.PC, layers: int = 2) -> None:
-        self._projection = Projection(matrix.comm.tompi4py())
         self._matrix = matrix
         operator = PETSc.Mat().createPython(matrix.getSizes(), WeakContext(self), comm=matrix.comm)
         operator.setUp()
@@ -70,9 +69,8 @@ class ConstrainedSolver:
         self._ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
         self._ksp.setTolerances(max_it=_MOST_ITERATIONS)
         self._ksp.pc.setType("python")
-        self._preconditioner = ConstrainedPreconditioner(
-            matrix, preconditioner, self._projection, layers
-        )
+        self._preconditioner = ConstrainedPreconditioner(matrix, preconditioner, layers)
+        self._projection = self._preconditioner.projection
         self._ksp.pc.setPythonContext(WeakContext(self._preconditioner))
 
     def constrain(self, dofs: NDArray[np.intp], motions: Array | None = None) -> None:
@@ -83,8 +81,8 @@ class ConstrainedSolver:
             motions: Displacements of these by every motion that is left to them, shape (n, k);
                 orthonormal over all ranks. None: they stand still.
         """
-        self._projection.constrain(dofs, np.zeros((len(dofs), 0)) if motions is None else motions)
-        self._preconditioner.constrain(dofs)
+        still = np.zeros((len(dofs), 0))
+        self._preconditioner.constrain(dofs, still if motions is None else motions)
 
     def improve(self, solution: PETSc.Vec, residual: PETSc.Vec, tolerance: float) -> int:
         """Change the free part of a solution until its residual is small.
@@ -166,30 +164,28 @@ class ConstrainedPreconditioner:
     Args:
         matrix: Symmetric positive definite matrix A.
         preconditioner: M.
-        projection: P; its owner sets the constraints.
         layers: Layers of nodes around the constrained ones that are swept.
+
+    Attributes:
+        projection: P.
 
     Note:
         Everything here is collective.
     """
 
-    def __init__(
-        self, matrix: PETSc.Mat, preconditioner: PETSc.PC, projection: Projection, layers: int
-    ) -> None:
+    def __init__(self, matrix: PETSc.Mat, preconditioner: PETSc.PC, layers: int) -> None:
         self._local = matrix.getDiagonalBlock()
-        self._preconditioner, self._projection = preconditioner, projection
+        self._preconditioner = preconditioner
+        self.projection = Projection(matrix.comm.tompi4py())
         self._layers = layers
         self._work = matrix.createVecRight()
         self._shared = coupled_nodes(matrix)
         self._dofs: Indices = np.empty(0, dtype=np.intp)
         self._near: _Neighbourhood | None = None
 
-    def constrain(self, dofs: Indices) -> None:
-        """Move to other constrained degrees of freedom.
-
-        Args:
-            dofs: Local indices of those that this rank owns, shape (n,).
-        """
+    def constrain(self, dofs: Indices, motions: Array) -> None:
+        """Move to other constrained degrees of freedom; see `ConstrainedSolver.constrain`."""
+        self.projection.constrain(dofs, motions)
         if np.array_equal(dofs, self._dofs):
             return
         if self._near is not None:
@@ -205,9 +201,9 @@ class ConstrainedPreconditioner:
         if near is not None:
             before = near.swept(x.array_r[near.dofs])
             self._work.array[near.coupled] -= before @ near.rows
-        self._projection.project(self._work)
+        self.projection.project(self._work)
         self._preconditioner.apply(self._work, y)
-        self._projection.project(y)
+        self.projection.project(y)
         if near is not None:
             y.array[near.dofs] += before
             left = x.array_r[near.dofs] - near.rows @ y.array_r[near.coupled]

@@ -11,7 +11,6 @@ from macro.linear_solvers.constrained import (
     TOLERANCE,
     ConstrainedPreconditioner,
     ConstrainedSolver,
-    Projection,
     contact_tolerance,
 )
 
@@ -36,11 +35,9 @@ def test_it_is_symmetric_and_positive(layers, motions):
     block = block_of((4, 4, 3))
     dofs, count = pressed_dofs(block, 0.3), block.dofs
     q = np.full((len(dofs), motions), len(dofs) ** -0.5)
-    left = Projection(MPI.COMM_SELF)
-    left.constrain(dofs, q)
-    mended = ConstrainedPreconditioner(block.stiffness, block.solver.pc, left, layers)
-    mended.constrain(np.arange(7))  # forgotten by the next
-    mended.constrain(dofs)
+    mended = ConstrainedPreconditioner(block.stiffness, block.solver.pc, layers)
+    mended.constrain(np.arange(7), np.zeros((7, 0)))  # forgotten by the next
+    mended.constrain(dofs, q)
     free = np.setdiff1d(np.arange(count), dofs)
     ways = np.zeros((count, len(free) + motions))  # an orthonormal basis of what is left
     ways[free, np.arange(len(free))] = 1.0
