@@ -86,14 +86,18 @@ def lattice_part(cells: Counts, ranks: int, rank: int) -> Part:
         Recursive bisection: Berger, Bokhari, IEEE Transactions on Computers C-36 (1987) 570,
         doi 10.1109/TC.1987.1676942.
     """
-    part: Part = (range(cells[0]), range(cells[1]), range(cells[2]))
+    x, y, z = map(range, cells)
+    part = [x, y, z]
     while ranks > 1:
-        lower, upper, few = _halves(part, ranks)
+        few = ranks // 2
+        longest = max(part, key=len)
+        axis = part.index(longest)
+        cut = (2 * len(longest) * few + ranks) // (2 * ranks)  # to the nearest layer
         if rank < few:
-            part, ranks = lower, few
+            part[axis], ranks = longest[:cut], few
         else:
-            part, ranks, rank = upper, ranks - few, rank - few
-    return part
+            part[axis], ranks, rank = longest[cut:], ranks - few, rank - few
+    return part[0], part[1], part[2]
 
 
 def cells_beyond(cells: Counts, ranks: int, part: Part) -> tuple[Numbers, Numbers]:
@@ -118,16 +122,6 @@ def cells_beyond(cells: Counts, ranks: int, part: Part) -> tuple[Numbers, Number
             found.append(numbers[near].ravel())
             others.append(np.full(len(found[-1]), rank))
     return np.concatenate(found), np.concatenate(others)
-
-
-def _halves(part: Part, ranks: int) -> tuple[Part, Part, int]:
-    """Return two parts of a part for half the ranks each, and the number of the lower ones."""
-    few = ranks // 2
-    axis = max(range(3), key=lambda k: len(part[k]))
-    cut = (2 * len(part[axis]) * few + ranks) // (2 * ranks)  # to the nearest layer
-    lower, upper = list(part), list(part)
-    lower[axis], upper[axis] = part[axis][:cut], part[axis][cut:]
-    return (lower[0], lower[1], lower[2]), (upper[0], upper[1], upper[2]), few
 
 
 def _common(one: range, other: range, step: int) -> slice:

@@ -84,15 +84,13 @@ class ParityBlock:
             return np.asarray(np.kron(x, y) @ top).reshape(len(x), len(y), *sizes)
 
         u, v, w = tops
+        along_y = seen(u, ux.modes, uy.mode_slopes, shear=True)
+        along_x = seen(v, vx.mode_slopes, vy.modes, shear=True)
         return Response(
             normal=-seen(w, wx.modes, wy.modes),
             xx=seen(u, ux.mode_slopes, uy.modes),
             yy=seen(v, vx.modes, vy.mode_slopes),
-            xy=0.5
-            * (
-                seen(u, ux.modes, uy.mode_slopes, shear=True)
-                + seen(v, vx.mode_slopes, vy.modes, shear=True)
-            ),
+            xy=0.5 * (along_y + along_x),
             growth=growth.reshape(*sizes, *sizes),
         )
 
