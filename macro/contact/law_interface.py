@@ -8,18 +8,20 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, Protocol, get_args
+from typing import Literal, Protocol, get_args
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
+from scipy.sparse import csr_matrix
 
 from geometry.errors import InputError
 from geometry.meshes.block import require_inside
 from geometry.patches import PatchGrid
 from macro import compat
 from macro.block import Block
+from macro.linear_solvers.node_matrices import distributed
 from macro.linear_solvers.options import solve_linear
 from macro.mesh.contact_face import FacetQuadrature, facet_quadrature
 
@@ -156,12 +158,13 @@ class Interface:
     def patchwise(self) -> Sampling:
         """Laws at the mean closures of the patches, which are distributed over the ranks."""
         points, comm = self.quadrature, self.block.mesh.comm
-        member = PETSc.Mat().createAIJ(
-            ((len(points.x), None), (None, self.patches.count)),
-            csr=_csr(np.arange(len(points.x) + 1), points.patch, np.ones(len(points.x))),
-            comm=comm,
+        count = self.patches.count
+        member = csr_matrix(
+            (np.ones(len(points.x)), points.patch, np.arange(len(points.x) + 1)),
+            shape=(len(points.x), count),
         )
-        operator = self.points_by_dofs.transposeMatMult(member)
+        columns = count // comm.size + (comm.rank < count % comm.size)
+        operator = self.points_by_dofs.transposeMatMult(distributed(member, columns, comm))
         own = np.arange(*operator.getOwnershipRangeColumn())
         centres = self.patches.centres[own]
         return Sampling(
@@ -201,12 +204,9 @@ class Interface:
         columns = 3 * nodes.local_to_global(points.nodes[used]).astype(np.int64) + 2
         starts = np.concatenate([[0], np.cumsum(used.sum(axis=1))])
         entries = -(points.weight[:, None] * points.values)[used]
-        owned = self.block.owned_dofs
-        return PETSc.Mat().createAIJ(
-            ((len(points.x), None), (owned, None)),
-            csr=_csr(starts, columns, entries),
-            comm=self.block.mesh.comm,
-        )
+        shape = (len(points.x), 3 * nodes.size_global)
+        rows = csr_matrix((entries, columns, starts), shape=shape)
+        return distributed(rows, self.block.owned_dofs, self.block.mesh.comm)
 
 
 def patch_compliance_matrix(interface: Interface) -> Array:
@@ -251,7 +251,3 @@ def displacements_under(interface: Interface, pressures: Array) -> Array:
         rows.append(interface.patch_displacements(work))
         compat.collect_garbage(work.comm)
     return np.array(rows)
-
-
-def _csr(starts: Any, columns: Any, entries: Array) -> tuple[Any, Any, Array]:
-    return starts.astype(PETSc.IntType), columns.astype(PETSc.IntType), entries
