@@ -1,12 +1,18 @@
 """Galerkin's products of matrices of 3 × 3 blocks, made by every rank from the rows it owns.
 
+petsc4py only hands out copies of a matrix's entries, so the blocks are read in place through
+PETSc's C interface.
+
 Theory: section 11 of ``demos/theory.md``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from itertools import pairwise
+import ctypes
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -14,12 +20,27 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
 
-from macro.linear_solvers.node_matrices import coupled_nodes, dofs_of, node_submatrix
+Indices = NDArray[np.integer]
 
-Indices = NDArray[np.intp]
+_NODES_AT_ONCE = 20_000
+"""Nodes whose rows are multiplied at a time: 30 MB."""
 
-_NODES_AT_ONCE = 5_000
-"""Nodes whose rows are copied and multiplied at a time: 30 MB."""
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BlockRows:
+    """A rank's rows of a matrix of 3 × 3 blocks, node by node.
+
+    Every block stands as a column of its 9 entries, in PETSc's order: down its columns.
+
+    Args:
+        own: Blocks in columns of nodes that this rank owns, shape (9 n, n) with blocks (9, 1).
+        ghost: Blocks in columns of other ranks' nodes, shape (9 n, ghosts).
+        ghosts: Global numbers of these nodes, ascending.
+    """
+
+    own: sparse.bsr_matrix
+    ghost: sparse.bsr_matrix
+    ghosts: Indices
 
 
 def galerkin(
@@ -48,117 +69,164 @@ def galerkin(
     Note:
         Collective.
     """
-    parts = _products(matrix, weights, free.array_r == 0.0, nodes_at_once)
-    own, constrained = _sum_over_ranks(_sum(list(parts)), weights), coarse_free.array_r == 0.0
-    coarser = _distributed(own + _units(constrained, own, weights), weights)
-    rows = coarser.getOwnershipRange()[0] + np.flatnonzero(constrained)
-    coarser.zeroRowsColumns(rows.astype(PETSc.IntType), 1.0)
+    parts = []
+    with block_rows(matrix) as rows:
+        weights_seen, coarse = _weights_of(rows, weights)
+        own = weights_seen[: rows.own.shape[1]]
+        units = -_diagonal_blocks(free.array_r == 0.0)  # are no part of the product
+        terms = ((rows.own, own), (rows.ghost, weights_seen[rows.own.shape[1] :]), (units, own))
+        for blocks, right in terms:
+            parts += list(_products(own, blocks, right, nodes_at_once))
+    coarser = _sum_of_parts(parts, coarse, weights)
+    first = coarser.getOwnershipRange()[0]
+    constrained = first + np.flatnonzero(coarse_free.array_r == 0.0)
+    coarser.zeroRowsColumns(constrained.astype(PETSc.IntType), 1.0)
     return coarser
 
 
-def _products(
-    matrix: PETSc.Mat, weights: PETSc.Mat, constrained: NDArray[np.bool_], nodes_at_once: int
-) -> Iterator[sparse.bsr_matrix]:
-    """Yield parts of the product by this rank's rows, blocks (1, 9) of all coarse nodes.
-
-    Most rows are taken from the rank's own part of the matrix, some at a time. Rows that have
-    entries in columns of other ranks come together, because all ranks take part in that.
-    """
+def _weights_of(rows: BlockRows, weights: PETSc.Mat) -> tuple[sparse.csr_matrix, Indices]:
+    """Return the weights of own nodes, then of ghosts, and the coarse nodes that they are of."""
     first, last = weights.getOwnershipRange()
-    own, local = np.arange(last - first), matrix.getDiagonalBlock()
-    coupled, own_weights = coupled_nodes(matrix), _rows(weights, first + own)
-    if matrix.comm.size > 1:
-        rows = node_submatrix(matrix, first + coupled, np.arange(weights.getSize()[0]))
-        seen = np.unique(rows.indices // 3)
-        columns = rows[:, dofs_of(seen)]
-        fixed = constrained[dofs_of(coupled)]
-        yield _product(own_weights[coupled], columns, fixed, _rows(weights, seen))
-    inner = np.setdiff1d(own, coupled)
-    for nodes in np.array_split(inner, max(1, -(-len(inner) // nodes_at_once))):
-        if len(nodes):
-            rows, fixed = node_submatrix(local, nodes, own), constrained[dofs_of(nodes)]
-            yield _product(own_weights[nodes], rows, fixed, own_weights)
-
-
-def _product(
-    left: sparse.csr_matrix,
-    rows: sparse.csr_matrix,
-    constrained: NDArray[np.bool_],
-    right: sparse.csr_matrix,
-) -> sparse.bsr_matrix:
-    """Multiply rows of unknowns by weights of nodes from both sides, without constrained rows."""
-    if constrained.any():
-        rows.data[np.repeat(constrained, np.diff(rows.indptr))] = 0.0
-    blocks = rows.tobsr((3, 3))
-    nine = (blocks.data.reshape(-1, 9, 1), blocks.indices, blocks.indptr)
-    half = sparse.bsr_matrix(nine, shape=(9 * left.shape[0], right.shape[0])) @ right.tobsr((1, 1))
-    turned = (half.data.reshape(-1, 1, 9), half.indices, half.indptr)
-    half = sparse.bsr_matrix(turned, shape=(left.shape[0], 9 * right.shape[1]))
-    return left.T.tocsr().tobsr((1, 1)) @ half
-
-
-def _rows(weights: PETSc.Mat, nodes: Indices) -> sparse.csr_matrix:
-    """Return the weights of all coarse nodes in some nodes of any rank, ascending; collective."""
-    at = PETSc.IS().createGeneral(nodes.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
+    seen = np.concatenate([np.arange(first, last), rows.ghosts])
+    wanted = np.sort(seen).astype(PETSc.IntType)
+    at = PETSc.IS().createGeneral(wanted, comm=PETSc.COMM_SELF)
     every = PETSc.IS().createStride(weights.getSize()[1], 0, 1, comm=PETSc.COMM_SELF)
     found = weights.createSubMatrices(at, every)[0]
     starts, columns, values = found.getValuesCSR()
     found.destroy()
-    return sparse.csr_matrix((values, columns, starts), shape=(len(nodes), weights.getSize()[1]))
+    coarse, places = np.unique(columns, return_inverse=True)
+    table = sparse.csr_matrix((values, places, starts), shape=(len(wanted), len(coarse)))
+    return table[np.searchsorted(wanted, seen)], coarse
 
 
-def _sum(parts: Sequence[sparse.bsr_matrix]) -> sparse.bsr_matrix:
-    """Add matrices in pairs, so that no large sum is copied for every small part."""
-    while len(parts) > 1:
-        pairs = zip(parts[::2], parts[1::2], strict=False)
-        parts = [one + other for one, other in pairs] + [*parts[len(parts) // 2 * 2 :]]
-    return parts[0]
-
-
-def _sum_over_ranks(part: sparse.bsr_matrix, weights: PETSc.Mat) -> sparse.bsr_matrix:
-    """Add the parts of all ranks, and return the rows of the coarse nodes that this rank owns."""
-
-    def rows(first: int, last: int) -> tuple[Any, ...]:
-        starts = part.indptr[first : last + 1]
-        within = slice(starts[0], starts[-1])
-        return part.data[within], part.indices[within], starts - starts[0]
-
-    owners = weights.getOwnershipRangesColumn()
-    comm = weights.comm.tompi4py()
-    received = comm.alltoall([rows(first, last) for first, last in pairwise(owners)])
-    shape = (owners[comm.rank + 1] - owners[comm.rank], part.shape[1])
-    return _sum([sparse.bsr_matrix(piece, shape=shape) for piece in received])
-
-
-def _units(
-    constrained: NDArray[np.bool_], own: sparse.bsr_matrix, weights: PETSc.Mat
-) -> sparse.bsr_matrix:
-    """Return 1 on the diagonal of constrained unknowns, whose rows of a sum may be empty."""
-    nodes = constrained.reshape(-1, 3)
+def _diagonal_blocks(flags: NDArray[np.bool_]) -> sparse.bsr_matrix:
+    """Return flags of a rank's unknowns on the diagonals of blocks as in `BlockRows`."""
+    nodes = flags.reshape(-1, 3)
     some = nodes.any(axis=1)
-    blocks = nodes[some][:, :, None] * np.eye(3)
-    columns = weights.getOwnershipRangeColumn()[0] + np.flatnonzero(some)
+    blocks = np.einsum("na,ab->nab", nodes[some].astype(float), np.eye(3)).reshape(-1, 9, 1)
     starts = np.concatenate([[0], np.cumsum(some)])
-    return sparse.bsr_matrix((blocks.reshape(-1, 1, 9), columns, starts), shape=own.shape)
+    parts = (blocks, np.flatnonzero(some), starts)
+    return sparse.bsr_matrix(parts, shape=(9 * len(nodes), len(nodes)))
 
 
-def _distributed(own: sparse.bsr_matrix, weights: PETSc.Mat) -> PETSc.Mat:
-    """Return the matrix of type ``baij`` from the rows that every rank owns."""
-    first, last = weights.getOwnershipRangeColumn()
-    count, size = last - first, weights.getSize()[1]
-    near = (own.indices >= first) & (own.indices < last)
-    row = np.repeat(np.arange(count), np.diff(own.indptr))
-    filled = [np.bincount(row[which], minlength=count) for which in (near, ~near)]
+def _products(
+    left: sparse.csr_matrix,
+    blocks: sparse.bsr_matrix,
+    right: sparse.csr_matrix,
+    nodes_at_once: int,
+) -> Iterator[sparse.bsr_matrix]:
+    """Multiply from both sides, some rows of blocks at a time, without those that are empty.
+
+    Yields:
+        Parts of the product, blocks (1, 9) whose entries stand as in `BlockRows`.
+    """
+    filled = np.flatnonzero(np.diff(blocks.indptr))
+    right = right.tobsr((1, 1))
+    for nodes in np.array_split(filled, -(-len(filled) // nodes_at_once) or 1):
+        if not len(nodes):
+            return
+        first, last = nodes[0], nodes[-1] + 1
+        starts = blocks.indptr[first : last + 1]
+        within = slice(starts[0], starts[-1])
+        some = (blocks.data[within], blocks.indices[within], starts - starts[0])
+        shape = (9 * (last - first), blocks.shape[1])
+        half = sparse.bsr_matrix(some, shape=shape, copy=False) @ right
+        turned = (half.data.reshape(-1, 1, 9), half.indices, half.indptr)
+        half = sparse.bsr_matrix(turned, shape=(last - first, 9 * right.shape[1]))
+        yield left[first:last].T.tocsr().tobsr((1, 1)) @ half
+
+
+def _sum_of_parts(parts: list[sparse.bsr_matrix], coarse: Indices, weights: PETSc.Mat) -> PETSc.Mat:
+    """Add parts of the coarser matrix, of all ranks, at the coarse nodes that they are of."""
+    owner = np.searchsorted(weights.getOwnershipRangesColumn(), coarse, side="right")
+    counted = [weights.createVecRight() for _ in range(2)]
+    entries = []
+    for part in parts:
+        counts = np.diff(part.indptr)
+        filled = np.flatnonzero(counts)
+        rows, columns = (coarse[at].astype(PETSc.IntType) for at in (filled, part.indices))
+        near = owner[part.indices] == np.repeat(owner, counts)
+        own = np.add.reduceat(near, part.indptr[filled], dtype=float)
+        counted[0].setValues(rows, own, addv=True)
+        counted[1].setValues(rows, counts[filled] - own, addv=True)
+        starts = np.concatenate([[0], np.cumsum(counts[filled])]).astype(PETSc.IntType)
+        entries.append((starts, columns, part.data.ravel(), rows))
+    local, size = counted[0].getSizes()
+    room = []  # blocks per row in columns of the same rank, and of others
+    for vector, most in zip(counted, (local, size - local), strict=True):
+        vector.assemble()
+        room.append(np.minimum(np.rint(vector.array_r).astype(PETSc.IntType), most))
+        vector.destroy()
     matrix = PETSc.Mat().create(weights.comm)
-    matrix.setSizes(((3 * count, 3 * size),) * 2)
+    matrix.setSizes(((3 * local, 3 * size),) * 2)
     matrix.setType("baij")
     matrix.setBlockSize(3)
-    matrix.setPreallocationNNZ(tuple(part.astype(PETSc.IntType) for part in filled))
+    matrix.setPreallocationNNZ(tuple(room))
     # ranks without rows do not set this by themselves, and assembly hangs where ranks differ in it
     matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, True)
-    if own.nnz:
-        pattern = (part.astype(PETSc.IntType) for part in (own.indptr, own.indices))
-        rows = np.arange(first, last, dtype=PETSc.IntType)
-        matrix.setValuesBlockedIJV(*pattern, own.data.ravel(), rowmap=rows)
+    matrix.setOption(PETSc.Mat.Option.ROW_ORIENTED, False)
+    for starts, columns, values, rows in entries:
+        matrix.setValuesBlockedIJV(starts, columns, values, addv=True, rowmap=rows)
     matrix.assemble()
     return matrix
+
+
+@contextmanager
+def block_rows(matrix: PETSc.Mat) -> Iterator[BlockRows]:
+    """Lend this rank's rows of a matrix of PETSc's type ``baij`` without copying entries.
+
+    Args:
+        matrix: Assembled, block size 3; must not change while it is lent.
+
+    Raises:
+        PETSc.Error: When the matrix is of another type.
+    """
+    count = matrix.getLocalSize()[0] // 3
+    none = np.zeros(0, dtype=PETSc.IntType)
+    own, ghost, ghosts = ctypes.c_void_p(matrix.handle), ctypes.c_void_p(), _pointer(PETSc.IntType)
+    if matrix.getType() == "seqbaij":
+        with _sequential(own, count) as blocks:
+            yield BlockRows(blocks, sparse.bsr_matrix((9 * count, 0), blocksize=(9, 1)), none)
+        return
+    _call("MatMPIBAIJGetSeqBAIJ", own, *map(ctypes.byref, (own, ghost, ghosts)))
+    with _sequential(own, count) as first, _sequential(ghost, None) as second:
+        numbers = np.ctypeslib.as_array(ghosts, second.shape[1:]) if second.shape[1] else none
+        yield BlockRows(first, second, numbers)
+
+
+@contextmanager
+def _sequential(matrix: ctypes.c_void_p, columns: int | None) -> Iterator[sparse.bsr_matrix]:
+    """Lend the blocks of a ``seqbaij`` matrix; None takes its number of columns from itself."""
+    integer = np.ctypeslib.as_ctypes_type(PETSc.IntType)
+    count, width, done = integer(), integer(), ctypes.c_int(0)
+    rows, places, entries = map(_pointer, (PETSc.IntType, PETSc.IntType, np.float64))
+    pattern = (*map(ctypes.byref, (count, rows, places, done)),)
+    _call("MatGetLocalSize", matrix, None, ctypes.byref(width))
+    _call("MatGetRowIJ", matrix, integer(0), 0, 1, *pattern)
+    _call("MatSeqBAIJGetArray", matrix, ctypes.byref(entries))
+    try:
+        starts = np.ctypeslib.as_array(rows, (count.value + 1,))
+        size = int(starts[-1])
+        values = np.ctypeslib.as_array(entries, (size, 9, 1)) if size else np.empty((0, 9, 1))
+        indices = np.ctypeslib.as_array(places, (size,)) if size else np.empty(0, starts.dtype)
+        shape = (9 * count.value, width.value // 3 if columns is None else columns)
+        yield sparse.bsr_matrix((values, indices, starts), shape=shape)
+    finally:
+        _call("MatSeqBAIJRestoreArray", matrix, ctypes.byref(entries))
+        _call("MatRestoreRowIJ", matrix, integer(0), 0, 1, *pattern)
+
+
+def _pointer(number: Any) -> Any:
+    return ctypes.POINTER(np.ctypeslib.as_ctypes_type(number))()
+
+
+@cache
+def _petsc() -> ctypes.CDLL:
+    """Return the PETSc library that petsc4py itself is linked with."""
+    return ctypes.CDLL(PETSc.__file__)
+
+
+def _call(name: str, *arguments: Any) -> None:
+    code = getattr(_petsc(), name)(*arguments)
+    if code:
+        raise PETSc.Error(code)

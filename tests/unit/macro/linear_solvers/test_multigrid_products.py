@@ -1,5 +1,7 @@
 """Matrices of coarser grids against dense Galerkin products, and the blocks they are made from."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -8,7 +10,7 @@ from petsc4py import PETSc
 from geometry import BlockShape
 from macro import Block, Material, block_mesh
 from macro.linear_solvers.multigrid import coarser_grids, lattice_of, transfers
-from macro.linear_solvers.multigrid_products import galerkin
+from macro.linear_solvers.multigrid_products import block_rows, galerkin
 from macro.linear_solvers.node_matrices import dofs_of, node_submatrix
 
 
@@ -70,6 +72,26 @@ def test_rows_are_multiplied_in_any_number_of_pieces():
         for count in (10_000, 7)
     )
     np.testing.assert_allclose(pieces, whole, atol=1e-13 * whole.max())  # order of sums
+
+
+def test_blocks_are_those_of_the_matrix():
+    matrix = make("roller").stiffness
+    with block_rows(matrix) as rows:
+        blocks = rows.own.data.reshape(-1, 3, 3).transpose(0, 2, 1).copy()
+        starts, columns = rows.own.indptr.copy(), rows.own.indices.copy()
+        assert rows.ghost.nnz == len(rows.ghosts) == 0
+    expected = dense(matrix)
+    found = np.zeros_like(expected)
+    for node, (first, last) in enumerate(pairwise(starts)):
+        for block, column in zip(blocks[first:last], columns[first:last], strict=True):
+            found[3 * node : 3 * node + 3, 3 * column : 3 * column + 3] = block
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_other_types_of_matrices_are_refused():
+    with pytest.raises(PETSc.Error):
+        with block_rows(make().stiffness.convert("aij", PETSc.Mat())):
+            pass
 
 
 def test_parts_are_those_of_the_matrix():
