@@ -1,15 +1,15 @@
-"""A quarter of a block, in which even and odd modes of pressure are solved for separately.
+"""Response of a block to even and odd modes of pressure, which are solved for separately.
 
-The two vertical planes of symmetry divide the block into quarters. Under a pressure that is even
-along an axis, the displacement component along that axis is odd along it, and the other components
-are even; under an odd pressure it is the other way round.
+The two vertical planes of symmetry decouple them. Under a pressure that is even along an axis, the
+displacement component along that axis is odd along it, and the other components are even; under an
+odd pressure it is the other way round.
 
 Theory: section 6 of ``demos/theory.md``.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, reduce
 from typing import Any, NamedTuple
 
@@ -20,8 +20,8 @@ from scipy.sparse import bmat, csr_matrix, kron
 
 from geometry.materials import Material
 from macro.block import Sides
-from macro.compliance.elements import Division, Line, mode_integrals
-from macro.linear_solvers.direct import set_up
+from macro.compliance.elements import Line
+from macro.linear_solvers.options import set_up
 
 Array = NDArray[np.float64]
 Parity = tuple[int, int]
@@ -54,97 +54,90 @@ class Response(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Quarter:
-    """The quarter of a block at x and y beyond the middle of its top, clamped at the bottom.
+class ParityBlock:
+    """A block under pressures of one parity, clamped at the bottom.
 
     Args:
-        division: Its elements.
-        lengths: Sides (Lx, Ly) of the top [mm].
+        lines: Shape functions along x, y and z.
+        height: Height of the block [mm].
         material: Elastic constants.
         sides: Support of the block's sides.
         parity: Parity of the pressures.
     """
 
-    division: Division
-    lengths: tuple[float, float]
+    lines: tuple[Line, Line, Line]
+    height: float
     material: Material
     sides: Sides
     parity: Parity
 
-    def response(self, count: int) -> Response:
-        """Return the displacements and strains of the top by the modes of the parity.
+    def response(self) -> Response:
+        """Return the displacements and strains of the top by the modes of the parity."""
+        (ux, uy, _), (vx, vy, _), (wx, wy, z) = self._lines
+        odd_x, odd_y = self.parity
+        loads = np.kron(wx.modes[odd_x::2], wy.modes[odd_y::2])
+        tops, growth = self._solved(loads, z.end)
+        sizes = len(wx.modes[odd_x::2]), len(wy.modes[odd_y::2])
+
+        def seen(top: Array, along_x: Array, along_y: Array, *, shear: bool = False) -> Array:
+            x, y = along_x[(odd_x + shear) % 2 :: 2], along_y[(odd_y + shear) % 2 :: 2]
+            return np.asarray(np.kron(x, y) @ top).reshape(len(x), len(y), *sizes)
+
+        u, v, w = tops
+        along_y = seen(u, ux.modes, uy.mode_slopes, shear=True)
+        along_x = seen(v, vx.mode_slopes, vy.modes, shear=True)
+        return Response(
+            normal=-seen(w, wx.modes, wy.modes),
+            xx=seen(u, ux.mode_slopes, uy.modes),
+            yy=seen(v, vx.modes, vy.mode_slopes),
+            xy=0.5 * (along_y + along_x),
+            growth=growth.reshape(*sizes, *sizes),
+        )
+
+    def _solved(self, loads: Array, end: int) -> tuple[list[Array], Array]:
+        """Solve for the displacements by loads on the top.
 
         Args:
-            count: Modes K along a side, even and odd together.
+            loads: Downward forces on the vertical unknowns (ix, iy) of the top, shape (m, n) [N].
+            end: Index iz of the unknowns of the top.
+
+        Returns:
+            The displacements of the top by component, shape (unknowns, m), and the derivative of
+            the work of every load along every displacement with respect to the height, (m, m).
         """
+        sizes = [part.shape for part in self._free]
+        splits = np.cumsum([part.size for part in self._free])
         free = np.concatenate([part.ravel() for part in self._free])
-        top, place = self._top
-        x, y = ([self._modes(component, axis, count) for component in range(3)] for axis in (0, 1))
-        loads = np.kron(x[2], y[2])[:, place[2]].T
-        right = np.zeros((int(free.sum()), loads.shape[1]), order="F")
-        right[top[2]] = -loads
-        solved = _solved(self._stiffness()[free][:, free], right)
-
-        def seen(component: int, along_x: Array, along_y: Array) -> Array:
-            modes = np.kron(along_x, along_y)[:, place[component]]
-            sizes = len(along_x), len(along_y), len(x[2]), len(y[2])
-            return np.asarray(4.0 * (modes @ solved[top[component]]).reshape(sizes))
-
-        dx, dy = (
-            [self._modes(component, axis, count, slopes=True) for component in (0, 1)]
-            for axis in (0, 1)
-        )
-        normal = -seen(2, x[2], y[2])
+        forces = np.zeros((len(free), len(loads)))
+        forces[splits[1] :].reshape(-1, sizes[2][2], len(loads))[:, end] = -loads.T
+        solved = _solution(self._stiffness()[free][:, free], np.asfortranarray(forces[free]))
+        found = np.zeros_like(forces)  # also where a roller constrains
+        found[free] = solved
+        tops = [
+            part.reshape(-1, size[2], len(loads))[:, end]
+            for part, size in zip(np.split(found, splits[:2]), sizes, strict=True)
+        ]
         # derivative of the inverse stiffness when all elements grow in proportion
         change = self._stiffness(by_height=True)[free][:, free]
-        growth = -4.0 * solved.T @ (change @ solved)
-        return Response(
-            normal=normal,
-            xx=seen(0, dx[0], y[0]),
-            yy=seen(1, x[1], dy[1]),
-            xy=0.5 * (seen(0, x[0], dy[0]) + seen(1, dx[1], y[1])),
-            growth=growth.reshape(normal.shape),
-        )
-
-    def _modes(self, component: int, axis: int, count: int, *, slopes: bool = False) -> Array:
-        """Return the integrals of modes times a component's shapes, or slopes, along an axis."""
-        return mode_integrals(
-            self._lines[component][axis], self.lengths[axis], count, slopes=slopes
-        )
+        return tops, -solved.T @ (change @ solved)
 
     @cached_property
     def _lines(self) -> list[tuple[Line, Line, Line]]:
-        """Lines along x, y and z by component of the displacement."""
-        division, (odd_x, odd_y) = self.division, self.parity
+        """Shape functions along x, y and z by component of the displacement."""
+        (x, y, z), (odd_x, odd_y) = self.lines, self.parity
         return [
-            (
-                replace(division.x, parity=(odd_x + (component == 0)) % 2),
-                replace(division.y, parity=(odd_y + (component == 1)) % 2),
-                division.z,
-            )
-            for component in range(3)
+            (x.of_parity((odd_x + (k == 0)) % 2), y.of_parity((odd_y + (k == 1)) % 2), z)
+            for k in range(3)
         ]
 
     @cached_property
     def _free(self) -> list[NDArray[np.bool_]]:
         """Which unknowns (ix, iy, iz) no roller constrains, by component."""
-        found = [np.ones([len(line.unknowns) for line in lines], bool) for lines in self._lines]
+        found = [np.ones([len(line.values) for line in lines], bool) for lines in self._lines]
         if self.sides == "roller":
             for axis in (0, 1):
                 np.moveaxis(found[axis], axis, 0)[self._lines[axis][axis].end] = False
         return found
-
-    @property
-    def _top(self) -> tuple[list[NDArray[np.intp]], list[NDArray[np.intp]]]:
-        """Free unknowns with values on the top, by component, and their flat indices (ix, iy)."""
-        top, place, before = [], [], 0
-        for free in self._free:
-            number = before + np.cumsum(free).reshape(free.shape) - 1
-            here = free[:, :, self.division.z.end]
-            top.append(number[:, :, self.division.z.end][here])
-            place.append(np.flatnonzero(here))
-            before += int(free.sum())
-        return top, place
 
     def _stiffness(self, *, by_height: bool = False) -> csr_matrix:
         """Return the stiffness of all unknowns (component, ix, iy, iz) [N/mm].
@@ -179,22 +172,18 @@ class Quarter:
         """
         factors = []
         for axis in range(3):
-            one, other = (self._sampled[component][axis] for component in components)
+            one, other = (self._lines[component][axis] for component in components)
             left = one.slopes if axis == slopes[0] else one.values
             right = other.slopes if axis == slopes[1] else other.values
             matrix = (left * one.weights) @ right.T
             large = np.abs(matrix) > _NEGLIGIBLE * np.abs(matrix).max(initial=0.0)
             factors.append(csr_matrix(np.where(large, matrix, 0.0)))
         # with the height λ of elements integrals over z grow as λ, and slopes along z as 1/λ
-        share = (1.0 - slopes.count(2)) / -self.division.z.ticks[0] if by_height else 1.0
+        share = (1.0 - slopes.count(2)) / self.height if by_height else 1.0
         return share * reduce(kron, factors)
 
-    @cached_property
-    def _sampled(self) -> list[list[Any]]:
-        return [[line.sampled(max(line.degrees) + 1) for line in lines] for lines in self._lines]
 
-
-def _solved(stiffness: csr_matrix, right: Array) -> Array:
+def _solution(stiffness: csr_matrix, right: Array) -> Array:
     """Solve for many right-hand sides with one factorisation."""
     kind = PETSc.IntType
     rows, columns = stiffness.indptr.astype(kind), stiffness.indices.astype(kind)
