@@ -13,8 +13,8 @@ keeps a tolerance.
 """
 
 from geometry.rigid_plane import RigidPlane
-from micro.asperities.contacts import SOLVERS, AsperityState
-from micro.asperities.model import MODELS, AsperityModel, ModelKind, asperity_model
+from micro.asperities.contacts import SOLVERS, ModelKind
+from micro.asperities.model import MODELS, AsperityModel
 from micro.asperities.scaled_model import BORDERS, CURVATURES, ScaledModel
 from micro.choice.candidates import Candidate
 from micro.choice.selection import Choice, choose
@@ -30,8 +30,8 @@ from micro.factory import MODEL_NAMES, START_KINDS, micro_model
 from micro.half_space.contact_spots import Contacts, find_contacts
 from micro.half_space.model import HalfSpaceModel, resampled
 from micro.half_space.state import HalfSpaceState
+from micro.interaction.contact_model import ContactState
 from micro.islands.model import IslandModel
-from micro.islands.shapes import IslandState
 from micro.model import MicroModel
 from micro.response import Pressed, Response
 
@@ -43,11 +43,11 @@ __all__ = [
     "SOLVERS",
     "START_KINDS",
     "AsperityModel",
-    "AsperityState",
     "BodyModes",
     "BodyStresses",
     "Candidate",
     "Choice",
+    "ContactState",
     "Contacts",
     "FiniteSlopes",
     "FreeSides",
@@ -55,7 +55,6 @@ __all__ = [
     "HalfSpaceState",
     "HertzContact",
     "IslandModel",
-    "IslandState",
     "MicroModel",
     "ModelKind",
     "Pressed",
@@ -64,7 +63,6 @@ __all__ = [
     "ScaledModel",
     "SideStresses",
     "SurfaceStress",
-    "asperity_model",
     "choose",
     "coarse_grid",
     "find_contacts",

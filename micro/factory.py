@@ -5,7 +5,8 @@ from __future__ import annotations
 from geometry import Surface, find_asperities
 from geometry.errors import InputError
 from geometry.rigid_plane import RigidPlane
-from micro.asperities.model import MODELS, Equilibrium, asperity_model
+from micro.asperities.contacts import Equilibrium
+from micro.asperities.model import MODELS, AsperityModel
 from micro.asperities.scaled_model import ScaledModel
 from micro.half_space.model import HalfSpaceModel
 from micro.interaction.contact_problem import Solution
@@ -57,4 +58,4 @@ def micro_model(
             solver=solver,
         )
     asperities = find_asperities(surface, periodic=False)
-    return asperity_model(name, asperities, contact_modulus=contact_modulus, solver=solver)
+    return AsperityModel(name, asperities, contact_modulus=contact_modulus, solver=solver)

@@ -25,6 +25,11 @@ from micro.islands.division import Saddles, divided, saddles_between, sampled
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
+MOST_WHOLE = 2**20
+"""Cells of the largest surface whose watersheds are found as a whole, once for all planes."""
+
+_MARGIN = 1.2
+"""Depth of watersheds that are not found as a whole, in units of the approach."""
 _FEW = 32  # samples of the smallest cap that has a shape of its own
 _POWERS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
 _ORDER = np.array([2.0, 2.5, 2.5, 3.0, 3.0, 3.0])[:, None]
@@ -212,6 +217,23 @@ class Watersheds:
             for part in (self.moments, self.moments * self.depth)
         )
         return moments, deep
+
+
+def needed_depth(surface: Surface, approach: float, most_whole: int = MOST_WHOLE) -> float:
+    """Return how far below the reference height watersheds must reach for an approach [mm].
+
+    Small surfaces need one depth, the infinite one. Those of a large one are found as deep as
+    needed, to a power of two, so that load steps that follow each other need the same.
+
+    Args:
+        surface: The surface.
+        approach: The approach [mm].
+        most_whole: Cells of the largest small surface.
+    """
+    if surface.heights.size <= most_whole:
+        return np.inf
+    least = 1e-9 * min(surface.spacing)
+    return float(np.exp2(np.ceil(np.log2(max(_MARGIN * approach, least)))))
 
 
 def _needed(heights: Array, owner: Indices, z: Array, floor: float) -> NDArray[np.bool_]:

@@ -28,9 +28,9 @@ FLOORS = {
     ],
     "micro": [
         "closed_forms",
-        "compliance plane_on_peaks response",
-        "contact interaction model",
-        "half_space patch_sums",
+        "compliance response",
+        "contact model",
+        "half_space interaction",
         "islands",
         "asperities",
         "factory",

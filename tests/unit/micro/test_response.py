@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from geometry import InputError, PatchGrid
-from micro import asperity_model
+from micro import AsperityModel
 
 PATCHES = PatchGrid(grid=(2, 3), lengths=(1.0, 1.0))
 
 
 @pytest.fixture
 def response(cluster):
-    model = asperity_model("circular", cluster, contact_modulus=4000.0)
+    model = AsperityModel("circular", cluster, contact_modulus=4000.0)
     return model.respond([0.0, 2e-3, 5e-3], patches=PATCHES, mean_heights=np.full(6, -0.02))
 
 

@@ -19,7 +19,7 @@ from micro.interaction.hertz_pairs import HertzPairs
 @pytest.fixture
 def problem(cluster):
     shape = shape_factors(cluster.radius_major, cluster.radius_minor)
-    kernel = HertzPairs.among(cluster, shape, circular=False)
+    kernel = HertzPairs(asperities=cluster, shape=shape, circular=False)
     return ContactProblem(interaction=kernel, interference=5e-3 + cluster.z)
 
 

@@ -12,7 +12,8 @@ from micro.interaction.hertz_pairs import MERGING_SLOPE, HertzPairs, merging_par
 def interaction(asperities, circular):
     major = asperities.radius if circular else asperities.radius_major
     minor = asperities.radius if circular else asperities.radius_minor
-    return HertzPairs.among(asperities, shape_factors(major, minor), circular=circular)
+    shape = shape_factors(major, minor)
+    return HertzPairs(asperities=asperities, shape=shape, circular=circular)
 
 
 both_shapes = pytest.mark.parametrize("circular", [True, False], ids=["circular", "elliptic"])

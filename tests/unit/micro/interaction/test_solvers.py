@@ -12,7 +12,7 @@ from micro.interaction.truncated_newton import truncated_newton
 
 def problem(asperities, approach):
     shape = shape_factors(asperities.radius_major, asperities.radius_minor)
-    kernel = HertzPairs.among(asperities, shape, circular=False)
+    kernel = HertzPairs(asperities=asperities, shape=shape, circular=False)
     interference = np.maximum(approach + asperities.z, 1e-9)
     return ContactProblem(interaction=kernel, interference=interference)
 
