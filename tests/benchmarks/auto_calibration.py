@@ -50,7 +50,7 @@ def models(surface):
     for factor in FACTORS:
         n = round(factor * surface.grid[0])
         if 16 <= n <= 800:
-            yield "half-space", factor, half_space(surface, (n, n), 1.0, False)
+            yield "half-space", factor, half_space(surface, (n, n), 1.0)
 
 
 def measured(count, seed):
@@ -59,7 +59,7 @@ def measured(count, seed):
     for surface, approach in surfaces(count, seed):
         loads = [0.5 * approach, approach]
         truth, own = converged(surface, loads)
-        at = [contact_measures(surface, load, periodic=False) for load in loads]
+        at = [contact_measures(surface, load) for load in loads]
         for kind, factor, model in models(surface):
             for where, error, sure in zip(at, errors(model, loads, truth), own, strict=True):
                 values = [getattr(where, name) for name in FIELDS]
