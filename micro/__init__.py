@@ -6,7 +6,7 @@ given asperities, `ScaledModel` asperities whose curvature follows the load, and
 regions above the plane. `micro_model` makes any of them by name, and `choose` the cheapest one that
 keeps a tolerance.
 
-    closed_forms                                      Hertz, Love, Boussinesq
+    closed_forms                                      Hertz, Love
     compliance → contact → half_space                 the contact problem on cells
     interaction → islands, asperities                 contacts that interact pair by pair
     factory → choice                                  models by name and by accuracy

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import toeplitz
 
 from geometry.errors import InputError
-from geometry.patches import Partition, PatchGrid
+from geometry.patches import PatchGrid
 
 Array = NDArray[np.float64]
 
@@ -103,12 +103,11 @@ def love_mutual(dx: ArrayLike, dy: ArrayLike, a: ArrayLike, b: ArrayLike) -> Arr
     return total / (4.0 * a * b)
 
 
-def influence_matrix(patches: Partition) -> Array:
+def influence_matrix(patches: PatchGrid) -> Array:
     """Return the mean displacements Λ_ij of all patches by pressure on each, shape (N, N) [mm].
 
-    Pressures p displace the patches by Λ p / (π E*). For equal patches symmetric and exact to 1e-12
-    if they are squares, to 2e-11 for sides of 5 to 1 and to 1e-10 for 10 to 1. Of unequal ones
-    A_i Λ_ij is symmetric; entries lose 1e-16 (distance / shortest side)⁴ to rounding.
+    Pressures p displace the patches by Λ p / (π E*). The matrix is symmetric and exact to 1e-12 for
+    squares, to 2e-11 for sides of 5 to 1 and to 1e-10 for 10 to 1.
 
     Args:
         patches: The N patches.
@@ -116,26 +115,12 @@ def influence_matrix(patches: Partition) -> Array:
     Source:
         Love 1929, doi 10.1098/rsta.1929.0009; Waddad et al. 2016, eq. 29-30 for one point.
     """
-    if not isinstance(patches, PatchGrid):
-        return _unequal(patches)
     (nx, ny), (sx, sy), (a, b) = patches.grid, patches.size, patches.half_sizes
     table = mutual_influence(np.arange(nx)[:, None] * sx, np.arange(ny) * sy, a, b)
     steps_x = toeplitz(np.arange(nx))
     steps_y = toeplitz(np.arange(ny))
     whole = table[steps_x[:, None, :, None], steps_y[None, :, None, :]]
     return np.asarray(whole.reshape(patches.count, patches.count))
-
-
-def _unequal(patches: Partition) -> Array:
-    """Difference the fourfold antiderivative over the borders of both rectangles."""
-    x, y = patches.borders_x, patches.borders_y
-    table = fourfold_integral(
-        np.subtract.outer(x, x)[:, :, None, None], np.subtract.outer(y, y)[None, None]
-    )
-    for axis in range(4):
-        table = np.diff(table, axis=axis)
-    whole = table.transpose(0, 2, 1, 3).reshape(patches.count, patches.count)
-    return np.asarray(whole / patches.areas[:, None])
 
 
 def mutual_influence(dx: ArrayLike, dy: ArrayLike, a: float, b: float) -> Array:

@@ -32,7 +32,7 @@ from scipy.special import elliprf
 
 from geometry import Asperities, Partition
 from geometry.legendre_modes import mode_values
-from micro.closed_forms.ellipse import ShapeFactors
+from micro.closed_forms.hertz import ShapeFactors
 from micro.closed_forms.hertz_field import circular_field, elliptic_field
 from micro.compliance.body_modes import BodyModes
 from micro.interaction.contact_problem import InteractionDisplacement

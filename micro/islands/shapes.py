@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Partition, overlaps
-from micro.closed_forms.ellipse import shape_factors
+from micro.closed_forms.hertz import shape_factors
 from micro.interaction.patch_sums import EllipticContacts
 from micro.islands.watersheds import Watersheds
 

@@ -28,7 +28,7 @@ from micro import (
 )
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from geometry import BlockShape, Partition
+    from geometry import BlockShape, PatchGrid
     from macro import FaceCompliance
     from macro.block import Sides
 
@@ -175,7 +175,7 @@ class Body:
             half_space = half_space + side_stress_modes(self.side_term, face.count)
         return BodyStresses(self.lengths, grid, face.stresses - half_space, self.shape.margin)
 
-    def patch_compliance(self, patches: Partition, comm: Any) -> Array:
+    def patch_compliance(self, patches: PatchGrid, comm: Any) -> Array:
         """Return the whole compliance of the block under its patches.
 
         Args:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from geometry import InputError, NotConverged
-from micro.closed_forms.ellipse import shape_factors
+from micro.closed_forms.hertz import shape_factors
 from micro.interaction.contact_problem import (
     BYTES_PER_PAIR,
     TOLERANCE,

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import elliprf
 
-from micro.closed_forms.ellipse import shape_factors
-from micro.closed_forms.hertz import HertzContact
+from micro.closed_forms.hertz import HertzContact, shape_factors
 from micro.interaction.hertz_pairs import MERGING_SLOPE, HertzPairs, merging_parameter
 
 

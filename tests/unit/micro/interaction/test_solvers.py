@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from geometry import NotConverged
-from micro.closed_forms.ellipse import shape_factors
+from micro.closed_forms.hertz import shape_factors
 from micro.interaction.contact_problem import TOLERANCE, ContactProblem, active_set, damped_step
 from micro.interaction.hertz_pairs import HertzPairs
 from micro.interaction.truncated_newton import truncated_newton
