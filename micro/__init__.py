@@ -9,14 +9,14 @@ keeps a tolerance.
     closed_forms                                      Hertz, Love
     compliance → contact → half_space                 the contact problem on cells
     interaction → islands, asperities                 contacts that interact pair by pair
-    factory → choice                                  models by name and by accuracy
+    choice                                            models by name and by accuracy
 """
 
 from geometry.rigid_plane import RigidPlane
 from micro.asperities.contacts import SOLVERS, ModelKind
 from micro.asperities.model import MODELS, AsperityModel
 from micro.asperities.scaled_model import BORDERS, CURVATURES, ScaledModel
-from micro.choice.candidates import Candidate
+from micro.choice.models import MODEL_NAMES, START_KINDS, Candidate, micro_model
 from micro.choice.selection import Choice, choose
 from micro.closed_forms.hertz import HertzContact
 from micro.closed_forms.love import influence_matrix
@@ -26,14 +26,12 @@ from micro.compliance.free_sides import FreeSides
 from micro.compliance.half_space_modes import half_space_modes, half_space_stress_modes
 from micro.compliance.side_cells import SideStresses, side_stresses
 from micro.compliance.side_modes import side_modes, side_stress_modes
-from micro.factory import MODEL_NAMES, START_KINDS, micro_model
 from micro.half_space.contact_spots import Contacts, find_contacts
 from micro.half_space.model import HalfSpaceModel, resampled
 from micro.half_space.state import HalfSpaceState
 from micro.interaction.contact_model import ContactState
 from micro.islands.model import IslandModel
-from micro.model import MicroModel
-from micro.response import Pressed, Response
+from micro.model import MicroModel, Pressed, Response
 
 __all__ = [
     "BORDERS",

@@ -1,7 +1,7 @@
 """Choice of the cheapest micro model whose expected error in force is below a tolerance.
 
 Candidates promise a bound of their error from measures of the contacts
-(`micro.choice.expected_errors`) and a cost (`micro.choice.candidates`). The cheapest that promises
+(`micro.choice.expected_errors`) and a cost (`micro.choice.models`). The cheapest that promises
 the tolerance is made, solved at one load and compared with a half-space solution; one that misses
 there gives way to the next.
 
@@ -21,8 +21,8 @@ import numpy as np
 
 from geometry import PatchGrid, Surface
 from geometry.errors import InputError, NotConverged
-from micro.choice.candidates import Candidate, Cells, Option, grid_of, half_space, options
 from micro.choice.expected_errors import ContactMeasures, contact_measures, grid_error
+from micro.choice.models import Candidate, Cells, Option, grid_of, half_space, options
 from micro.model import MicroModel
 
 _FINER = (1.0, 1.5, 2.0, 3.0)

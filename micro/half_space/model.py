@@ -21,8 +21,7 @@ from micro.contact.solver import ContactSolver
 from micro.half_space.patch_sums import response_row
 from micro.half_space.plane_contact import LEVEL, PlaneContact
 from micro.half_space.state import HalfSpaceState
-from micro.model import checked_approaches, checked_patches, whole_patch
-from micro.response import Pressed, Response
+from micro.model import Pressed, Response, checked_approaches, checked_patches, whole_patch
 
 Array = NDArray[np.float64]
 

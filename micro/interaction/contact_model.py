@@ -21,8 +21,7 @@ from micro.closed_forms.hertz import checked_modulus
 from micro.compliance.body_modes import BodyModes
 from micro.interaction.hertz_pairs import BodyPoints
 from micro.interaction.patch_sums import EllipticContacts, patch_displacements, patch_loads
-from micro.model import checked_approaches, checked_patches
-from micro.response import Pressed, Response
+from micro.model import Pressed, Response, checked_approaches, checked_patches
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from geometry.meshes.block import BlockShape
 from micro import HalfSpaceModel, ScaledModel
-from micro.choice.candidates import contact_box_share, solution_seconds
+from micro.choice.models import contact_box_share, solution_seconds
 from multiscale.costs.work import Machine, Work, this_machine
 from multiscale.couplings.newton_choice import CYCLES_PER_PATCH, full_cycles, newton_choice
 from multiscale.loading.stepper import LoadHistory

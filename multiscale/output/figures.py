@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from geometry.asperities import Asperities
 from geometry.patches import PatchGrid
 from geometry.surface import Surface
-from micro.response import Response
+from micro.model import Response
 from multiscale.laws.law_table import LawTable
 from multiscale.output.figure_style import (
     PRESSURE_LABEL,

@@ -19,7 +19,6 @@ from scipy.optimize import linprog
 from geometry import Spectrum, Surface, synthesise
 from geometry.errors import NotConverged
 from micro import MODELS, micro_model
-from micro.choice.candidates import FACTORS, half_space
 from micro.choice.expected_errors import (
     CONTACT_TERMS,
     GRID_TERMS,
@@ -28,6 +27,7 @@ from micro.choice.expected_errors import (
     contact_terms,
     grid_terms,
 )
+from micro.choice.models import FACTORS, half_space
 
 SCALED = {"curvature": "contact", "border": "include"}
 KINDS = {**{name: (name, {}) for name in MODELS}, "scaled": ("elliptic", SCALED)}

@@ -28,12 +28,10 @@ FLOORS = {
     ],
     "micro": [
         "closed_forms",
-        "compliance response",
-        "contact model",
-        "half_space interaction",
-        "islands",
+        "compliance model",
+        "contact interaction",
+        "half_space islands",
         "asperities",
-        "factory",
         "choice",
     ],
     "macro": [

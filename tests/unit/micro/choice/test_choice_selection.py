@@ -86,7 +86,7 @@ def test_the_surfaces_own_grid_is_checked_against_a_finer_one():
 
 def test_a_failed_check_gives_way_to_the_next_and_says_so(monkeypatch):
     # A bound far too good promises everything; the check refuses what asperities give.
-    monkeypatch.setattr("micro.choice.candidates.contact_error", lambda kind, at: 1e-5)
+    monkeypatch.setattr("micro.choice.models.contact_error", lambda kind, at: 1e-5)
     choice = choose(rough(5), contact_modulus=1.0, approach=0.02, tolerance=0.005)
     assert "circular-independent differs by" in choice.sentence
     assert "none that was checked keeps" in choice.sentence
@@ -99,7 +99,7 @@ def test_a_model_without_a_solution_gives_way(monkeypatch):
     def stuck(*_, **__):
         raise NotConverged("nothing", reason="STUCK", iterations=1, remedy="none")
 
-    monkeypatch.setattr("micro.choice.candidates.contact_error", lambda kind, at: 1e-5)
+    monkeypatch.setattr("micro.choice.models.contact_error", lambda kind, at: 1e-5)
     monkeypatch.setattr(AsperityModel, "respond", stuck)
     choice = choose(rough(5), contact_modulus=1.0, approach=0.02, tolerance=0.1)
     assert "circular-independent has no solution when checked" in choice.sentence

@@ -1,4 +1,4 @@
-"""The micro models that can be chosen from: what they promise, what they cost, how to make them.
+"""The micro models: made by name, and as candidates with what they promise and cost.
 
 Times are for one solution, started from a solution nearby. They are fits to times on one core of an
 Intel Xeon (Rocket Lake, 3 GHz), for Set 1 of Waddad et al. 2016 and for bands of 1 to 6 and 2 to 32
@@ -15,16 +15,25 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import PatchGrid, Surface
+from geometry import PatchGrid, Surface, find_asperities
 from geometry.errors import InputError
-from micro.asperities.model import MODELS
+from geometry.rigid_plane import RigidPlane
+from micro.asperities.contacts import Equilibrium
+from micro.asperities.model import MODELS, AsperityModel
+from micro.asperities.scaled_model import ScaledModel
 from micro.choice.expected_errors import ContactMeasures, contact_error, grid_error
-from micro.factory import micro_model
 from micro.half_space.model import HalfSpaceModel
-from micro.interaction.contact_problem import checked_pairs
+from micro.interaction.contact_problem import Solution, checked_pairs
+from micro.islands.model import IslandModel
 from micro.model import MicroModel
 
 Cells = tuple[int, int]
+
+MODEL_NAMES = (*MODELS, "islands", "half-space")
+"""Names of all micro models, the cheapest kinds first."""
+
+START_KINDS: tuple[type, ...] = (RigidPlane, Equilibrium, Solution)
+"""Records that `Pressed.start` may consist of, besides arrays and tuples."""
 
 FACTORS = (0.25, 0.375, 0.5, 0.75, 1.0, 1.5, 2.0)
 """Cells of half-space grids along a side, relative to the surface's own."""
@@ -35,6 +44,47 @@ _MOST_CELLS = 2**22
 _SCALED = "elliptic with curvature at the contact's scale and border summits"
 _LOADS = (0.25, 0.5, 0.75, 1.0)
 """Loads relative to the largest; their mean stands for the loads of a run."""
+
+
+def micro_model(
+    name: str,
+    surface: Surface,
+    *,
+    contact_modulus: float,
+    solver: str = "active-set",
+    curvature: str = "summit",
+    border: str = "ignore",
+) -> MicroModel:
+    """Return the micro model of a surface whose border is free, as that of a block's top is.
+
+    Args:
+        name: A name in `MODEL_NAMES`.
+        surface: The surface.
+        contact_modulus: E* [MPa].
+        solver: Solver of the interacting asperity models.
+        curvature: Where asperity models take the curvature, a name in `CURVATURES`.
+        border: How asperity models treat maxima on the border, a name in `BORDERS`.
+
+    Raises:
+        InputError: When there is no such model, option or solver, or the modulus is not positive.
+    """
+    if name == "half-space":
+        return HalfSpaceModel(surface=surface, contact_modulus=contact_modulus)
+    if name == "islands":
+        return IslandModel(surface=surface, contact_modulus=contact_modulus)
+    if name not in MODELS:
+        raise InputError("unknown micro model", value=name, allowed=", ".join(MODEL_NAMES))
+    if (curvature, border) != ("summit", "ignore"):
+        return ScaledModel(
+            kind=name,
+            surface=surface,
+            contact_modulus=contact_modulus,
+            curvature=curvature,
+            border=border,
+            solver=solver,
+        )
+    asperities = find_asperities(surface, periodic=False)
+    return AsperityModel(name, asperities, contact_modulus=contact_modulus, solver=solver)
 
 
 @dataclass(frozen=True, kw_only=True)
