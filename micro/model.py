@@ -185,12 +185,7 @@ class Response:
             model: Name of the micro model.
             contact_modulus: E* [MPa].
             patches: The patches.
-
-        Raises:
-            InputError: When there is no row.
         """
-        if not rows:
-            raise InputError("a response needs at least one approach", value=[])
         columns = {key: np.array([row[key] for row in rows]) for key in rows[0]}
         return cls(
             model=model,
@@ -245,12 +240,7 @@ def checked_approaches(approaches: ArrayLike) -> Array:
         InputError: When they are no finite, non-empty list of numbers.
     """
     allowed = "a number or a list of finite numbers in mm"
-    try:
-        given = np.atleast_1d(np.asarray(approaches, float))
-    except (TypeError, ValueError):
-        raise InputError(
-            "the approaches are no numbers", value=approaches, allowed=allowed
-        ) from None
+    given = np.atleast_1d(_numbers(approaches, "the approaches are no numbers", allowed))
     if given.size == 0:
         raise InputError("a response needs at least one approach", value=[])
     if given.ndim != 1:
@@ -287,14 +277,16 @@ def checked_patches(
         )
     mean_heights = [rough.mean_height] if mean_heights is None else mean_heights
     allowed = f"shape ({patches.count},)"
-    try:
-        means = np.asarray(mean_heights, float)
-    except (TypeError, ValueError):
-        raise InputError(
-            "the mean heights are no numbers", value=mean_heights, allowed=allowed
-        ) from None
+    means = _numbers(mean_heights, "the mean heights are no numbers", allowed)
     if means.shape != (patches.count,):
         raise InputError("every patch needs one mean height", value=means.shape, allowed=allowed)
     if not np.isfinite(means).all():
         raise InputError("a mean height is not finite", value=means.tolist(), allowed="mm")
     return patches, means
+
+
+def _numbers(values: ArrayLike, problem: str, allowed: str) -> Array:
+    try:
+        return np.asarray(values, float)
+    except (TypeError, ValueError):
+        raise InputError(problem, value=values, allowed=allowed) from None

@@ -33,9 +33,6 @@ from scipy.ndimage import label
 from geometry import Surface, roughness
 from geometry.summits import grid_maxima
 
-CONTACT_TERMS = ("floor", "crowding", "eccentricity", "wave", "eccentric_wave", "border")
-GRID_TERMS = ("radius_few", "radius", "wave")
-
 CONTACT_COEFFICIENTS = {
     "elliptic": (0.0124, 0.0, 0.0, 0.109, 1.20, 1.15),
     "circular": (0.0120, 0.0, 0.0, 0.0965, 1.37, 1.15),

@@ -49,11 +49,6 @@ class Choice:
     candidates: tuple[Candidate, ...]
     sentence: str
 
-    @property
-    def checked_error(self) -> float | None:
-        """Difference from the half-space solution checked against, None without a check."""
-        return self.taken.checked_error
-
 
 def choose(
     surface: Surface,

@@ -150,7 +150,6 @@ def checked_pairs(
     what: str,
     *,
     bytes_per_pair: float = BYTES_PER_PAIR,
-    available: float | None = None,
 ) -> None:
     """Refuse a number of pairs whose dense matrices do not fit into the memory.
 
@@ -159,13 +158,11 @@ def checked_pairs(
         columns: Number of contacts that displace them.
         what: Name of the contacts in the message, such as ``asperities``.
         bytes_per_pair: Memory that a pair takes [B].
-        available: Memory that may be filled [B]; that of this process when not given.
 
     Raises:
-        InputError: When the matrices need more than the memory available.
+        InputError: When the matrices need more than the memory of this process.
     """
-    available = process_memory() if available is None else available
-    needed = bytes_per_pair * rows * columns
+    needed, available = bytes_per_pair * rows * columns, process_memory()
     if needed > available:
         raise InputError(
             f"the interaction of {columns} {what} needs {needed / 1e9:.3g} GB of memory"

@@ -39,15 +39,15 @@ class Paraboloids(NamedTuple):
         x: Abscissae of the centroids of volume, shape (m,) [mm].
         y: Ordinates, shape (m,) [mm].
         angle: Directions of the larger principal radii from the x axis, shape (m,) [rad].
-        radius: R = sqrt(R' R''), shape (m,) [mm].
-        ratio: R'/R'' ≥ 1, shape (m,).
+        radius_major: Larger principal radii R', shape (m,) [mm].
+        radius_minor: Smaller ones R'', shape (m,) [mm].
     """
 
     x: Array
     y: Array
     angle: Array
-    radius: Array
-    ratio: Array
+    radius_major: Array
+    radius_minor: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -114,8 +114,9 @@ def islands(watersheds: Watersheds, height: Array, region: Indices) -> Islands:
     moments = from_origin(caps[:, on], watersheds.x[on], watersheds.y[on])
     total: Array = np.stack([np.bincount(island, part, count) for part in moments])
     found = equivalent(total, depth)
-    shape = shape_factors(found.ratio, np.ones(count))
-    major = shape.axis * np.sqrt(found.radius * depth)
+    shape = shape_factors(found.radius_major, found.radius_minor)
+    radius = np.sqrt(found.radius_major * found.radius_minor)
+    major = shape.axis * np.sqrt(radius * depth)
     return Islands(
         member=member,
         top=top,
@@ -123,8 +124,8 @@ def islands(watersheds: Watersheds, height: Array, region: Indices) -> Islands:
         x=found.x,
         y=found.y,
         angle=found.angle,
-        semi_axes=np.stack([major, major * np.sqrt(shape.axis_ratio_squared)], axis=1),
-        force=4.0 / 3.0 * np.sqrt(found.radius) * shape.force * depth**1.5,
+        semi_axes=np.stack([major, major * shape.axis_ratio], axis=1),
+        force=4.0 / 3.0 * np.sqrt(radius) * shape.force * depth**1.5,
     )
 
 
@@ -150,14 +151,16 @@ def equivalent(moments: Array, depth: Array) -> Paraboloids:
     x, y, xx, xy, yy = list(moments[1:] / volume)
     mean, half = 0.5 * (xx - x**2 + yy - y**2), 0.5 * (xx - x**2 - yy + y**2)
     cross = xy - x * y
-    radius = np.hypot(half, cross)
-    largest = np.maximum(mean + radius, np.finfo(float).tiny)  # 0 for a single sample
+    spread = np.hypot(half, cross)
+    largest = np.maximum(mean + spread, np.finfo(float).tiny)  # 0 for a single sample
+    ratio = largest / np.clip(mean - spread, largest / _MOST_SLENDER, largest)
+    radius = volume / (np.pi * depth**2)
     return Paraboloids(
         x=x,
         y=y,
         angle=np.mod(0.5 * np.arctan2(cross, half), np.pi),
-        radius=volume / (np.pi * depth**2),
-        ratio=largest / np.clip(mean - radius, largest / _MOST_SLENDER, largest),
+        radius_major=radius * np.sqrt(ratio),
+        radius_minor=radius / np.sqrt(ratio),
     )
 
 

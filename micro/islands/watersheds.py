@@ -47,7 +47,8 @@ class Watersheds:
         owner: Peak of every sample, by watershed and there by depth, shape (s,).
         sample: Flat indices of the samples, shape (s,).
         depth: Depths of the samples below their peak, shape (s,) [mm].
-        moments: X^p Y^q of the samples from their peak for the six powers up to 2, (6, s).
+        sums: Sums over the samples before each, in their order, of X^p Y^q from their peak for the
+            six powers up to 2, and of the same times the depths, shape (2, 6, s + 1).
         grid: Numbers of samples over the surface.
         cell: Area of a sample [mm²].
     """
@@ -59,7 +60,7 @@ class Watersheds:
     owner: Indices
     sample: Indices
     depth: Array
-    moments: Array
+    sums: Array
     grid: tuple[int, int]
     cell: float
 
@@ -107,6 +108,10 @@ class Watersheds:
         sample, depth, owner = sample[order], depth[order], owner[sample][order]
         place = (np.stack(np.unravel_index(sample, heights.shape), axis=1) + 0.5) * side
         along, across = (place - summit[owner]).T
+        moments = np.stack([along**p * across**q for p, q in _POWERS])
+        sums: Array = np.zeros((2, len(_POWERS), len(depth) + 1))
+        np.cumsum(moments, axis=1, out=sums[0, :, 1:])
+        np.cumsum(moments * depth, axis=1, out=sums[1, :, 1:])
         return cls(
             x=summit[:, 0],
             y=summit[:, 1],
@@ -115,7 +120,7 @@ class Watersheds:
             owner=owner,
             sample=sample,
             depth=depth,
-            moments=np.stack([along**p * across**q for p, q in _POWERS]),
+            sums=sums,
             grid=(heights.shape[0], heights.shape[1]),
             cell=float(side.prod()),
         )
@@ -137,7 +142,7 @@ class Watersheds:
         taken = np.maximum(height, least)
         ends = np.searchsorted(self._key, np.arange(len(self)) + taken / self._deepest)
         ends = np.clip(ends, self._start[:-1], self._start[1:])
-        sums, deep = (table[:, ends] - table[:, self._start[:-1]] for table in self._cumulated)
+        sums, deep = self.sums[:, :, ends] - self.sums[:, :, self._start[:-1]]
         shrunk = np.divide(height, taken, out=np.zeros_like(height), where=taken > 0.0)
         return self.cell * (taken * sums - deep) * shrunk**_ORDER
 
@@ -208,15 +213,6 @@ class Watersheds:
         least: Array = np.zeros(len(self))
         least[many] = self.depth[last[many]]
         return least
-
-    @cached_property
-    def _cumulated(self) -> tuple[Array, Array]:
-        nothing = np.zeros((len(_POWERS), 1))
-        moments, deep = (
-            np.concatenate([nothing, np.cumsum(part, axis=1)], axis=1)
-            for part in (self.moments, self.moments * self.depth)
-        )
-        return moments, deep
 
 
 def needed_depth(surface: Surface, approach: float, most_whole: int = MOST_WHOLE) -> float:

@@ -20,8 +20,6 @@ from geometry import Spectrum, Surface, synthesise
 from geometry.errors import NotConverged
 from micro import MODELS, micro_model
 from micro.choice.expected_errors import (
-    CONTACT_TERMS,
-    GRID_TERMS,
     ContactMeasures,
     contact_measures,
     contact_terms,
@@ -32,6 +30,8 @@ from micro.choice.models import FACTORS, half_space
 SCALED = {"curvature": "contact", "border": "include"}
 KINDS = {**{name: (name, {}) for name in MODELS}, "scaled": ("elliptic", SCALED)}
 KINDS["islands"] = ("islands", {})
+CONTACT_TERMS = ("floor", "crowding", "eccentricity", "wave", "eccentric_wave", "border")
+GRID_TERMS = ("radius_few", "radius", "wave")
 FIELDS = list(ContactMeasures.__dataclass_fields__)
 
 
