@@ -13,10 +13,10 @@ keeps a tolerance.
 """
 
 from geometry.rigid_plane import RigidPlane
-from micro.asperities.contacts import SOLVERS, ModelKind
+from micro.asperities.contacts import SOLVERS
 from micro.asperities.model import MODELS, AsperityModel
 from micro.asperities.scaled_model import BORDERS, CURVATURES, ScaledModel
-from micro.choice.models import MODEL_NAMES, START_KINDS, Candidate, micro_model
+from micro.choice.models import MODEL_NAMES, START_KINDS, micro_model
 from micro.choice.selection import Choice, choose
 from micro.closed_forms.hertz import HertzContact
 from micro.closed_forms.love import influence_matrix
@@ -29,7 +29,6 @@ from micro.compliance.side_modes import side_modes, side_stress_modes
 from micro.half_space.contact_spots import Contacts, find_contacts
 from micro.half_space.model import HalfSpaceModel, resampled
 from micro.half_space.state import HalfSpaceState
-from micro.interaction.contact_model import ContactState
 from micro.islands.model import IslandModel
 from micro.model import MicroModel, Pressed, Response
 
@@ -43,9 +42,7 @@ __all__ = [
     "AsperityModel",
     "BodyModes",
     "BodyStresses",
-    "Candidate",
     "Choice",
-    "ContactState",
     "Contacts",
     "FiniteSlopes",
     "FreeSides",
@@ -54,7 +51,6 @@ __all__ = [
     "HertzContact",
     "IslandModel",
     "MicroModel",
-    "ModelKind",
     "Pressed",
     "Response",
     "RigidPlane",

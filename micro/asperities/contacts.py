@@ -145,7 +145,7 @@ class AsperityContacts:
         while True:
             checked_pairs(len(above), len(above), "asperities", bytes_per_pair=size)
             pairs = self.pairs.subset(above)
-            problem = ContactProblem(interaction=pairs, interference=interference[above])
+            problem = ContactProblem(interaction=pairs.evaluate, interference=interference[above])
             found = solve(problem, SOLVERS[self.solver], start[above])
             own[above], displacement[above] = found.indentation, found.displacement
             spent += found.iterations

@@ -76,20 +76,10 @@ def factors_at(eccentricity: ArrayLike) -> ShapeFactors:
     Args:
         eccentricity: e in [0, 1).
 
-    Raises:
-        InputError: When e lies outside [0, 1).
-
     Source:
         Waddad et al. 2016, eqs. 1 and 3, doi 10.1016/j.triboint.2015.12.023.
     """
     e = np.asarray(eccentricity, float)
-    good = (e >= 0.0) & (e < 1.0)
-    if not np.all(good):
-        raise InputError(
-            "this eccentricity is not one of an ellipse",
-            value=float(e[~good].flat[0]),
-            allowed="0 ≤ e < 1",
-        )
     return _factors((1.0 - e) * (1.0 + e))
 
 

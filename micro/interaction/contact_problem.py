@@ -28,7 +28,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,11 +72,8 @@ class InteractionDisplacement(NamedTuple):
     overlapping_contacts: int = 0
 
 
-class Interaction(Protocol):
-    """Contacts that displace each other's summits."""
-
-    def evaluate(self, indentation: Array, /) -> InteractionDisplacement:
-        """Return the displacements by given indentations, shape (n,) [mm]; negative ones are 0."""
+Interaction = Callable[[Array], InteractionDisplacement]
+"""Returns the displacements by given indentations, shape (n,) [mm]; negative ones count as 0."""
 
 
 class Solution(NamedTuple):
@@ -229,7 +226,7 @@ def active_set(
     """
 
     def evaluate(z: Array) -> tuple[InteractionDisplacement, Array]:
-        caused = problem.interaction.evaluate(z)
+        caused = problem.interaction(z)
         return caused, z + caused.displacement - problem.interference
 
     z = start

@@ -115,7 +115,7 @@ class PointForces:
         """
         if interference.max(initial=0.0) <= 0.0:
             return np.zeros(len(interference))
-        problem = ContactProblem(interaction=self, interference=interference)
+        problem = ContactProblem(interaction=self.evaluate, interference=interference)
         return solve(problem, active_set, start).indentation
 
     def stiffness(self, indentation: Array, lever: Array) -> Array:

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.checks import process_memory
-from geometry.errors import InputError
-from geometry.materials import Material
+from geometry import InputError, Material
 from micro import (
     BodyModes,
     BodyStresses,

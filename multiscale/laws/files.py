@@ -12,8 +12,7 @@ from typing import Any, BinaryIO
 import h5py
 import numpy as np
 
-from geometry.errors import InputError
-from geometry.patches import PatchGrid
+from geometry import InputError, PatchGrid
 from multiscale.laws.law_table import LawTable, PlanePath
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.rows import LawRows

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
-from geometry.errors import InputError
-from geometry.patches import PatchGrid
+from geometry import InputError, PatchGrid
 from multiscale.laws.interpolation import LawCurves, LawPoint
 from multiscale.laws.patch_law import PatchLaw
 

@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
+from geometry import InputError
 
 Array = NDArray[np.float64]
 

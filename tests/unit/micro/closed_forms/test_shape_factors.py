@@ -76,9 +76,3 @@ def test_papers_approximation(ratio, error):
 def test_refuses_radii(radii):
     with pytest.raises(InputError, match=r"do not describe a summit.*finite R' ≥ R'' > 0"):
         shape_factors(*radii)
-
-
-@pytest.mark.parametrize("value", [-0.1, 1.0, np.nan])
-def test_refuses_eccentricity(value):
-    with pytest.raises(InputError, match=r"is not one of an ellipse \(allowed: 0 ≤ e < 1\)"):
-        factors_at(value)

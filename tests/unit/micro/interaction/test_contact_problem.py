@@ -21,7 +21,7 @@ from micro.interaction.hertz_pairs import HertzPairs
 def problem(cluster):
     shape = shape_factors(cluster.radius_major, cluster.radius_minor)
     kernel = HertzPairs(asperities=cluster, shape=shape, circular=False)
-    return ContactProblem(interaction=kernel, interference=5e-3 + cluster.z)
+    return ContactProblem(interaction=kernel.evaluate, interference=5e-3 + cluster.z)
 
 
 def refusing(limit):

@@ -5,7 +5,8 @@ import pytest
 from scipy.special import elliprf
 
 from micro.closed_forms.hertz import HertzContact, shape_factors
-from micro.interaction.hertz_pairs import MERGING_SLOPE, HertzPairs, merging_parameter
+from micro.compliance.body_modes import BodyModes
+from micro.interaction.hertz_pairs import MERGING_SLOPE, BodyPoints, HertzPairs, merging_parameter
 
 
 def interaction(asperities, circular):
@@ -103,3 +104,15 @@ def test_round_ellipses_are_circles(summits):
     circle, ellipse = (interaction(balls, circular).evaluate(own) for circular in (True, False))
     assert ellipse.displacement == pytest.approx(circle.displacement, rel=1e-12)
     assert ellipse.derivative == pytest.approx(circle.derivative, rel=1e-12, abs=0.0)
+
+
+def test_body_between_points_counts_from_the_corner_of_its_top():
+    rng = np.random.default_rng(2)
+    half = rng.normal(size=(9, 9))
+    body = BodyModes((2.0, 3.0), half @ half.T, (-0.5, -1.0))
+    x, y = rng.random((2, 5))
+    points = BodyPoints.at(body, x, y)
+    expected = body.between(x, y)
+    np.testing.assert_allclose(points.by(points), expected, atol=1e-12 * np.abs(expected).max())
+    force = rng.random(5)
+    np.testing.assert_allclose(points.displacement(force), expected @ force, rtol=1e-10)

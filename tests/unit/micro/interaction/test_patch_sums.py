@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from boussinesq import love_integral
 from scipy.special import roots_jacobi
 
 from geometry import PatchGrid
 from micro import HertzContact
-from micro.closed_forms.love import love_integral
 from micro.interaction.patch_sums import EllipticContacts, patch_displacements
 
 PATCHES = PatchGrid(grid=(4, 2), lengths=(1.0, 0.6))

@@ -32,7 +32,7 @@ class Springs:
         rates = 1.5 * LAW * self.known * np.sqrt(w)
         return PlaneResponse(
             loads=self.lever.T @ forces,
-            stiffness=lambda: contact_stiffness(self.lever, rates),
+            stiffness=lambda: contact_stiffness(self.lever, rates, np.zeros(2 * rates.shape)),
             state=forces,
         )
 

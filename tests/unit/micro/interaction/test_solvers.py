@@ -14,7 +14,7 @@ def problem(asperities, approach):
     shape = shape_factors(asperities.radius_major, asperities.radius_minor)
     kernel = HertzPairs(asperities=asperities, shape=shape, circular=False)
     interference = np.maximum(approach + asperities.z, 1e-9)
-    return ContactProblem(interaction=kernel, interference=interference)
+    return ContactProblem(interaction=kernel.evaluate, interference=interference)
 
 
 both = pytest.mark.parametrize("method", [active_set, truncated_newton])
