@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from geometry.collective import on_root
-from geometry import NotConverged
+from geometry.errors import NotConverged
 from micro import HalfSpaceModel, MicroModel
 from multiscale.couplings import blocks
 from multiscale.couplings.assembly import assemble, make_table, meshed_blocks

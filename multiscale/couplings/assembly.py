@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from geometry import InputError
+from geometry.errors import InputError
 from micro import MicroModel
 from multiscale.couplings.blocks import embedding, patch_compliance, patch_displacements
 from multiscale.couplings.condensed import CondensedCoupling, FreePlaneCoupling

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.checks import process_memory
-from geometry import InputError, Material
+from geometry.errors import InputError
+from geometry.materials import Material
 from micro import (
     BodyModes,
     BodyStresses,

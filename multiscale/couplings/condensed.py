@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Control, NotConverged, RigidPlane
+from geometry.errors import NotConverged
+from geometry.rigid_plane import Control, RigidPlane
 from multiscale.couplings.dense_newton import DenseNewton
 from multiscale.couplings.load_steps import beyond_law
 from multiscale.couplings.loaded_patches import DenseState

@@ -8,8 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Control, InputError, NotConverged, PatchGrid
+from geometry.errors import InputError, NotConverged
+from geometry.patches import PatchGrid
 from geometry.plane_equilibrium import UNSUPPORTED, plane_failure
+from geometry.rigid_plane import Control
 from multiscale.couplings.loaded_patches import TOLERANCE, DenseState, LoadedPatches
 from multiscale.laws.law_table import PatchLaws
 

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.collective import on_root
-from geometry import Control, InputError, NotConverged, PatchGrid
+from geometry.errors import InputError, NotConverged
+from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
 from micro import START_KINDS, MicroModel
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep

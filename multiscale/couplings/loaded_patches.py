@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from geometry import Control, NotConverged, PatchGrid
-from geometry.rigid_plane import PlaneLevers
+from geometry.errors import NotConverged
+from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control, PlaneLevers
 from multiscale.laws.interpolation import LawPoint, Tangent
 from multiscale.laws.law_table import PatchLaws
 

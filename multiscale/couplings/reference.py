@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Control, InputError
+from geometry.errors import InputError
+from geometry.rigid_plane import Control
 from multiscale.couplings.blocks import block_material
 from multiscale.loading.load_step import LoadStep
 from multiscale.results.reference_record import ReferenceRecord, reference_record

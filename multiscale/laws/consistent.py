@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.collective import on_root, shared
-from geometry import Control, PatchGrid
+from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
 from micro import MicroModel, Response, RigidPlane, influence_matrix
 from multiscale.laws.law_table import LawTable, PlanePath
 from multiscale.laws.patch_law import PatchLaw

@@ -12,7 +12,8 @@ from typing import Any, BinaryIO
 import h5py
 import numpy as np
 
-from geometry import InputError, PatchGrid
+from geometry.errors import InputError
+from geometry.patches import PatchGrid
 from multiscale.laws.law_table import LawTable, PlanePath
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.rows import LawRows

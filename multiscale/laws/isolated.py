@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.collective import shared
-from geometry import PatchGrid
+from geometry.patches import PatchGrid
 from micro import MicroModel
 from micro.closed_forms.love import love_centre, love_mean
 from multiscale.laws.law_table import LawTable

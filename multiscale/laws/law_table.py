@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
-from geometry import InputError, PatchGrid
+from geometry.errors import InputError
+from geometry.patches import PatchGrid
 from multiscale.laws.interpolation import LawCurves, LawPoint
 from multiscale.laws.patch_law import PatchLaw
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry import InputError
+from geometry.errors import InputError
 from multiscale.laws.interpolation import LEAST_SLOPE, LawCurves, LawPoint
 from multiscale.laws.rows import LawRows
 

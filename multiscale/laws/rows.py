@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import InputError
+from geometry.errors import InputError
 
 Array = NDArray[np.float64]
 

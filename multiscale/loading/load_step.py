@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry import PatchGrid
+from geometry.patches import PatchGrid
 
 Array = NDArray[np.float64]
 

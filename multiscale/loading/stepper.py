@@ -9,7 +9,8 @@ from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 
-from geometry import Control, NotConverged
+from geometry.errors import NotConverged
+from geometry.rigid_plane import Control
 from multiscale.loading.load_step import LoadStep
 from multiscale.storage.serialisation import Arrays
 

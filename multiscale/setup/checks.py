@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from geometry import InputError, Surface
+from geometry.errors import InputError
 from geometry.files import BYTES_PER_HEIGHT
+from geometry.surface import Surface
 from multiscale.machine.nodes import ClusterNodes, MemoryRequest
 from multiscale.scene.scene import Scene
 

@@ -9,7 +9,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Asperities, BlockShape, PatchGrid, RigidPlane, Surface
+from geometry.asperities import Asperities
+from geometry.meshes.block import BlockShape
+from geometry.patches import PatchGrid
+from geometry.rigid_plane import RigidPlane
+from geometry.surface import Surface
 from micro import AsperityModel, Choice, HalfSpaceModel, MicroModel, ScaledModel
 from multiscale.laws.refinement import MOST_ROWS
 from multiscale.scene.scene import Scene

@@ -12,8 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
-from geometry import BlockShape, InputError, RefinedShape, RigidPlane, Surface, characteristic_size, reference_shapes
-from geometry.meshes.families import contact_radius
+from geometry.errors import InputError
+from geometry.meshes.block import BlockShape
+from geometry.meshes.families import characteristic_size, contact_radius, reference_shapes
+from geometry.meshes.refined_block import RefinedShape
+from geometry.rigid_plane import RigidPlane
+from geometry.surface import Surface
 from multiscale.machine.nodes import ClusterNodes, MemoryRequest
 from multiscale.scene.scene import Scene
 from multiscale.setup.checks import check_memory

@@ -6,7 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from geometry import BlockShape, InputError, Surface, read_surface, synthesise
+from geometry.errors import InputError
+from geometry.files import read_surface
+from geometry.meshes.block import BlockShape
+from geometry.spectrum import synthesise
+from geometry.surface import Surface
 from multiscale.scene.scene import Scene
 from multiscale.setup.checks import block_cells
 
