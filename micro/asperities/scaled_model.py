@@ -83,11 +83,10 @@ class ScaledModel(SummitModel):
         """The surface."""
         return self.surface
 
-    @cached_property
+    @property
     def first_touch(self) -> float:
         """Approach of a level plane at first contact [mm]; infinite without asperities."""
-        plane = RigidPlane.above(self.surface, 0.0)
-        return self.touch_of(self._scaled(self._depth(plane)).summits)
+        return self.touch_of(self.asperities)
 
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
         """Return the model of the summits of one patch; see `MicroModel.of_patch`."""
@@ -96,7 +95,7 @@ class ScaledModel(SummitModel):
     @cached_property
     def asperities(self) -> Asperities:
         """The asperities, with the radii of their smallest contacts."""
-        return self._scaled(np.inf).summits
+        return self._scaled(self._depth(RigidPlane.above(self.surface, 0.0))).summits
 
     def equilibrium(self, control: Control, start: Equilibrium | None = None) -> ContactState:
         """Fit curvatures and solve for contacts and plane until all agree.

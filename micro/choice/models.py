@@ -28,6 +28,7 @@ from micro.islands.model import IslandModel
 from micro.model import MicroModel
 
 Cells = tuple[int, int]
+Maker = Callable[[], MicroModel]
 
 MODEL_NAMES = (*MODELS, "islands", "half-space")
 """Names of all micro models, the cheapest kinds first."""
@@ -41,6 +42,7 @@ _LEAST_CELLS, _FEWEST_CELLS = 8, 16
 """Cells along a patch, and along a side, that a grid needs at least."""
 _MOST_CELLS = 2**22
 """Cells of the largest grid that is offered."""
+_INTERACTING = {"elliptic", "circular", "scaled"}
 _SCALED = "elliptic with curvature at the contact's scale and border summits"
 _LOADS = (0.25, 0.5, 0.75, 1.0)
 """Loads relative to the largest; their mean stands for the loads of a run."""
@@ -116,8 +118,8 @@ class Option(NamedTuple):
     """
 
     candidate: Candidate
-    make: Callable[[], MicroModel]
-    cells: tuple[int, int] | None = None
+    make: Maker
+    cells: Cells | None = None
 
 
 def options(
@@ -145,26 +147,21 @@ def options(
     summits = round(surface.area * (measures[-1].crowding / radius) ** 2)
     parts = patches.grid if patches else (1, 1)
 
-    def option(
-        label: str, kind: str, error: float, make: Callable[[], MicroModel], cells: Cells | None
-    ) -> Option:
+    def option(label: str, kind: str, error: float, make: Maker, cells: Cells | None) -> Option:
         heights = surface.heights.size if cells is None else cells[0] * cells[1]
         cost = solutions * solution_seconds(kind, heights, box=box, summits=summits)
         return Option(Candidate(label=label, expected_error=error, cost=cost), make, cells)
 
     named = partial(micro_model, surface=surface, contact_modulus=contact_modulus)
-    scaled = partial(named, "elliptic", curvature="contact", border="include")
-    for kind in (*MODELS, "scaled", "islands"):
-        interacts = kind == "scaled" or (kind in MODELS and MODELS[kind].interacting)
-        if interacts and not _has_memory(summits):
-            continue
-        if kind == "islands" and not _fits(surface.grid, parts):
-            continue
+    makers = {kind: partial(named, kind) for kind in (*MODELS, "islands")}
+    makers["scaled"] = partial(named, "elliptic", curvature="contact", border="include")
+    if not _has_memory(summits):
+        makers = {kind: makers[kind] for kind in makers if kind not in _INTERACTING}
+    if not _fits(surface.grid, parts):
+        del makers["islands"]
+    for kind, make in makers.items():
         error = max(contact_error(kind, at) for at in measures)
-        if kind == "scaled":
-            yield option(_SCALED, kind, error, scaled, None)
-        else:
-            yield option(kind, kind, error, partial(named, kind), None)
+        yield option(_SCALED if kind == "scaled" else kind, kind, error, make, None)
     for factor in FACTORS:
         cells = grid_of(surface, factor)
         small = cells[0] * cells[1] <= _MOST_CELLS
@@ -172,8 +169,8 @@ def options(
             continue
         label = f"half-space on {cells[0]} × {cells[1]} cells"
         error = max(grid_error(at, factor) for at in measures)
-        make = partial(half_space, surface, cells, contact_modulus)
-        yield option(label, "half-space", error, make, cells)
+        finer = partial(half_space, surface, cells, contact_modulus)
+        yield option(label, "half-space", error, finer, cells)
 
 
 def grid_of(surface: Surface, factor: float) -> Cells:
