@@ -5,6 +5,11 @@ import numpy as np
 from micro import HertzContact
 
 
+def places(asperities):
+    """Return what pairs of contacts need of asperities, by name."""
+    return {name: getattr(asperities, name) for name in ("x", "y", "angle", "radius")}
+
+
 def interference(asperities, state):
     """Return the depth of the plane below each undisplaced summit, 0 for summits below it."""
     return np.maximum(asperities.interference(state.plane), 0.0)

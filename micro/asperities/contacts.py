@@ -111,7 +111,10 @@ class AsperityContacts:
         """How the contacts displace each other's summits."""
         a, body = self.asperities, self.body
         return HertzPairs(
-            asperities=a,
+            x=a.x,
+            y=a.y,
+            angle=a.angle,
+            radius=a.radius,
             shape=self.hertz.factors,
             circular=not self.kind.elliptic,
             half_space=self.kind.interacting,
@@ -204,6 +207,9 @@ class AsperityContacts:
                 value=own.shape,
                 allowed=f"({len(self.asperities)},)",
             )
+        if control.approach is not None and control.tilt is not None:
+            plane = RigidPlane.above(self.asperities, control.approach, control.tilt)
+            return Equilibrium(plane, self.solution(self.asperities.interference(plane), own))
         peaks, first, spent = self._peaks, self.first_plane(control, start), 0
 
         def respond(motion: Array) -> PlaneResponse[Equilibrium]:

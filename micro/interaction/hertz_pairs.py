@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import elliprf
 
-from geometry import Asperities, Partition
+from geometry import Partition
 from geometry.legendre_modes import mode_values
 from micro.closed_forms.hertz import ShapeFactors
 from micro.closed_forms.hertz_field import circular_field, elliptic_field
@@ -117,8 +117,11 @@ class HertzPairs:
     """Asperities that displace each other's summits.
 
     Args:
-        asperities: The n asperities.
-        shape: Their shape factors, arrays of shape (n,).
+        x: Abscissae of the n summits, shape (n,) [mm].
+        y: Ordinates, shape (n,) [mm].
+        angle: Directions of the major semi-axes from the x axis, shape (n,) [rad].
+        radius: Equivalent radii R, shape (n,) [mm].
+        shape: Shape factors of the contacts, arrays of shape (n,).
         circular: Whether the shape factors are those of circles, which have a kernel in closed
             form.
         half_space: Whether contacts displace each other's summits through the half-space.
@@ -127,7 +130,10 @@ class HertzPairs:
         contact_modulus: E* [MPa], by which the forces on a body grow.
     """
 
-    asperities: Asperities
+    x: Array
+    y: Array
+    angle: Array
+    radius: Array
     shape: ShapeFactors
     circular: bool
     half_space: bool = True
@@ -137,7 +143,7 @@ class HertzPairs:
     @cached_property
     def size(self) -> Array:
         """The ratios s_i/t_i = R (2 K F1/π)², shape (n,) [mm]."""
-        return self.asperities.radius * self.shape.axis**2
+        return self.radius * self.shape.axis**2
 
     @cached_property
     def v_merged(self) -> Array:
@@ -148,7 +154,10 @@ class HertzPairs:
         """Return the interaction among some of the asperities."""
         return replace(
             self,
-            asperities=self.asperities.subset(index),
+            x=self.x[index],
+            y=self.y[index],
+            angle=self.angle[index],
+            radius=self.radius[index],
             shape=ShapeFactors(*(factor[index] for factor in self.shape)),
             body=None if self.body is None else self.body.among(index),
         )
@@ -186,23 +195,22 @@ class HertzPairs:
     def _blocks(self, columns: int) -> list[slice]:
         """Return slices of the displaced summits, so that the fields of a block fit the cache."""
         rows = max(1, _PAIRS_AT_ONCE // max(columns, 1))
-        return [slice(first, first + rows) for first in range(0, len(self.asperities), rows)]
+        return [slice(first, first + rows) for first in range(0, len(self.x), rows)]
 
     def _by_contacts(self, rows: slice, active: Indices, own: Array) -> tuple[Array, Array]:
         """Return displacements of some summits by the others' contacts, and slopes c_ki."""
-        a = self.asperities
-        x, y = a.x[rows, None] - a.x[active], a.y[rows, None] - a.y[active]
+        x, y = self.x[rows, None] - self.x[active], self.y[rows, None] - self.y[active]
         size, integral = self.size[active], self.shape.integral[active]
         s = size * own[active]
         if self.circular:
             field, slope = circular_field(x**2 + y**2, s, SINE_MERGED)
         else:
-            cos, sin = np.cos(a.angle[active]), np.sin(a.angle[active])
+            cos, sin = np.cos(self.angle[active]), np.sin(self.angle[active])
             along, across = cos * x + sin * y, cos * y - sin * x
             beta, merged = self.shape.axis_ratio_squared[active], self.v_merged[active]
             field, slope = elliptic_field(along**2, across**2, s, beta, merged)
         slope /= integral
-        itself = np.arange(len(a))[rows, None] == active
+        itself = np.arange(len(self.x))[rows, None] == active
         field[itself] = slope[itself] = 0.0
         return field @ (1.0 / (size * integral)), slope
 

@@ -123,7 +123,8 @@ def shares(
     # The ellipse is that of the matrix [[X², cross], [cross, Y²]], (X, Y) its half extents.
     extent = np.sqrt(np.stack([(axes * squares).sum(1), (axes * squares[:, ::-1]).sum(1)], axis=1))
     cross = cos * sin * (axes[:, 0] - axes[:, 1])
-    first, last = (_interval(patches, position + side * extent) for side in (-1.0, 1.0))
+    ticks = patches.borders_x, patches.borders_y
+    first, last = (_intervals(ticks, position + side * extent) for side in (-1.0, 1.0))
     spans = last - first + 1
     count = spans.prod(axis=1)
     contact = np.repeat(np.arange(len(count)), count)
@@ -134,18 +135,25 @@ def shares(
     for start in range(0, len(cut), at_once):
         some = cut[start : start + at_once]
         on = contact[some]
-        low, high = (_borders(patches, place[some] + side) - position[on] for side in (0, 1))
+        low, high = (_borders(ticks, place[some] + side) - position[on] for side in (0, 1))
         parts[:, some] = _within(low, high, extent[on], cross[on])
     force, area = (part / np.bincount(contact, part)[contact] for part in parts)
-    return Shares(contact, place @ np.array([patches.shape[1], 1]), force, area)
+    return Shares(contact, place @ np.array([len(ticks[1]) - 1, 1]), force, area)
 
 
-def _borders(patches: Partition, place: Indices) -> Array:
+def _intervals(ticks: tuple[Array, Array], point: Array) -> Indices:
+    """Return the grid places (ix, iy) of the patches that hold points, or are nearest to them."""
+    pairs = zip(ticks, point.T, strict=True)
+    places = [np.searchsorted(borders[1:-1], along, side="right") for borders, along in pairs]
+    return np.stack(places, axis=1)
+
+
+def _borders(ticks: tuple[Array, Array], place: Indices) -> Array:
     """Return the lower borders of grid places, shape (s, 2); the outer ones lie at infinity."""
-    borders = []
-    for ticks, along in zip((patches.borders_x, patches.borders_y), place.T, strict=True):
-        borders.append(np.concatenate([[-np.inf], ticks[1:-1], [np.inf]])[along])
-    return np.stack(borders, axis=1)
+    lower = []
+    for borders, along in zip(ticks, place.T, strict=True):
+        lower.append(np.concatenate([[-np.inf], borders[1:-1], [np.inf]])[along])
+    return np.stack(lower, axis=1)
 
 
 def _within(low: Array, high: Array, extent: Array, cross: Array) -> tuple[Array, Array]:
@@ -194,16 +202,6 @@ def _segment(t: Array) -> Array:
     return t * np.sqrt(1.0 - t * t) + np.arcsin(t)
 
 
-def _interval(patches: Partition, point: Array) -> Indices:
-    """Return the grid places (ix, iy) of the patches that hold points, or are nearest to them."""
-    ticks = patches.borders_x, patches.borders_y
-    columns = [
-        np.searchsorted(border[1:-1], values, side="right")
-        for border, values in zip(ticks, point.T, strict=True)
-    ]
-    return np.stack(columns, axis=1)
-
-
 def patch_displacements(
     patches: Partition, contacts: EllipticContacts, contact_modulus: float
 ) -> Array:
@@ -216,13 +214,12 @@ def patch_displacements(
     """
     point, weight = _cubature(contacts)
     load = (contacts.force[:, None] * weight).ravel()
-    crossings = patches.shape[0] + 1, patches.shape[1] + 1
-    corners = np.zeros(crossings)
+    ticks_x, ticks_y = patches.borders_x, patches.borders_y
+    corners = np.zeros((len(ticks_x), len(ticks_y)))
     block = max(1, _CORNERS_AT_ONCE // corners.size)
     for first in range(0, len(load), block):  # blocks bound the memory
         some = slice(first, first + block)
-        to_x = patches.borders_x - point[some, 0, None]
-        to_y = patches.borders_y - point[some, 1, None]
+        to_x, to_y = ticks_x - point[some, 0, None], ticks_y - point[some, 1, None]
         integrals = corner_integral(to_x[:, :, None], to_y[:, None, :])
         corners += np.tensordot(load[some], integrals, axes=1)
     love = np.diff(np.diff(corners, axis=0), axis=1)

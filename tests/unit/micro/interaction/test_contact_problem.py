@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from asperity_states import places
 
 from geometry import InputError, NotConverged
 from micro.closed_forms.hertz import shape_factors
@@ -20,7 +21,7 @@ from micro.interaction.hertz_pairs import HertzPairs
 @pytest.fixture
 def problem(cluster):
     shape = shape_factors(cluster.radius_major, cluster.radius_minor)
-    kernel = HertzPairs(asperities=cluster, shape=shape, circular=False)
+    kernel = HertzPairs(**places(cluster), shape=shape, circular=False)
     return ContactProblem(interaction=kernel.evaluate, interference=5e-3 + cluster.z)
 
 

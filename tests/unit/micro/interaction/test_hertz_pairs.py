@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from asperity_states import places
 from scipy.special import elliprf
 
 from micro.closed_forms.hertz import HertzContact, shape_factors
@@ -13,7 +14,7 @@ def interaction(asperities, circular):
     major = asperities.radius if circular else asperities.radius_major
     minor = asperities.radius if circular else asperities.radius_minor
     shape = shape_factors(major, minor)
-    return HertzPairs(asperities=asperities, shape=shape, circular=circular)
+    return HertzPairs(**places(asperities), shape=shape, circular=circular)
 
 
 both_shapes = pytest.mark.parametrize("circular", [True, False], ids=["circular", "elliptic"])

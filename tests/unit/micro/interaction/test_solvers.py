@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from asperity_states import places
 
 from geometry import NotConverged
 from micro.closed_forms.hertz import shape_factors
@@ -12,7 +13,7 @@ from micro.interaction.truncated_newton import truncated_newton
 
 def problem(asperities, approach):
     shape = shape_factors(asperities.radius_major, asperities.radius_minor)
-    kernel = HertzPairs(asperities=asperities, shape=shape, circular=False)
+    kernel = HertzPairs(**places(asperities), shape=shape, circular=False)
     interference = np.maximum(approach + asperities.z, 1e-9)
     return ContactProblem(interaction=kernel.evaluate, interference=interference)
 
