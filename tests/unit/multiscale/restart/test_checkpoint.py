@@ -16,11 +16,15 @@ from geometry.errors import InputError, NotWritten
 from multiscale import Run, Scene
 from multiscale.cli.command_line import main
 from multiscale.output.field_files import write_fields
-from multiscale.resolution import accuracy
-from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
-from multiscale.restart.folder_lock import FolderLock
-from multiscale.restart.resuming import CheckpointWriter, find_checkpoint, go_on
-from multiscale.storage.serialisation import checksum
+from multiscale.planning import accuracy
+from multiscale.restart.checkpoint import (
+    CheckpointWriter,
+    checkpoint_of,
+    read_checkpoint,
+    write_checkpoint,
+)
+from multiscale.restart.results_folder import FolderLock, find_checkpoint, go_on
+from multiscale.storage import checksum
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 ALONE = {"coupling": {"kind": "analytic"}, "micro": {"model": "half-space"}}
@@ -122,7 +126,7 @@ def interrupted(folder, ended, steps=2):
     """Leave in a folder what a run leaves that is stopped after some steps."""
     run = Run(ended.scene)
     lock = FolderLock(folder)
-    with CheckpointWriter(folder, run, lock) as writer:
+    with CheckpointWriter(folder, run, lock.hold) as writer:
         writer.write()
         for step in run.load_steps():
             writer.accept()
@@ -147,7 +151,7 @@ def test_load_steps_of_the_last_second_are_written_when_the_run_ends(tmp_path, e
     path = tmp_path / "out" / "checkpoint.h5"
     with (
         pytest.raises(RuntimeError, match="a bug"),
-        CheckpointWriter(path.parent, run, lock) as w,
+        CheckpointWriter(path.parent, run, lock.hold) as w,
     ):
         w.write()
         for _ in run.load_steps():
@@ -163,7 +167,7 @@ def test_load_steps_of_the_last_second_are_written_when_the_run_ends(tmp_path, e
 
 def test_checkpoint_is_replaced_whole_and_removed(tmp_path, ended):
     run, lock = Run(ended.scene), FolderLock(tmp_path / "out")
-    with CheckpointWriter(tmp_path / "out", run, lock) as writer:
+    with CheckpointWriter(tmp_path / "out", run, lock.hold) as writer:
         for step in run.load_steps():
             writer.write()
             assert len(read_checkpoint(writer.path).steps) == step.step
@@ -196,7 +200,7 @@ def test_damaged_checkpoint_is_refused_and_stays(tmp_path, ended, capsys, damage
 
 def flip(path):
     with h5py.File(path, "r+") as file:
-        file["position/structure"][3] ^= 1
+        file["run/structure"][3] ^= 1
 
 
 def relabel(path):
@@ -254,7 +258,7 @@ def test_folder_that_vanishes_comes_back_whole(tmp_path, ended):
     run, folder = Run(ended.scene), tmp_path / "out"
     lock = FolderLock(folder)
     lock.hold()
-    with CheckpointWriter(folder, run, lock) as writer:
+    with CheckpointWriter(folder, run, lock.hold) as writer:
         writer.write()
         for step in run.load_steps():
             if step.step == 2:
@@ -271,7 +275,7 @@ def test_folder_that_becomes_a_file_under_way_ends_with_5(tmp_path, ended):
     shutil.rmtree(path.parent)
     path.parent.touch()
     with pytest.raises(NotWritten, match="out: is not a folder") as error:
-        CheckpointWriter(path.parent, ended, lock).write()
+        CheckpointWriter(path.parent, ended, lock.hold).write()
     assert error.value.exit_code == 5
     lock.release()
 
@@ -298,7 +302,7 @@ def test_full_disk_leaves_the_earlier_checkpoint(tmp_path, ended, monkeypatch):
     with pytest.raises(
         NotWritten, match=r"checkpoint.h5: cannot be written: No space left"
     ) as error:
-        CheckpointWriter(path.parent, run, FolderLock(path.parent)).write()
+        CheckpointWriter(path.parent, run, FolderLock(path.parent).hold).write()
     assert error.value.exit_code == 5
     assert path.read_bytes() == before
     assert {each.name for each in path.parent.iterdir()} == {".lock", "checkpoint.h5"}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import InputError
-from multiscale.storage.serialisation import checksum, checksummed, verified
+from multiscale.storage import checksum, checksummed, verified
 
 
 @pytest.fixture
@@ -53,7 +53,7 @@ def test_damage_costs_no_memory(tmp_path):
         "import resource, sys; from pathlib import Path\n"
         "from geometry.errors import InputError\n"
         "from multiscale.laws.files import read_laws\n"
-        "from multiscale.storage.serialisation import checksummed\n"
+        "from multiscale.storage import checksummed\n"
         "def fill(file): file.attrs['format'] = 'patchlaw laws 2'\n"
         "path = Path(sys.argv[1])\n"
         "path.write_bytes(checksummed(fill))\n"

@@ -8,7 +8,7 @@ from geometry.errors import InputError
 from micro import choose
 from multiscale.output.provenance import provenance
 from multiscale.planning.plan import statements, warnings
-from multiscale.resolution.problem_setup import make_setup
+from multiscale.planning.problem_setup import make_setup
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
 

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from geometry.surface import Surface
 from micro import HalfSpaceModel
-from multiscale.scene.coupling_sections import CouplingSection, ReferenceSection
+from multiscale.scene.coupling_sections import CouplingSection
 from multiscale.scene.scene import Scene
 from multiscale.scene.sections import SpectrumSection
 from multiscale.setup.checks import PROVISIONAL_PATCHES
@@ -22,8 +22,6 @@ PATCHES_ACROSS = 8
 """Patches along the shorter side, enough for a map."""
 LEAST_HEIGHTS, MOST_HEIGHTS = 32, 2048
 """Heights along a side of grids that are chosen."""
-REFERENCE = "reference"
-"""Section that is resolved as a whole beside an accuracy."""
 
 _KEYS = ("surface.grid", "micro.model", "coupling.kind", "patches.grid", "block.cells")
 
@@ -88,10 +86,10 @@ def provisional(scene: Scene, auto: frozenset[str]) -> Scene:
         "patches.grid": PROVISIONAL_PATCHES,
     }
     changed = scene
+    if "coupling.kind" in auto:
+        changed = scene.model_copy(update={"coupling": next(couplings(scene))})
     for key in auto & set(start):
         changed = with_value(changed, key, start[key])
-    if "coupling.kind" in auto:
-        changed = changed.model_copy(update={"coupling": next(couplings(scene))})
     return changed
 
 
@@ -108,7 +106,7 @@ def with_value(scene: Scene, key: str, value: Any) -> Scene:
     return scene.model_copy(update={name: section})
 
 
-def resolved_keys(setup: ProblemSetup, given: Scene) -> dict[str, Any]:
+def resolved_sections(setup: ProblemSetup, given: Scene) -> dict[str, Any]:
     """Return what the auto values of a scene became, so that a run goes on as it began.
 
     The speed of the machine decides near ties, and another session may run on another machine.
@@ -118,24 +116,21 @@ def resolved_keys(setup: ProblemSetup, given: Scene) -> dict[str, Any]:
         given: The scene as it was given.
 
     Returns:
-        Values that JSON can hold, by key: of the micro model the candidate's label or the cells of
-        a half-space; of coupling and reference the whole section.
+        The sections with auto values by name, as JSON can hold them. That of the micro model is the
+        label of the candidate that was chosen, or the cells of the half-space.
     """
-    found: dict[str, Any] = {}
-    for key in sorted(auto_keys(given)):
-        name, _, field = key.partition(".")
-        section = getattr(setup.scene, name)
-        if key == "coupling.kind":
-            found[key] = section.model_dump(mode="json", exclude_unset=True)
-        elif key != "micro.model":
-            found[key] = getattr(section, field)
-        elif setup.choice is not None:
-            found[key] = setup.choice.taken.label
-        else:
-            cells = setup.micro.surface.grid if isinstance(setup.micro, HalfSpaceModel) else None
-            found[key] = cells and list(cells)
+    names = {key.partition(".")[0] for key in auto_keys(given)}
     if is_measured(given):
-        found[REFERENCE] = setup.scene.reference.model_dump(mode="json", exclude_unset=True)
+        names.add("reference")
+    found = {}
+    for name in sorted(names):
+        section = getattr(setup.scene, name)
+        found[name] = section.model_dump(mode="json", by_alias=True, exclude_unset=True)
+    if setup.choice is not None:
+        found["micro"] = setup.choice.taken.label
+    elif "micro" in names:
+        model = setup.micro
+        found["micro"] = list(model.surface.grid) if isinstance(model, HalfSpaceModel) else None
     return found
 
 
@@ -144,22 +139,16 @@ def with_resolved(scene: Scene, resolved: Mapping[str, Any]) -> Scene:
 
     Args:
         scene: The scene as it was given.
-        resolved: What `resolved_keys` returned.
+        resolved: What `resolved_sections` returned.
     """
-    changed = scene
-    for key in auto_keys(scene) & set(resolved):
-        value = resolved[key]
-        if key == "coupling.kind":
-            coupling = CouplingSection.model_validate(value)
-            changed = changed.model_copy(update={"coupling": coupling})
-        elif key != "micro.model":
-            changed = with_value(changed, key, tuple(value) if isinstance(value, list) else value)
-        elif isinstance(value, list):
-            changed = with_value(changed, key, "half-space")
-    if REFERENCE in resolved:
-        reference = ReferenceSection.model_validate(resolved[REFERENCE])
-        changed = changed.model_copy(update={REFERENCE: reference})
-    return changed
+    changed: dict[str, Any] = {
+        name: type(getattr(scene, name)).model_validate(content)
+        for name, content in resolved.items()
+        if name != "micro"
+    }
+    if isinstance(resolved.get("micro"), list):
+        changed["micro"] = scene.micro.model_copy(update={"model": "half-space"})
+    return scene.model_copy(update=changed)
 
 
 def couplings(scene: Scene) -> Iterator[CouplingSection]:

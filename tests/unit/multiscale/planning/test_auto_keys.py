@@ -9,9 +9,9 @@ import pytest
 
 from geometry.errors import InputError
 from multiscale import Scene, make_setup
-from multiscale.machine.nodes import ClusterNodes
+from multiscale.machine import ClusterNodes
+from multiscale.planning.auto_keys import auto_keys, couplings, resolved_sections
 from multiscale.planning.plan import statements, warnings
-from multiscale.resolution.auto_keys import auto_keys, couplings, resolved_keys
 
 
 def scene(source=None, **sections):
@@ -70,7 +70,7 @@ def test_auto_values_are_resolved_and_the_plan_says_what_was_measured():
 def test_what_a_run_began_with_is_what_it_goes_on_with():
     given = scene(accuracy=0.05)
     setup = make_setup(given)
-    kept = json.loads(json.dumps(resolved_keys(setup, given)))
+    kept = json.loads(json.dumps(resolved_sections(setup, given)))
     again = make_setup(given, kept)
     assert again.scene == setup.scene
     np.testing.assert_array_equal(again.micro.surface.heights, setup.micro.surface.heights)

@@ -9,7 +9,7 @@ import pytest
 
 from geometry.errors import InputError
 from multiscale.cli.command_line import main
-from multiscale.restart.folder_lock import FolderLock
+from multiscale.restart.results_folder import FolderLock
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 
@@ -80,7 +80,7 @@ def test_folders_above_are_removed_as_well(tmp_path):
 def test_lock_of_a_killed_process_is_lifted(tmp_path, root):
     code = (
         "import os, signal, sys; from pathlib import Path\n"
-        "from multiscale.restart.folder_lock import FolderLock\n"
+        "from multiscale.restart.results_folder import FolderLock\n"
         "lock = FolderLock(Path(sys.argv[1])); lock.hold()\n"
         "os.kill(os.getpid(), signal.SIGKILL)"
     )

@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,18 +17,12 @@ from geometry.materials import Material
 from geometry.patches import PatchGrid, patch_means
 from geometry.rigid_plane import RigidPlane
 from geometry.surface import Surface
-from micro import (
-    Choice,
-    HalfSpaceModel,
-    MicroModel,
-    choose,
-    micro_model,
-)
+from micro import Choice, HalfSpaceModel, MicroModel, choose, micro_model
 from multiscale.couplings.load_steps import ContactCoupling
 from multiscale.loading.stepper import Coupling, LoadHistory, load_steps
-from multiscale.machine.nodes import ClusterNodes
-from multiscale.resolution.accuracy import setup_by_accuracy
-from multiscale.resolution.auto_keys import (
+from multiscale.machine import ClusterNodes
+from multiscale.planning.accuracy import setup_by_accuracy
+from multiscale.planning.auto_keys import (
     accuracy_of,
     auto_keys,
     is_measured,
@@ -36,7 +31,7 @@ from multiscale.resolution.auto_keys import (
     with_resolved,
     with_value,
 )
-from multiscale.resolution.mesh_accuracy import MeshError, measured_mesh_error
+from multiscale.planning.mesh_accuracy import MeshError, measured_mesh_error
 from multiscale.scene.scene import Scene
 from multiscale.setup.checks import check_load, check_memory, check_patches, patch_grid
 from multiscale.setup.problem import ProblemSetup
@@ -61,7 +56,7 @@ def make_setup(
 
     Args:
         scene: The scene.
-        resolved: What auto values became when the run began; see `resolved_keys`.
+        resolved: What auto values became when the run began; see `resolved_sections`.
         nodes: The nodes of the run; None for this process alone.
         mesh_error: Measures the relative error of a reference's meshes at the largest load.
 
@@ -70,14 +65,14 @@ def make_setup(
         NotConverged: When a contact problem cannot be solved.
     """
     began, nodes, known = time.perf_counter(), nodes or ClusterNodes(), resolved or {}
-    auto = auto_keys(scene) - set(known)
+    auto = frozenset() if known else auto_keys(scene)
     start = provisional(with_resolved(scene, known), auto)
-    if auto and is_measured(scene) and not known:
+    if auto and is_measured(scene):
         found = setup_by_accuracy(scene, start, lambda stated: _setup(stated, nodes), mesh_error)
         return replace(found, seconds={"surface": 0.0, "choice": time.perf_counter() - began})
     if "patches.grid" in auto:
         start = with_value(start, "patches.grid", map_grid(make_surface(start)))
-    return _setup(start, nodes, known.get("micro.model"))
+    return _setup(start, nodes, known.get("micro"))
 
 
 def _setup(scene: Scene, nodes: ClusterNodes, known: Any = None) -> ProblemSetup:
@@ -95,22 +90,21 @@ def _setup(scene: Scene, nodes: ClusterNodes, known: Any = None) -> ProblemSetup
     check_patches(scene, surface)
     check_load(scene, surface)
     patches = PatchGrid(grid=patch_grid(scene), lengths=surface.lengths)
-    given: dict[str, Any] = {
-        "scene": scene,
-        "surface": surface,
-        "asperities": find_asperities(surface, periodic=False),  # the block's sides are free
-        "patches": patches,
-        "mean_heights": patch_means(surface, patches),
-        "shape": make_shape(scene, surface),
-    }
+    setup = partial(
+        ProblemSetup,
+        scene=scene,
+        surface=surface,
+        asperities=find_asperities(surface, periodic=False),  # the block's sides are free
+        patches=patches,
+        mean_heights=patch_means(surface, patches),
+        shape=make_shape(scene, surface),
+    )
     made = time.perf_counter()
     seconds = {"surface": made - began}
     if scene.coupling.kind == "reference":
         plane = _estimated_plane(scene, surface)
         meshes = reference_meshes(scene, surface, plane, nodes)
-        return ProblemSetup(
-            **given, micro=None, plane_at_largest_load=plane, meshes=meshes, seconds=seconds
-        )
+        return setup(micro=None, plane_at_largest_load=plane, meshes=meshes, seconds=seconds)
     choice = None
     if scene.micro.model == "auto":
         choice = _chosen_model(scene, surface, patches, known)
@@ -129,11 +123,9 @@ def _setup(scene: Scene, nodes: ClusterNodes, known: Any = None) -> ProblemSetup
     if isinstance(model, HalfSpaceModel) and scene.coupling.kind in ("analytic", "concurrent"):
         plane = _estimated_plane(scene, surface)  # its load steps need no plane ahead of them
     else:
-        coupling = ContactCoupling(model, patches, given["mean_heights"])
+        coupling = ContactCoupling(model, patches, patch_means(surface, patches))
         plane = plane_at_largest_load(scene.loading.load_history, coupling, surface)
-    return ProblemSetup(
-        **given, micro=model, plane_at_largest_load=plane, choice=choice, seconds=seconds
-    )
+    return setup(micro=model, plane_at_largest_load=plane, choice=choice, seconds=seconds)
 
 
 def stated_model(scene: Scene, surface: Surface) -> MicroModel:

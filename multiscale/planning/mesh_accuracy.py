@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from geometry.errors import InputError
 from multiscale.couplings.reference import make_reference
-from multiscale.resolution.auto_keys import accuracy_of, with_value
+from multiscale.planning.auto_keys import accuracy_of, with_value
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
 
@@ -15,8 +15,8 @@ Build = Callable[[Scene], ProblemSetup]
 MeshError = Callable[[ProblemSetup], float]
 Errors = Mapping[str, float]
 
-TRIALS = 6
-"""Most trials of a refinement."""
+_TRIALS = 6
+"""Most trials of the size of meshes."""
 _LEAST_STEP, _LARGEST_STEP = 1.3, 2.0
 """Limits of the refinement from one trial to the next."""
 _DEFAULT_MESHES = 0.005
@@ -81,7 +81,7 @@ class MeshSearch:
         assert setup.meshes is not None
         if len(setup.meshes.shapes) == 1:  # one mesh does not show its error
             return setup, {}
-        for _ in range(TRIALS):
+        for _ in range(_TRIALS):
             error, fine = self.mesh_error(setup), setup.scene.reference.fine
             if error <= self.accuracy or not self._may_refine(setup) or fine is None:
                 break

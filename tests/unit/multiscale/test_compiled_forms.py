@@ -27,7 +27,7 @@ def begin(home, *words, compiler=None):
         environment["CC"] = compiler
     return subprocess.Popen(
         [sys.executable, "-m", "multiscale", *map(str, words)],
-        cwd=Path(__file__).parents[4], env=environment, stdout=subprocess.PIPE,
+        cwd=Path(__file__).parents[3], env=environment, stdout=subprocess.PIPE,
         stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
 

@@ -1,4 +1,7 @@
-"""The compiled forms of finite elements: compiler, cache, a test solve, and compiling ahead."""
+"""Checks the compiled forms of finite elements, and compiles them ahead of runs.
+
+The checks are of the compiler, of the cache, and of a test solve with a known answer.
+"""
 
 from __future__ import annotations
 
@@ -14,12 +17,13 @@ from numpy.typing import NDArray
 
 from geometry.collective import on_root
 from geometry.errors import InputError
-from multiscale.doctor.examination import CheckResult, gathered
+from multiscale.doctor import CheckResult, gathered
 
 Array = NDArray[np.float64]
 
-_SLOW_FILE = 0.02
-"""Time to make, read and remove a small file that deserves a warning [s]; local disks: < 1 ms."""
+_SMALL_FILES, _SLOW_FILE = 5, 0.02
+"""Small files that are made, read and removed, and the mean time of one that deserves a warning
+[s]; local disks take less than 1 ms."""
 _MOST_ITERATIONS = 60
 """Iterations of the test solve that deserve a warning; multigrid of any kind takes 5 to 30."""
 _LARGEST_ERROR = 1e-8
@@ -27,7 +31,7 @@ _LARGEST_ERROR = 1e-8
 _SPRING, _APPROACH = 3000.0, 0.002  # of the test solve [MPa/mm, mm]
 
 
-def compiler_works(comm: Any) -> list[CheckResult]:
+def compiler_works(comm: Any) -> CheckResult:
     """Compile an empty C program on rank 0, where forms are compiled.
 
     Args:
@@ -36,23 +40,22 @@ def compiler_works(comm: Any) -> list[CheckResult]:
     from macro import form_cache as jit
 
     if comm is not None and comm.rank > 0:
-        return []
-    path = jit.compiler()
+        return CheckResult("ok", "compiles on rank 0")
+    path, problem = jit.compiler(), "no C compiler on PATH"
+    if path is not None:
+        with tempfile.TemporaryDirectory() as folder:
+            source = Path(folder) / "empty.c"
+            source.write_text("#include <math.h>\nint empty(void) { return 0; }\n", "utf-8")
+            words = [path, "-c", str(source), "-o", str(source.with_suffix(".o"))]
+            done = subprocess.run(words, capture_output=True, text=True, check=False)
+        if done.returncode == 0:
+            return CheckResult("ok", path)
+        problem = (done.stderr.strip().splitlines() or [f"{path} fails"])[0]
     remedy = "apt-get install gcc libc6-dev; or run patchlaw warm where there is one"
-    if path is None:
-        return [CheckResult("form compiler", "warning", "no C compiler on PATH", remedy)]
-    with tempfile.TemporaryDirectory() as folder:
-        source = Path(folder) / "empty.c"
-        source.write_text("#include <math.h>\nint empty(void) { return 0; }\n", encoding="utf-8")
-        words = [path, "-c", str(source), "-o", str(source.with_suffix(".o"))]
-        done = subprocess.run(words, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        text = (done.stderr.strip().splitlines() or [f"{path} fails"])[0]
-        return [CheckResult("form compiler", "warning", text, remedy)]
-    return [CheckResult("form compiler", "ok", path)]
+    return CheckResult("warning", problem, remedy)
 
 
-def cache(comm: Any, folder: Path | None = None) -> list[CheckResult]:
+def cache(comm: Any, folder: Path | None = None) -> CheckResult:
     """Check the cache of compiled forms, as every rank sees it.
 
     Args:
@@ -66,20 +69,22 @@ def cache(comm: Any, folder: Path | None = None) -> list[CheckResult]:
     compiled, writable = _compiled(folder), jit.writable(folder)
     slowest = max(gathered(comm, _small_file_seconds(folder) if writable else 0.0))
     fewest = min(gathered(comm, compiled))
-    text, problem, remedy = f"{folder}, {compiled} compiled", "", ""
+    text = f"{folder}, {compiled} compiled"
     if left := jit.stale_locks(folder):
         text = f"{text}; {len(left)} compilation(s) cut short, such as {left[0].name}"
-        return [CheckResult("form cache", "fail", text, "clear them with: patchlaw warm")]
+        return CheckResult("fail", text, "clear them with: patchlaw warm")
     if not writable:
-        problem = "; cannot be written to"
+        problem = "cannot be written to"
         remedy = "set XDG_CACHE_HOME to a folder that can, unless patchlaw warm filled this one"
     elif fewest < compiled:
-        problem = f"; another host sees {fewest}"
+        problem = f"another host sees {fewest}"
         remedy = "every host compiles for itself; run patchlaw warm on each, or share the folder"
     elif slowest > _SLOW_FILE:
-        problem = f"; {1e3 * slowest:.0f} ms for a small file"
+        problem = f"{1e3 * slowest:.0f} ms for a small file"
         remedy = "copy it to a local disk of each node and set XDG_CACHE_HOME (demos/hpc/README.md)"
-    return [CheckResult("form cache", "warning" if problem else "ok", text + problem, remedy)]
+    else:
+        return CheckResult("ok", text)
+    return CheckResult("warning", f"{text}; {problem}", remedy)
 
 
 def _compiled(folder: Path) -> int:
@@ -91,18 +96,15 @@ def _compiled(folder: Path) -> int:
 
 
 def _small_file_seconds(folder: Path) -> float:
-    """Return the median time to make, read and remove a small file [s]."""
+    """Return the mean time to make, read and remove a small file [s]."""
     folder.mkdir(parents=True, exist_ok=True)
-    times = []
     with tempfile.TemporaryDirectory(dir=folder, prefix="doctor-") as place:
-        for number in range(5):
-            began = time.perf_counter()
-            file = Path(place) / str(number)
+        file, began = Path(place) / "file", time.perf_counter()
+        for _ in range(_SMALL_FILES):
             file.write_bytes(b"x" * 512)
             file.read_bytes()
             file.unlink()
-            times.append(time.perf_counter() - began)
-    return float(np.median(times))
+        return (time.perf_counter() - began) / _SMALL_FILES
 
 
 class _Spring:
@@ -117,7 +119,7 @@ class _Spring:
         return np.full_like(closure, _SPRING)
 
 
-def known_solve(comm: Any) -> list[CheckResult]:
+def known_solve(comm: Any) -> CheckResult:
     """Press a block between rollers and compare the force with the closed form.
 
     Nothing moves sideways, so that a block of height h shortens by p h / M under a pressure p, with
@@ -149,11 +151,11 @@ def known_solve(comm: Any) -> list[CheckResult]:
         f"{seconds:.1f} s"
     )
     if error > _LARGEST_ERROR:
-        return [CheckResult("test solve", "fail", text, "please report this: numbers are wrong")]
+        return CheckResult("fail", text, "please report this: numbers are wrong")
     if state.linear_iterations > _MOST_ITERATIONS:
         remedy = "the preconditioner is weak here; look at PETSc's options with -- -options_left"
-        return [CheckResult("test solve", "warning", text, remedy)]
-    return [CheckResult("test solve", "ok", text)]
+        return CheckResult("warning", text, remedy)
+    return CheckResult("ok", text)
 
 
 def warm(elements: Sequence[str], comm: Any = None) -> tuple[Path, int]:

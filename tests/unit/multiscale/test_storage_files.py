@@ -12,7 +12,7 @@ from multiscale.loading.load_step import LoadStep, PatchState
 from multiscale.output.results import write_tables
 from multiscale.output.terminal import show_history
 from multiscale.results.history import PATCH_COLUMNS, History
-from multiscale.storage.whole_files import write_csv, write_text, write_whole
+from multiscale.storage import write_csv, write_text, write_whole
 
 
 @pytest.fixture

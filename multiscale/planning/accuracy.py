@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 from geometry.errors import InputError, NotConverged
 from micro import HalfSpaceModel
-from multiscale.costs.prediction import predicted_cost
 from multiscale.couplings.blocks import SLOPES, OnBody, on_body
 from multiscale.measured_errors import error_probe
-from multiscale.resolution.auto_keys import (
+from multiscale.planning.auto_keys import (
     MOST_HEIGHTS,
     auto_keys,
     couplings,
@@ -25,19 +25,15 @@ from multiscale.resolution.auto_keys import (
     on_waves,
     with_value,
 )
-from multiscale.resolution.mesh_accuracy import (
-    TRIALS,
-    Build,
-    Errors,
-    MeshError,
-    MeshSearch,
-    refinement,
-)
+from multiscale.planning.costs import predicted_cost
+from multiscale.planning.mesh_accuracy import Build, Errors, MeshError, MeshSearch, refinement
 from multiscale.scene.scene import Scene
 from multiscale.setup.decision import Alternative, Decision
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.surface import make_surface
 
+_TRIALS = 6
+"""Most trials of a grid."""
 _SPARE = 0.8
 """Share of the accuracy that errors at the largest load may take; errors at other loads differ."""
 _ORDER = 1.5
@@ -97,7 +93,7 @@ class _Search(MeshSearch):
         if may_refine and not new_surface:
             cells = _scaled(cells, 1.0 / _FIRST_CELLS)
         body = on_body(setup, None, half_space=not setup.has_block)
-        for trial in range(TRIALS):
+        for trial in range(_TRIALS):
             if new_surface:
                 surface = make_surface(with_value(setup.scene, "surface.grid", cells))
                 model = replace(model, surface=surface, highest=surface.highest)
@@ -106,7 +102,7 @@ class _Search(MeshSearch):
             errors = self._measured(setup, model, body)
             others = sum(errors.values()) - errors["grid"]
             allowed = max(_SPARE * self.accuracy - others, 0.5 * others)
-            last = trial == TRIALS - 1 or max(cells) >= MOST_HEIGHTS
+            last = trial == _TRIALS - 1 or max(cells) >= MOST_HEIGHTS
             if not may_refine or last or errors["grid"] <= allowed:
                 break
             cells = _scaled(cells, refinement(errors["grid"] / allowed, _ORDER))
@@ -135,28 +131,28 @@ class _Search(MeshSearch):
         A reference is tried where the errors exceed the accuracy, or to save time.
         """
         by_cost = sorted(self._coupled(setup), key=_seconds)
-        setup, others = by_cost[0], [_alternative(other) for other in by_cost[1:]]
+        taken, others, missed = by_cost[0], by_cost[1:], None
         keeps = sum(errors.values()) <= self.accuracy
-        if not self._may_be_meshed or (keeps and _seconds(setup) < _NOTHING_TO_SAVE):
-            return self.decided(setup, errors, others)
-        try:
-            meshed = self.with_first_meshes(self.build(_meshed(setup.scene)))
-            if keeps and _seconds(meshed) > _CHEAPER * _seconds(setup):
-                return self.decided(setup, errors, [*others, _alternative(meshed)])
+        if not self._may_be_meshed or (keeps and _seconds(taken) < _NOTHING_TO_SAVE):
+            return self.decided(taken, errors, others)
+        with suppress(InputError, NotConverged):  # the block or the memory may not allow meshes
+            reference = type(taken.scene.coupling)(kind="reference")
+            scene = taken.scene.model_copy(update={"coupling": reference})
+            meshed = self.with_first_meshes(self.build(scene))
+            if keeps and _seconds(meshed) > _CHEAPER * _seconds(taken):
+                return self.decided(taken, errors, [*others, meshed])
             meshed, mesh_errors = self.with_refined_meshes(meshed)
-        except (InputError, NotConverged):  # the block or the memory does not allow meshes
-            return self.decided(setup, errors, others)
-        if not keeps and sum(mesh_errors.values()) > sum(errors.values()):
-            return self.decided(setup, errors, others)
-        others = [_alternative(setup), *others]
-        return self.decided(meshed, mesh_errors, others, missed={} if keeps else errors)
+            if keeps or sum(mesh_errors.values()) <= sum(errors.values()):
+                missed = None if keeps else errors
+                taken, others, errors = meshed, by_cost, mesh_errors
+        return self.decided(taken, errors, others, missed)
 
     def _coupled(self, setup: ProblemSetup) -> Iterator[ProblemSetup]:
         """Yield the problem with every coupling that may be chosen."""
         chosen = "coupling.kind" in auto_keys(self.given)
+        tolerance = {"table_tolerance": 0.1 * self.accuracy}
         for section in couplings(self.given) if chosen else iter([setup.scene.coupling]):
             if section.kind == "consistent" and section.table_tolerance is None:
-                tolerance = {"table_tolerance": 0.1 * self.accuracy}
                 section = section.model_copy(update=tolerance)
             yield replace(setup, scene=setup.scene.model_copy(update={"coupling": section}))
 
@@ -170,7 +166,7 @@ class _Search(MeshSearch):
         self,
         setup: ProblemSetup,
         errors: Errors,
-        others: Sequence[Alternative] = (),
+        others: Sequence[ProblemSetup] = (),
         missed: Errors | None = None,
     ) -> ProblemSetup:
         """Return the problem with what was decided for it."""
@@ -178,7 +174,7 @@ class _Search(MeshSearch):
             accuracy=self.accuracy,
             taken=_alternative(setup),
             errors=errors,
-            others=tuple(others),
+            others=tuple(map(_alternative, others)),
             missed=missed or {},
         )
         return replace(setup, decision=decision)
@@ -191,11 +187,6 @@ def _scaled(cells: tuple[int, int], factor: float) -> tuple[int, int]:
         for count in cells
     )
     return x, y
-
-
-def _meshed(scene: Scene) -> Scene:
-    """Return a scene as a reference."""
-    return scene.model_copy(update={"coupling": type(scene.coupling)(kind="reference")})
 
 
 def _seconds(setup: ProblemSetup) -> float:

@@ -1,4 +1,4 @@
-"""Records as named arrays, and named arrays in HDF5 files with a checksum over all their bytes.
+"""Writes files whole or not at all, and stores arrays in HDF5 files with a checksum.
 
 The library that reads HDF5 trusts what a file says of itself: a few damaged bytes can make it ask
 for gigabytes, never return or end the process. So the bytes are compared with a SHA-256 checksum
@@ -12,9 +12,13 @@ an error in 42 of 565 places, and 5 of 1010 damages ended or stopped the process
 
 from __future__ import annotations
 
+import csv
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping
+import os
+import shutil
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from io import BytesIO
 from pathlib import Path
@@ -24,7 +28,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
+from geometry.errors import InputError, NotWritten
 
 Arrays = dict[str, NDArray[Any]]
 """Arrays by name: what a file can hold and a checksum be taken of."""
@@ -32,44 +36,6 @@ Arrays = dict[str, NDArray[Any]]
 _STRUCTURE = "structure"
 _HEAD = 512  # bytes before the content, the least that HDF5 leaves to users
 _MARK = b"patchlaw, SHA-256 of all bytes from 512 on: "
-
-
-def as_text(array: NDArray[Any]) -> str:
-    """Return the text that an array of bytes holds.
-
-    Args:
-        array: What `text_array` made.
-    """
-    return array.tobytes().decode()
-
-
-def text_array(text: str) -> NDArray[np.uint8]:
-    """Return a text as an array of bytes (UTF-8), which every file format can hold.
-
-    Args:
-        text: Any text.
-    """
-    return np.frombuffer(text.encode(), np.uint8)
-
-
-def part(arrays: Arrays, prefix: str) -> Arrays:
-    """Return the arrays whose names begin with a prefix, without it.
-
-    Args:
-        arrays: Arrays by name.
-        prefix: What to leave away.
-    """
-    return {n.removeprefix(prefix): a for n, a in arrays.items() if n.startswith(prefix)}
-
-
-def prefixed(prefix: str, arrays: Arrays) -> Arrays:
-    """Return arrays under names led by a prefix.
-
-    Args:
-        prefix: What to lead names by.
-        arrays: Arrays by name.
-    """
-    return {prefix + name: array for name, array in arrays.items()}
 
 
 def packed(value: Any) -> Arrays:
@@ -81,7 +47,7 @@ def packed(value: Any) -> Arrays:
     """
     arrays: Arrays = {}
     structure = _apart(value, arrays)
-    return {_STRUCTURE: text_array(json.dumps(structure)), **arrays}
+    return {_STRUCTURE: np.frombuffer(json.dumps(structure).encode(), np.uint8), **arrays}
 
 
 def unpacked(arrays: Mapping[str, NDArray[Any]], kinds: Iterable[type]) -> Any:
@@ -97,7 +63,7 @@ def unpacked(arrays: Mapping[str, NDArray[Any]], kinds: Iterable[type]) -> Any:
         TypeError: When a record lacks a field, or has one too many.
     """
     known = {kind.__name__: kind for kind in kinds}
-    return _together(json.loads(as_text(arrays[_STRUCTURE])), arrays, known)
+    return _together(json.loads(arrays[_STRUCTURE].tobytes()), arrays, known)
 
 
 def _apart(value: Any, arrays: Arrays) -> Any:
@@ -154,9 +120,7 @@ def checksummed(fill: Callable[[Any], None]) -> bytes:
     image = BytesIO()  # HDF5 itself may not survive a full disk
     with h5py.File(image, "w", userblock_size=_HEAD) as file:
         fill(file)
-    content = image.getbuffer()
-    content[:_HEAD] = _head_of(content)
-    return image.getvalue()
+    return checksum(image.getvalue())
 
 
 def checksum(content: bytes) -> bytes:
@@ -204,7 +168,131 @@ def stored_numbers(item: Any) -> NDArray[Any]:
     return np.asarray(item[()])
 
 
-def _head_of(content: bytes | memoryview) -> bytes:
+def _head_of(content: bytes) -> bytes:
     """Return what stands before the content that HDF5 sees: mark, checksum, zeros."""
     check = hashlib.sha256(memoryview(content)[_HEAD:]).hexdigest()
     return (_MARK + check.encode() + b"\n").ljust(_HEAD, b"\0")
+
+
+@contextmanager
+def written(path: Path) -> Iterator[None]:
+    """Turn an error of the system while a file is written into one that names the file.
+
+    Args:
+        path: The file.
+
+    Raises:
+        NotWritten: When the system raised an error.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise NotWritten(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
+    """Write a file under a temporary name beside it and rename it when it is complete.
+
+    Args:
+        path: Final name; its folder is made when missing.
+        write: Writes the file whose name it is given; the suffix is that of the final name.
+
+    Returns:
+        The final name.
+
+    Raises:
+        NotWritten: When the system refuses; whatever stood under the final name stands there still.
+    """
+    partial = path.with_name(f".{path.stem}.partial-{os.getpid()}{path.suffix}")
+    with written(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            write(partial)
+            with partial.open("rb") as file:
+                os.fsync(file.fileno())  # lest a crash of the machine leave the name without data
+            partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
+    return path
+
+
+def remove_partial(folder: Path) -> None:
+    """Remove the half-written files of runs that were killed.
+
+    Args:
+        folder: Folder of results; no other run may be writing there.
+    """
+    for path in folder.glob(".*.partial-*"):
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)
+
+
+def remove(path: Path) -> None:
+    """Remove a file, or a folder written by ADIOS2, if it is there; leave all other folders.
+
+    Args:
+        path: Its name.
+    """
+    if path.suffix == ".bp" and path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def write_json(path: Path, content: dict[str, Any]) -> Path:
+    """Write a dictionary as indented JSON.
+
+    Args:
+        path: File to write.
+        content: What JSON can hold; everything else is written as its text.
+    """
+    return write_text(path, json.dumps(content, indent=2, default=str) + "\n")
+
+
+def write_bytes(path: Path, content: bytes) -> Path:
+    """Write bytes.
+
+    Args:
+        path: File to write.
+        content: Its content.
+    """
+    return write_whole(path, lambda partial: partial.write_bytes(content))
+
+
+def write_text(path: Path, text: str) -> Path:
+    """Write a text as UTF-8.
+
+    Args:
+        path: File to write.
+        text: Its content.
+    """
+    return write_whole(path, lambda partial: partial.write_text(text, encoding="utf-8"))
+
+
+def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> Path:
+    """Write rows; numbers keep all their digits (Python's shortest exact form).
+
+    Args:
+        path: File to write.
+        header: Names of the columns.
+        rows: Their values; an unknown value, None or NaN, leaves its cell empty.
+    """
+
+    def write(partial: Path) -> None:
+        with partial.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(header)
+            writer.writerows([_plain(value) for value in row] for row in rows)
+
+    return write_whole(path, write)
+
+
+def _plain(value: Any) -> Any:
+    """Return what stands in a cell: numpy's scalars as Python's own, nothing for NaN.
+
+    The text of Python's numbers is the same on every numpy release.
+    """
+    plain = value.item() if hasattr(value, "item") else value
+    return None if plain != plain else plain

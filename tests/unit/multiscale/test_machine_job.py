@@ -6,7 +6,7 @@ import pytest
 
 from geometry.errors import InputError
 from multiscale.cli.command_line import main
-from multiscale.machine.mpi_job import detached_processes, refuse_detached_processes
+from multiscale.machine import detached_processes, refuse_detached_processes
 
 PAPER = "demos/scenes/paper.toml"
 

@@ -13,7 +13,7 @@ from stored_inputs import READERS, flipped, originals, read, rewritten
 from geometry.errors import InputError
 from multiscale.laws.files import read_laws
 from multiscale.restart.checkpoint import read_checkpoint
-from multiscale.storage.serialisation import checksum
+from multiscale.storage import checksum
 
 few = settings(
     derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)
