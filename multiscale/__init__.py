@@ -19,10 +19,9 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time `_HOMES` says wh
     from multiscale.couplings.condensed import CondensedCoupling
     from multiscale.couplings.reference import ReferenceCoupling
     from multiscale.laws.consistent import consistent_laws
-    from multiscale.laws.files import read_laws, write_laws
     from multiscale.laws.isolated import isolated_laws
-    from multiscale.laws.law_table import LawTable, PatchLaws
-    from multiscale.laws.patch_law import PatchLaw
+    from multiscale.laws.law_table import LawTable, read_laws, write_laws
+    from multiscale.laws.patch_law import PatchLaw, PatchLaws
     from multiscale.loading.load_step import LoadStep
     from multiscale.loading.stepper import LoadHistory, load_steps
     from multiscale.planning.problem_setup import make_setup
@@ -37,10 +36,9 @@ _MODULES = {
     "couplings.condensed": "CondensedCoupling",
     "couplings.reference": "ReferenceCoupling",
     "laws.consistent": "consistent_laws",
-    "laws.files": "read_laws write_laws",
     "laws.isolated": "isolated_laws",
-    "laws.law_table": "LawTable PatchLaws",
-    "laws.patch_law": "PatchLaw",
+    "laws.law_table": "LawTable read_laws write_laws",
+    "laws.patch_law": "PatchLaw PatchLaws",
     "loading.load_step": "LoadStep",
     "loading.stepper": "LoadHistory load_steps",
     "planning.problem_setup": "make_setup",

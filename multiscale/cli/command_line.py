@@ -16,10 +16,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn
 
+from multiscale.comparison import AGAINST
 from multiscale.output.streams import sturdy_streams
-
-AGAINST = ("reference", "concurrent", "half-space")
-"""What a comparison can be against; the keys of `multiscale.comparison.compare.AGAINST`."""
 
 COMPARE_ENDING = "-compare"
 """What the results folder of a comparison is called after the scene's name."""

@@ -11,8 +11,8 @@ from typing import Any
 from geometry.collective import on_root
 from geometry.statistics import roughness
 from multiscale.cli.inputs import scene_and_folder
-from multiscale.couplings.blocks import load_finite_elements
-from multiscale.laws.files import write_laws
+from multiscale.couplings.assembly import load_finite_elements
+from multiscale.laws.law_table import write_laws
 from multiscale.machine import cluster_nodes, large_object_comm
 from multiscale.output import terminal
 from multiscale.output.results import write_figure

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from geometry.collective import on_root, together
-from multiscale.laws.files import write_laws
+from multiscale.laws.law_table import write_laws
 from multiscale.output.provenance import provenance
 from multiscale.output.report import report_html
 from multiscale.planning import plan

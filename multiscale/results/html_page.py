@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -52,8 +52,17 @@ def page_html(title: str, sections: Iterable[Section]) -> str:
         title: The title and main heading.
         sections: The sections.
     """
-    page = _templates().get_template("page.jinja")
-    return page.render(title=title, sections=list(sections)) + "\n"
+    return filled("results/page.jinja", title=title, sections=list(sections))
+
+
+def filled(template: str, **content: Any) -> str:
+    """Return a template filled with content; characters that HTML reserves are escaped.
+
+    Args:
+        template: Its file, relative to the folder of this package.
+        content: What stands in it, by name.
+    """
+    return _templates().get_template(template).render(**content) + "\n"
 
 
 def table_html(table: Table) -> str:
@@ -62,7 +71,7 @@ def table_html(table: Table) -> str:
     Args:
         table: Its headings and rows.
     """
-    return str(_templates().get_template("table.jinja").module.table(table))  # type: ignore[attr-defined]
+    return str(_templates().get_template("results/table.jinja").module.table(table))  # type: ignore[attr-defined]
 
 
 @cache
@@ -71,7 +80,7 @@ def _templates() -> Environment:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     templates = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
+        loader=FileSystemLoader(Path(__file__).parents[1]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

@@ -50,7 +50,7 @@ FLOORS = {
         "setup",
         "couplings",
         "measured_errors",
-        "notes planning",
+        "planning",
         "run",
         "output restart",
         "comparison",

@@ -87,9 +87,9 @@ def test_only_the_force_curve(monkeypatch, tmp_path):
 def test_a_plan_solves_nothing_of_the_scene(monkeypatch, kind):
     for solution in ("solve", "solve_force", "equilibrium", "respond", "press"):
         monkeypatch.setattr(HalfSpaceModel, solution, never)
-    monkeypatch.setattr("multiscale.couplings.blocks.embedding", never)
-    monkeypatch.setattr("multiscale.couplings.body_terms.Body.face", never)
-    monkeypatch.setattr("multiscale.couplings.blocks.on_body", never)
+    monkeypatch.setattr("multiscale.couplings.body.embedding", never)
+    monkeypatch.setattr("multiscale.couplings.body.Body.face", never)
+    monkeypatch.setattr("multiscale.couplings.contact.on_body", never)
     monkeypatch.setattr("multiscale.couplings.assembly.make_table", never)
     given = data(kind, grid=128)
     setup = make_setup(Scene.from_dict(given))

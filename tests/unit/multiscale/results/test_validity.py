@@ -9,7 +9,7 @@ import pytest
 from geometry import PatchGrid, Spectrum, patch_means, synthesise
 from geometry.rigid_plane import Control
 from micro import BodyModes, micro_model
-from multiscale.couplings.load_steps import ContactCoupling
+from multiscale.couplings.contact import ContactCoupling
 from multiscale.laws.consistent import consistent_laws
 from multiscale.laws.isolated import isolated_laws
 from multiscale.results.validity import range_notes

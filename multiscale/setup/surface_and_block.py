@@ -1,17 +1,20 @@
-"""Refuses scenes that could never fit: too much memory, too many patches, too large loads."""
+"""Makes the surface and the block of a scene, and refuses what could never fit.
+
+Refused are too much memory, too many patches and too large loads, before anything is allocated.
+"""
 
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from geometry.errors import InputError
+from geometry import BlockShape, InputError, Material, Surface, read_surface, synthesise
 from geometry.files import BYTES_PER_HEIGHT
-from geometry.surface import Surface
 from multiscale.machine import ClusterNodes, MemoryRequest
 from multiscale.scene.scene import Scene
 
@@ -30,10 +33,57 @@ BYTES_PER_STATE, BYTES_PER_STEP = 24, 1000
 LAW_BLOCK_CELLS, FIELD_CELLS = (40, 40, 25), (20, 20, 12)
 """Cells of a block that carries laws on its mesh, those of Waddad et al. 2016, and of one that is
 meshed after the load for its fields alone."""
-_ROUNDING = 16.0 * sys.float_info.epsilon
+_ROUNDING = 16.0 * float(np.finfo(float).eps)
 """Approach over the largest height below which it does not change where the plane is."""
 PROVISIONAL_PATCHES = (4, 4)
 """Patches that stand for ``"auto"`` until they are chosen."""
+_DETREND_ORDER = {"mean": 0, "plane": 1, "quadratic": 2}
+
+
+def make_surface(scene: Scene) -> Surface:
+    """Make or read the surface of a scene.
+
+    Raises:
+        InputError: When it cannot be made or read; names file and key.
+    """
+    section = scene.surface
+    extent: dict[str, Any] = {"grid": section.grid, "lengths": section.lengths}
+    if section.spectrum is not None:
+        with located(scene, "surface.spectrum"):
+            surface = synthesise(section.spectrum.spectrum(), **extent)
+    else:
+        with located(scene, "surface.file"):
+            path = scene.surface_path or Path()
+            surface = read_surface(path, missing=section.missing, **extent)
+    if section.detrend == "none":
+        return surface
+    return surface.detrended(_DETREND_ORDER[section.detrend])
+
+
+def make_shape(scene: Scene, surface: Surface) -> BlockShape:
+    """Return the shape and cells of a scene's block under its surface.
+
+    Raises:
+        InputError: When they do not fit together or the coupling; names file and key.
+    """
+    block = scene.block
+    with located(scene, "block"):
+        return BlockShape(
+            interface=surface.lengths,
+            height=block.height_under(surface.lengths),
+            cells=block_cells(scene),
+            element=block.element,
+            grading=block.grading,
+            margin=block.margin,
+            margin_cells=block.margin_cells if block.margin else 0,
+            margin_grading=block.margin_grading if block.margin else 1.0,
+        )
+
+
+def block_material(scene: Scene) -> Material:
+    """Return the elastic constants of a scene's block."""
+    block = scene.block
+    return Material(young_modulus=block.young_modulus, poisson_ratio=block.poisson_ratio)
 
 
 def block_cells(scene: Scene) -> tuple[int, int, int]:
@@ -128,12 +178,12 @@ def memory_requests(scene: Scene) -> Iterator[MemoryRequest]:
 
 def check_patches(scene: Scene, surface: Surface) -> None:
     """Refuse more patches than heights of the surface or cells of the interface."""
-    limits: list[tuple[str, Sequence[int]]] = [("heights of the surface", surface.grid)]
+    limits: dict[str, Sequence[int]] = {"heights of the surface": surface.grid}
     if meshes_block(scene):
-        limits.append(("cells of the interface (block.cells)", block_cells(scene)[:2]))
+        limits["cells of the interface (block.cells)"] = block_cells(scene)[:2]
     grid = patch_grid(scene)
-    for what, limit in limits:
-        if any(patches > most for patches, most in zip(grid, limit, strict=True)):
+    for what, limit in limits.items():
+        if np.any(np.greater(grid, limit)):
             raise InputError(
                 f"more patches than {what}",
                 key="patches.grid",
@@ -171,3 +221,17 @@ def check_load(scene: Scene, surface: Surface) -> None:
             allowed=f"at most {named}, {most:.6g} {unit}",
             file=scene.file,
         )
+
+
+@contextmanager
+def located(scene: Scene, key: str) -> Iterator[None]:
+    """Give errors of the input that occur within the scene's file and a key.
+
+    Args:
+        scene: The scene.
+        key: The key.
+    """
+    try:
+        yield
+    except InputError as error:
+        raise error.located(key=key, file=scene.file) from None

@@ -8,7 +8,8 @@ import pytest
 from geometry.errors import InputError
 from micro import BodyModes, FiniteSlopes, FreeSides
 from multiscale import Scene, make_setup
-from multiscale.couplings.blocks import contact_model, patch_displacements, scene_body
+from multiscale.couplings.body import patch_displacements, scene_body
+from multiscale.couplings.contact import contact_model
 from multiscale.planning.costs import solution_time
 
 

@@ -1,38 +1,53 @@
-"""The body correction: what the block of a scene adds to the compliance of its contact.
+"""The block of a scene: its terms in the contact problem, its compliance, its mesh.
 
-In Legendre modes of the block's top it is the compliance of the block, from finite elements, less
-that of the half-space, and less the effect of free sides where they are a term of their own.
+The body correction is what the block adds to the compliance of a half-space. In Legendre modes of
+the block's top it is the compliance of the block, from finite elements, less that of the
+half-space, and less the effect of free sides where they are a term of their own.
+
+Theory: demos/theory.md, sections 5, 6 and 11.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry import InputError, Material, Surface
 from geometry.checks import process_memory
-from geometry.errors import InputError
-from geometry.materials import Material
 from micro import (
     BodyModes,
     BodyStresses,
     FreeSides,
+    HalfSpaceModel,
+    SurfaceStress,
+    coarse_grid,
     half_space_modes,
     half_space_stress_modes,
     influence_matrix,
     side_modes,
     side_stress_modes,
+    side_stresses,
 )
+from multiscale.setup.problem import ProblemSetup
+from multiscale.setup.surface_and_block import block_material
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from geometry import BlockShape, PatchGrid
-    from macro import FaceCompliance
+    from macro import FaceCompliance, Interface
     from macro.block import Sides
 
 Array = NDArray[np.float64]
+Displacements = Callable[[Array], Array]
+"""From pressures of N patches at m load steps to their mean displacements, [MPa] to [mm]."""
+
+_DECAY_LENGTH = 0.25
+"""Decay length of the effect of free sides in the micro model, relative to the shortest side of
+the block."""
 
 _CUBE_MODES = 8
 """Modes along a side of a cube whose free sides are a term of their own. On Set 1's recipe (seed 1,
@@ -100,29 +115,12 @@ class Body:
             count = max(count, _LEAST_WITH_SIDES)
         return math.ceil(round(count, 6))
 
-    def _check_memory(self, count: int) -> None:
-        """Refuse a block so flat or slender that its modes do not fit into memory."""
-        needed, memory = _BYTES * float(count) ** 4, process_memory()
-        if needed <= memory:
-            return
-        ratio = ((memory / _BYTES) ** 0.25 / _CUBE_MODES) ** (1.0 / _FLATNESS_POWER)
-        key = "block.margin" if self.shape.margin else "block.height"
-        raise InputError(
-            f"the compliance of so flat a block, in {count} modes a side, needs about "
-            f"{needed / 1e9:.3g} GB of memory",
-            key=key,
-            value=self.shape.margin or self.shape.height,
-            allowed=f"blocks whose longest side is at most {ratio:.3g} times the shortest or the "
-            "height",
-        )
-
-    def face(self, comm: Any, *, modes: int | None = None, coarse: bool = False) -> FaceCompliance:
+    def face(self, comm: Any, *, modes: int | None = None) -> FaceCompliance:
         """Return the compliance of the top in modes, from finite elements.
 
         Args:
             comm: MPI communicator; None for this process alone.
             modes: Modes along a side; by default those of the shape.
-            coarse: Whether to take coarser elements; the difference bounds the error.
 
         Raises:
             InputError: When the modes of so flat a block do not fit into memory.
@@ -135,7 +133,17 @@ class Body:
         from macro import face_compliance
 
         count = modes or self.modes
-        self._check_memory(count)
+        needed, memory = _BYTES * float(count) ** 4, process_memory()
+        if needed > memory:
+            ratio = ((memory / _BYTES) ** 0.25 / _CUBE_MODES) ** (1.0 / _FLATNESS_POWER)
+            raise InputError(
+                f"the compliance of so flat a block, in {count} modes a side, needs about "
+                f"{needed / 1e9:.3g} GB of memory",
+                key="block.margin" if self.shape.margin else "block.height",
+                value=self.shape.margin or self.shape.height,
+                allowed="blocks whose longest side is at most "
+                f"{ratio:.3g} times the shortest or the height",
+            )
         return face_compliance(
             self.lengths,
             self.shape.height,
@@ -143,7 +151,6 @@ class Body:
             self.sides,
             count,
             comm or MPI.COMM_SELF,
-            coarse=coarse,
             use_cache=True,
         )
 
@@ -162,18 +169,22 @@ class Body:
         origin = -self.shape.margin, -self.shape.margin
         return BodyModes(self.lengths, compliance, origin)
 
-    def stresses(self, face: FaceCompliance, grid: tuple[int, int]) -> BodyStresses:
-        """Return the stresses in the contact face less those of the half-space and its sides.
+    def stresses(self, face: FaceCompliance, surface: Surface) -> list[SurfaceStress]:
+        """Return the stresses in the contact face beyond those of the half-space.
 
         Args:
             face: Compliance of the top.
-            grid: Cells that fill the contact face.
+            surface: The rough surface, whose cells fill the contact face.
         """
-        nu = self.material.poisson_ratio
-        half_space = half_space_stress_modes(self.lengths, nu, face.count)
+        grid, count = coarse_grid(surface), face.count
+        without = half_space_stress_modes(self.lengths, self.material.poisson_ratio, count)
+        found: list[SurfaceStress] = []
         if self.side_term is not None:
-            half_space = half_space + side_stress_modes(self.side_term, face.count)
-        return BodyStresses(self.lengths, grid, face.stresses - half_space, self.shape.margin)
+            spacing = surface.lengths[0] / grid[0], surface.lengths[1] / grid[1]
+            found.append(side_stresses(self.side_term, spacing))
+            without = without + side_stress_modes(self.side_term, count)
+        own = BodyStresses(self.lengths, grid, face.stresses - without, self.shape.margin)
+        return [*found, own]
 
     def patch_compliance(self, patches: PatchGrid, comm: Any) -> Array:
         """Return the whole compliance of the block under its patches.
@@ -198,3 +209,95 @@ class Body:
             count = max(count, min(_MODES_PER_PATCH * max(patches.shape), _MOST_MODES))
         correction = self.term(self.face(comm, modes=count))
         return np.asarray(half_space + correction.patch_compliance(patches))
+
+
+def scene_body(setup: ProblemSetup, *, side_term: bool | None = None) -> Body:
+    """Return the block of a scene.
+
+    Args:
+        setup: The problem set up from the scene, of a coupling with a block.
+        side_term: Whether free sides that bound the interface are a term of their own; by default
+            they are in half-space models.
+    """
+    block, lengths, shape = setup.scene.block, setup.surface.lengths, setup.shape
+    if side_term is None:
+        side_term = isinstance(setup.micro, HalfSpaceModel)
+    sides = None
+    if side_term and block.sides == "free" and not shape.margin:
+        sides = FreeSides(
+            lengths=lengths,
+            poisson_ratio=block.poisson_ratio,
+            decay_length=_DECAY_LENGTH * min(*lengths, shape.height),
+        )
+    material = block_material(setup.scene)
+    return Body(shape=shape, material=material, sides=block.sides, side_term=sides)
+
+
+def patch_displacements(setup: ProblemSetup, comm: Any, *, dense: bool) -> Displacements:
+    """Return what gives the mean displacements of patches in the macro model of a scene.
+
+    Args:
+        setup: The problem set up from the scene.
+        comm: MPI communicator; None for this process alone.
+        dense: Whether the macro model is the compliance of the patches, or the mesh itself.
+
+    Returns:
+        A function from pressures of N patches at m load steps to displacements, (m, N) both, [MPa]
+        to [mm]. It is collective.
+
+    Note:
+        Collective.
+    """
+    # with fewer patches than rows of laws the compliance takes fewer solutions of the mesh
+    if dense or setup.patches.count <= setup.table_rows:
+        compliance = patch_compliance(setup, comm)
+        return lambda pressures: np.asarray(pressures @ compliance.T)
+    from macro import displacements_under
+
+    interface = embedding(setup, comm)
+    return lambda pressures: displacements_under(interface, pressures)
+
+
+def patch_compliance(setup: ProblemSetup, comm: Any) -> Array:
+    """Return the compliance of a scene's block under its patches, shape (N, N) [mm/MPa].
+
+    Args:
+        setup: The problem set up from the scene.
+        comm: MPI communicator; None for this process alone.
+
+    Note:
+        Collective.
+    """
+    if setup.scene.coupling.decomposed:
+        return scene_body(setup, side_term=True).patch_compliance(setup.patches, comm)
+    from mpi4py import MPI
+
+    from macro import patch_compliance_matrix
+    from macro.compliance.cache import cached
+    from macro.linear_solvers.options import users_options
+
+    def compute() -> dict[str, Array]:
+        return {"compliance": patch_compliance_matrix(embedding(setup, comm))}
+
+    sides = setup.scene.block.sides
+    key = (setup.shape, block_material(setup.scene), sides, setup.patches, users_options())
+    return cached("plain", key, compute, comm or MPI.COMM_SELF)["compliance"]
+
+
+def embedding(setup: ProblemSetup, comm: Any) -> Interface:
+    """Mesh and assemble the block of a scene, with its patches on top.
+
+    Args:
+        setup: The problem set up from the scene.
+        comm: MPI communicator; None for this process alone.
+
+    Note:
+        Collective.
+    """
+    from mpi4py import MPI
+
+    from macro import Block, Interface, block_mesh
+
+    section = setup.scene.block
+    mesh = block_mesh(setup.shape, comm or MPI.COMM_SELF)
+    return Interface(Block(mesh, block_material(setup.scene), sides=section.sides), setup.patches)

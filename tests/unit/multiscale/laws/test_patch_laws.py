@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import InputError
-from multiscale.laws.law_table import PatchLaws
-from multiscale.laws.patch_law import PatchLaw
+from multiscale.laws.patch_law import PatchLaw, PatchLaws
 from multiscale.laws.rows import LawRows, SolvedRows
 
 
@@ -41,16 +40,15 @@ def test_packed_laws_are_the_laws(common):
         strict=True,
     ):
         np.testing.assert_array_equal(together, np.array(each).ravel())
-    closure = packed.along(local).closure
-    contact = packed.contact(local)
+    point = packed.along(local)
     for index in (0, 1):  # those whose pressure is a function of closure
-        values = LAWS[index].at(closure[index], extend=True)
-        found = contact.area_fraction[index], contact.separation[index]
+        values = LAWS[index].at(point.closure[index], extend=True)
+        found = point.contact_area_fraction[index], point.separation[index]
         expected = values.contact_area_fraction, values.separation
         np.testing.assert_allclose(expected, found, rtol=1e-11, atol=1e-14)  # the inversion's
     rows = [np.searchsorted(one.rows.approach, s, side="right") - 1
             for one, s in zip(LAWS, local, strict=True)]  # fmt: skip
-    assert contact.contacts.tolist() == [max(row, 0) for row in rows]
+    assert point.contacts.tolist() == [max(row, 0) for row in rows]
 
 
 def test_derivatives_are_exact():
@@ -78,7 +76,8 @@ def test_falling_closure_ends_the_law_over_closure():
     start, end = FALLING.range
     assert start == 1e-3
     assert end == FALLING.rows.closure.max()
-    pressure, stiffness, *_ = FALLING.at(np.linspace(start, end, 50))
+    found = FALLING.at(np.linspace(start, end, 50))
+    pressure, stiffness = found.pressure, found.stiffness
     assert np.all(np.diff(pressure) > 0.0)
     assert np.all(stiffness >= 0.0)
     with pytest.raises(InputError, match=r"beyond the end .* stops being a function of closure"):
@@ -103,10 +102,12 @@ def test_newton_may_look_beyond_where_closure_turns():
 def test_law_over_closure_is_the_law_along_the_approach(one):
     local = np.random.default_rng(2).uniform(0.0, 10e-3, 500)
     point = one.along(local)
-    pressure, stiffness, *_ = one.at(point.closure, extend=True)
+    found = one.at(point.closure, extend=True)
     # the inversion ends at the rounding of the closure: 1e-16 over the distance from touch
-    np.testing.assert_allclose(pressure, point.pressure, rtol=1e-9, atol=1e-15)
-    np.testing.assert_allclose(stiffness, point.dpressure / point.dclosure, rtol=1e-8, atol=1e-9)
+    np.testing.assert_allclose(found.pressure, point.pressure, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(
+        found.stiffness, point.dpressure / point.dclosure, rtol=1e-8, atol=1e-9
+    )
 
 
 def test_ends_and_touches():

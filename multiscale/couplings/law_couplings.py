@@ -1,18 +1,19 @@
-"""Couplings that solve the contact problem itself, or laws on the mesh of a block."""
+"""Couplings of patch laws with the mesh of a block, and with a plane that turns as in their rows.
+
+Theory: demos/theory.md, section 11.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.collective import on_root
-from geometry.errors import InputError, NotConverged
-from geometry.patches import PatchGrid
-from geometry.rigid_plane import Control
-from micro import START_KINDS, MicroModel
+from geometry import Control, InputError, NotConverged, RigidPlane
+from multiscale.couplings.body import Displacements
 from multiscale.laws.law_table import LawTable
+from multiscale.laws.patch_law import PatchLaws
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import BeyondLaws
 from multiscale.storage import Arrays, packed, unpacked
@@ -22,57 +23,12 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
 
 Array = NDArray[np.float64]
 
+ROUNDING = 1e-12
+"""Share of a law's end by which a converged approach may exceed it."""
 
-class ContactCoupling:
-    """The contact problem itself at every load step, without laws.
-
-    ``analytic`` is the micro model on a half-space, ``concurrent`` the same on the scene's block:
-    they differ by a term of the compliance. Rank 0 solves for all.
-
-    Args:
-        model: Micro model of the whole surface, with the body that it is pressed on.
-        patches: Partition that the results are summed over; it does not change the solution.
-        mean_heights: Mean height of each patch, shape (N,) [mm].
-        comm: MPI communicator (mpi4py) or None.
-    """
-
-    def __init__(
-        self, model: MicroModel, patches: PatchGrid, mean_heights: Array, comm: Any = None
-    ) -> None:
-        self._model, self._patches, self._mean_heights = model, patches, mean_heights
-        self._comm = comm
-        self._start: Any = None
-
-    def press(self, control: Control) -> LoadStep:
-        """Solve one load step; see `Coupling.press`."""
-
-        def solve() -> LoadStep:
-            response, plane, self._start = self._model.press(
-                control, patches=self._patches, mean_heights=self._mean_heights, start=self._start
-            )
-            return LoadStep.of_patches(
-                self._patches,
-                plane=(plane.approach, *plane.tilt),
-                load=(response.force[0], *response.moment[0]),
-                closure=plane.means(self._patches) - response.patch_displacement[0],
-                pressure=response.patch_force[0] / self._patches.area,
-                area_fraction=response.patch_contact_area[0] / self._patches.area,
-                separation=response.mean_separation,
-                contacts=response.contacts,
-                newton_iterations=int(response.iterations[0]),
-                residuals=(float(response.residual[0]),),
-                warnings=response.warnings,
-            )
-
-        return on_root(self._comm, solve)
-
-    def state(self) -> Arrays:
-        """Return the latest solution; see `Restorable`. It is whole on rank 0 alone."""
-        return packed(self._start)
-
-    def restore(self, state: Arrays) -> None:
-        """Start from a solution; see `Restorable`."""
-        self._start = unpacked(state, START_KINDS)
+_OTHER_MODEL = 0.05
+"""Residual of closures, relative to the largest local approach, that shows that the laws were made
+for another macro model; between their rows it is hundredths of that."""
 
 
 class EmbeddedCoupling:
@@ -160,8 +116,75 @@ class EmbeddedCoupling:
             linear_iterations=state.linear_iterations,
             reason=state.reason,
             imbalance=(state.force - state.reaction) / state.force if state.force else 0.0,
-            residuals=tuple(map(float, state.residuals)),
         )
+
+
+class FreePlaneCoupling:
+    """Consistent laws under a plane without moment.
+
+    It is the contacts that balance such a plane, not the mean pressures of patches at their
+    centres: laws of few large patches do not determine how it turns, and a single law not at all.
+    Therefore it turns as it did in the rows of the laws, and the macro model that the laws were
+    made for is in equilibrium with their pressures there.
+
+    Args:
+        table: The laws, with the path of the plane.
+        displacements: Mean displacements of the patches by their pressures in the macro model.
+            Collective.
+
+    Raises:
+        ValueError: When the laws have no path.
+    """
+
+    def __init__(self, table: LawTable, displacements: Displacements) -> None:
+        if table.path is None:
+            raise ValueError("the laws were made under a plane of given tilt")
+        self._table, self._path, self._laws = table, table.path, PatchLaws(table.laws)
+        self._displacements = displacements
+
+    def press(self, control: Control) -> LoadStep:
+        """Find the equilibrium of one load step; see `Coupling.press`.
+
+        Raises:
+            NotConverged: Also when the laws were made for another macro model.
+        """
+        path, patches = self._path, self._table.patches
+        approach, evaluations = control.approach, 0
+        if approach is None:
+            approach, evaluations = path.approach_under(control.force or 0.0, self._force)
+        end = float(path.approach[-1])
+        if approach > end + ROUNDING * abs(end):
+            problem = f"the plane at an approach of {approach:.6g} mm (allowed: up to {end:.6g} mm)"
+            raise beyond_law(control, problem, self._table)
+        tx, ty, *moment = map(float, path.at(approach))
+        point = self._laws.along(np.full(patches.count, approach))
+        local = RigidPlane.above(patches, approach, (tx, ty)).means(patches)
+        closure = local - self._displacements(point.pressure[None])[0]
+        residual = np.abs(np.where(point.pressure > 0.0, closure - point.closure, 0.0)).max()
+        residual /= float(np.abs(local).max()) or 1.0
+        if residual > _OTHER_MODEL:
+            raise NotConverged(
+                f"the patches at {control}",
+                reason="OTHER_BODY",
+                iterations=0,
+                remedy=f"their closures miss {residual:.1%} of the approach: make the laws for "
+                "this block and mesh",
+            )
+        return LoadStep.of_patches(
+            patches,
+            plane=(approach, tx, ty),
+            load=(self._force(approach), *moment),
+            closure=closure,
+            pressure=point.pressure,
+            area_fraction=point.contact_area_fraction,
+            separation=point.separation,
+            contacts=point.contacts,
+            newton_iterations=evaluations,
+        )
+
+    def _force(self, approach: float) -> float:
+        everywhere = np.full(self._table.patches.count, approach)
+        return self._table.patches.area * float(self._laws.along(everywhere).pressure.sum())
 
 
 def beyond_law(

@@ -10,8 +10,9 @@ import pytest
 
 from geometry.errors import InputError, NotConverged
 from multiscale.comparison.catalogue import configurations
-from multiscale.comparison.launching import check_launchable, launch_process, run_all
-from multiscale.comparison.run_result import RunResult, read_result, run_here, write_result
+from multiscale.comparison.compare import launch_process, run_all
+from multiscale.comparison.configuration import RunResult, read_result, write_result
+from multiscale.comparison.process import check_launchable, run_here
 from multiscale.run import Run, run
 from multiscale.scene.scene import Scene
 
@@ -45,7 +46,7 @@ class Fake:
             self.now += seconds
             return RunResult(configuration=one, status="over budget")
         self.now += self.seconds
-        return RunResult(configuration=one, status=end, seconds={"load steps": self.seconds})
+        return RunResult(configuration=one, status=end, phases={"load steps": self.seconds})
 
     def clock(self):
         return self.now
@@ -130,8 +131,9 @@ def test_torn_files_are_run_again(some, tmp_path):
 
 def test_result_survives_its_file(some, tmp_path):
     result = run_here(named(some, "analytic"))
-    again = read_result(write_result(tmp_path / "result.json", result), result.configuration)
-    assert replace(again, curves=None, start_s=0.0) == replace(result, curves=None, start_s=0.0)
+    again = read_result(write_result(tmp_path / "result.json", result))
+    plain = {"curves": None, "start_s": 0.0}
+    assert replace(again, **plain) == replace(result, **plain)
     assert again.curves.patches == result.curves.patches
     for name in set(result.curves.__slots__) - {"patches"}:
         np.testing.assert_array_equal(getattr(again.curves, name), getattr(result.curves, name))
@@ -143,7 +145,7 @@ def test_result_is_that_of_the_scene(some):
     assert (result.status, result.exit_code, result.message) == ("done", 0, "")
     np.testing.assert_array_equal(result.curves.force, history.force_N)
     np.testing.assert_array_equal(result.curves.patch_pressure, history.patch_pressure_MPa)
-    assert set(result.seconds) == set(history.seconds)
+    assert set(result.phases) == set(history.seconds)
 
 
 def test_configuration_that_stops_keeps_its_steps(some, monkeypatch):
@@ -155,14 +157,14 @@ def test_configuration_that_stops_keeps_its_steps(some, monkeypatch):
 
     monkeypatch.setattr(Run, "load_steps", stopping)
     result = run_here(some[0])
-    assert (result.status, result.exit_code, len(result.curves)) == ("not converged", 3, 1)
+    assert (result.status, result.exit_code, result.steps) == ("not converged", 3, 1)
     assert result.message.startswith("load step 2 did not converge: LAW_RANGE after 4 iterations")
 
 
 def test_refused_configuration_tells_why(some):
     scene = Scene.load(PAPER, ["patches.grid=[64, 64]", "block.cells=[8, 8, 4]"])
     result = run_here(replace(some[0], content=scene.model_dump(by_alias=True, exclude_none=True)))
-    assert (result.status, result.exit_code, result.curves) == ("refused", 2, None)
+    assert (result.status, result.exit_code, result.steps) == ("refused", 2, 0)
     assert "more patches than cells of the interface" in result.message
 
 
@@ -179,7 +181,7 @@ def test_process_of_its_own_gives_the_same_and_its_own_memory(some):
 def test_process_is_ended_when_its_time_is_over(some, tmp_path):
     pid = tmp_path / "pid"
     code = f"import os, time; open({str(pid)!r}, 'w').write(str(os.getpid())); time.sleep(60)"
-    result = launch_process(some[0], 1.0, command=lambda *_: [sys.executable, "-c", code])
+    result = launch_process(some[0], 1.0, [sys.executable, "-c", code])
     assert result.status == "over budget"
     assert result.message.endswith("which was what the budget left")
     assert 1.0 <= result.start_s
@@ -189,7 +191,7 @@ def test_process_is_ended_when_its_time_is_over(some, tmp_path):
 
 def test_crash_is_recorded_with_its_last_words(some):
     code = "import sys; print('a line', file=sys.stderr); sys.exit('out of luck')"
-    result = launch_process(some[0], None, command=lambda *_: [sys.executable, "-c", code])
+    result = launch_process(some[0], None, [sys.executable, "-c", code])
     assert (result.status, result.exit_code, result.message) == ("failed", 1, "out of luck")
 
 
