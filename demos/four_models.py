@@ -17,6 +17,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+from paper.models_figure import models_figure
 
 from geometry import (
     Material,
@@ -28,7 +29,7 @@ from geometry import (
     synthesise,
 )
 from micro import MODELS, AsperityModel
-from multiscale.output.figures import models_figure, surface_figure
+from multiscale.output.figures import surface_figure
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -11,7 +11,7 @@ from typing import Any
 
 from geometry.errors import InputError, NotConverged
 from multiscale.cli.command_line import COMPARE_ENDING
-from multiscale.cli.inputs import scene_and_folder
+from multiscale.cli.execution import scene_and_folder
 from multiscale.comparison import errors
 from multiscale.comparison.compare import Launch, compare
 from multiscale.comparison.comparison import Comparison

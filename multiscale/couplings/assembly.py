@@ -21,8 +21,8 @@ from multiscale.laws.isolated import isolated_laws
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling
+from multiscale.results.history import range_notes
 from multiscale.results.reference_record import ReferenceRecord
-from multiscale.results.validity import range_notes
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
 

@@ -55,7 +55,6 @@ FLOORS = {
         "output restart",
         "comparison",
         "cli",
-        "__main__",
     ],
 }
 HEAVY = {

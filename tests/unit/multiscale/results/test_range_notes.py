@@ -12,7 +12,7 @@ from micro import BodyModes, micro_model
 from multiscale.couplings.contact import ContactCoupling
 from multiscale.laws.consistent import consistent_laws
 from multiscale.laws.isolated import isolated_laws
-from multiscale.results.validity import range_notes
+from multiscale.results.history import range_notes
 
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
 END = 40e-3
