@@ -7,7 +7,7 @@ from itertools import cycle
 
 from matplotlib.figure import Figure
 
-from micro.response import Response
+from micro.model import Response
 from multiscale.output.figures import COLOURS, LINE_STYLES, add_grid_and_legend, new_figure
 
 

@@ -37,7 +37,7 @@ from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.surface_and_block import block_material
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from geometry import BlockShape, Partition
+    from geometry import BlockShape, PatchGrid
     from macro import FaceCompliance, Interface
     from macro.block import Sides
 
@@ -186,7 +186,7 @@ class Body:
         own = BodyStresses(self.lengths, grid, face.stresses - without, self.shape.margin)
         return [*found, own]
 
-    def patch_compliance(self, patches: Partition, comm: Any) -> Array:
+    def patch_compliance(self, patches: PatchGrid, comm: Any) -> Array:
         """Return the whole compliance of the block under its patches.
 
         Args:

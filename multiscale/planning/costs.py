@@ -19,7 +19,7 @@ from scipy.sparse import diags
 
 from geometry.meshes.block import BlockShape
 from micro import HalfSpaceModel, ScaledModel
-from micro.choice.cost import contact_box_share, solution_seconds
+from micro.choice.models import contact_box_share, solution_seconds
 from multiscale.couplings.assembly import CYCLES_PER_PATCH, full_cycles, newton_choice
 from multiscale.loading.stepper import LoadHistory
 from multiscale.machine import MemoryRequest, peak_memory

@@ -28,12 +28,10 @@ FLOORS = {
     ],
     "micro": [
         "closed_forms",
-        "compliance plane_on_peaks response",
-        "contact interaction model",
-        "half_space patch_sums",
-        "islands",
+        "compliance model",
+        "contact interaction",
+        "half_space islands",
         "asperities",
-        "factory",
         "choice",
     ],
     "macro": [

@@ -12,7 +12,7 @@ import pytest
 
 import micro.interaction.hertz_pairs
 from geometry import Asperities, PatchGrid
-from micro import HalfSpaceModel, asperity_model
+from micro import AsperityModel, HalfSpaceModel
 from multiscale import Run, Scene, make_setup
 from multiscale.cli.command_line import main
 from multiscale.output.results import write_results
@@ -127,7 +127,7 @@ def evaluations(monkeypatch, below: int) -> int:
 
     with monkeypatch.context() as patch:
         patch.setattr(micro.interaction.hertz_pairs, "circular_field", watched)
-        model = asperity_model("circular", summits(below), contact_modulus=1.0)
+        model = AsperityModel("circular", summits(below), contact_modulus=1.0)
         whole = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
         model.respond([0.002, 0.004], patches=whole, mean_heights=[-0.1])
     return counted[0]

@@ -13,15 +13,40 @@ Theory: demos/theory.md, section 4.
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geometry import Material, Partition
 from geometry.errors import InputError
+from micro.closed_forms.love import corner_integral
 
 Array = NDArray[np.float64]
 
 _TINY = 1e-290
+
+
+def love_integral(x: ArrayLike, y: ArrayLike, a: ArrayLike, b: ArrayLike) -> Array:
+    """Return L(a, b, x, y), the integral of 1/distance from (x, y) over the rectangle [mm].
+
+    Finite everywhere, borders and corners included. The four corner terms cancel far away: the
+    relative error is about 1e-16 (r/a)², so 1e-10 at a thousand half-sides.
+
+    Args:
+        x: Distance of the point from the centre along x [mm]; all arguments broadcast.
+        y: Distance along y [mm].
+        a: Half-side along x [mm].
+        b: Half-side along y [mm].
+
+    Source:
+        Waddad et al. 2016, eq. 30, doi 10.1016/j.triboint.2015.12.023 (Love 1929).
+    """
+    x, y, a, b = (np.asarray(part, float) for part in (x, y, a, b))
+    total = np.zeros(np.broadcast_shapes(x.shape, y.shape, a.shape, b.shape))
+    for i, j in product((1, -1), repeat=2):
+        total += i * j * corner_integral(x + i * a, y + j * b)
+    return total
 
 
 def displacements(

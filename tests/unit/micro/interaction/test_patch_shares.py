@@ -7,13 +7,21 @@ import pytest
 from scipy.integrate import quad
 
 from geometry import PatchGrid
-from micro.asperities.patch_shares import shares
+from micro.interaction.patch_sums import EllipticContacts, shares
 
 GRID = PatchGrid(grid=(4, 5), lengths=(1.0, 1.2))
 
 
+def _shares(patches, position, semi_axes, angle, **options):
+    x, y = np.reshape(position, (-1, 2)).T
+    contacts = EllipticContacts(
+        x=x, y=y, angle=angle, semi_axes=semi_axes, force=np.ones(len(position))
+    )
+    return shares(patches, contacts, **options)
+
+
 def _table(position, semi_axes, angle, patches=GRID):
-    found = shares(patches, position, semi_axes, angle)
+    found = _shares(patches, position, semi_axes, angle)
     table = np.zeros((2, len(position), patches.count))
     np.add.at(table[0], (found.contact, found.patch), found.force)
     np.add.at(table[1], (found.contact, found.patch), found.area)
@@ -86,7 +94,7 @@ def _integrated(position, axes, angle, patch):
 
 def test_shares_are_good_to_a_millionth():
     position, axes, angle = _random_contacts(12, seed=4)
-    found = shares(GRID, position, axes, angle)
+    found = _shares(GRID, position, axes, angle)
     for k, patch, force, area in zip(*found, strict=True):
         expected = _integrated(position[k], axes[k], angle[k], patch)
         assert (force, area) == pytest.approx(expected, abs=1e-6)  # stated: 4e-7
@@ -107,7 +115,7 @@ def test_shares_add_up_and_whole_contacts_stay_whole():
     table = _table(position, 0.5 * axes, angle)
     assert table.sum(axis=2) == pytest.approx(1.0, abs=1e-14)
     assert (table >= -1e-14).all()
-    tiny = shares(GRID, position, 1e-9 * axes, angle)
+    tiny = _shares(GRID, position, 1e-9 * axes, angle)
     assert np.array_equal(tiny.patch, GRID.index_of(*position.T))
     assert (tiny.force == 1.0).all()
 
@@ -119,7 +127,7 @@ def test_what_lies_outside_counts_for_the_nearest_patch():
 
 
 def test_no_contact_has_no_share():
-    assert len(shares(GRID, np.empty((0, 2)), np.empty((0, 2)), np.empty(0)).contact) == 0
+    assert len(_shares(GRID, np.empty((0, 2)), np.empty((0, 2)), np.empty(0)).contact) == 0
 
 
 def test_shares_do_not_depend_on_how_many_are_integrated_at_once():
@@ -127,7 +135,7 @@ def test_shares_do_not_depend_on_how_many_are_integrated_at_once():
     patches = PatchGrid(grid=(16, 16), lengths=(1.0, 1.2))
     position, _, angle = _random_contacts(20)
     axes = np.full((20, 2), [9.0, 5.0])
-    whole, parts = (shares(patches, position, axes, angle, at_once=n) for n in (4096, 7))
+    whole, parts = (_shares(patches, position, axes, angle, at_once=n) for n in (4096, 7))
     np.testing.assert_array_equal(parts[:2], whole[:2])
     np.testing.assert_allclose(parts.force, whole.force, rtol=1e-13)
     np.testing.assert_allclose(parts.area, whole.area, rtol=1e-13)

@@ -144,17 +144,15 @@ class Peaks:
         )
 
 
-def contact_stiffness(lever: Array, rate: Array, coupling: Array | None = None) -> Array:
+def contact_stiffness(lever: Array, rate: Array, coupling: Array) -> Array:
     """Return the derivative of a rigid plane's loads by its motions, shape (k, k).
 
     Args:
         lever: Displacements of the m contacts by unit motions, shape (m, k).
         rate: Derivatives dP/dt of the forces by the own indentations, shape (m,) [N/mm].
         coupling: Derivatives of the displacements by all contacts' own indentations but a
-            contact's own through the half-space, shape (m, m); none when not given.
+            contact's own through the half-space, shape (m, m).
     """
-    own = lever
-    if coupling is not None and len(rate):
-        own = np.linalg.solve(np.eye(len(rate)) + coupling, lever)
+    own = np.linalg.solve(np.eye(len(rate)) + coupling, lever)
     found = lever.T @ (rate[:, None] * own)
     return np.asarray(0.5 * (found + found.T))

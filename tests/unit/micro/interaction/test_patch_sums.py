@@ -2,23 +2,19 @@
 
 import numpy as np
 import pytest
+from boussinesq import love_integral
 from scipy.special import roots_jacobi
 
 from geometry import PatchGrid
 from micro import HertzContact
-from micro.closed_forms.love import love_integral
-from micro.patch_sums import EllipticContacts, patch_displacements
+from micro.interaction.patch_sums import EllipticContacts, patch_displacements
 
 PATCHES = PatchGrid(grid=(4, 2), lengths=(1.0, 0.6))
 
 
 def displacements(patches, position, semi_axes, angle, force, contact_modulus):
     contacts = EllipticContacts(
-        position=position,
-        angle=angle,
-        semi_axes=semi_axes,
-        area=np.pi * semi_axes.prod(axis=1),
-        force=force,
+        x=position[:, 0], y=position[:, 1], angle=angle, semi_axes=semi_axes, force=force
     )
     return patch_displacements(patches, contacts, contact_modulus)
 
