@@ -127,3 +127,23 @@ class LoadStep:
             moment_N_mm=(mx, my),
             **other,
         )
+
+    @property
+    def tilt_x(self) -> float:
+        """Slope of the approach along x."""
+        return self.tilt[0]
+
+    @property
+    def tilt_y(self) -> float:
+        """Slope of the approach along y."""
+        return self.tilt[1]
+
+    @property
+    def moment_x_N_mm(self) -> float:
+        """First moment of the forces along x [N mm]."""
+        return self.moment_N_mm[0]
+
+    @property
+    def moment_y_N_mm(self) -> float:
+        """First moment of the forces along y [N mm]."""
+        return self.moment_N_mm[1]

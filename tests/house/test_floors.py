@@ -55,6 +55,7 @@ FLOORS = {
         "output restart",
         "comparison",
         "cli",
+        "__main__",
     ],
 }
 HEAVY = {
