@@ -9,7 +9,7 @@ from geometry.asperities import Asperities, find_asperities
 from geometry.errors import InputError, NotConverged, PatchlawError
 from geometry.files import read_surface
 from geometry.materials import Material, MaterialPair
-from geometry.meshes.block import Alignment, BlockShape, alignment
+from geometry.meshes.block import BlockShape, misalignment
 from geometry.meshes.families import (
     characteristic_size,
     places_in_reach,
@@ -24,7 +24,6 @@ from geometry.statistics import PowerSpectrum, Roughness, power_spectrum, roughn
 from geometry.surface import Surface
 
 __all__ = [
-    "Alignment",
     "Asperities",
     "BlockShape",
     "Control",
@@ -42,9 +41,9 @@ __all__ = [
     "Spectrum",
     "Surface",
     "UnevenPartition",
-    "alignment",
     "characteristic_size",
     "find_asperities",
+    "misalignment",
     "overlaps",
     "patch_means",
     "places_in_reach",

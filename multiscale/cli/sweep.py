@@ -10,11 +10,12 @@ from typing import Any
 
 from geometry.collective import on_root
 from geometry.errors import InputError, NotConverged
-from multiscale.cli.inputs import scene_and_folder
+from multiscale.cli.command_line import SWEEP_ENDING
+from multiscale.cli.execution import scene_and_folder
 from multiscale.output import terminal
 from multiscale.output.results import write_figure
-from multiscale.restart.folder_lock import locked
-from multiscale.storage.whole_files import remove, write_csv
+from multiscale.restart.results_folder import locked
+from multiscale.storage import remove, write_csv
 from multiscale.sweeps.cases import Case, values_from_text
 from multiscale.sweeps.journal import CaseResult
 from multiscale.sweeps.sweep import JOURNAL, sweep
@@ -35,7 +36,7 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    scene, folder = scene_and_folder(choice, comm, ending="-sweep")
+    scene, folder = scene_and_folder(choice, comm, ending=SWEEP_ENDING)
     vary = dict(values_from_text(text) for text in choice.vary)
     which, parts = choice.part or slurm_part()
     with locked(folder / JOURNAL / f"{which}-of-{parts}", comm):

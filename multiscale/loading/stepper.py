@@ -9,10 +9,9 @@ from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 
-from geometry.errors import NotConverged
-from geometry.rigid_plane import Control
+from geometry import Control, NotConverged
 from multiscale.loading.load_step import LoadStep
-from multiscale.storage.serialisation import Arrays
+from multiscale.storage import Arrays
 
 _MOST_HALVINGS = 8
 """Halvings of a load step that does not converge, or that changes the force by too much."""

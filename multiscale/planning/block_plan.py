@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from geometry.meshes.block import BlockShape, alignment
-from multiscale.machine.nodes import ClusterNodes
-from multiscale.setup.checks import memory_requests
+from geometry.meshes.block import BlockShape, misalignment
+from multiscale.machine import ClusterNodes
+from multiscale.planning.costs import run_memory_requests
 from multiscale.setup.problem import ProblemSetup
-from multiscale.setup.reference_meshes import ReferenceMeshes, reference_requests
+from multiscale.setup.reference_meshes import ReferenceMeshes
 
 LOCKING_FROM = 0.45
 """Poisson's ratio above which linear elements lock. Two by two patches on 8 × 8 × 6 trilinear
@@ -76,9 +76,8 @@ def block_warnings(setup: ProblemSetup) -> Iterator[str]:
             "coupling.compliance = 'decomposed', whose elements are of high order"
         )
     if setup.meshes is None:
-        fit = alignment(setup.shape, setup.patches)
-        if not fit:
-            yield fit.sentence
+        if sentence := misalignment(setup.shape, setup.patches):
+            yield sentence
 
 
 def memory_warnings(setup: ProblemSetup, nodes: ClusterNodes) -> Iterator[str]:
@@ -88,10 +87,7 @@ def memory_warnings(setup: ProblemSetup, nodes: ClusterNodes) -> Iterator[str]:
         setup: The problem.
         nodes: The nodes there are.
     """
-    requests = [*memory_requests(setup.scene)]
-    if setup.meshes is not None:
-        requests += reference_requests(setup.scene, setup.meshes)
-    for request in requests:
+    for request in run_memory_requests(setup):
         if not nodes.fits(request):
             key = "" if request.value is None else f"{request.key} = {request.value}: "
             yield f"{key}{request.sentence}; there is {nodes.remedy(request)}"

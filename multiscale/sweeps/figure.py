@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from multiscale.output.figure_style import add_grid_and_legend, curve_styles, new_figure
+from multiscale.output.figures import add_grid_and_legend, curve_styles, new_figure
 
 MOST_CURVES = 200
 """Cases that are drawn as curves; bands show those beyond."""

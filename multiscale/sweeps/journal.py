@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from geometry.errors import InputError
-from multiscale.storage.whole_files import written
+from multiscale.storage import written
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

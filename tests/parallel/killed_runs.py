@@ -94,7 +94,7 @@ class Runs:
 
     def on_two_ranks(self, words, log, over):
         """Run on two ranks until `over` tells; return the exit code, None when killed."""
-        command = ["mpirun", "-n", "2", sys.executable, "-m", "multiscale", *words]
+        command = ["mpirun", "-n", "2", sys.executable, "-m", "patchlaw", *words]
         with log.open("wb") as file:
             process = subprocess.Popen(
                 command, cwd=self.root, env=self.environment, start_new_session=True, stdout=file,
@@ -122,10 +122,10 @@ def enter(words, log, root):
     os.dup2(file, 1)
     os.dup2(file, 2)
     from multiscale.cli.command_line import main
-    from multiscale.restart import resuming
+    from multiscale.restart import checkpoint
 
     # these runs take less than the second between two writes
-    resuming.LEAST_INTERVAL = resuming.LEAST_RATIO = 0.0
+    checkpoint.LEAST_INTERVAL = checkpoint.LEAST_RATIO = 0.0
     sys.exit(main(words))
 
 
