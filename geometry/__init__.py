@@ -7,7 +7,7 @@ contact modulus, and block shapes the mesh of the body under the surface.
 
 from geometry.asperities import Asperities, find_asperities
 from geometry.errors import InputError, NotConverged, PatchlawError
-from geometry.files import read_surface
+from geometry.files.reading import read_surface
 from geometry.materials import Material, MaterialPair
 from geometry.meshes.block import Alignment, BlockShape, alignment
 from geometry.meshes.families import (

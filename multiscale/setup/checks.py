@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from geometry.errors import InputError
-from geometry.files import BYTES_PER_HEIGHT
+from geometry.files.content import BYTES_PER_HEIGHT
 from geometry.surface import Surface
 from multiscale.machine.nodes import ClusterNodes, MemoryRequest
 from multiscale.scene.scene import Scene

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from geometry.errors import InputError
-from geometry.files import read_surface
+from geometry.files.reading import read_surface
 from geometry.meshes.block import BlockShape
 from geometry.spectrum import synthesise
 from geometry.surface import Surface

@@ -20,10 +20,11 @@ FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 FLOORS = {
     "geometry": [
         "collective errors legendre_modes",
-        "checks instruments interpolant materials missing",
-        "surface",
-        "files patches spectrum statistics summits",
-        "rigid_plane",
+        "checks interpolant materials missing",
+        "filters surface",
+        "patches spectrum statistics summits",
+        "preparation rigid_plane",
+        "files",
         "asperities meshes plane_equilibrium",
     ],
     "micro": [

@@ -5,7 +5,7 @@ import pytest
 from hard_cases import centred, from_file, history, scene
 
 from geometry.errors import InputError
-from geometry.files import read_surface
+from geometry.files.reading import read_surface
 from geometry.missing import filled
 from multiscale import make_setup, run
 from multiscale.planning.plan import statements, warnings

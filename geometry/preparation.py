@@ -1,0 +1,224 @@
+"""What is done to a measured map before it is a surface that is pressed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.checks import cell_counts, cells_between, is_level
+from geometry.errors import InputError
+from geometry.filters import regridded, smoothed, spikes
+from geometry.missing import filled
+from geometry.statistics import roughness
+from geometry.surface import Surface
+
+Array = NDArray[np.float64]
+Interval = tuple[float, float]
+
+STEEPEST = 2.0
+"""Rms gradient of the steepest map that is accepted; ground, etched and blasted metal has 0.05 to
+1, and a map whose heights are taken in a unit too large has a thousand times as much."""
+
+_FLATTEST = 1e-5
+_LONGEST, _SHORTEST = 200.0, 1e-4
+"""Rms gradient below which, and sides beyond which [mm], the units of a map are asked for."""
+_MUCH_MISSING = 0.3
+
+_ORDERS = {"mean": 0, "plane": 1, "quadratic": 2}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Preparation:
+    """What is done to a map, in the order of the arguments.
+
+    Args:
+        crop: Rectangle that is kept, intervals along x and along y [mm]; all along an axis that is
+            None. Rounded to whole cells.
+        outliers: ``remove`` makes spikes missing heights, which are filled; see `spikes`.
+        missing: What is done with missing heights: refuse the map, or ``fill`` them by a membrane,
+            see `geometry.missing.filled`.
+        form: Form that is removed by least squares: ``none``, ``mean``, ``plane``, ``quadratic``.
+        short: Cut-off wavelength below which waves are removed (S-filter) [mm].
+        long: Cut-off wavelength beyond which waves are removed (L-filter) [mm].
+        resample: New numbers of heights, see `regridded`.
+
+    Note:
+        ISO 25178-3 takes the S-filter before the form. Here the form goes first, as a tilt would
+        disturb the filter along the borders of the map.
+    """
+
+    crop: tuple[Interval | None, Interval | None] = (None, None)
+    outliers: Literal["keep", "remove"] = "keep"
+    missing: Literal["refuse", "fill"] = "refuse"
+    form: Literal["none", "mean", "plane", "quadratic"] = "none"
+    short: float | None = None
+    long: float | None = None
+    resample: tuple[int, int] | None = None
+
+
+def prepared(surface: Surface, steps: Preparation) -> Surface:
+    """Remove the form of a surface, filter it and put it on another grid.
+
+    Args:
+        surface: The surface; its source then says what was done.
+        steps: What is done; `completed` does what comes before the form.
+
+    Raises:
+        InputError: When a cut-off or the new grid does not fit the surface.
+    """
+    done = []
+    if steps.form != "none":
+        surface = surface.detrended(_ORDERS[steps.form])
+        done.append(f"its {steps.form} removed")
+    _check_cut_offs(surface, steps.short, steps.long)
+    h, spacing, periodic = surface.heights, surface.spacing, surface.periodic
+    if steps.short is not None:
+        h = smoothed(h, spacing, steps.short, periodic=periodic)
+        done.append(f"waves below {1e3 * steps.short:g} µm removed (Gaussian)")
+    if steps.long is not None:
+        h = h - smoothed(h, spacing, steps.long, periodic=periodic)
+        done.append(f"waves beyond {1e3 * steps.long:g} µm removed (Gaussian)")
+    if steps.resample is not None:
+        mx, my = cell_counts(steps.resample, "the new grid of the surface", smallest=4)
+        h = regridded(h, surface.lengths, (mx, my), periodic=periodic)
+        done.append(f"resampled from {surface.grid[0]} × {surface.grid[1]} heights")
+    if not done:
+        return surface
+    return replace(surface, heights=h, source=", ".join((surface.source, *done)))
+
+
+def completed(
+    heights: Array, lengths: tuple[float, float], steps: Preparation
+) -> tuple[Array, tuple[float, float], list[str], list[str]]:
+    """Crop a map, remove its spikes and fill its gaps.
+
+    Args:
+        heights: Heights, shape (nx, ny) [mm]; not a number where missing.
+        lengths: Sides (Lx, Ly) [mm].
+        steps: What is done; what comes after the gaps is left to `prepared`.
+
+    Returns:
+        Heights without gaps, their sides [mm], what was done, and what a user should know of it.
+
+    Raises:
+        InputError: When the crop does not fit, or heights are missing that are not to be filled.
+    """
+    done, notes = [], []
+    if steps.crop != (None, None):
+        parts = [
+            cells_between(interval, length, count, axis)
+            for interval, length, count, axis in zip(
+                steps.crop, lengths, heights.shape, "xy", strict=True
+            )
+        ]
+        spacing = [length / count for length, count in zip(lengths, heights.shape, strict=True)]
+        corner = [1e3 * (part.start or 0) * step for part, step in zip(parts, spacing, strict=True)]
+        heights = heights[parts[0], parts[1]]
+        x, y = (count * step for count, step in zip(heights.shape, spacing, strict=True))
+        lengths = x, y
+        done.append(
+            f"cropped to {1e3 * x:g} × {1e3 * y:g} µm from ({corner[0]:g}, {corner[1]:g}) µm"
+        )
+    gaps = np.argwhere(np.isnan(heights))
+    if len(gaps) and steps.missing == "refuse":
+        raise InputError(
+            f"{len(gaps)} of {heights.size} heights are missing, the first at index "
+            f"({gaps[0][0]}, {gaps[0][1]})",
+            allowed="finite heights; missing = 'fill' closes gaps by a membrane",
+        )
+    spacing_x, spacing_y = (side / n for side, n in zip(lengths, heights.shape, strict=True))
+    whole, share = filled(heights, (spacing_x, spacing_y)) if len(gaps) else (heights, 0.0)
+    if share:
+        done.append(f"{share:.3g} of the heights missing and filled by a membrane")
+    if share > _MUCH_MISSING:
+        notes.append(
+            f"{100 * share:.0f} % of the heights are missing: what fills them is smooth and has no "
+            "summits, and forces and contact areas are those of the rest"
+        )
+    found = spikes(whole) & ~np.isnan(heights)
+    count = int(np.count_nonzero(found))
+    if count and steps.outliers == "remove":
+        whole, _ = filled(np.where(found, np.nan, heights), (spacing_x, spacing_y))
+        done.append(f"{count} spikes removed and filled")
+    elif count:
+        notes.append(
+            f"{count} heights are spikes, out of line with their neighbours, and are the first to "
+            "touch; surface.outliers = 'remove' fills their places"
+        )
+    return whole, lengths, done, notes
+
+
+def surface_notes(surface: Surface) -> Iterator[str]:
+    """Yield what a user should know of a measured surface before it is pressed.
+
+    Args:
+        surface: The surface, prepared.
+    """
+    share = _plane_share(surface)
+    if share > 0.5:
+        yield (
+            f"the map is tilted: its mean plane makes {100 * share:.0f} % of the variance of its "
+            "heights, and a level plane touches one edge first; surface.detrend = 'plane' levels it"
+        )
+    gradient, (least, most) = roughness(surface).sdq, sorted(surface.lengths)
+    if most > _LONGEST or least < _SHORTEST:
+        yield (
+            f"the map is {surface.lengths[0]:g} × {surface.lengths[1]:g} mm large: are its lengths "
+            'in mm? (surface.lengths takes units, such as "100 um")'
+        )
+    if 0.0 < gradient < _FLATTEST:
+        yield (
+            f"the rms gradient of the map is {gradient:.2g}, far less than of any machined "
+            "surface: are lengths and heights in the units that they were taken in?"
+        )
+
+
+def check_steepness(surface: Surface) -> None:
+    """Refuse a map that is steeper than any rough surface.
+
+    Args:
+        surface: The surface, prepared.
+
+    Raises:
+        InputError: Asks for the unit of the heights.
+    """
+    gradient = roughness(surface).sdq
+    if gradient > STEEPEST:
+        raise InputError(
+            f"the rms gradient of the map is {gradient:.3g}, no rough surface is so steep: are its "
+            "heights in µm? Then say height_unit = 'um'; if it has spikes, outliers = 'remove'",
+            allowed=f"rms gradients up to {STEEPEST:g}",
+        )
+
+
+def _plane_share(surface: Surface) -> float:
+    """Return the share of the mean plane in the variance of the heights."""
+    variance = float(np.var(surface.heights))
+    if not variance > 0.0 or is_level(surface.heights):
+        return 0.0
+    return 1.0 - float(np.var(surface.detrended(1).heights)) / variance
+
+
+def _check_cut_offs(surface: Surface, short: float | None, long: float | None) -> None:
+    """Refuse cut-offs that the grid cannot resolve, that exceed the map or leave no waves."""
+    least, most = 2.0 * max(surface.spacing), min(surface.lengths)
+    for name, value in (("short", short), ("long", long)):
+        if value is not None and not (math.isfinite(value) and least <= value <= most):
+            raise InputError(
+                f"the {name} cut-off of the filter does not fit the map",
+                key=f"surface.filter.{name}",
+                value=value,
+                allowed=f"two cells to the shorter side, {least:g} to {most:g} mm",
+            )
+    if short is not None and long is not None and not short < long:
+        raise InputError(
+            "the cut-offs of the filter leave no waves",
+            key="surface.filter.short",
+            value=short,
+            allowed=f"less than the long cut-off, {long:g} mm",
+        )
