@@ -110,29 +110,18 @@ def completed(
     """
     done, notes = [], []
     if steps.crop != (None, None):
-        parts = [
-            cells_between(interval, length, count, axis)
-            for interval, length, count, axis in zip(
-                steps.crop, lengths, heights.shape, "xy", strict=True
-            )
-        ]
-        spacing = [length / count for length, count in zip(lengths, heights.shape, strict=True)]
-        corner = [1e3 * (part.start or 0) * step for part, step in zip(parts, spacing, strict=True)]
-        heights = heights[parts[0], parts[1]]
-        x, y = (count * step for count, step in zip(heights.shape, spacing, strict=True))
-        lengths = x, y
-        done.append(
-            f"cropped to {1e3 * x:g} × {1e3 * y:g} µm from ({corner[0]:g}, {corner[1]:g}) µm"
-        )
-    gaps = np.argwhere(np.isnan(heights))
-    if len(gaps) and steps.missing == "refuse":
+        heights, lengths, sentence = _cropped(heights, lengths, steps.crop)
+        done.append(sentence)
+    gaps = np.isnan(heights)
+    if steps.missing == "refuse" and gaps.any():
+        first = np.argwhere(gaps)[0]
         raise InputError(
-            f"{len(gaps)} of {heights.size} heights are missing, the first at index "
-            f"({gaps[0][0]}, {gaps[0][1]})",
+            f"{np.count_nonzero(gaps)} of {heights.size} heights are missing, the first at index "
+            f"({first[0]}, {first[1]})",
             allowed="finite heights; missing = 'fill' closes gaps by a membrane",
         )
-    spacing_x, spacing_y = (side / n for side, n in zip(lengths, heights.shape, strict=True))
-    whole, share = filled(heights, (spacing_x, spacing_y)) if len(gaps) else (heights, 0.0)
+    spacing = lengths[0] / heights.shape[0], lengths[1] / heights.shape[1]
+    whole, share = filled(heights, spacing)
     if share:
         done.append(f"{share:.3g} of the heights missing and filled by a membrane")
     if share > _MUCH_MISSING:
@@ -140,17 +129,36 @@ def completed(
             f"{100 * share:.0f} % of the heights are missing: what fills them is smooth and has no "
             "summits, and forces and contact areas are those of the rest"
         )
-    found = spikes(whole) & ~np.isnan(heights)
-    count = int(np.count_nonzero(found))
+    outlying = spikes(whole) & ~gaps
+    count = int(np.count_nonzero(outlying))
     if count and steps.outliers == "remove":
-        whole, _ = filled(np.where(found, np.nan, heights), (spacing_x, spacing_y))
+        whole, _ = filled(np.where(outlying, np.nan, heights), spacing)
         done.append(f"{count} spikes removed and filled")
-    elif count:
+    elif count and (above := float(whole.max() - whole[~outlying].max())) > 0.0:
         notes.append(
-            f"{count} heights are spikes, out of line with their neighbours, and are the first to "
-            "touch; surface.outliers = 'remove' fills their places"
+            f"{count} heights are spikes, out of line with their neighbours; the highest stands "
+            f"{1e3 * above:.3g} µm above all others and touches first; outliers = 'remove' fills "
+            "their places"
         )
     return whole, lengths, done, notes
+
+
+def _cropped(
+    heights: Array, lengths: tuple[float, float], crop: tuple[Interval | None, Interval | None]
+) -> tuple[Array, tuple[float, float], str]:
+    """Return what lies in a rectangle, its sides [mm], and a sentence on it."""
+    cells, corner, sides = [], [], []
+    for interval, length, count, axis in zip(crop, lengths, heights.shape, "xy", strict=True):
+        part = cells_between(interval, length, count, axis)
+        first, last, _ = part.indices(count)
+        cells.append(part)
+        corner.append(first * length / count)
+        sides.append((last - first) * length / count)
+    (x, y), (x0, y0) = sides, corner
+    sentence = (
+        f"cropped to {1e3 * x:g} × {1e3 * y:g} µm from x = {1e3 * x0:g} µm, y = {1e3 * y0:g} µm"
+    )
+    return heights[cells[0], cells[1]], (x, y), sentence
 
 
 def surface_notes(surface: Surface) -> Iterator[str]:
@@ -163,7 +171,7 @@ def surface_notes(surface: Surface) -> Iterator[str]:
     if share > 0.5:
         yield (
             f"the map is tilted: its mean plane makes {100 * share:.0f} % of the variance of its "
-            "heights, and a level plane touches one edge first; surface.detrend = 'plane' levels it"
+            "heights, and a level plane touches one edge first; detrend = 'plane' levels it"
         )
     gradient, (least, most) = roughness(surface).sdq, sorted(surface.lengths)
     if most > _LONGEST or least < _SHORTEST:

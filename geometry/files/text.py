@@ -67,7 +67,9 @@ def read_text(file: Path) -> FileContent:
         InputError: When it is no matrix of numbers, a profile, or points of no regular grid.
     """
     matrix, comments = _load_text(file)
-    if file.suffix.lower() == ".xyz" or matrix.shape[1] == 3:
+    stated = next((found[1] for line in comments if (found := _VALUE_UNIT.fullmatch(line))), None)
+    sizes = [found for line in comments if (found := _SIZE.fullmatch(line))]
+    if file.suffix.lower() == ".xyz" or (matrix.shape[1] == 3 and not sizes):
         return _points(matrix)
     if min(matrix.shape) < 3:
         rows, columns = matrix.shape
@@ -75,8 +77,6 @@ def read_text(file: Path) -> FileContent:
             f"{rows} rows of {columns} numbers are a profile, not a surface",
             allowed="a matrix of heights, or three columns x, y, z",
         )
-    stated = next((found[1] for line in comments if (found := _VALUE_UNIT.fullmatch(line))), None)
-    sizes = [found for line in comments if (found := _SIZE.fullmatch(line))]
     if len(sizes) != 2 or any(size[2] not in {*LENGTH_UNITS, "µm", "μm"} for size in sizes):
         return FileContent(heights=matrix, unit=stated and length_unit(stated))
     after = comments[comments.index(sizes[1].string) + 1 :]

@@ -139,7 +139,7 @@ def stated_model(scene: Scene, surface: Surface) -> MicroModel:
         scene: The scene.
         surface: Its surface.
     """
-    return micro_model(
+    model = micro_model(
         scene.micro.model,
         surface,
         contact_modulus=_modulus(scene),
@@ -147,6 +147,9 @@ def stated_model(scene: Scene, surface: Surface) -> MicroModel:
         curvature=scene.micro.curvature,
         border=scene.micro.border,
     )
+    if scene.surface.periodic and isinstance(model, HalfSpaceModel):
+        return replace(model, periodic=True)
+    return model
 
 
 def plane_at_largest_load(

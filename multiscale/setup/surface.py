@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 from geometry.errors import InputError
 from geometry.files.reading import read_surface
 from geometry.meshes.block import BlockShape
+from geometry.preparation import prepared
 from geometry.spectrum import synthesise
 from geometry.surface import Surface
 from multiscale.scene.scene import Scene
 from multiscale.setup.checks import block_cells
-
-_DETREND_ORDER = {"mean": 0, "plane": 1, "quadratic": 2}
 
 
 def make_surface(scene: Scene) -> Surface:
@@ -23,18 +23,24 @@ def make_surface(scene: Scene) -> Surface:
     Raises:
         InputError: When it cannot be made or read; names file and key.
     """
-    section = scene.surface
+    section, path = scene.surface, scene.surface_path
     extent: dict[str, Any] = {"grid": section.grid, "lengths": section.lengths}
+    steps = section.preparation
     if section.spectrum is not None:
         spectrum = section.spectrum.spectrum()
         surface = _located(scene, "surface.spectrum", lambda: synthesise(spectrum, **extent))
+        surface = _located(scene, "surface", lambda: prepared(surface, steps))
     else:
-        path = scene.surface_path or Path()
-        extent["missing"] = section.missing
-        surface = _located(scene, "surface.file", lambda: read_surface(path, **extent))
-    if section.detrend == "none":
-        return surface
-    return surface.detrended(_DETREND_ORDER[section.detrend])
+        stated = {"height_unit": section.height_unit, "channel": section.channel}
+        stated |= {"periodic": section.periodic, **asdict(steps)}
+        surface = _located(
+            scene,
+            "surface.file",
+            lambda: read_surface(path or Path(), **extent, **stated),
+        )
+    if section.periodic and not surface.periodic:  # it continues so, whatever was removed of it
+        return replace(surface, periodic=True)
+    return surface
 
 
 def make_shape(scene: Scene, surface: Surface) -> BlockShape:

@@ -69,7 +69,11 @@ def test_point_lists_may_carry_rounded_coordinates(tmp_path):
         ("a.csv", "1,5 2,5\n1,5 2,5\n", "not a matrix of numbers"),
         ("a.dat", "", "the file is empty"),
         ("a.dat", "# nothing\n", "the file is empty"),
-        ("a.txt", "1 2 3 4\n" * 3 + "1 nan 3 4\n", r"1 of 16 heights are missing, the first at .*\(3, 1\)"),
+        (
+            "a.txt",
+            "1 2 3 4\n" * 3 + "1 nan 3 4\n",
+            r"1 of 16 heights are missing, the first at .*\(3, 1\)",
+        ),
         ("a.txt", "1 2 3 4 5\n", "1 rows of 5 numbers are a profile, not a surface"),
         ("a.dat", "0 1\n1 1\n2 3\n", "3 rows of 2 numbers are a profile, not a surface"),
         ("a.txt", "0 1 2 3\n" * 3, r"a surface needs at least 4 × 4 heights.*: \(3, 4\)"),
