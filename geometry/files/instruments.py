@@ -80,7 +80,8 @@ def _channel(reader: Any, wanted: str | int | None) -> Any:
         default = reader.default_channel
         found = default if default in maps or not maps else maps[0]
     else:
-        named = dict(enumerate(channels)) if isinstance(wanted, int) else _by_name(channels)
+        named: dict[str | int, Any] = {one.name: one for one in reversed(channels)}
+        named |= enumerate(channels)
         if wanted not in named:
             names = ", ".join(f"{number} {one.name!r}" for number, one in enumerate(channels))
             raise InputError("there is no such channel", value=wanted, allowed=names)
@@ -90,8 +91,3 @@ def _channel(reader: Any, wanted: str | int | None) -> Any:
     if not found.is_height_channel:
         raise InputError(f"the channel {found.name!r} holds {found.data_kind.value}, no heights")
     return found
-
-
-def _by_name(channels: Any) -> dict[str, Any]:
-    """Return channels by name, the first of those that share one."""
-    return {one.name: one for one in reversed(channels)}

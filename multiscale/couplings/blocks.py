@@ -111,7 +111,12 @@ def on_body(
             return model
         plane = surface.highest if edge_stresses else None
         slopes = FiniteSlopes(
-            surface, material, order=order, plane=plane, edge_stresses=edge_stresses
+            surface,
+            material,
+            order=order,
+            periodic=model.periodic,
+            plane=plane,
+            edge_stresses=edge_stresses,
         )
         return replace(model, slopes=slopes)
 

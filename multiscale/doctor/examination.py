@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from geometry.errors import InputError, PatchlawError
+from multiscale.machine.installation import removal, shadows
 
 State = Literal["ok", "warning", "fail"]
 
@@ -58,7 +59,9 @@ def _made(topic: str, check: Check, comm: Any) -> list[CheckResult]:
         error = CheckResult(topic, "fail", str(failure))
     except Exception as failure:
         text = f"{type(failure).__name__}: {failure}"
-        error = CheckResult(topic, "fail", text, "please report this with the lines above")
+        found = shadows()
+        advice = removal(found) if found else "please report this with the lines above"
+        error = CheckResult(topic, "fail", text, advice)
     errors = [one for one in gathered(comm, error) if one is not None]
     if errors:
         return errors[:1]

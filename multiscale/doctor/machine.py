@@ -16,6 +16,7 @@ from typing import Any
 import threadpoolctl
 
 from multiscale.doctor.examination import CheckResult, State, gathered
+from multiscale.machine.installation import removal, shadows
 from multiscale.machine.mpi_job import detached_processes
 from multiscale.machine.nodes import control_group_memory
 
@@ -59,6 +60,8 @@ def packages(comm: Any, load: Callable[[str], Any] = importlib.import_module) ->
             text = f"{version} is older than {'.'.join(map(str, oldest))}"
             remedy = "take Debian 12 or newer and ./setup.sh"
             results.append(CheckResult(name, "fail", text, remedy))
+    for shadow in shadows():
+        results.append(CheckResult(shadow.name, "warning", str(shadow), removal([shadow])))
     return [CheckResult("packages", "ok", ", ".join(found)), *results]
 
 

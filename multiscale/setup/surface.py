@@ -31,13 +31,9 @@ def make_surface(scene: Scene) -> Surface:
         surface = _located(scene, "surface.spectrum", lambda: synthesise(spectrum, **extent))
         surface = _located(scene, "surface", lambda: prepared(surface, steps))
     else:
-        stated = {"height_unit": section.height_unit, "channel": section.channel}
-        stated |= {"periodic": section.periodic, **asdict(steps)}
-        surface = _located(
-            scene,
-            "surface.file",
-            lambda: read_surface(path or Path(), **extent, **stated),
-        )
+        extent |= {"height_unit": section.height_unit, "channel": section.channel}
+        extent |= {"periodic": section.periodic, **asdict(steps)}
+        surface = _located(scene, "surface.file", lambda: read_surface(path or Path(), **extent))
     if section.periodic and not surface.periodic:  # it continues so, whatever was removed of it
         return replace(surface, periodic=True)
     return surface
