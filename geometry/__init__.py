@@ -19,9 +19,10 @@ from geometry.meshes.families import (
 from geometry.meshes.refined_block import RefinedShape
 from geometry.patches import Partition, PatchGrid, UnevenPartition, overlaps, patch_means
 from geometry.rigid_plane import Control, RigidPlane
-from geometry.spectrum import Spectrum, synthesise
+from geometry.spectrum import Spectrum
 from geometry.statistics import PowerSpectrum, Roughness, power_spectrum, roughness
 from geometry.surface import Surface
+from geometry.synthesis import synthesise
 
 __all__ = [
     "Alignment",

@@ -15,7 +15,8 @@ from geometry.files.arrays import read_array
 from geometry.files.content import LENGTH_UNITS, FileContent, length_unit
 from geometry.files.instruments import read_instrument
 from geometry.files.text import is_plain, read_text
-from geometry.preparation import Preparation, check_steepness, completed, prepared, surface_notes
+from geometry.plausibility import check_steepness, surface_notes
+from geometry.preparation import Preparation, completed, prepared
 from geometry.surface import Surface
 
 _TEXT = (".txt", ".dat", ".csv", ".xyz")

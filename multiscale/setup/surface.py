@@ -11,8 +11,8 @@ from geometry.errors import InputError
 from geometry.files.reading import read_surface
 from geometry.meshes.block import BlockShape
 from geometry.preparation import prepared
-from geometry.spectrum import synthesise
 from geometry.surface import Surface
+from geometry.synthesis import synthesise
 from multiscale.scene.scene import Scene
 from multiscale.setup.checks import block_cells
 

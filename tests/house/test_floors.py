@@ -19,11 +19,11 @@ FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 # folders and flat modules from the ground up: each imports only from lines above its own
 FLOORS = {
     "geometry": [
-        "collective errors legendre_modes",
+        "blocked_spline collective errors legendre_modes",
         "checks interpolant materials missing",
-        "filters surface",
-        "patches spectrum statistics summits",
-        "preparation rigid_plane",
+        "filters spectrum surface",
+        "patches statistics summits synthesis",
+        "plausibility preparation rigid_plane",
         "files",
         "asperities meshes plane_equilibrium",
     ],
