@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from geometry.checks import is_level
@@ -12,60 +10,56 @@ from geometry.statistics import roughness
 from geometry.surface import Surface
 
 STEEPEST = 2.0
-"""Rms gradient of the steepest map that is accepted; ground, etched and blasted metal has 0.05 to
-1, and a map whose heights are taken in a unit too large has a thousand times as much."""
+"""Rms gradient of the steepest map that is accepted, a slope of 63°. Heights in µm that are taken
+for mm make a map a thousand times as steep."""
 
-_FLATTEST = 1e-5
+_MUCH_TILT, _FLATTEST = 0.5, 1e-5
 _LONGEST, _SHORTEST = 200.0, 1e-4
-"""Rms gradient below which, and sides beyond which [mm], the units of a map are asked for."""
+"""Share of the mean plane in the variance, rms gradient and sides [mm] that deserve a note."""
 
 
-def surface_notes(surface: Surface) -> Iterator[str]:
-    """Yield what a user should know of a measured surface before it is pressed.
-
-    Args:
-        surface: The surface, prepared.
-    """
-    share = _plane_share(surface)
-    if share > 0.5:
-        yield (
-            f"the map is tilted: its mean plane makes {100 * share:.0f} % of the variance of its "
-            "heights, and a level plane touches one edge first; detrend = 'plane' levels it"
-        )
-    gradient, (least, most) = roughness(surface).sdq, sorted(surface.lengths)
-    if most > _LONGEST or least < _SHORTEST:
-        yield (
-            f"the map is {surface.lengths[0]:g} × {surface.lengths[1]:g} mm large: are its lengths "
-            'in mm? (surface.lengths takes units, such as "100 um")'
-        )
-    if 0.0 < gradient < _FLATTEST:
-        yield (
-            f"the rms gradient of the map is {gradient:.2g}, far less than of any machined "
-            "surface: are lengths and heights in the units that they were taken in?"
-        )
-
-
-def check_steepness(surface: Surface) -> None:
-    """Refuse a map that is steeper than any rough surface.
+def surface_notes(surface: Surface) -> list[str]:
+    """Return what a user should know of a measured surface before it is pressed.
 
     Args:
         surface: The surface, prepared.
 
     Raises:
-        InputError: Asks for the unit of the heights.
+        InputError: When it is steeper than any rough surface; asks for the unit of the heights.
     """
-    gradient = roughness(surface).sdq
+    gradient, (least, most), notes = roughness(surface).sdq, sorted(surface.lengths), []
     if gradient > STEEPEST:
         raise InputError(
             f"the rms gradient of the map is {gradient:.3g}, no rough surface is so steep: are its "
             "heights in µm? Then say height_unit = 'um'; if it has spikes, outliers = 'remove'",
             allowed=f"rms gradients up to {STEEPEST:g}",
         )
+    share = _plane_share(surface)
+    if share > _MUCH_TILT:
+        notes.append(
+            f"the map is tilted: its mean plane makes {100 * share:.0f} % of the variance of its "
+            "heights, and a level plane touches one edge first; detrend = 'plane' levels it"
+        )
+    if most > _LONGEST or least < _SHORTEST:
+        notes.append(
+            f"the map is {surface.lengths[0]:g} × {surface.lengths[1]:g} mm large: are its lengths "
+            "in mm? Quantities take units, as in '100 um'"
+        )
+    if 0.0 < gradient < _FLATTEST:
+        notes.append(
+            f"the rms gradient of the map is {gradient:.2g}, far less than of any machined "
+            "surface: are lengths and heights in the units that they were taken in?"
+        )
+    return notes
 
 
 def _plane_share(surface: Surface) -> float:
     """Return the share of the mean plane in the variance of the heights."""
-    variance = float(np.var(surface.heights))
-    if not variance > 0.0 or is_level(surface.heights):
+    if is_level(surface.heights):
         return 0.0
-    return 1.0 - float(np.var(surface.detrended(1).heights)) / variance
+    heights = surface.heights - surface.mean_height
+    share = 0.0
+    for centres, means in ((surface.x, heights.mean(axis=1)), (surface.y, heights.mean(axis=0))):
+        u = centres - centres.mean()  # on a grid the slopes along x and y are found one by one
+        share += float(np.mean(means * u) ** 2 / np.mean(u * u))
+    return share / float(np.mean(heights * heights))

@@ -140,7 +140,10 @@ def _cropped(
     """Return what lies in a rectangle, its sides [mm], and a sentence on it."""
     cells, corner, sides = [], [], []
     for interval, length, count, axis in zip(crop, lengths, heights.shape, "xy", strict=True):
-        part = cells_between(interval, length, count, axis)
+        try:
+            part = cells_between(interval, length, count, axis)
+        except InputError as error:
+            raise error.located(key=f"surface.crop.{axis}") from None
         first, last, _ = part.indices(count)
         cells.append(part)
         corner.append(first * length / count)

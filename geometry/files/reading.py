@@ -15,7 +15,7 @@ from geometry.files.arrays import read_array
 from geometry.files.content import LENGTH_UNITS, FileContent, length_unit
 from geometry.files.instruments import read_instrument
 from geometry.files.text import is_plain, read_text
-from geometry.plausibility import check_steepness, surface_notes
+from geometry.plausibility import surface_notes
 from geometry.preparation import Preparation, completed, prepared
 from geometry.surface import Surface
 
@@ -112,7 +112,6 @@ def _surface(
         said += done
     raw = Surface(heights=heights, lengths=sides, periodic=periodic, source=", ".join(said))
     surface = prepared(raw, steps)
-    check_steepness(surface)
     return replace(surface, notes=(*notes, *surface_notes(surface)))
 
 

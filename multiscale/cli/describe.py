@@ -89,7 +89,7 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
             cluster_nodes(comm), extensible=True
         )  # a surface needs no memory for its block
         setup = on_root(large_object_comm(comm), lambda: make_setup(scene, nodes=nodes))
-        terminal.show_pairs(comm, _surface_facts(setup))
+        terminal.show_pairs(comm, _surface_facts(setup), setup.surface.notes)
 
         def write() -> list[Path]:
             from multiscale.output.figures import surface_figure

@@ -137,6 +137,9 @@ class SurfaceSection(Section):
     Of a file: ``height_unit`` is the unit of its heights where the file does not state one, mm when
     not given; ``channel`` the name or number of a channel, counted from 0.
 
+    ``grid`` is what a spectrum is sampled on, or what the file must have, ``lengths`` its sides,
+    needed where the file does not state them.
+
     A map is prepared in this order: ``crop``; ``missing``, heights that are not a number are
     refused, or filled by the smoothest membrane between the others, see `geometry.missing.filled`;
     ``outliers``, spikes are removed and filled; ``detrend``, its form is removed; ``filter``;

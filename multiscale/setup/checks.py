@@ -99,10 +99,11 @@ def memory_requests(scene: Scene) -> Iterator[MemoryRequest]:
         return MemoryRequest(key=key, value=value, purpose=purpose, **sizes)
 
     grid, patches, kind = scene.surface.grid, scene.patches.grid, scene.coupling.kind
-    if isinstance(grid, tuple):
-        sent = math.prod(grid) * BYTES_PER_SENT_HEIGHT
-        made = math.prod(grid) * BYTES_PER_HEIGHT - sent
-        yield request("surface.grid", grid, per_rank=sent, root_only=made)
+    for key, heights in (("surface.grid", grid), ("surface.resample", scene.surface.resample)):
+        if isinstance(heights, tuple):
+            sent = math.prod(heights) * BYTES_PER_SENT_HEIGHT
+            made = math.prod(heights) * BYTES_PER_HEIGHT - sent
+            yield request(key, heights, per_rank=sent, root_only=made)
     if meshes_block(scene):
         nx, ny, nz = block_cells(scene)
         yield request("block.cells", (nx, ny, nz), shared=nx * ny * nz * BYTES_PER_CELL)
