@@ -23,13 +23,17 @@ from micro.closed_forms.love import influence_matrix
 from micro.compliance.body_modes import BodyModes, BodyStresses
 from micro.compliance.finite_slopes import FiniteSlopes, SurfaceStress, coarse_grid
 from micro.compliance.free_sides import FreeSides
-from micro.compliance.half_space_modes import half_space_modes, half_space_stress_modes
+from micro.compliance.rectangle_modes import (
+    half_space_modes,
+    half_space_stress_modes,
+    side_modes,
+    side_stress_modes,
+)
 from micro.compliance.side_cells import SideStresses, side_stresses
-from micro.compliance.side_modes import side_modes, side_stress_modes
 from micro.factory import MODEL_NAMES, START_KINDS, micro_model
 from micro.half_space.contact_spots import Contacts, find_contacts
-from micro.half_space.model import HalfSpaceModel, resampled
-from micro.half_space.state import HalfSpaceState
+from micro.half_space.model import HalfSpaceModel
+from micro.half_space.plane_contact import HalfSpaceState
 from micro.islands.model import IslandModel
 from micro.islands.shapes import IslandState
 from micro.model import MicroModel
@@ -72,7 +76,6 @@ __all__ = [
     "half_space_stress_modes",
     "influence_matrix",
     "micro_model",
-    "resampled",
     "side_modes",
     "side_stress_modes",
     "side_stresses",

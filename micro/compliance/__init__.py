@@ -1,11 +1,11 @@
 """The compliance of an elastic body as a sum of terms: pressures on its surface to displacements.
 
     term            for a grid of cells     for Legendre modes of the face   for patches
-    half-space      `half_space_grid`       `half_space_modes`               `closed_forms.love`
-    free sides      `side_cells`            `side_modes`                     `free_sides`
+    half-space      `half_space_grid`       `rectangle_modes`                `closed_forms.love`
+    free sides      `side_cells`            `rectangle_modes`                `free_sides`
     finite body     `body_modes`            (given)                          `body_modes`
     finite slopes   `finite_slopes`         -                                -
 
-`grid_compliance` sums them on grids for the contact problem. `free_sides` rests on `quarter_space`
-and `distance_nodes`, `finite_slopes` on `waves`, and `cells` names parts of a grid.
+`grid_compliance` sums them on grids for the contact problem. `free_sides` rests on `quarter_space`,
+and `finite_slopes` on `waves`.
 """

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geometry import Partition
+from geometry.checks import positive_lengths
 from geometry.errors import InputError
 from geometry.legendre_modes import mode_means, mode_values
 
@@ -44,17 +45,14 @@ class BodyModes:
     def __post_init__(self) -> None:
         matrix = np.asarray(self.matrix, float)
         object.__setattr__(self, "matrix", matrix)
-        shape, largest = matrix.shape, np.abs(matrix).max(initial=0.0)
-        if not (np.all(np.isfinite(self.lengths)) and min(self.lengths) > 0.0):
-            raise InputError("lengths must be positive", value=self.lengths, allowed="> 0 mm")
-        if matrix.ndim != 2 or not len(matrix) or shape != 2 * (self.count**2,):
+        positive_lengths(self.lengths, "the top")
+        if matrix.ndim != 2 or not len(matrix) or matrix.shape != 2 * (self.count**2,):
             problem = "the compliance is not one of K × K modes"
-            raise InputError(problem, value=shape, allowed="(K², K²), K ≥ 1")
-        if not np.isfinite(largest):
-            raise InputError("the compliance is not finite", value=matrix[0, 0], allowed="numbers")
+            raise InputError(problem, value=matrix.shape, allowed="(K², K²), K ≥ 1")
         apart = float(np.abs(matrix - matrix.T).max())
-        if apart > 1e-9 * largest:
-            raise InputError("the compliance is not symmetric", value=apart, allowed="D = Dᵀ")
+        if not apart <= 1e-9 * float(np.abs(matrix).max()):
+            problem = "the compliance is not finite and symmetric"
+            raise InputError(problem, value=apart, allowed="D = Dᵀ")
 
     @property
     def count(self) -> int:
@@ -121,12 +119,13 @@ class BodyModes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModesOnCells:
-    """A compliance in modes on the cells of a grid; pressures are uniform on cells.
+    """A compliance in modes, or stresses in modes, on the cells of a grid.
 
-    Displacements are means over the cells, which makes the compliance symmetric for equal cells.
+    Pressures are uniform on cells. Displacements are means over the cells, which makes the
+    compliance symmetric for equal cells.
 
     Args:
-        matrix: D [mm/N].
+        matrix: D, shape (K², K²) [mm/N]; or several such matrices, shape (n, K², K²).
         means_x: Means of the modes along x over the cells, shape (K, nx).
         means_y: Means along y, shape (K, ny).
         widths_x: Widths of the cells along x, times the unit of the pressures, shape (nx,) [N/mm].
@@ -146,10 +145,11 @@ class ModesOnCells:
             pressure: In the unit chosen, shape (nx, ny).
 
         Returns:
-            Shape (nx, ny) [mm].
+            Shape (nx, ny) [mm]; one after the other for several matrices.
         """
         moments = (self.means_x * self.widths_x) @ pressure @ (self.means_y * self.widths_y).T
-        amplitudes = (self.matrix @ moments.ravel()).reshape(moments.shape)
+        amplitudes = self.matrix @ moments.ravel()
+        amplitudes = amplitudes.reshape(*self.matrix.shape[:-2], *moments.shape)
         return np.asarray(self.means_x.T @ amplitudes @ self.means_y)
 
     def among(self, rows: Indices, columns: Indices) -> ModesOnCells:
@@ -181,22 +181,19 @@ class BodyStresses:
         self,
         lengths: tuple[float, float],
         grid: tuple[int, int],
-        matrix: ArrayLike,
+        matrix: Array,
         margin: float = 0.0,
     ) -> None:
-        self._matrix = np.asarray(matrix, float)
-        count = int(np.sqrt(self._matrix.shape[-1]) + 0.5)
-        if not count or self._matrix.shape != (3, count**2, count**2):
+        count = round(matrix.shape[-1] ** 0.5)
+        if not count or matrix.shape != (3, count**2, count**2) or not np.isfinite(matrix).all():
             problem = "the stresses are not those of K × K modes"
-            raise InputError(problem, value=self._matrix.shape, allowed="(3, K², K²), K ≥ 1")
-        if not np.all(np.isfinite(self._matrix)):
-            raise InputError("the stresses are not finite", value="nan or inf", allowed="numbers")
-        sizes = [length - 2.0 * margin for length in lengths]
-        self._x, self._y = (
-            mode_means(np.linspace(margin, margin + size, cells + 1), length, count)
-            for size, length, cells in zip(sizes, lengths, grid, strict=True)
+            raise InputError(problem, value=matrix.shape, allowed="finite, (3, K², K²), K ≥ 1")
+        x, y = (
+            np.linspace(margin, length - margin, cells + 1)
+            for length, cells in zip(lengths, grid, strict=True)
         )
-        self._cell = float(np.prod(sizes) / np.prod(grid))
+        means = mode_means(x, lengths[0], count), mode_means(y, lengths[1], count)
+        self._on_cells = ModesOnCells(matrix, *means, np.diff(x), np.diff(y))
 
     def stresses(self, pressure: Array) -> Array:
         """Return σ_xx, σ_yy and σ_xy on the cells, shape (3, nx, ny) [MPa].
@@ -204,9 +201,7 @@ class BodyStresses:
         Args:
             pressure: On all cells, shape (nx, ny) [MPa].
         """
-        moments = self._x @ pressure @ self._y.T * self._cell
-        amplitudes = (self._matrix @ moments.ravel()).reshape(3, *moments.shape)
-        return np.asarray(self._x.T @ amplitudes @ self._y)
+        return self._on_cells.displacement(pressure)
 
     def adjoint(self, fields: Array) -> Array:
         """Apply the transpose of `stresses`.
@@ -217,6 +212,8 @@ class BodyStresses:
         Returns:
             Weights of the pressures, shape (nx, ny).
         """
-        amplitudes = self._x @ fields @ self._y.T
-        moments = np.tensordot(amplitudes.reshape(3, -1), self._matrix, axes=2)
-        return np.asarray(self._x.T @ moments.reshape(amplitudes.shape[1:]) @ self._y * self._cell)
+        on = self._on_cells
+        amplitudes = on.means_x @ fields @ on.means_y.T
+        moments = np.tensordot(amplitudes.reshape(3, -1), on.matrix, axes=2)
+        loads_x, loads_y = on.means_x * on.widths_x, on.means_y * on.widths_y
+        return np.asarray(loads_x.T @ moments.reshape(amplitudes.shape[1:]) @ loads_y)

@@ -232,10 +232,9 @@ def coarse_grid(surface: Surface) -> tuple[int, int]:
     squared *= (np.arange(nx)[:, None] / (nx * dx)) ** 2 + (np.arange(ny) / (ny * dy)) ** 2
     for ratio in _RATIOS:
         cx, cy = (min(n, int(fft.next_fast_len(-(-n // ratio), real=True))) for n in (nx, ny))
-        coarse = cx, cy
-        kept = squared[: coarse[0], : coarse[1]].sum() >= _GRADIENT * squared.sum()
-        if kept and min(coarse) >= _FEWEST:
-            return coarse
+        kept = squared[:cx, :cy].sum() >= _GRADIENT * squared.sum()
+        if kept and min(cx, cy) >= _FEWEST:
+            return cx, cy
     return nx, ny
 
 

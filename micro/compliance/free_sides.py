@@ -14,15 +14,18 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from geometry import Partition
 from geometry.errors import InputError
-from micro.compliance.distance_nodes import distance_nodes, means_over
-from micro.compliance.quarter_space import quarter_space
+from micro.compliance.quarter_space import side_compliance, side_stresses
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
+_STEP = 0.4
+"""Distance of the nodes, in the logarithm of the distance from a side; cubics between them err by
+1e-3 of 1/(x + x')."""
 _SHORTEST = 8.0
 """Waves on the narrowest patch along a side."""
 _NEAREST = 1.0 / 256.0
@@ -59,13 +62,11 @@ class FreeSides:
     def __post_init__(self) -> None:
         given = (*self.lengths, self.decay_length)
         if not (np.all(np.isfinite(given)) and min(given) > 0.0):
-            raise InputError(
-                "lengths and decay length must be positive", value=given, allowed="> 0 mm, finite"
-            )
-        if not -1.0 < self.poisson_ratio < 0.5:
-            raise InputError(
-                "Poisson's ratio is out of range", value=self.poisson_ratio, allowed="−1 < ν < ½"
-            )
+            problem = "lengths and decay length must be positive"
+            raise InputError(problem, value=given, allowed="> 0 mm, finite")
+        nu = self.poisson_ratio
+        if not -1.0 < nu < 0.5:
+            raise InputError("Poisson's ratio is out of range", value=nu, allowed="−1 < ν < ½")
 
     def compliance(self, axis: int, distances: Array, waves: Indices) -> Array:
         """Return what one side adds at distances by line loads at distances, for E* = 1.
@@ -78,9 +79,8 @@ class FreeSides:
         Returns:
             Shape (w, n, n); symmetric.
         """
-        space = quarter_space(self.poisson_ratio)
-        numbers = self._wave_numbers(axis, waves, self.decay_length)
-        return np.stack([space.compliance(distances, number) for number in numbers])
+        nu, numbers = self.poisson_ratio, self._wave_numbers(axis, waves, self.decay_length)
+        return np.stack([side_compliance(nu, distances, number) for number in numbers])
 
     def stresses(self, axis: int, distances: Array, waves: Indices) -> Array:
         """Return the stresses that one side adds at distances by line loads at distances.
@@ -96,15 +96,15 @@ class FreeSides:
         Returns:
             Normal to the side, along it, and in shear, shape (3, w, n, n), the loads last [1/mm].
         """
-        space = quarter_space(self.poisson_ratio)
+        nu = self.poisson_ratio
         numbers = self._wave_numbers(axis, waves, _STRESS_DECAY * self.decay_length)
-        found = np.stack([space.stresses(distances, number) for number in numbers], axis=1)
+        found = np.stack([side_stresses(nu, distances, number) for number in numbers], axis=1)
         apart = np.add.outer(distances, distances)
         cut_off, full = (
             number[:, None, None] * np.exp(-np.multiply.outer(number, apart))
             for number in (numbers, np.pi * waves / self.lengths[1 - axis])
         )
-        rest = (0.5 - self.poisson_ratio) * (cut_off - full)
+        rest = (0.5 - nu) * (cut_off - full)
         found[0] += rest
         found[2] -= rest
         return found
@@ -147,3 +147,70 @@ class FreeSides:
         numbers, cut = np.pi * waves / self.lengths[1 - axis], 1.0 / decay_length
         larger, smaller = np.maximum(numbers, cut), np.minimum(numbers, cut)
         return np.asarray(larger * (1.0 + (smaller / larger) ** 4) ** 0.25)
+
+
+def distance_nodes(nearest: float, farthest: float) -> Array:
+    """Return nodes from one distance to another at least, ascending [mm].
+
+    Args:
+        nearest: First node [mm]; what is interpolated is taken for constant below it.
+        farthest: A distance within the nodes [mm].
+    """
+    count = int(np.ceil(np.log(farthest / nearest) / _STEP)) + 1
+    return np.asarray(nearest * np.exp(_STEP * np.arange(max(count, 4))))
+
+
+def values_at(nodes: Array, distances: Array) -> csr_array:
+    """Return the cubic interpolation from nodes to distances, shape (distances, nodes).
+
+    Args:
+        nodes: Of `distance_nodes`, shape (a,) [mm].
+        distances: Shape (n,) [mm].
+    """
+    place = np.log(np.clip(distances, nodes[0], nodes[-1]) / nodes[0]) / _STEP
+    first = np.clip(place.astype(np.intp) - 1, 0, len(nodes) - 4)
+    t = place - first
+    entries = np.stack(
+        [
+            -(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0,
+            t * (t - 2.0) * (t - 3.0) / 2.0,
+            -t * (t - 1.0) * (t - 3.0) / 2.0,
+            t * (t - 1.0) * (t - 2.0) / 6.0,
+        ],
+        axis=1,
+    )
+    columns = first[:, None] + np.arange(4)
+    rows = np.repeat(np.arange(len(distances)), 4)
+    shape = len(distances), len(nodes)
+    return csr_array((entries.ravel(), (rows, columns.ravel())), shape=shape)
+
+
+def means_over(nodes: Array, borders: Array) -> csr_array:
+    """Return the means of the interpolation over intervals, shape (intervals, nodes).
+
+    Args:
+        nodes: Of `distance_nodes`, shape (a,) [mm].
+        borders: Of the intervals, ascending [mm].
+    """
+    inside = nodes[(nodes > borders[0]) & (nodes < borders[-1])]
+    ends = np.union1d(borders, inside)  # the interpolation bends at the nodes
+    points, weights = gauss_points(ends, 4)
+    owner = np.searchsorted(borders, points) - 1
+    sums = csr_array((weights / np.diff(borders)[owner], (owner, np.arange(points.size))))
+    return csr_array(sums @ values_at(nodes, points))
+
+
+def gauss_points(ticks: Array, count: int) -> tuple[Array, Array]:
+    """Return points and weights of Gauss' rule on each interval between ticks.
+
+    Args:
+        ticks: Ends of the n intervals, ascending, shape (n + 1,).
+        count: Points on an interval.
+
+    Returns:
+        Two arrays of shape (n count,).
+    """
+    points, weights = np.polynomial.legendre.leggauss(count)
+    half = 0.5 * np.diff(ticks)[:, None]
+    middle = 0.5 * (ticks[1:] + ticks[:-1])[:, None]
+    return (middle + half * points).ravel(), (half * weights).ravel()

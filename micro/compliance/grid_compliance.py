@@ -10,24 +10,29 @@ Theory: demos/theory.md, section 3.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property, lru_cache, partial
 from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from micro.compliance.body_modes import BodyModes
-from micro.compliance.cells import Box, Cells
+from micro.compliance.body_modes import BodyModes, ModesOnCells
+from micro.compliance.finite_slopes import FiniteSlopes
 from micro.compliance.free_sides import FreeSides
-from micro.compliance.half_space_grid import HalfSpaceGrid
+from micro.compliance.half_space_grid import Cells, HalfSpaceGrid
 from micro.compliance.side_cells import side_cells
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
+Grid = tuple[int, ...]
+"""Numbers of cells (nx, ny)."""
+Pair = tuple[float, float]
+"""Lengths along x and y [mm]."""
 
 _MOST_GRIDS = 24
-"""Half-spaces that are cached, those used last: three sizes of box with their coarse grids."""
+"""Half-spaces that are cached: three sizes of box with their coarse grids."""
 
 
 class ComplianceTerm(Protocol):
@@ -39,14 +44,6 @@ class ComplianceTerm(Protocol):
 
     def among(self, rows: Indices, columns: Indices, /) -> Self:
         """Return the same for some of these rows and columns, by ascending indices."""
-        ...
-
-
-class SlopeTerm(Protocol):
-    """What finite slopes add: a small part of the compliance, on the whole surface."""
-
-    def displacement(self, pressure: Array, /) -> Array:
-        """Return the displacements by pressures on all cells, shape (nx, ny), [MPa] to [mm]."""
         ...
 
 
@@ -108,7 +105,7 @@ class GridCompliance:
 class Compliance:
     """The elastic body of one contact model: its terms, on any grid.
 
-    Half-spaces are cached with their kernels and work arrays.
+    Half-spaces are cached with their kernels and work arrays, those used last.
 
     Args:
         periodic: Whether pressures continue periodically.
@@ -123,57 +120,50 @@ class Compliance:
     modulus: float = 1.0
     sides: FreeSides | None = None
     body: BodyModes | None = None
-    slopes: SlopeTerm | None = None
-    _half_spaces: dict[tuple[object, ...], HalfSpaceGrid] = field(default_factory=dict, init=False)
+    slopes: FiniteSlopes | None = None
     _last: tuple[Array, Array] | None = field(default=None, init=False)
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave the caches behind when sent to another process."""
-        return vars(self) | {"_half_spaces": {}, "_last": None}
+        caches = {"half_space", "_last"}
+        return {name: value for name, value in vars(self).items() if name not in caches}
 
     def on_grid(
-        self, grid: tuple[int, ...], spacing: tuple[float, float], box: Box | None = None
+        self, grid: Grid, spacing: Pair, corner: Pair = (0.0, 0.0), *, coarse: bool = False
     ) -> GridCompliance:
         """Return the compliance of cells of the surface.
 
         Args:
             grid: Numbers of cells (nx, ny).
             spacing: Sides of a cell [mm].
-            box: Their place on the surface; the half-space alone when not given.
+            corner: Corner of the first cell on the surface [mm].
+            coarse: Whether these are no cells of the surface but coarser ones, where free sides are
+                left out.
         """
         terms: list[ComplianceTerm] = []
-        if box is not None:
-            if self.sides is not None:
-                rows, columns = (np.arange(part.start, part.stop) for part in box)
-                terms.append(side_cells(self.sides, spacing).among(rows, columns))
-            terms += self._of_body(grid, spacing, box.corner(spacing))
-        return GridCompliance(self.half_space(grid, spacing), terms)
+        if self.sides is not None and not coarse:
+            rows, columns = (
+                round(start / step) + np.arange(n)
+                for start, step, n in zip(corner, spacing, grid, strict=True)
+            )
+            terms.append(side_cells(self.sides, spacing).among(rows, columns))
+        if self.body is not None:
+            terms.append(self.body_on(grid, spacing, corner))
+        return GridCompliance(self.half_space((grid[0], grid[1]), spacing), terms)
 
-    def on_coarse(
-        self, grid: tuple[int, ...], spacing: tuple[float, float], corner: tuple[float, float]
-    ) -> GridCompliance:
-        """Return the compliance of coarse cells, without free sides and slopes.
+    def body_on(self, grid: Grid, spacing: Pair, corner: Pair = (0.0, 0.0)) -> ModesOnCells:
+        """Return what the finite body, which must be given, adds on cells; see `on_grid`."""
+        assert self.body is not None
+        x, y = (
+            start + step * np.arange(n + 1)
+            for start, step, n in zip(corner, spacing, grid, strict=True)
+        )
+        return self.body.on(x, y, modulus=self.modulus)
 
-        Args:
-            grid: Numbers of cells (nx, ny).
-            spacing: Sides of a cell [mm].
-            corner: Corner of the first cell on the surface [mm].
-        """
-        return GridCompliance(self.half_space(grid, spacing), self._of_body(grid, spacing, corner))
-
-    def half_space(self, grid: tuple[int, ...], spacing: tuple[float, float]) -> HalfSpaceGrid:
-        """Return the half-space on a grid of cells of given sides, from the cache if it is there.
-
-        Of more than `_MOST_GRIDS` sizes, the one that was not used for longest is given up.
-        """
-        key = (*grid, *spacing)
-        found = self._half_spaces.pop(key, None)
-        if found is None:
-            found = HalfSpaceGrid((grid[0], grid[1]), spacing, periodic=self.periodic)
-            if len(self._half_spaces) >= _MOST_GRIDS:
-                del self._half_spaces[next(iter(self._half_spaces))]
-        self._half_spaces[key] = found  # the last one is the one used last
-        return found
+    @cached_property
+    def half_space(self) -> Callable[[tuple[int, int], Pair], HalfSpaceGrid]:
+        """Function from numbers of cells and their sides to the half-space on them, cached."""
+        return lru_cache(maxsize=_MOST_GRIDS)(partial(HalfSpaceGrid, periodic=self.periodic))
 
     def slope_displacement(self, pressure: Array) -> Array:
         """Return what finite slopes add to the displacements of all cells, shape (nx, ny) [mm].
@@ -187,26 +177,3 @@ class Compliance:
         if self._last is None or not np.array_equal(self._last[0], pressure):
             self._last = pressure, self.slopes.displacement(pressure * self.modulus)
         return self._last[1]
-
-    def body_displacement(self, pressure: Array, spacing: tuple[float, float]) -> Array:
-        """Return what the body alone adds to the displacements of all cells, (nx, ny) [mm].
-
-        Args:
-            pressure: Pressures / E* of all cells of the surface, shape (nx, ny).
-            spacing: Sides of a cell [mm].
-        """
-        found = np.zeros(pressure.shape)
-        for term in self._of_body(pressure.shape, spacing, (0.0, 0.0)):
-            found += term.displacement(pressure)
-        return found
-
-    def _of_body(
-        self, grid: tuple[int, ...], spacing: tuple[float, float], corner: tuple[float, float]
-    ) -> list[ComplianceTerm]:
-        if self.body is None:
-            return []
-        x, y = (
-            start + step * np.arange(n + 1)
-            for start, step, n in zip(corner, spacing, grid, strict=True)
-        )
-        return [self.body.on(x, y, modulus=self.modulus)]

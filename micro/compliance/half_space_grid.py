@@ -9,18 +9,17 @@ Theory: demos/theory.md, section 4.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
 from micro.closed_forms.love import corner_integral
-from micro.compliance.cells import Cells
 
 Array = NDArray[np.float64]
 Field = NDArray[Any]
-Rows = NDArray[np.intp]
+Indices = NDArray[np.intp]
 
 _CHUNK = 2**15
 """Numbers in a block of rows that is transformed at a time: temporaries stay in the cache."""
@@ -87,6 +86,28 @@ def periodic_spectrum(grid: tuple[int, int], spacing: tuple[float, float]) -> Ar
     return np.divide(2.0, q, out=np.zeros_like(q), where=q > 0.0)
 
 
+class Cells(NamedTuple):
+    """Some cells of a grid.
+
+    Attributes:
+        flat: Their flat indices, ascending, shape (n,).
+        rows: The rows that they lie in, shape (r,).
+        place: Their flat indices in an array of these rows alone, shape (n,).
+        columns: Number of columns of the grid.
+    """
+
+    flat: Indices
+    rows: Indices
+    place: Indices
+    columns: int
+
+    @classmethod
+    def of(cls, flat: Indices, grid: tuple[int, ...]) -> Cells:
+        """Return cells of a grid (nx, ny) by their flat indices, ascending."""
+        rows, at = np.unique(flat // grid[1], return_inverse=True)
+        return cls(flat, rows, at.ravel() * grid[1] + flat % grid[1], grid[1])
+
+
 class Convolution:
     """Multiplication by a real spectrum, in the precision of that spectrum.
 
@@ -98,7 +119,7 @@ class Convolution:
         spectrum: Real half spectrum of the kernel, shape (mx, my // 2 + 1).
         grid: Cells (nx, ny) of the fields.
         padded: Cells (mx, my) of the grid on which the convolution is circular.
-        work: Complex array of the spectrum's shape and precision; overwritten by every call.
+        work: Complex array, as large as the spectrum at least; overwritten by every call.
     """
 
     def __init__(
@@ -106,9 +127,10 @@ class Convolution:
     ) -> None:
         self.grid, self.padded = grid, padded
         self._factors = np.repeat(spectrum, 2, axis=1)  # of real and imaginary parts
-        self._work = work
+        parts = work.ravel().view(np.result_type(spectrum.dtype, np.complex64))
+        self._work = parts[: spectrum.size].reshape(spectrum.shape)
 
-    def __call__(self, field: Field, rows: Rows | None = None) -> Field:
+    def __call__(self, field: Field, rows: Indices | None = None) -> Field:
         """Convolve a field in place.
 
         Args:
@@ -140,7 +162,7 @@ class Convolution:
         found = self(field, cells.rows).ravel()[cells.place]
         return found.astype(np.float64) * scale
 
-    def _blocks(self, rows: Rows | None) -> Iterator[tuple[slice, slice | Rows]]:
+    def _blocks(self, rows: Indices | None) -> Iterator[tuple[slice, slice | Indices]]:
         """Yield blocks of rows: where they are in the field and where in the grid."""
         size = max(1, _CHUNK // self.padded[1])
         count = self.grid[0] if rows is None else len(rows)
@@ -179,17 +201,12 @@ class HalfSpaceGrid:
             padded, period = _good(2 * n - 1 for n in grid), _good(grid)
             spectrum = padded_spectrum(padded, spacing)
             waves = periodic_spectrum(period, spacing)
-        rough = spectrum.astype(np.float32)
         # at the mean of a period, where the compliance vanishes, its largest value counts
         inverse = 1.0 / np.where(waves > 0.0, waves, waves.max() or 1.0)
         work = np.empty(spectrum.shape, complex)  # one for all: they take turns
-        single = work.ravel().view(np.complex64)
-        part = single[: inverse.size].reshape(inverse.shape)
         self.compliance = Convolution(spectrum, grid, padded, work)
-        self.rough_compliance = Convolution(
-            rough, grid, padded, single[: rough.size].reshape(rough.shape)
-        )
-        self.inverse = Convolution(inverse.astype(np.float32), grid, period, part)
+        self.rough_compliance = Convolution(spectrum.astype(np.float32), grid, padded, work)
+        self.inverse = Convolution(inverse.astype(np.float32), grid, period, work)
 
 
 def _good(counts: Iterable[int]) -> tuple[int, int]:

@@ -37,7 +37,7 @@ Theory: demos/theory.md, section 5.
 
 from __future__ import annotations
 
-from functools import cache, cached_property
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,72 +52,64 @@ _SMALLEST, _SMALLEST_STRESS, _LARGEST = 1e-8, 1e-11, 40.0
 """Ends of the tables of displacements and of stresses, distances times wave number."""
 
 
-class QuarterSpace:
-    """Displacement and stresses of the top by what is there of the side alone, for E* = 1.
+def side_compliance(poisson_ratio: float, x: Array, wave_number: float) -> Array:
+    """Return normal displacements at distances x from the edge by line loads at distances x.
+
+    They are what is there of the side alone, for E* = 1.
 
     Args:
         poisson_ratio: ν.
+        x: Distances, ascending, shape (n,) [mm].
+        wave_number: k of loads ~ cos ky along the edge [1/mm].
+
+    Returns:
+        Shape (n, n); symmetric.
 
     Source:
         Hetényi 1970, J. Appl. Mech. 37, 75-80; Keer, Lee & Mura 1983, Int. J. Solids Struct.
         19, 497-508.
     """
-
-    def __init__(self, poisson_ratio: float) -> None:
-        self._nu = poisson_ratio
-
-    @cached_property
-    def _compliance(self) -> _Table:
-        logs = _logs(_SMALLEST)
-        return _Table(logs, _side_compliance(logs, self._nu)[None])
-
-    @cached_property
-    def _stresses(self) -> _Table:
-        logs = _logs(_SMALLEST_STRESS)
-        # the stresses are of the size of 1/(x + x') where both distances are short
-        apart = np.add.outer(np.exp(logs), np.exp(logs))
-        return _Table(logs, _side_stresses(logs, self._nu) * apart)
-
-    def compliance(self, x: Array, wave_number: float) -> Array:
-        """Return normal displacements at distances x from the edge by line loads at distances x.
-
-        Args:
-            x: Distances, ascending, shape (n,) [mm].
-            wave_number: k of loads ~ cos ky along the edge [1/mm].
-
-        Returns:
-            Shape (n, n); symmetric.
-        """
-        return self._compliance.at(x * wave_number)[0]
-
-    def stresses(self, x: Array, wave_number: float) -> Array:
-        """Return stresses at distances x from the edge by line loads at distances x.
-
-        Args:
-            x: Distances, ascending, shape (n,) [mm].
-            wave_number: k > 0 of loads ~ cos ky along the edge [1/mm].
-
-        Returns:
-            σ_xx, σ_yy (~ cos ky) and σ_xy (~ sin ky) by loads of 1 N/mm, shape (3, n, n), the
-            loads last [1/mm].
-        """
-        return self._stresses.at(x * wave_number) / np.add.outer(x, x)
+    return _values(_compliance_splines(poisson_ratio), x * wave_number)[0]
 
 
-class _Table:
-    """Functions of two distances, by splines in their logarithms; zero beyond the last one."""
+def side_stresses(poisson_ratio: float, x: Array, wave_number: float) -> Array:
+    """Return stresses at distances x from the edge by line loads at distances x.
 
-    def __init__(self, logs: Array, values: Array) -> None:
-        self._ends = float(logs[0]), float(logs[-1])
-        self._splines = [RectBivariateSpline(logs, logs, part) for part in values]
+    They are what is there of the side alone.
 
-    def at(self, distances: Array) -> Array:
-        """Return all functions at all pairs of distances, shape (functions, n, n)."""
-        logs = np.log(distances)
-        places = 2 * (np.clip(logs, *self._ends),)
-        inside = logs < self._ends[1]
-        found = np.stack([spline(*places) for spline in self._splines])
-        return np.where(inside[:, None] & inside, found, 0.0)
+    Args:
+        poisson_ratio: ν.
+        x: Distances, ascending, shape (n,) [mm].
+        wave_number: k > 0 of loads ~ cos ky along the edge [1/mm].
+
+    Returns:
+        σ_xx, σ_yy (~ cos ky) and σ_xy (~ sin ky) by loads of 1 N/mm, shape (3, n, n), the loads
+        last [1/mm].
+    """
+    return _values(_stress_splines(poisson_ratio), x * wave_number) / np.add.outer(x, x)
+
+
+@cache
+def _compliance_splines(nu: float) -> list[RectBivariateSpline]:
+    logs = _logs(_SMALLEST)
+    return [RectBivariateSpline(logs, logs, _side_compliance(logs, nu))]
+
+
+@cache
+def _stress_splines(nu: float) -> list[RectBivariateSpline]:
+    """Return splines of the stresses times x + x': so they vary little where both are short."""
+    logs = _logs(_SMALLEST_STRESS)
+    apart = np.add.outer(np.exp(logs), np.exp(logs))
+    return [RectBivariateSpline(logs, logs, part) for part in _side_stresses(logs, nu) * apart]
+
+
+def _values(splines: list[RectBivariateSpline], distances: Array) -> Array:
+    """Return functions at all pairs of distances, (functions, n, n); zero beyond their tables."""
+    first, *_, last = splines[0].get_knots()[0]
+    logs = np.log(distances)
+    places = np.clip(logs, first, last)
+    found = np.stack([spline(places, places) for spline in splines])
+    return np.where((logs < last)[:, None] & (logs < last), found, 0.0)
 
 
 def _logs(smallest: float) -> Array:
@@ -206,6 +198,3 @@ def _depth_integral(logs: Array) -> Array:
     x = np.exp(logs)
     below = make_interp_spline(logs, kn(0, np.hypot.outer(x, x)) * x[:, None]).antiderivative()
     return np.asarray(below(logs[-1]) - below(logs))
-
-
-quarter_space = cache(QuarterSpace)

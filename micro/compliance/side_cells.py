@@ -2,7 +2,7 @@
 
 Pressures are uniform on the cells, and displacements and stresses are their means over them. Along
 a side, Fourier's transform takes cells to waves, which do not mix. Across it, sparse matrices take
-cells to values at nodes of the distance from the side (`micro.compliance.distance_nodes`).
+cells to values at nodes of the distance from the side (`micro.compliance.free_sides`).
 
 Theory: demos/theory.md, section 5.
 """
@@ -11,14 +11,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 from scipy.sparse import csr_array, hstack
 
-from micro.compliance.distance_nodes import distance_nodes, means_over
-from micro.compliance.free_sides import FreeSides
+from micro.compliance.free_sides import FreeSides, distance_nodes, means_over
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -35,32 +35,41 @@ _SHEAR = np.array([-1j, 1j])
 """Shear ~ sin by loads ~ cos; it changes its sign from a side to the opposite one."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class _SidePair:
-    """Two opposite sides; rows of cells lie along them, and continue by zeros to twice the length.
+    """Two opposite sides, and rows of cells along them, continued by zeros to twice the length.
 
     Args:
-        sides: The free sides.
-        axis: 0 for the sides across x, 1 across y.
-        grid: Cells (nx, ny) between the sides.
-        stress: Whether to prepare stresses, three kernels below each other, or displacements.
-
-    Attributes:
-        means: Means of the rows' cells from values at the nodes of both sides, shape (rows, 2 a).
+        means: Means over the rows' cells of values at the nodes of both sides, shape (rows, 2 a).
         loads: Its transpose.
         kernels: For each wave what loads at the nodes do at the nodes, (waves, a or 3 a, a).
+        place: Places of the cells in a row, counted from the first of them, shape (cells,).
     """
 
-    def __init__(self, sides: FreeSides, axis: int, grid: tuple[int, int], *, stress: bool) -> None:
+    means: csr_array
+    loads: csr_array
+    kernels: Array
+    place: Indices
+
+    @classmethod
+    def of(cls, sides: FreeSides, axis: int, grid: tuple[int, int], *, stress: bool) -> Self:
+        """Return two sides with all cells between them.
+
+        Args:
+            sides: The free sides.
+            axis: 0 for the sides across x, 1 across y.
+            grid: Cells (nx, ny) between the sides.
+            stress: Whether the kernels are those of stresses, three below each other, or of
+                displacements.
+        """
         length, rows, cells = sides.lengths[axis], grid[axis], grid[1 - axis]
-        step, self._period = length / rows, 2 * cells
+        step, period = length / rows, 2 * cells
         nodes = distance_nodes((_NEAREST_STRESS if stress else _NEAREST) * step, length)
         lower = means_over(nodes, np.linspace(0.0, length, rows + 1))
-        self.means = csr_array(hstack([lower, lower[::-1]]))
-        self.loads = csr_array(self.means.T)
-        self._nodes = len(nodes)
+        means = csr_array(hstack([lower, lower[::-1]]))
         parts = []
         # waves on twice the length of a side that cells take for the same, some running backwards
-        for shift in (-self._period, 0, self._period):
+        for shift in (-period, 0, period):
             waves = np.arange(cells + 1) + shift
             if stress:
                 kernels = sides.stresses(axis, nodes, np.abs(waves))
@@ -68,18 +77,42 @@ class _SidePair:
                 kernel = np.concatenate(kernels, axis=1)
             else:
                 kernel = sides.compliance(axis, nodes, np.abs(waves))
-            parts.append((step * np.sinc(waves / self._period) ** 2)[:, None, None] * kernel)
-        self.kernels = np.sum(parts, axis=0)
+            parts.append((step * np.sinc(waves / period) ** 2)[:, None, None] * kernel)
+        return cls(means, csr_array(means.T), np.sum(parts, axis=0), np.arange(cells))
 
-    def waves(self, lines: Array) -> Waves:
-        """Return the waves of lines (2 a, n) at the nodes of both sides, shape (waves, a, 2)."""
-        waves = fft.rfft(lines, self._period, axis=1)
-        return np.ascontiguousarray(waves.reshape(2, self._nodes, -1).transpose(2, 1, 0))
+    def among(self, rows: Indices, cells: Indices) -> _SidePair:
+        """Return the same sides with some of these rows, and some of the cells of each."""
+        means, place = self.means[rows], self.place[cells]
+        return _SidePair(means, csr_array(means.T), self.kernels, place - place[0])
 
-    def lines(self, waves: Waves) -> Array:
-        """Return lines at the nodes of both sides by their waves, shape (2 a, cells)."""
-        by_side = waves.transpose(2, 1, 0).reshape(2 * self._nodes, -1)
-        return np.asarray(fft.irfft(by_side, self._period, axis=1)[:, : self._period // 2])
+    def loaded(self, pressure: Array) -> Waves:
+        """Return the waves of loads at the nodes by pressures on cells, shape (waves, a, 2)."""
+        lines = np.zeros((self.loads.shape[0], self.place[-1] + 1))
+        lines[:, self.place] = self.loads @ pressure
+        waves = fft.rfft(lines, 2 * len(self.kernels) - 2, axis=1)
+        return np.ascontiguousarray(waves.reshape(2, -1, len(self.kernels)).transpose(2, 1, 0))
+
+    def on_cells(self, waves: Waves) -> Array:
+        """Return the means over the cells of values at the nodes, by their waves, (rows, cells)."""
+        by_side = waves.transpose(2, 1, 0).reshape(self.means.shape[1], -1)
+        lines = fft.irfft(by_side, 2 * len(self.kernels) - 2, axis=1)
+        return np.asarray(self.means @ lines[:, self.place])
+
+    def displacement(self, pressure: Array) -> Array:
+        """Return displacements of the cells by pressures on them, shape (rows, cells)."""
+        return self.on_cells(_multiplied(self.kernels, self.loaded(pressure)))
+
+    def stresses(self, pressure: Array) -> Array:
+        """Return stresses normal to the sides, along them and in shear, (3, rows, cells)."""
+        found = _multiplied(self.kernels, self.loaded(pressure))
+        normal, parallel, shear = np.split(found, 3, axis=1)
+        return np.stack([self.on_cells(part) for part in (normal, parallel, shear * _SHEAR)])
+
+    def adjoint(self, fields: Array) -> Array:
+        """Apply the transpose of `stresses`, shape (rows, cells)."""
+        normal, parallel, shear = (self.loaded(field) for field in fields)
+        waves = np.concatenate([normal, parallel, shear * _SHEAR.conj()], axis=1)
+        return self.on_cells(_multiplied(self.kernels.transpose(0, 2, 1), waves))
 
 
 def _multiplied(kernels: Array, waves: Waves) -> Waves:
@@ -92,63 +125,30 @@ def _pairs(
 ) -> tuple[_SidePair, _SidePair]:
     """Return the sides across x and those across y, around cells that fill the rectangle."""
     nx, ny = (round(length / step) for length, step in zip(sides.lengths, spacing, strict=True))
-    across_x, across_y = (_SidePair(sides, axis, (nx, ny), stress=stress) for axis in (0, 1))
+    across_x, across_y = (_SidePair.of(sides, axis, (nx, ny), stress=stress) for axis in (0, 1))
     return across_x, across_y
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class SideCells:
     """Compliance that free sides add to the cells where rows and columns cross, for E* = 1.
 
     Args:
-        pairs: The sides across x and those across y.
-        rows: Indices of the rows, ascending, shape (r,).
-        columns: Indices of the columns, ascending, shape (c,).
+        across_x: The sides across x, with the rows.
+        across_y: Those across y, with the columns.
     """
 
-    def __init__(self, pairs: tuple[_SidePair, _SidePair], rows: Indices, columns: Indices) -> None:
-        self._pairs, self._rows, self._columns = pairs, rows, columns
-        self._across_x = _Lines.of(pairs[0], rows, columns)
-        self._across_y = _Lines.of(pairs[1], columns, rows)
+    across_x: _SidePair
+    across_y: _SidePair
 
     def displacement(self, pressure: Array) -> Array:
         """Return the displacements of these cells by pressures on them, shape (r, c) [mm]."""
-        found = self._across_x.displacement(pressure)
-        return np.asarray(found + self._across_y.displacement(pressure.T).T)
+        found = self.across_x.displacement(pressure)
+        return np.asarray(found + self.across_y.displacement(pressure.T).T)
 
     def among(self, rows: Indices, columns: Indices) -> SideCells:
         """Return some of these rows and columns, by ascending indices among them."""
-        return SideCells(self._pairs, self._rows[rows], self._columns[columns])
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Lines:
-    """Some cells of some rows along two sides.
-
-    Args:
-        pair: The sides.
-        near: Means of the rows' cells from values at the nodes, shape (r, 2 a).
-        loads: Its transpose.
-        place: Places of the cells along the sides, shape (c,).
-    """
-
-    pair: _SidePair
-    near: csr_array
-    loads: csr_array
-    place: Indices
-
-    @classmethod
-    def of(cls, pair: _SidePair, rows: Indices, cells: Indices) -> _Lines:
-        if len(rows) == pair.means.shape[0]:
-            return cls(pair, pair.means, pair.loads, cells - cells[0])
-        near = pair.means[rows]
-        return cls(pair, near, csr_array(near.T), cells - cells[0])
-
-    def displacement(self, pressure: Array) -> Array:
-        """Return displacements by pressures, shape (r, c)."""
-        lines = np.zeros((self.near.shape[1], self.place[-1] + 1))
-        lines[:, self.place] = self.loads @ pressure
-        found = self.pair.lines(_multiplied(self.pair.kernels, self.pair.waves(lines)))
-        return np.asarray(self.near @ found[:, self.place])
+        return SideCells(self.across_x.among(rows, columns), self.across_y.among(columns, rows))
 
 
 class SideStresses:
@@ -169,8 +169,8 @@ class SideStresses:
             pressure: On all cells of the grid, shape (nx, ny) [MPa].
         """
         across_x, across_y = self._pairs
-        total = _stresses(across_x, pressure)
-        total += _stresses(across_y, pressure.T)[_SWAPPED].transpose(0, 2, 1)
+        total = across_x.stresses(pressure)
+        total += across_y.stresses(pressure.T)[_SWAPPED].transpose(0, 2, 1)
         return total
 
     def adjoint(self, fields: Array) -> Array:
@@ -184,22 +184,7 @@ class SideStresses:
         """
         across_x, across_y = self._pairs
         turned = fields[_SWAPPED].transpose(0, 2, 1)
-        return np.asarray(_adjoint(across_x, fields) + _adjoint(across_y, turned).T)
-
-
-def _stresses(pair: _SidePair, pressure: Array) -> Array:
-    """Return stresses normal to two sides, along them and in shear, shape (3, rows, cells)."""
-    found = _multiplied(pair.kernels, pair.waves(pair.loads @ pressure))
-    normal, parallel, shear = np.split(found, 3, axis=1)
-    return np.stack([pair.means @ pair.lines(part) for part in (normal, parallel, shear * _SHEAR)])
-
-
-def _adjoint(pair: _SidePair, fields: Array) -> Array:
-    """Apply the transpose of `_stresses`, shape (rows, cells)."""
-    normal, parallel, shear = (pair.waves(pair.loads @ field) for field in fields)
-    waves = np.concatenate([normal, parallel, shear * _SHEAR.conj()], axis=1)
-    found = _multiplied(pair.kernels.transpose(0, 2, 1), waves)
-    return np.asarray(pair.means @ pair.lines(found))
+        return across_x.adjoint(fields) + across_y.adjoint(turned).T
 
 
 @lru_cache(maxsize=8)
@@ -210,8 +195,7 @@ def side_cells(sides: FreeSides, spacing: tuple[float, float]) -> SideCells:
         sides: The free sides.
         spacing: Sides (dx, dy) of a cell [mm]; the cells fill the rectangle between the sides.
     """
-    pairs = _pairs(sides, spacing, stress=False)
-    return SideCells(pairs, *(np.arange(pair.means.shape[0]) for pair in pairs))
+    return SideCells(*_pairs(sides, spacing, stress=False))
 
 
 side_stresses = lru_cache(maxsize=8)(SideStresses)

@@ -63,11 +63,17 @@ class Waves:
         kx = 2.0 * np.pi * fft.fftfreq(self.padded[0], self.spacing[0])[:, None]
         ky = 2.0 * np.pi * fft.rfftfreq(self.padded[1], self.spacing[1])
         self.wave_number = np.hypot(kx, ky)
-        self.directions = _directions(kx, ky)
+        products = np.stack(np.broadcast_arrays(kx * kx, ky * ky, kx * ky))
+        trace = products[0] + products[1]
+        self.directions = np.divide(products, trace, out=products, where=trace > 0.0)
+        self.directions[:2, 0, 0] = 0.5
         for axis, count in enumerate(self.padded):
             if count % 2 == 0:  # waves of two cells run either way
                 self.directions[2].swapaxes(0, axis)[count // 2] = 0.0
-        self._filter = _filter(self.coarse)
+        # falls from one to zero between two radii of the plane of wave numbers
+        x, y = (np.arange(count) / count for count in coarse)
+        radius = np.hypot(x[:, None], y)
+        self._filter = np.clip((_DROPPED - radius) / (_DROPPED - _KEPT), 0.0, 1.0)
 
     def coarsened(self, field: Array) -> Array:
         """Return a field on the coarse cells, without waves that are too short.
@@ -110,18 +116,3 @@ class Waves:
         """Return fields by their waves, shape (..., sx, sy)."""
         rows = fft.ifft(waves, axis=-2)[..., : self.shown[0], :]
         return np.asarray(fft.irfft(rows, n=self.padded[1], axis=-1)[..., : self.shown[1]])
-
-
-def _directions(kx: Array, ky: Array) -> Array:
-    squared = kx**2 + ky**2
-    inverse = np.divide(1.0, squared, out=np.zeros_like(squared), where=squared > 0.0)
-    found = np.stack([kx * kx * inverse, ky * ky * inverse, kx * ky * inverse])
-    found[:2, 0, 0] = 0.5
-    return found
-
-
-def _filter(coarse: tuple[int, int]) -> Array:
-    """Fall from one to zero between two radii of the plane of wave numbers."""
-    radius = np.hypot(np.arange(coarse[0])[:, None] / coarse[0], np.arange(coarse[1]) / coarse[1])
-    falling = (_DROPPED - radius) / (_DROPPED - _KEPT)
-    return np.clip(falling, 0.0, 1.0)

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import NotConverged
-from micro.compliance.cells import Cells
+from micro.compliance.half_space_grid import Cells
 from micro.contact.conjugate_gradients import ContactCells
 from micro.contact.problem import ContactPressures, ContactProblem
+from micro.contact.start import admissible_start
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -69,30 +70,28 @@ class ActiveSet:
         self._constrained: Indices = np.zeros(0, np.intp)  # cells at a bound that have no gap
         self._set: Flags = np.zeros(problem.interference.shape, bool)
         self._yielding: Flags | None = None
-        pressure, self.motion = problem.started(start)
+        pressure, self.motion = admissible_start(problem, start)
         self._accept(pressure)
 
     def _accept(self, pressure: Array) -> None:
         """Evaluate admissible pressures."""
         problem, self.pressure = self.problem, pressure
-        gap = problem.compliance.displacement(pressure)
+        gap = problem.grid.displacement(pressure)
         twice_elastic = float(np.vdot(pressure, gap))
         self._energy = twice_elastic - 2.0 * float(np.vdot(pressure, problem.interference))
         gap -= problem.interference
-        interference = problem.interference
-        if problem.motions is not None:
-            if pressure.any():
-                self.motion = problem.motions.closing(self._weights(pressure), gap)
-            nearer = problem.motions.displacement(self.motion)
-            gap -= nearer
-            interference = interference + nearer
+        if problem.motions.count and pressure.any():
+            self.motion = problem.motions.closing(self._weights(pressure), gap)
+        nearer = problem.motions.displacement(self.motion)
+        gap -= nearer
+        interference = problem.interference + nearer
         self.gap = gap  # in the memory of the displacement
         self.scale = float(interference.max())
         elastic = gap if problem.upper == np.inf else gap[pressure < problem.upper]
         worst = max(-float(elastic.min(initial=0.0)), float(gap[pressure > 0.0].max(initial=0.0)))
         self.residual = max(0.0, worst) / self.scale if self.scale > 0.0 else 0.0
         self.rounding = 0.0
-        if problem.turns and self.scale > 0.0:
+        if problem.motions.turns and self.scale > 0.0:
             self.rounding = _ROUNDING * float(np.abs(interference).max()) / self.scale
 
     def _weights(self, pressure: Array) -> Array:
@@ -105,25 +104,29 @@ class ActiveSet:
             weights.ravel()[self._constrained] += _CONSTRAINED_WEIGHT * float(pressure.max())
         return weights
 
-    def step(self, tolerance: float, *, cautious: bool) -> None:
+    @property
+    def enough(self) -> float:
+        """Residual at which the search may end."""
+        return max(self.problem.tolerance, self.rounding)
+
+    def step(self, *, cautious: bool) -> None:
         """Solve on the cells that seem to touch and accept the pressures.
 
         Args:
-            tolerance: Largest residual wanted.
             cautious: Whether no step may raise the energy.
         """
-        few = self.problem.turns and np.count_nonzero(self.pressure) <= _FEW
+        few = self.problem.motions.turns and np.count_nonzero(self.pressure) <= _FEW
         if not self._one_by_one and not few:
             old = self.pressure
-            if self._step_together(tolerance, cautious=cautious or self.problem.unloaded):
+            if self._step_together(cautious=cautious or self.problem.unloaded):
                 return
-            if not self.problem.turns:
+            if not self.problem.motions.turns:
                 return
             self._one_by_one = True
             self._accept(old)
-        self._step_one_by_one(tolerance)
+        self._step_one_by_one()
 
-    def _step_together(self, tolerance: float, *, cautious: bool) -> bool:
+    def _step_together(self, *, cautious: bool) -> bool:
         """Move all cells at once, by less while that gains nothing; return whether it gained."""
         touching = self._touching()
         same = np.array_equal(touching, self._set)
@@ -131,7 +134,7 @@ class ActiveSet:
             self._set, self._contact = touching, self._among(np.flatnonzero(touching))
         cells = self._contact.cells.flat
         change = self._contact.close(
-            self.gap.ravel()[cells], stop=self._stop(tolerance, same), limit=_MOST_ITERATIONS
+            self.gap.ravel()[cells], stop=self._stop(same), limit=_MOST_ITERATIONS
         )
         old, residual, energy = self.pressure, self.residual, self._energy
         for halving in range(_MOST_HALVINGS):
@@ -143,11 +146,11 @@ class ActiveSet:
                 continue
             self._accept(admissible)
             gain = self._energy < energy or (self.residual < residual and not cautious)
-            if gain or self.residual <= max(tolerance, self.rounding):
+            if gain or self.residual <= self.enough:
                 return True
         return False
 
-    def _step_one_by_one(self, tolerance: float) -> None:
+    def _step_one_by_one(self) -> None:
         """Close the gaps of cells, dropping one at a time that would leave its bounds.
 
         Each move keeps the loads and lowers the energy, however few cells carry the body. A step
@@ -156,17 +159,17 @@ class ActiveSet:
         with its middle.
         """
         cells, old, upper = self._carrying(), self.pressure, self.problem.upper
-        new, stop = old.copy(), self._stop(tolerance, same=True)
+        new, stop = old.copy(), self._stop(same=True)
         pressure, gap = old.ravel()[cells], self.gap.ravel()[cells]
         for _ in range(len(cells)):
             contact = self._among(cells)
             change = contact.close(gap, stop=stop, limit=_MOST_ITERATIONS)
             bound = (pressure <= 0.0) | (pressure >= upper)
             change[bound & (np.abs(change) <= _NOISE * old.max())] = 0.0
-            first, part = _first_bounds(pressure, change, upper)
+            first, part = self.problem.first_at_bounds(pressure, change)
             if part > 0.0:
                 pressure = np.clip(pressure + part * change, 0.0, upper)
-                displaced = self.problem.compliance.apply_compliance(contact.cells, change)
+                displaced = self.problem.grid.apply_compliance(contact.cells, change)
                 gap = gap + part * displaced
             if part == 1.0:
                 break
@@ -198,36 +201,17 @@ class ActiveSet:
         touching.ravel()[self._constrained] = True
         return touching
 
-    def _stop(self, tolerance: float, same: bool) -> float:
+    def _stop(self, same: bool) -> float:
         """Return the largest gap that a linear solution leaves [mm]."""
-        return max(_FORCING[same] * self.residual, 0.25 * tolerance) * self.scale
+        return max(_FORCING[same] * self.residual, 0.25 * self.problem.tolerance) * self.scale
 
     def _among(self, flat: Indices) -> ContactCells:
         """Return the linear problem of some cells by their flat indices."""
-        cells, motions = Cells.of(flat, self.gap.shape), self.problem.motions
-        levers = np.empty((0, flat.size)) if motions is None else motions.levers_of(flat)
-        return ContactCells.among(self.problem.compliance, cells, levers)
+        cells, levers = Cells.of(flat, self.gap.shape), self.problem.motions.levers_of(flat)
+        return ContactCells(self.problem.grid, cells, levers)
 
 
-def _first_bounds(pressure: Array, change: Array, upper: float) -> tuple[Indices, float]:
-    """Return which cells a change drives out of their bounds first, and the part it may do.
-
-    Of cells that are at their bound already, it is the half that is driven most.
-    """
-    distance = np.where(change < 0.0, pressure, upper - pressure)
-    size = np.abs(change)
-    stuck = np.flatnonzero((distance <= 0.0) & (size > 0.0))
-    if stuck.size:
-        most = np.argsort(-size[stuck], kind="stable")[: (stuck.size + 1) // 2]
-        return stuck[most], 0.0
-    parts = np.divide(distance, size, out=np.full_like(change, np.inf), where=size > 0.0)
-    first = int(np.argmin(parts))
-    return np.array([first]), min(1.0, float(parts[first]))
-
-
-def solve(
-    problem: ContactProblem, start: Array, tolerance: float, *, most_steps: int = 200
-) -> ContactPressures:
+def solve(problem: ContactProblem, start: Array, *, most_steps: int = 200) -> ContactPressures:
     """Solve the contact problem on one grid.
 
     The residual ε bounds the error of the force: the solution is exact for a body whose heights
@@ -237,7 +221,6 @@ def solve(
     Args:
         problem: The contact problem.
         start: Pressures / E* ≥ 0 to start from, shape (nx, ny).
-        tolerance: Largest residual.
         most_steps: Sets of cells that are tried at most.
 
     Raises:
@@ -248,16 +231,16 @@ def solve(
         Hintermüller, Ito & Kunisch 2002, doi 10.1137/S1052623401383558; Polonsky & Keer 1999,
         doi 10.1016/S0043-1648(99)00113-1.
     """
-    used = problem.compliance.products
+    used = problem.grid.products
     search = ActiveSet(problem, start)
     for steps in range(most_steps):
-        if search.residual <= max(tolerance, search.rounding):
-            products = problem.compliance.products - used
+        if search.residual <= search.enough:
+            products = problem.grid.products - used
             return ContactPressures(search.pressure, search.motion, search.residual, products)
-        search.step(tolerance, cautious=steps >= _TRUSTING_STEPS)
+        search.step(cautious=steps >= _TRUSTING_STEPS)
     raise NotConverged(
-        f"the contact pressure (residual {search.residual:.1e}, asked {tolerance:.1e})",
+        f"the contact pressure (residual {search.residual:.1e}, asked {problem.tolerance:.1e})",
         reason="set of cells in contact not found",
-        iterations=problem.compliance.products - used,
+        iterations=problem.grid.products - used,
         remedy="raise the tolerance or take smaller steps of the approach",
     )

@@ -9,48 +9,30 @@ Theory: demos/theory.md, section 3.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
-from micro.compliance.cells import Cells
 from micro.compliance.grid_compliance import GridCompliance
+from micro.compliance.half_space_grid import Cells
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class ContactCells:
     """Cells in contact, loaded by a rigid body of which k motions are free.
 
     Args:
         compliance: The elastic body.
         cells: The n cells in contact.
-        levers: How much nearer each free motion brings the cells, shape (k, n).
-        resistance: Pressures by each of these motions, by the approximate inverse, shape (k, n).
-        inverse: Inverse of the loads of these pressures, levers · resistance, shape (k, k).
+        levers: How much nearer each of k ≥ 0 free motions brings them, shape (k, n).
     """
 
-    compliance: GridCompliance
-    cells: Cells
-    levers: Array
-    resistance: Array
-    inverse: Array
-
-    @classmethod
-    def among(cls, compliance: GridCompliance, cells: Cells, levers: Array) -> ContactCells:
-        """Prepare a set of cells.
-
-        Args:
-            compliance: The elastic body.
-            cells: The n cells in contact.
-            levers: How much nearer each of k ≥ 0 free motions brings them, shape (k, n).
-        """
+    def __init__(self, compliance: GridCompliance, cells: Cells, levers: Array) -> None:
+        self.compliance, self.cells, self.levers = compliance, cells, levers
+        # pressures by each free motion, and the inverse of their loads, by the approximate inverse
         found = [compliance.apply_inverse(cells, lever) for lever in levers]
-        resistance = np.array(found).reshape(levers.shape)
-        inverse = np.linalg.pinv(levers @ resistance.T, rcond=1e-10)
-        return cls(compliance, cells, levers, resistance, inverse)
+        self.resistance = np.array(found).reshape(levers.shape)
+        self.inverse = np.linalg.pinv(levers @ self.resistance.T, rcond=1e-10)
 
     def balanced(self, gap: Array) -> Array:
         """Subtract from gaps the part that free motions of the body take up."""

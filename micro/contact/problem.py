@@ -20,22 +20,20 @@ Theory: demos/theory.md, section 3.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import NotConverged
-from micro.compliance.grid_compliance import GridCompliance
-from micro.contact.clear_plane import clearance
-from micro.contact.rigid_motions import Motions
+from micro.compliance.grid_compliance import Compliance, GridCompliance
+from micro.contact.rigid_motions import Box, Motions, coarsened
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-
-_LEAST_EVEN, _MOST_EVEN = 1e-3, 1e6
-"""Shares of uniform pressure that are added to a start which cannot meet the loads."""
+Indices = NDArray[np.intp]
 
 
 class ContactPressures(NamedTuple):
@@ -54,32 +52,68 @@ class ContactPressures(NamedTuple):
     iterations: int = 0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class ContactProblem:
-    """Contact on the cells of one grid.
+    """Contact of a rigid body with a rectangle of cells of a surface.
 
     Args:
         compliance: The elastic body.
+        spacing: Sides of a cell [mm].
         interference: Overlap d of the undeformed bodies at zero free motions, negative where they
             are apart, shape (nx, ny) [mm].
-        motions: Free rigid motions of the body with their loads; none when not given.
+        motions: Free rigid motions of the body, if there are any, with their loads.
+        tolerance: Largest residual of a solution.
         upper: Upper bound H of the pressures / E*.
+        corner: Corner of the first cell on the surface [mm].
+        coarse: Whether these are no cells of the surface but coarser ones, where free sides are
+            left out.
     """
 
-    compliance: GridCompliance
+    compliance: Compliance
+    spacing: tuple[float, float]
     interference: Array
-    motions: Motions | None = None
+    motions: Motions
+    tolerance: float
     upper: float = np.inf
+    corner: tuple[float, float] = (0.0, 0.0)
+    coarse: bool = False
 
-    @property
-    def turns(self) -> bool:
-        """Whether slopes of the body are free."""
-        return self.motions is not None and self.motions.turns
+    @cached_property
+    def grid(self) -> GridCompliance:
+        """Compliance of these cells, without finite slopes."""
+        shape = self.interference.shape
+        return self.compliance.on_grid(shape, self.spacing, self.corner, coarse=self.coarse)
 
     @property
     def unloaded(self) -> bool:
         """Whether no free motion has a load: the approach is prescribed and the tilt is free."""
-        return self.motions is not None and not self.motions.loads.any()
+        return self.motions.turns and not self.motions.loads.any()
+
+    def on(self, box: Box) -> ContactProblem:
+        """Return the problem of a box of these cells, those of a surface, which carries all loads.
+
+        Args:
+            box: Rows and columns of the box.
+        """
+        x, y = (part.start * step for part, step in zip(box, self.spacing, strict=True))
+        interference = np.ascontiguousarray(self.interference[box])
+        return replace(self, interference=interference, motions=self.motions.on(box), corner=(x, y))
+
+    def coarsened(self, factors: Sequence[int], tolerance: float) -> ContactProblem:
+        """Return the problem on coarse cells, with a tolerance of its own.
+
+        Args:
+            factors: Fine cells along x and y in a coarse one.
+            tolerance: Largest residual of a solution.
+        """
+        return replace(
+            self,
+            interference=coarsened(self.interference, factors),
+            motions=self.motions.coarsened(factors),
+            spacing=(self.spacing[0] * factors[0], self.spacing[1] * factors[1]),
+            tolerance=tolerance,
+            coarse=True,
+        )
 
     def admissible(self, pressure: Array, fixed: Flags | None = None) -> Array | None:
         """Return pressures near given ones that lie within the bounds and meet the loads.
@@ -91,54 +125,28 @@ class ContactProblem:
         Returns:
             The pressures, zero where they were; None where no such pressures meet the loads.
         """
-        if self.motions is None:
-            return pressure if self.upper == np.inf else np.minimum(pressure, self.upper)
+        if not self.motions.count:
+            return np.minimum(pressure, self.upper)
         found = None
         if fixed is not None:
             found = self.motions.scaled_to_loads(pressure, self.upper, fixed)
         return self.motions.scaled_to_loads(pressure, self.upper) if found is None else found
 
-    def started(self, pressure: Array) -> tuple[Array, Array]:
-        """Return admissible pressures near given ones, and the free motions if nothing touches.
+    def first_at_bounds(self, pressure: Array, change: Array) -> tuple[Indices, float]:
+        """Return which cells a change drives out of the bounds first, and the part it may do.
+
+        Of cells that are at their bound already, it is the half that is driven most.
 
         Args:
-            pressure: Pressures / E* ≥ 0, shape (nx, ny).
-
-        Raises:
-            NotConverged: When no pressures within the bounds meet the loads.
+            pressure: Pressures / E* of some cells, within the bounds, shape (n,).
+            change: Their change, shape (n,).
         """
-        if self.unloaded:
-            return self._started_unloaded(pressure)
-        share = 0.0
-        while share <= _MOST_EVEN:
-            even = share * (float(pressure.max()) or 1.0)
-            found = self.admissible(pressure + even if share else pressure)
-            if found is not None:
-                return found, np.zeros(0 if self.motions is None else len(self.motions.loads))
-            share = 10.0 * share or _LEAST_EVEN
-        raise NotConverged(
-            "the pressures to start from",
-            reason="no pressures within their bounds meet the loads on these cells",
-            iterations=0,
-            remedy="give a smaller force",
-        )
-
-    def _started_unloaded(self, pressure: Array) -> tuple[Array, Array]:
-        """Start a body that turns without load from pressures of negative energy.
-
-        The energy without pressure is zero. A body that cannot turn clear must not come to that
-        point, for no single contact can carry it from there. Steps that lower the energy never do.
-        """
-        assert self.motions is not None
-        still = np.zeros(len(self.motions.loads))
-        found = self.admissible(pressure)
-        if found is None or float(np.vdot(found, self.interference)) <= 0.0:
-            clear = clearance(self.interference, self.motions)
-            if clear.interference <= 0.0:
-                return np.zeros(pressure.shape), clear.motion
-            found = clear.support
-        twice_elastic = float(np.vdot(found, self.compliance.displacement(found)))
-        factor = float(np.vdot(found, self.interference)) / twice_elastic  # of the least energy
-        found = found * min(factor, self.upper / float(found.max()))
-        balanced = self.admissible(found)
-        return found if balanced is None else balanced, still
+        distance = np.where(change < 0.0, pressure, self.upper - pressure)
+        size = np.abs(change)
+        stuck = np.flatnonzero((distance <= 0.0) & (size > 0.0))
+        if stuck.size:
+            most = np.argsort(-size[stuck], kind="stable")[: (stuck.size + 1) // 2]
+            return stuck[most], 0.0
+        parts = np.divide(distance, size, out=np.full_like(change, np.inf), where=size > 0.0)
+        first = int(np.argmin(parts))
+        return np.array([first]), min(1.0, float(parts[first]))

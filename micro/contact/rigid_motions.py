@@ -14,17 +14,17 @@ products of a factor along x and one along y, as a full matrix would be as large
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
-
-from micro.compliance.cells import Box
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Flags = NDArray[np.bool_]
+Box = tuple[slice, slice]
+"""Rows and columns of a rectangle of cells."""
 
 _MOST_STEPS, _MOST_HALVINGS = 100, 8
 _LONGEST = 1.5
@@ -55,35 +55,29 @@ class Motions:
     loads: Array
 
     @classmethod
-    def approach(cls, grid: tuple[int, ...], total: float) -> Self:
-        """Return the approach alone, under a given sum of pressures / E*."""
-        return cls(
-            along_x=np.ones((1, grid[0])),
-            along_y=np.ones((1, grid[1])),
-            loads=np.array([float(total)]),
-        )
-
-    @classmethod
-    def turning(cls, x: Array, y: Array, total: float | None) -> Self:
-        """Return the tilts about the middle without moment, and the approach if a total is given.
+    def of_plane(cls, x: Array, y: Array, free: Flags, loads: ArrayLike) -> Self:
+        """Return those motions of a plane that are free: its approach and its two tilts.
 
         Args:
             x: Abscissae of the cells from the middle, over half the diagonal, shape (nx,).
             y: Ordinates, shape (ny,).
-            total: Sum of pressures / E*; None where the approach is prescribed.
+            free: Which of approach and tilts are free, shape (3,).
+            loads: Sums of pressures / E* times lever, shape (3,); those of free motions count.
         """
         ones_x, ones_y = np.ones_like(x), np.ones_like(y)
-        along_x, along_y, loads = [x, ones_x], [ones_y, y], [0.0, 0.0]
-        if total is not None:
-            along_x.insert(0, ones_x)
-            along_y.insert(0, ones_y)
-            loads.insert(0, total)
-        return cls(along_x=np.array(along_x), along_y=np.array(along_y), loads=np.array(loads))
+        along_x, along_y = np.stack([ones_x, x, ones_x]), np.stack([ones_y, ones_y, y])
+        loads = np.asarray(loads, float)
+        return cls(along_x=along_x[free], along_y=along_y[free], loads=loads[free])
+
+    @property
+    def count(self) -> int:
+        """Number k of free motions."""
+        return len(self.loads)
 
     @property
     def turns(self) -> bool:
         """Whether slopes are free."""
-        return len(self.loads) > 1
+        return self.count > 1
 
     def displacement(self, motion: Array) -> Array:
         """Return how far a motion moves the body towards the surface, shape (nx, ny) [mm]."""
@@ -104,7 +98,7 @@ class Motions:
         cells = np.flatnonzero(pressure)
         root = np.sqrt(pressure.ravel()[cells] / pressure.max())
         levers, left = self.levers_of(cells), gap.ravel()[cells]
-        found = np.zeros(len(self.loads))
+        found = np.zeros(self.count)
         for _ in range(2 if self.turns else 1):  # again for what rounding leaves of light cells
             change = np.linalg.lstsq((levers * root).T, left * root, rcond=1e-10)[0]
             found, left = found + change, left - change @ levers
@@ -112,17 +106,13 @@ class Motions:
 
     def on(self, box: Box) -> Motions:
         """Return the motions on a part of the cells, which carries all loads."""
-        return Motions(
-            along_x=self.along_x[:, box.rows],
-            along_y=self.along_y[:, box.columns],
-            loads=self.loads,
-        )
+        return replace(self, along_x=self.along_x[:, box[0]], along_y=self.along_y[:, box[1]])
 
     def coarsened(self, factors: Sequence[int]) -> Motions:
-        """Return the motions on blocks of cells; see `micro.contact.nested_grids.coarsened`."""
+        """Return the motions on blocks of cells; see `coarsened`."""
         return Motions(
-            along_x=_blocks(self.along_x, factors[0]),
-            along_y=_blocks(self.along_y, factors[1]),
+            along_x=coarsened(self.along_x, (1, factors[0])),
+            along_y=coarsened(self.along_y, (1, factors[1])),
             loads=self.loads / np.prod(factors),
         )
 
@@ -216,7 +206,9 @@ class _Scaled(NamedTuple):
         return None
 
 
-def _blocks(values: Array, factor: int) -> Array:
-    spare = -values.shape[1] % factor
-    full = np.pad(values, ((0, 0), (0, spare)), mode="edge")
-    return np.asarray(full.reshape(len(values), -1, factor).mean(axis=2))
+def coarsened(field: Array, factors: Sequence[int]) -> Array:
+    """Average blocks of cells; an incomplete last block is filled with its last cells."""
+    missing = [(0, -n % factor) for n, factor in zip(field.shape, factors, strict=True)]
+    full = np.pad(field, missing, mode="edge")
+    rows, columns = (n // factor for n, factor in zip(full.shape, factors, strict=True))
+    return np.asarray(full.reshape(rows, factors[0], columns, factors[1]).mean(axis=(1, 3)))

@@ -10,19 +10,16 @@ Theory: demos/theory.md, section 7.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import NotConverged
-from micro.compliance.grid_compliance import Compliance
-from micro.contact.problem import ContactPressures
-from micro.contact.rigid_motions import Motions
+from micro.contact.problem import ContactPressures, ContactProblem
+from micro.contact.solver import solve_on_surface
 
 Array = NDArray[np.float64]
-Solve = Callable[[Array, Motions | None, ContactPressures | None, float], ContactPressures]
-"""From the interference, free motions, a start and a tolerance to a solution."""
 
 _MOST_SOLUTIONS = 30
 _FIRST = 1e-2
@@ -74,36 +71,30 @@ class AndersonMixing:
         return moved
 
 
-def solve_with_slopes(
-    solve: Solve,
-    compliance: Compliance,
-    interference: Array,
-    motions: Motions | None,
-    start: ContactPressures | None,
-    tolerance: float,
-) -> ContactPressures:
-    """Solve a contact problem until it agrees with the displacements by finite slopes.
+def solve_contact(problem: ContactProblem, start: ContactPressures | None) -> ContactPressures:
+    """Solve a contact on all cells of a surface, with the displacements by its finite slopes.
 
     Args:
-        solve: Solves it with given displacements by finite slopes taken off the interference.
-        compliance: The elastic body; without finite slopes one solution is all.
-        interference: Overlap of the undeformed bodies, shape (nx, ny) [mm].
-        motions: Free motions of the body; none when not given.
-        start: A solution nearby.
-        tolerance: Largest residual.
+        problem: The contact problem; with the finite slopes of its compliance, if there are any.
+        start: A solution nearby, its motion that of the solution where the approach is free; None
+            starts from coarser grids.
 
     Raises:
-        NotConverged: When a solution does not converge, or displacements do not agree.
+        NotConverged: When the contact conditions or the loads cannot be met, or displacements by
+            finite slopes do not agree with the pressures.
     """
+    compliance, interference = problem.compliance, problem.interference
+    tolerance = problem.tolerance
     if compliance.slopes is None:
-        return solve(interference, motions, start, tolerance)
+        return solve_on_surface(problem, start)
     mixing, displaced = AndersonMixing(), np.zeros(interference.shape)
     if start is not None and start.pressure.any():
         displaced = compliance.slope_displacement(start.pressure)
     accuracy, iterations, left = max(tolerance, _FIRST), 0, np.inf
     last = max(_CONVERGED, 10.0 * tolerance)
     for _ in range(_MOST_SOLUTIONS):
-        found = start = solve(interference - displaced, motions, start, accuracy)
+        lowered = replace(problem, interference=interference - displaced, tolerance=accuracy)
+        found = start = solve_on_surface(lowered, start)
         iterations += found.iterations
         touching = found.pressure > 0.0
         if not touching.any():
@@ -113,9 +104,7 @@ def solve_with_slopes(
             mixing, displaced = AndersonMixing(), np.zeros(interference.shape)
             continue
         change = compliance.slope_displacement(found.pressure) - displaced
-        nearer = (
-            interference if motions is None else interference + motions.displacement(found.motion)
-        )
+        nearer = interference + problem.motions.displacement(found.motion)
         left = float(np.abs(change[touching]).max()) / float(nearer[touching].max())
         if left <= last and accuracy <= tolerance:
             return found._replace(residual=max(found.residual, left), iterations=iterations)

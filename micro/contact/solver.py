@@ -1,99 +1,65 @@
-"""Contact of a rigid body on the cells of a surface, of which it can touch only a part.
+"""Contact of a rigid body on the cells of a surface: on boxes of them, from coarser grids.
 
 The half-space's displacements by pressures are never negative. Without periodicity a rigid body
 therefore touches only cells with a positive interference, and a box around these is all that enters
 the solution. A finite body may lift other cells into contact: they are searched for at the end.
+
+Pressures to start from come from the solution on a grid half as fine, and so on down to a small
+one. The set of cells in contact is then found on the coarse grids, where that costs little, and
+only its edge is left to the fine one (full multigrid: Zhao, Vollebregt & Oosterlee 2014,
+doi 10.3846/13926292.2014.909899).
 
 Theory: demos/theory.md, section 3.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from micro.compliance.cells import Box
-from micro.compliance.grid_compliance import Compliance
+from geometry.errors import NotConverged
 from micro.contact.active_set import solve
-from micro.contact.nested_grids import FEW_CELLS, SurfaceProblem
-from micro.contact.problem import ContactPressures
-from micro.contact.rigid_motions import Motions
-from micro.contact.slope_iteration import solve_with_slopes
+from micro.contact.problem import ContactPressures, ContactProblem
+from micro.contact.rigid_motions import Box
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
+_FEW_CELLS = 32
+"""Cells per side on which a solution from nothing costs nothing."""
+_ROUGH = 2e-2
+"""Residual on the coarse grids; their discretisation errs by more."""
 _MARGIN = 1.1
 """Factor on an estimated approach, so that the box of cells that it overlaps holds the contact."""
 _ESTIMATE = 1e-2
 """Residual of the solution on a coarse grid that the approach is estimated from."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ContactSolver:
-    """Solves contacts of rigid bodies with one elastic body, on nx × ny cells.
+def solve_on_surface(problem: ContactProblem, start: ContactPressures | None) -> ContactPressures:
+    """Solve one contact without finite slopes.
 
     Args:
-        compliance: The elastic body.
-        spacing: Sides of a cell [mm].
-        tolerance: Largest residual, as that of `micro.contact.active_set.solve`.
-        upper: Upper bound of the pressures / E*.
+        problem: The contact problem of all cells of a surface.
+        start: A solution nearby, its motion that of the solution where the approach is free.
+
+    Raises:
+        NotConverged: When the contact conditions or the loads cannot be met.
     """
-
-    compliance: Compliance
-    spacing: tuple[float, float]
-    tolerance: float
-    upper: float = np.inf
-
-    def solve(
-        self,
-        interference: Array,
-        motions: Motions | None = None,
-        start: ContactPressures | None = None,
-    ) -> ContactPressures:
-        """Solve one contact; pressures are those of all cells.
-
-        Args:
-            interference: Overlap of the undeformed bodies where all free motions are zero, shape
-                (nx, ny) [mm].
-            motions: Free motions: none, the approach under a force, or slopes with or without it.
-            start: A solution nearby, its motion that of the solution where the approach is free.
-
-        Raises:
-            NotConverged: When the contact conditions or the loads cannot be met.
-        """
-        return solve_with_slopes(
-            self._solve, self.compliance, interference, motions, start, self.tolerance
-        )
-
-    def _solve(
-        self,
-        interference: Array,
-        motions: Motions | None,
-        start: ContactPressures | None,
-        tolerance: float,
-    ) -> ContactPressures:
-        problem = SurfaceProblem(
-            compliance=self.compliance,
-            interference=interference,
-            motions=motions,
-            upper=self.upper,
-            spacing=self.spacing,
-        )
-        pressure = None if start is None else start.pressure
-        if motions is None:
-            if interference.max() <= 0.0:
-                return ContactPressures(np.zeros(interference.shape))
-            return _solve_growing(problem, _box(problem, interference), pressure, tolerance)
-        if motions.turns:
-            return _solve_on(problem, Box.whole(interference.shape), pressure, tolerance)
-        return _solve_under_force(problem, start, tolerance)
+    interference, motions = problem.interference, problem.motions
+    pressure = None if start is None else start.pressure
+    if motions.turns:
+        return _solve_on(problem, _whole(interference), pressure)
+    if motions.count:
+        return _solve_under_force(problem, start)
+    if interference.max() <= 0.0:
+        return ContactPressures(np.zeros(interference.shape))
+    return _solve_growing(problem, _box(problem, interference), pressure)
 
 
-def _solve_under_force(
-    problem: SurfaceProblem, start: ContactPressures | None, tolerance: float
-) -> ContactPressures:
+def _solve_under_force(problem: ContactProblem, start: ContactPressures | None) -> ContactPressures:
     """Solve with a free approach; the box follows from an estimate of it."""
     top = float(problem.interference.max())
     level = problem.interference - top  # the approach counts from first touch of a cell
@@ -103,46 +69,40 @@ def _solve_under_force(
         first, most = start.pressure, _MARGIN * (float(start.motion[0]) + top)
     elif not problem.compliance.periodic:
         # summits of a coarse grid are lower: the estimate errs upwards
-        bits = FEW_CELLS.bit_length() - 1
+        bits = _FEW_CELLS.bit_length() - 1
         factors = [1 << max(0, (n - 1).bit_length() - bits) for n in level.shape]
-        most = _MARGIN * float(problem.coarsened(factors).solve_coarse(_ESTIMATE).motion[0])
+        most = _MARGIN * float(_solve_nested(problem.coarsened(factors, _ESTIMATE)).motion[0])
     while True:
         box = _box(problem, level + max(most, float(np.finfo(float).tiny)))
-        found = _solve_growing(problem, box, first, tolerance)
+        found = _solve_growing(problem, box, first)
         approach = float(found.motion[0])
-        if approach <= most or box.shape == level.shape:
+        if approach <= most or box == _whole(level):
             return found._replace(motion=found.motion - top)
         first, most = found.pressure, _MARGIN * approach
 
 
-def _box(problem: SurfaceProblem, interference: Array) -> Box:
+def _box(problem: ContactProblem, interference: Array) -> Box:
     """Return the box that a body of this interference can touch on a half-space."""
     if problem.compliance.periodic or not np.isfinite(interference).all():
-        return Box.whole(interference.shape)
-    return Box.around(interference > 0.0)
+        return _whole(interference)
+    return box_around(interference > 0.0)
 
 
-def _solve_growing(
-    problem: SurfaceProblem, box: Box, start: Array | None, tolerance: float
-) -> ContactPressures:
+def _solve_growing(problem: ContactProblem, box: Box, start: Array | None) -> ContactPressures:
     """Solve on a box, and on a larger one while cells outside are lifted into contact."""
-    found = _solve_on(problem, box, start, tolerance)
-    while problem.compliance.body is not None and box.shape != problem.interference.shape:
-        nearer = problem.interference
-        if problem.motions is not None:
-            nearer = nearer + problem.motions.displacement(found.motion)
+    found = _solve_on(problem, box, start)
+    while problem.compliance.body is not None and box != _whole(problem.interference):
+        nearer = problem.interference + problem.motions.displacement(found.motion)
         lifted = _lifted(problem, box, nearer, found.pressure)
         if not lifted.any():
             break
-        box = Box.around((found.pressure > 0.0) | (nearer > 0.0) | lifted)
-        again = _solve_on(problem, box, found.pressure, tolerance)
+        box = box_around((found.pressure > 0.0) | (nearer > 0.0) | lifted)
+        again = _solve_on(problem, box, found.pressure)
         found = again._replace(iterations=found.iterations + again.iterations)
     return found
 
 
-def _lifted(
-    problem: SurfaceProblem, box: Box, interference: Array, pressure: Array
-) -> NDArray[np.bool_]:
+def _lifted(problem: ContactProblem, box: Box, interference: Array, pressure: Array) -> Flags:
     """Return which cells outside a box penetrate the rigid body.
 
     The half-space only lowers cells. All displacements are therefore evaluated only where those by
@@ -150,22 +110,75 @@ def _lifted(
     """
     outside = np.ones(interference.shape, bool)
     outside[box] = False
-    body = problem.compliance.body_displacement(pressure, problem.spacing)
+    body = problem.compliance.body_on(pressure.shape, problem.spacing).displacement(pressure)
     if not np.any(outside & (body < interference)):
         return np.zeros(interference.shape, bool)
-    everywhere = Box.whole(pressure.shape)
-    grid = problem.compliance.on_grid(pressure.shape, problem.spacing, everywhere)
-    return np.asarray(outside & (grid.displacement(pressure) < interference))
+    return np.asarray(outside & (problem.grid.displacement(pressure) < interference))
 
 
-def _solve_on(
-    problem: SurfaceProblem, box: Box, start: Array | None, tolerance: float
-) -> ContactPressures:
+def _solve_on(problem: ContactProblem, box: Box, start: Array | None) -> ContactPressures:
     """Solve on the cells of a box, from coarser grids where there is no start."""
     part = problem.on(box)
-    first = part.nested_start() if start is None or not start[box].any() else start[box]
-    grid = problem.compliance.on_grid(box.shape, problem.spacing, box)
-    found = solve(part.with_compliance(grid), first, tolerance)
+    first = nested_start(part) if start is None or not start[box].any() else start[box]
+    found = solve(part, first)
     pressure = np.zeros(problem.interference.shape)
     pressure[box] = found.pressure
     return found._replace(pressure=pressure)
+
+
+def _solve_nested(problem: ContactProblem) -> ContactPressures:
+    """Solve on the cells of a problem from nothing, by way of coarser grids."""
+    return solve(problem, nested_start(problem))
+
+
+def nested_start(problem: ContactProblem) -> Array:
+    """Return pressures / E* to start from, shape (nx, ny).
+
+    They come from a grid half as fine. On a small grid they are uniform and meet the loads.
+
+    Args:
+        problem: The contact problem.
+    """
+    shape = problem.interference.shape
+    factors = [1 + (n > _FEW_CELLS) for n in shape]
+    if max(factors) > 1:
+        try:
+            found = _solve_nested(problem.coarsened(factors, _ROUGH))
+            return refined(found.pressure, factors)[: shape[0], : shape[1]]
+        except NotConverged:  # a bad start only costs time
+            pass
+    total = float(np.abs(problem.motions.loads).max(initial=0.0))
+    return np.full(shape, total / problem.interference.size)
+
+
+def refined(field: Array, factors: Sequence[int]) -> Array:
+    """Repeat cells."""
+    return np.repeat(np.repeat(field, factors[0], axis=0), factors[1], axis=1)
+
+
+def _whole(field: Array) -> Box:
+    """Return the box of all cells."""
+    return slice(0, field.shape[0]), slice(0, field.shape[1])
+
+
+def box_around(cells: Flags) -> Box:
+    """Return a box around some cells, at least one.
+
+    Its sides are rounded up to 2^k or 3 · 2^(k−1) cells, as far as the grid has them. Few sizes
+    then occur along a load path, and their kernels and work arrays are used again.
+
+    Args:
+        cells: Which cells, shape (nx, ny).
+    """
+    rows, columns = (np.logical_or.reduce(cells, axis=axis) for axis in (1, 0))
+    return _span(rows), _span(columns)
+
+
+def _span(used: Flags) -> slice:
+    first, last = (int(at) for at in np.flatnonzero(used)[[0, -1]])
+    count = last - first + 1
+    power = 1 << max(count - 1, 7).bit_length()
+    rounded = 3 * power // 4 if count <= 3 * power // 4 else power
+    size = min(rounded, used.size)
+    start = min(first, used.size - size)
+    return slice(start, start + size)

@@ -2,7 +2,6 @@
 
 HalfSpaceModel           surface, E* and what the body adds    `model`
   └ PlaneContact         a plane, prescribed or free           `plane_contact`
-      └ ContactSolver    the contact problem on the cells      `micro.contact`
-HalfSpaceState           pressures, gaps, contacts             `state`, `contact_spots`
-Response                 sums over patches                     `patch_sums`
+      └ solve_contact    the contact problem on the cells      `micro.contact`
+HalfSpaceState           pressures, gaps, sums over patches    `plane_contact`, `contact_spots`
 """

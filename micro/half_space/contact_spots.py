@@ -10,11 +10,15 @@ from scipy import ndimage
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from geometry import Partition
+
 Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
 
 EDGE_EXCESS = (np.pi - 1.0 + np.log(2.0)) / 24.0
 """Area, in cells, by which an edge of the counted contact makes it too large on average."""
+_ROUNDING = 1e-9
+"""Of a cell: a centre that is no further beyond a border lies on it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -23,22 +27,36 @@ class Contacts:
 
     Args:
         labels: Number 1 … m of the contact that holds each cell, 0 outside, shape (nx, ny).
+        share: Part of every cell that is in contact, corrected by the perimeter, shape (nx, ny).
         force: Forces, shape (m,) [N].
         area: Areas corrected by the perimeter, shape (m,) [mm²].
-        counted_area: Areas of all cells with a pressure, shape (m,) [mm²].
         peak_pressure: Largest pressures, shape (m,) [MPa].
         peak: Centres of the cells that carry them, shape (m, 2) [mm].
     """
 
     labels: Labels
+    share: Array
     force: Array
     area: Array
-    counted_area: Array
     peak_pressure: Array
     peak: Array
 
     def __len__(self) -> int:
         return len(self.force)
+
+    def per_patch(self, patches: Partition, spacing: tuple[float, float]) -> NDArray[np.int64]:
+        """Return how many contacts have their largest pressure in each patch, shape (N,).
+
+        Args:
+            patches: The N patches.
+            spacing: Sides of a cell [mm]; peaks that rounding alone puts beyond the outer borders
+                count as within.
+        """
+        x, y = patches.borders_x, patches.borders_y
+        nearest = np.clip(self.peak, (x[0], y[0]), (x[-1], y[-1]))
+        beyond = np.abs(self.peak - nearest) > _ROUNDING * np.array(spacing)
+        owner = patches.index_of(*np.where(beyond, self.peak, nearest).T)
+        return np.bincount(owner, minlength=patches.count)
 
 
 def find_contacts(pressure: Array, spacing: tuple[float, float], *, periodic: bool) -> Contacts:
@@ -56,16 +74,16 @@ def find_contacts(pressure: Array, spacing: tuple[float, float], *, periodic: bo
     cells = np.flatnonzero(owner)
     which, load = owner[cells] - 1, pressure.ravel()[cells]
     cell = np.float64(spacing[0] * spacing[1])
-    corrected = true_area(pressure > 0.0, periodic=periodic).ravel()[cells]
+    share = true_area(pressure > 0.0, periodic=periodic)
     rising = np.argsort(load, kind="stable")
     top = np.zeros(count, np.intp)
     top[which[rising]] = cells[rising]  # the last, largest one stays
     middle = np.stack(np.unravel_index(top, pressure.shape), axis=1) + 0.5
     return Contacts(
         labels=labels.astype(np.int64),
+        share=share,
         force=np.bincount(which, load, minlength=count) * cell,
-        area=np.bincount(which, corrected, minlength=count) * cell,
-        counted_area=np.bincount(which, minlength=count) * cell,
+        area=np.bincount(which, share.ravel()[cells], minlength=count) * cell,
         peak_pressure=pressure.ravel()[top],
         peak=np.multiply(middle, spacing),
     )
@@ -92,10 +110,8 @@ def true_area(contact: NDArray[np.bool_], *, periodic: bool) -> Array:
     around = np.pad(contact, 1, mode="wrap" if periodic else "edge")
     inner = slice(1, -1)
     neighbours = (around[2:, inner], around[:-2, inner], around[inner, 2:], around[inner, :-2])
-    edges = np.zeros(contact.shape)
-    for neighbour in neighbours:
-        edges += contact & ~neighbour
-    return contact - EDGE_EXCESS * edges
+    edges = np.sum([contact & ~neighbour for neighbour in neighbours], axis=0)
+    return np.asarray(contact - EDGE_EXCESS * edges)
 
 
 def _joined(labels: Labels, count: int) -> tuple[Labels, int]:

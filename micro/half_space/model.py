@@ -15,12 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 from geometry import Control, Partition, PatchGrid, Surface
 from geometry.errors import InputError
 from micro.compliance.body_modes import BodyModes
+from micro.compliance.finite_slopes import FiniteSlopes
 from micro.compliance.free_sides import FreeSides
-from micro.compliance.grid_compliance import Compliance, SlopeTerm
-from micro.contact.solver import ContactSolver
-from micro.half_space.patch_sums import response_row
-from micro.half_space.plane_contact import LEVEL, PlaneContact
-from micro.half_space.state import HalfSpaceState
+from micro.compliance.grid_compliance import Compliance
+from micro.half_space.plane_contact import LEVEL, HalfSpaceState, PlaneContact
 from micro.model import checked_approaches, checked_patches, whole_patch
 from micro.response import Pressed, Response
 
@@ -69,7 +67,7 @@ class HalfSpaceModel:
     highest: float | None = None
     sides: FreeSides | None = None
     body: BodyModes | None = None
-    slopes: SlopeTerm | None = None
+    slopes: FiniteSlopes | None = None
     upper: float = np.inf
 
     def __post_init__(self) -> None:
@@ -79,20 +77,16 @@ class HalfSpaceModel:
                 problem = f"the {what.replace('_', ' ')} must be positive and finite"
                 raise InputError(problem, value=value, allowed="> 0")
         if not self.upper > 0.0:
-            raise InputError(
-                "the upper bound of the pressures must be positive", value=self.upper, allowed="> 0"
-            )
+            problem = "the upper bound of the pressures must be positive"
+            raise InputError(problem, value=self.upper, allowed="> 0")
         source, lengths, sides = self.surface.source, self.surface.lengths, self.sides
         if self.periodic and not self.surface.periodic:
             raise InputError("a periodic half-space needs a periodic surface", value=source)
         if self.periodic and sides is not None:
             raise InputError("a periodic half-space has no free sides", value=sides)
         if sides is not None and not np.allclose(sides.lengths, lengths, rtol=1e-9, atol=0.0):
-            raise InputError(
-                "the free sides are not those of the surface",
-                value=sides.lengths,
-                allowed=f"{lengths} mm",
-            )
+            problem = "the free sides are not those of the surface"
+            raise InputError(problem, value=sides.lengths, allowed=f"{lengths} mm")
 
     @property
     def name(self) -> str:
@@ -129,7 +123,14 @@ class HalfSpaceModel:
         Args:
             grid: Cells in x and y.
         """
-        surface = resampled(self.surface, grid)
+        surface = self.surface
+        if grid != surface.grid:
+            x, y = (
+                (np.arange(n) + 0.5) * (size / n)
+                for n, size in zip(grid, surface.lengths, strict=True)
+            )
+            heights = surface.height_at(*np.meshgrid(x, y, indexing="ij"))
+            surface = replace(surface, heights=heights)
         return replace(self, surface=surface, highest=self.reference_height, slopes=None)
 
     def solve(
@@ -193,9 +194,8 @@ class HalfSpaceModel:
             InputError: When a periodic surface is pressed to full contact or by a tilted plane.
             NotConverged: When the contact conditions cannot be met to the tolerance.
         """
-        if start is None:
-            return self._contact.equilibrium(control, None, None)
-        return self._contact.equilibrium(control, start.pressure, start.plane)
+        known = (None, None) if start is None else (start.pressure, start.plane)
+        return self._contact.equilibrium(control, *known)
 
     def respond(
         self,
@@ -215,13 +215,14 @@ class HalfSpaceModel:
         rows: dict[int, dict[str, Any]] = {}
         before = last = None
         for index in np.argsort(given, kind="stable"):
-            plane = self._contact.plane(float(given[index]), tilt)
+            approach = float(given[index])
             start = None if last is None else last.pressure
             if last is not None and before is not None and last.approach > before.approach:
-                ahead = (plane.approach - last.approach) / (last.approach - before.approach)
+                ahead = (approach - last.approach) / (last.approach - before.approach)
                 start = np.maximum(last.pressure + ahead * (last.pressure - before.pressure), 0.0)
-            before, last = last, self._contact.at(plane, start)
-            rows[int(index)] = self._row(last, patches, means)
+            control = Control(approach=approach, tilt=tilt)
+            before, last = last, self._contact.equilibrium(control, start)
+            rows[int(index)] = last.row(patches, means)
         ordered = [rows[index] for index in range(len(given))]
         return Response.of(ordered, self.name, self.contact_modulus, patches)
 
@@ -236,46 +237,22 @@ class HalfSpaceModel:
         """Solve one load step; see `MicroModel.press`."""
         patches, means = checked_patches(self.surface, patches, mean_heights)
         state = self._contact.equilibrium(control, *(start or (None, None)))
-        rows = [self._row(state, patches, means)]
+        rows = [state.row(patches, means)]
         response = Response.of(rows, self.name, self.contact_modulus, patches)
         return Pressed(response, state.plane, (state.pressure, state.plane))
 
-    def _row(self, state: HalfSpaceState, patches: Partition, means: Array) -> dict[str, Any]:
-        return response_row(self.surface, state, patches, means, self.reference_height)
-
     @cached_property
     def _contact(self) -> PlaneContact:
-        compliance = Compliance(
-            periodic=self.periodic,
-            modulus=self.contact_modulus,
-            sides=self.sides,
-            body=self.body,
-            slopes=self.slopes,
-        )
-        solver = ContactSolver(
-            compliance=compliance,
-            spacing=self.surface.spacing,
-            tolerance=self.tolerance,
-            upper=self.upper / self.contact_modulus,
-        )
         return PlaneContact(
-            surface=self.surface, reference_height=self.reference_height, solver=solver
+            surface=self.surface,
+            reference_height=self.reference_height,
+            compliance=Compliance(
+                periodic=self.periodic,
+                modulus=self.contact_modulus,
+                sides=self.sides,
+                body=self.body,
+                slopes=self.slopes,
+            ),
+            tolerance=self.tolerance,
+            upper=self.upper,
         )
-
-
-def resampled(surface: Surface, grid: tuple[int, int]) -> Surface:
-    """Return the interpolant of a surface at the centres of other cells.
-
-    Its own highest point differs a little: models that are to be compared count the approach from
-    that of the original, as `HalfSpaceModel.resampled` does.
-
-    Args:
-        surface: The surface.
-        grid: Cells in x and y.
-    """
-    if grid == surface.grid:
-        return surface
-    x, y = (
-        (np.arange(n) + 0.5) * (size / n) for n, size in zip(grid, surface.lengths, strict=True)
-    )
-    return replace(surface, heights=surface.height_at(*np.meshgrid(x, y, indexing="ij")))

@@ -1,4 +1,4 @@
-"""A rigid plane on the cells of a surface: what is prescribed of it as a contact problem.
+"""A rigid plane on the cells of a surface: the contact problem, and the contact that solves it.
 
 Theory: demos/theory.md, section 3.
 """
@@ -6,17 +6,20 @@ Theory: demos/theory.md, section 3.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Control, Surface
+from geometry import Control, Partition, Surface, overlaps, patch_means
 from geometry.errors import InputError
-from geometry.rigid_plane import RigidPlane
-from micro.contact.problem import ContactPressures
+from geometry.rigid_plane import RigidPlane, motion_units
+from micro.compliance.grid_compliance import Compliance
+from micro.contact.problem import ContactPressures, ContactProblem
 from micro.contact.rigid_motions import Motions
-from micro.contact.solver import ContactSolver
-from micro.half_space.state import HalfSpaceState
+from micro.contact.slope_iteration import solve_contact
+from micro.half_space.contact_spots import Contacts, find_contacts
 
 Array = NDArray[np.float64]
 
@@ -30,121 +33,212 @@ class PlaneContact:
     Args:
         surface: The surface.
         reference_height: Height z_M that the approach counts from [mm].
-        solver: Solves the contact problem on the cells.
+        compliance: The elastic body.
+        tolerance: Largest residual.
+        upper: Upper bound of the pressures [MPa].
     """
 
     surface: Surface
     reference_height: float
-    solver: ContactSolver
-
-    def plane(self, approach: float, tilt: tuple[float, float]) -> RigidPlane:
-        """Return a plane over the surface.
-
-        Raises:
-            InputError: When a plane is tilted over a periodic surface, or a number is not finite.
-        """
-        if self.solver.compliance.periodic and any(tilt):
-            raise InputError(
-                "a tilted plane does not continue periodically", value=tilt, allowed="(0, 0)"
-            )
-        return RigidPlane.above(self.surface, approach, tilt)
-
-    def interference(self, plane: RigidPlane) -> Array:
-        """Return the overlap of plane and undeformed surface, shape (nx, ny) [mm]."""
-        surface = self.surface
-        below = self.reference_height - surface.heights
-        return np.asarray(plane.at(surface.x[:, None], surface.y) - below)
-
-    def at(self, plane: RigidPlane, start: Array | None) -> HalfSpaceState:
-        """Solve under a plane that does not move.
-
-        Args:
-            plane: The plane.
-            start: Pressures nearby, shape (nx, ny) [MPa].
-
-        Raises:
-            InputError: When a periodic surface is pressed to full contact.
-            NotConverged: When the contact conditions cannot be met.
-        """
-        interference = self.interference(plane)
-        mean = float(interference.mean())
-        if self.solver.compliance.periodic and mean >= 0.0:
-            raise InputError(
-                "a periodic surface has no gap left at this approach",
-                value=plane.approach,
-                allowed=f"< {plane.approach - mean:.6g} mm; beyond it give the force",
-            )
-        return self._state(plane, self.solver.solve(interference, start=self._start(start)))
+    compliance: Compliance
+    tolerance: float
+    upper: float
 
     def equilibrium(
-        self, control: Control, start: Array | None, near: RigidPlane | None
+        self, control: Control, start: Array | None = None, near: RigidPlane | None = None
     ) -> HalfSpaceState:
         """Solve the contact and the motions of the plane that are free, as one problem.
 
         Args:
             control: What is prescribed of the plane.
             start: Pressures nearby, shape (nx, ny) [MPa].
-            near: The plane that they belong to.
+            near: The plane that they belong to; needed where the force is prescribed.
 
         Raises:
             InputError: When a periodic surface is pressed to full contact or by a tilted plane.
             NotConverged: When the contact conditions cannot be met.
         """
-        tilt = control.tilt if control.tilt is not None else near.tilt if near else LEVEL
+        surface, modulus = self.surface, self.compliance.modulus
         if control.force == 0.0:
-            touch = -float(self.interference(self.plane(0.0, tilt)).max())
-            return self.at(self.plane(touch, tilt), None)
-        if control.tilt is None:
-            return self._with_free_tilt(control, start)
-        if control.approach is not None:
-            return self.at(self.plane(control.approach, tilt), start)
-        interference = self.interference(self.plane(0.0, tilt))
-        motions = Motions.approach(interference.shape, self._total(control))
-        first = self._start(start, near)
-        found = self.solver.solve(interference, motions, first)
-        return self._state(self.plane(float(found.motion[0]), tilt), found)
+            control, start = self._first_touch(control, near), None
+        motion = control.prescribed(np.zeros(3))
+        interference = self.interference(RigidPlane.moved(surface, motion))
+        if self.compliance.periodic:
+            _check_periodic(control, float(interference.mean()))
+        lx, ly = surface.lengths
+        unit = motion_units(0.5 * float(np.hypot(lx, ly)))
+        x, y = (surface.x - 0.5 * lx) * unit[1], (surface.y - 0.5 * ly) * unit[2]
+        cell = surface.spacing[0] * surface.spacing[1]
+        problem = ContactProblem(
+            compliance=self.compliance,
+            spacing=surface.spacing,
+            interference=interference,
+            motions=Motions.of_plane(x, y, control.free, control.loads / (modulus * cell)),
+            tolerance=self.tolerance,
+            upper=self.upper / modulus,
+        )
+        found = solve_contact(problem, self._start(start, near))
+        motion[control.free] = found.motion * unit[control.free]
+        return HalfSpaceState(
+            contact=self,
+            plane=RigidPlane.moved(surface, motion),
+            pressure=found.pressure * modulus,
+            residual=found.residual,
+            iterations=found.iterations,
+        )
 
-    def _with_free_tilt(self, control: Control, start: Array | None) -> HalfSpaceState:
-        """Solve with a plane that may turn about the middle."""
-        if self.solver.compliance.periodic:
-            raise InputError("a plane cannot turn on a periodic surface", value="tilt free")
-        half = 0.5 * float(np.hypot(*self.surface.lengths))
-        middle = tuple(0.5 * length for length in self.surface.lengths)
-        x, y = (self.surface.x - middle[0]) / half, (self.surface.y - middle[1]) / half
-        interference = self.interference(self.plane(control.approach or 0.0, LEVEL))
-        total = None if control.force is None else self._total(control)
-        found = self.solver.solve(interference, Motions.turning(x, y, total), self._start(start))
-        approach = control.approach if control.approach is not None else float(found.motion[0])
-        tilt = float(found.motion[-2]) / half, float(found.motion[-1]) / half
-        return self._state(self.plane(approach, tilt), found)
+    def interference(self, plane: RigidPlane) -> Array:
+        """Return the overlap δ(x, y) − (z_M − z) of plane and undeformed surface [mm].
 
-    def _total(self, control: Control) -> float:
-        """Return the sum of the pressures / E* of the cells under the force."""
-        dx, dy = self.surface.spacing
-        return (control.force or 0.0) / (self.solver.compliance.modulus * dx * dy)
+        Args:
+            plane: The plane.
 
-    def _start(
-        self, pressure: Array | None, near: RigidPlane | None = None
-    ) -> ContactPressures | None:
+        Returns:
+            Negative where they are apart, shape (nx, ny).
+        """
+        surface = self.surface
+        below = self.reference_height - surface.heights
+        return np.asarray(plane.at(surface.x[:, None], surface.y) - below)
+
+    def _first_touch(self, control: Control, near: RigidPlane | None) -> Control:
+        """Return the approach at which a plane without force, tilted as one near, first touches."""
+        tilt = control.tilt if control.tilt is not None else near.tilt if near else LEVEL
+        touch = -float(self.interference(RigidPlane.above(self.surface, 0.0, tilt)).max())
+        return Control(approach=touch, tilt=tilt)
+
+    def _start(self, pressure: Array | None, near: RigidPlane | None) -> ContactPressures | None:
         if pressure is None:
             return None
         if pressure.shape != self.surface.grid:
-            raise InputError(
-                "the solution to start from is of another grid",
-                value=pressure.shape,
-                allowed=f"{self.surface.grid}",
-            )
+            problem, allowed = "the solution to start from is of another grid", self.surface.grid
+            raise InputError(problem, value=pressure.shape, allowed=f"{allowed}")
         motion = np.zeros(0) if near is None else np.array([near.approach])
-        return ContactPressures(np.divide(pressure, self.solver.compliance.modulus), motion)
+        return ContactPressures(np.divide(pressure, self.compliance.modulus), motion)
 
-    def _state(self, plane: RigidPlane, found: ContactPressures) -> HalfSpaceState:
-        compliance = self.solver.compliance
-        return HalfSpaceState(
-            plane=plane,
-            interference=self.interference(plane),
-            pressure=found.pressure * compliance.modulus,
-            spacing=self.surface.spacing,
-            residual=found.residual,
-            iterations=found.iterations,
-            compliance=compliance,
-        )
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HalfSpaceState:
+    """Contact of all cells with one plane; maps are evaluated when first used.
+
+    Args:
+        contact: What the plane presses on.
+        plane: The rigid plane: approach at the centre from first touch, and slopes.
+        pressure: Contact pressure, shape (nx, ny) [MPa].
+        residual: Largest violation of gap ≥ 0 and of gap = 0 under pressure, relative to the
+            largest interference. It bounds the error of the force: this is exact for a surface
+            whose heights differ by ``residual`` δ at most.
+        iterations: Products of the compliance with pressures.
+    """
+
+    contact: PlaneContact
+    plane: RigidPlane
+    pressure: Array
+    residual: float
+    iterations: int
+
+    @property
+    def approach(self) -> float:
+        """Rigid approach δ at the centre, counted from first touch [mm]."""
+        return self.plane.approach
+
+    @property
+    def spacing(self) -> tuple[float, float]:
+        """Sides (dx, dy) of a cell [mm]."""
+        return self.contact.surface.spacing
+
+    @property
+    def force(self) -> float:
+        """Normal force [N]."""
+        return float(self.pressure.sum()) * self.spacing[0] * self.spacing[1]
+
+    @property
+    def in_contact(self) -> NDArray[np.bool_]:
+        """Which cells carry a pressure, shape (nx, ny)."""
+        return self.pressure > 0.0
+
+    @property
+    def counted_area(self) -> float:
+        """Area of all cells under pressure [mm²]; too large by a part of the perimeter."""
+        return np.count_nonzero(self.pressure) * self.spacing[0] * self.spacing[1]
+
+    @property
+    def contact_area(self) -> float:
+        """Real contact area, corrected by the perimeter [mm²]."""
+        return float(self.contacts.area.sum())
+
+    @cached_property
+    def contacts(self) -> Contacts:
+        """The connected contacts."""
+        periodic = self.contact.compliance.periodic
+        return find_contacts(self.pressure, self.spacing, periodic=periodic)
+
+    @cached_property
+    def displacement(self) -> Array:
+        """Normal displacement of the surface at the cell centres, shape (nx, ny) [mm].
+
+        On a periodic surface it counts from its own mean.
+        """
+        compliance = self.contact.compliance
+        pressure = np.divide(self.pressure, compliance.modulus)
+        found = compliance.on_grid(pressure.shape, self.spacing).displacement(pressure)
+        if compliance.slopes is not None:
+            found += compliance.slope_displacement(pressure)
+        return found
+
+    @property
+    def interference(self) -> Array:
+        """Overlap of plane and undeformed surface, negative where they are apart, (nx, ny) [mm]."""
+        return self.contact.interference(self.plane)
+
+    @property
+    def gap(self) -> Array:
+        """Distance of the displaced surface from the plane, shape (nx, ny) [mm]."""
+        return self.displacement - self.interference
+
+    def row(self, patches: Partition, mean_heights: Array) -> dict[str, Any]:
+        """Return the fields of a `Response` at this approach: sums and means over patches.
+
+        Pressure, area and displacement of a cell that straddles a border are shared by area; force
+        and area outside of all patches count for the nearest. A contact counts for the patch that
+        holds its largest pressure.
+
+        Args:
+            patches: The N patches, within the surface's rectangle.
+            mean_heights: Mean heights of the patches, shape (N,) [mm].
+        """
+        plane, surface = self.plane, self.contact.surface
+        displaced = Surface(heights=self.displacement, lengths=surface.lengths)
+        displacement = patch_means(displaced, patches)
+        below = self.contact.reference_height - plane.means(patches)
+        separation = below - mean_heights + displacement
+        borders = patches.borders_x, patches.borders_y
+        x, y = map(overlaps, borders, surface.lengths, surface.grid)
+        forces = self.pressure * (self.spacing[0] * self.spacing[1])
+        return {
+            "approach": plane.approach,
+            "force": self.force,
+            "moment": plane.moment(surface.x[:, None], surface.y, forces),
+            "contact_area": self.contact_area,
+            "contacts": len(self.contacts),
+            "mean_separation": np.average(separation, weights=patches.areas),
+            "iterations": self.iterations,
+            "residual": self.residual,
+            "overlapping_contacts": 0,
+            "patch_force": (x @ self.pressure @ y.T).ravel(),
+            "patch_contact_area": (x @ self.contacts.share @ y.T).ravel(),
+            "patch_contacts": self.contacts.per_patch(patches, self.spacing),
+            "patch_displacement": displacement,
+            "patch_separation": separation,
+            "warning": "",
+        }
+
+
+def _check_periodic(control: Control, overlap: float) -> None:
+    """Refuse planes that are not level, and approaches beyond full contact."""
+    if control.tilt is None or any(control.tilt):
+        problem, value = "a plane over a periodic surface must be level", control.tilt or "free"
+        raise InputError(problem, value=value, allowed="tilt (0, 0)")
+    if control.approach is not None and overlap >= 0.0:
+        allowed = f"< {control.approach - overlap:.6g} mm; beyond it give the force"
+        problem = "a periodic surface has no gap left at this approach"
+        raise InputError(problem, value=control.approach, allowed=allowed)

@@ -173,7 +173,7 @@ def _load(setup: ProblemSetup) -> str:
         text += f", tilted by {_slopes(load_history.tilt)}"
     if forced:
         approach = 1e3 * setup.plane_at_largest_load.approach
-        text += f"; on a half-space its approach is {approach:.4g} µm"
+        text += f"; on a half-space its approach is about {approach:.3g} µm"
     return text
 
 

@@ -44,7 +44,8 @@ class ProblemSetup:
         mean_heights: Mean height of each patch, shape (N,) [mm].
         shape: Shape and mesh of the block.
         plane_at_largest_load: The rigid plane at the largest load. Where the force or the moment is
-            prescribed, it is the plane in equilibrium on a half-space.
+            prescribed, it is the plane in equilibrium on a half-space, estimated on few of its
+            cells where load steps solve the half-space model itself and need no plane before.
         choice: Why this micro model was chosen, where the scene says ``auto``.
         meshes: The meshes of a reference; None with other couplings.
         decision: Why the auto values became what they are, where measured errors decided.

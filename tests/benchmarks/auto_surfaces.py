@@ -3,7 +3,7 @@
 import numpy as np
 
 from geometry import PatchGrid, Spectrum, Surface, synthesise
-from micro import HalfSpaceModel, resampled
+from micro import HalfSpaceModel
 
 WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
 GRIDS = {48: 0.15, 64: 0.2, 96: 0.15, 128: 0.2, 192: 0.1, 256: 0.1, 512: 0.1}
@@ -44,7 +44,7 @@ def converged(surface, loads):
     found = []
     for factor in factors:
         cells = (round(factor * n),) * 2
-        fine = resampled(surface, cells)
+        fine = HalfSpaceModel(surface, contact_modulus=1.0).resampled(cells).surface
         model = HalfSpaceModel(
             surface=fine,
             contact_modulus=1.0,

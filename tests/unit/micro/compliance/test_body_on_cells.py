@@ -1,15 +1,17 @@
 """A body's compliance on cells: symmetry, boxes, cells that the body lifts into contact."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from free_motions import contact_problem
 
 from geometry import Control, Surface
 from micro import HalfSpaceModel
 from micro.compliance.body_modes import BodyModes
-from micro.compliance.cells import Box, Cells
 from micro.compliance.grid_compliance import Compliance
+from micro.compliance.half_space_grid import Cells
 from micro.contact.active_set import solve
-from micro.contact.problem import ContactProblem
 
 E_STAR = 4000.0
 GRID, SPACING = (64, 48), (1.0 / 64, 0.75 / 48)
@@ -37,9 +39,7 @@ def two_bumps(lower):
 
 
 def test_is_symmetric_on_cells():
-    grid = Compliance(periodic=False, modulus=E_STAR, body=random_body()).on_grid(
-        GRID, SPACING, Box.whole(GRID)
-    )
+    grid = Compliance(periodic=False, modulus=E_STAR, body=random_body()).on_grid(GRID, SPACING)
     p, q = np.random.default_rng(1).standard_normal((2, *GRID))
     one, other = np.vdot(p, grid.displacement(q)), np.vdot(q, grid.displacement(p))
     scale = np.linalg.norm(p) * np.linalg.norm(grid.displacement(q))
@@ -49,22 +49,21 @@ def test_is_symmetric_on_cells():
 def test_some_cells_and_a_box_are_a_part_of_all():
     grids = Compliance(periodic=False, modulus=E_STAR, body=random_body())
     alone = Compliance(periodic=False)
-    box = Box(slice(8, 40), slice(16, 48))
+    box, shape = (slice(8, 40), slice(16, 48)), (32, 32)
+    corner = 8 * SPACING[0], 16 * SPACING[1]
     dice = np.random.default_rng(2)
     p = np.zeros(GRID)
-    p[box] = np.where(dice.random(box.shape) > 0.7, dice.random(box.shape), 0.0)
-    added = [
-        given.on_grid(GRID, SPACING, Box.whole(GRID)).displacement(p) for given in (grids, alone)
-    ]
+    p[box] = np.where(dice.random(shape) > 0.7, dice.random(shape), 0.0)
+    added = [given.on_grid(GRID, SPACING).displacement(p) for given in (grids, alone)]
     body = added[0] - added[1]
-    part = grids.on_grid(box.shape, SPACING, box)
-    inside = part.displacement(p[box]) - alone.on_grid(box.shape, SPACING, box).displacement(p[box])
+    part = grids.on_grid(shape, SPACING, corner)
+    inside = part.displacement(p[box]) - alone.on_grid(shape, SPACING, corner).displacement(p[box])
     assert inside == pytest.approx(body[box], abs=1e-12 * np.abs(body).max())
-    cells = Cells.of(np.flatnonzero(p[box]), box.shape)
+    cells = Cells.of(np.flatnonzero(p[box]), shape)
     rough = part.apply_compliance(cells, p[box].ravel()[cells.flat])
     fine = part.displacement(p[box]).ravel()[cells.flat]
     assert rough == pytest.approx(fine, abs=1e-5 * np.abs(fine).max())  # single precision
-    assert grids.body_displacement(p, SPACING) == pytest.approx(
+    assert grids.body_on(GRID, SPACING).displacement(p) == pytest.approx(
         body, abs=1e-11 * np.abs(body).max()
     )
 
@@ -95,10 +94,8 @@ def test_cells_lifted_into_contact_are_found(control, lower):
     # the same on all cells at once, where no box can hide any
     interference = state.interference
     body = Compliance(periodic=False, modulus=E_STAR, body=seesaw(3e-3))
-    problem = ContactProblem(
-        compliance=body.on_grid(GRID, SPACING, Box.whole(GRID)), interference=interference
-    )
-    every = solve(problem, np.zeros(GRID), 1e-10)
+    problem = replace(contact_problem(interference, SPACING, tolerance=1e-10), compliance=body)
+    every = solve(problem, np.zeros(GRID))
     assert state.pressure / E_STAR == pytest.approx(every.pressure, abs=1e-6 * every.pressure.max())
 
 

@@ -9,8 +9,8 @@ from free_side_points import side_displacements
 from geometry import Surface, UnevenPartition
 from geometry.errors import InputError
 from micro import FreeSides, HalfSpaceModel
-from micro.compliance.cells import Box, Cells
 from micro.compliance.grid_compliance import Compliance
+from micro.compliance.half_space_grid import Cells
 from micro.compliance.side_cells import side_cells
 
 SIDES = FreeSides(lengths=(1.0, 1.5), poisson_ratio=0.2, decay_length=0.25)
@@ -68,18 +68,18 @@ def test_cells_and_rectangles_tell_the_same(cells):
 
 def test_grids_know_their_sides_where_they_lie():
     grids, alone = (Compliance(periodic=False, sides=sides) for sides in (SIDES, None))
-    box = Box(slice(0, 8), slice(20, 30))
-    p = np.abs(random(5, box.shape))
-    beside = grids.on_grid(p.shape, SPACING, box).displacement(p)
-    inside = alone.on_grid(p.shape, SPACING, box).displacement(p)
+    box, corner = (slice(0, 8), slice(20, 30)), (0.0, 20 * SPACING[1])
+    p = np.abs(random(5, (8, 10)))
+    beside = grids.on_grid(p.shape, SPACING, corner).displacement(p)
+    inside = alone.on_grid(p.shape, SPACING, corner).displacement(p)
     every = np.zeros(GRID)
     every[box] = p
     added = whole(side_cells(SIDES, SPACING), every)[box]
     np.testing.assert_allclose(beside, inside + added, rtol=1e-12)
     where = Cells.of(np.flatnonzero(p > 1.0), p.shape)
     few = np.where(p > 1.0, p, 0.0)
-    rough = grids.on_grid(p.shape, SPACING, box).apply_compliance(where, few.ravel()[where.flat])
-    fine = grids.on_grid(p.shape, SPACING, box).displacement(few).ravel()[where.flat]
+    rough = grids.on_grid(p.shape, SPACING, corner).apply_compliance(where, few.ravel()[where.flat])
+    fine = grids.on_grid(p.shape, SPACING, corner).displacement(few).ravel()[where.flat]
     np.testing.assert_allclose(rough, fine, rtol=1e-5)  # products in single precision
 
 

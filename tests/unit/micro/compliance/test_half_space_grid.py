@@ -5,9 +5,9 @@ import pytest
 from scipy import fft
 
 from micro.closed_forms.love import love_integral
-from micro.compliance.cells import Cells
 from micro.compliance.grid_compliance import Compliance, GridCompliance
 from micro.compliance.half_space_grid import (
+    Cells,
     Convolution,
     HalfSpaceGrid,
     love_kernel,
@@ -20,7 +20,7 @@ SPACING = (0.1, 0.13)
 
 
 def half_space(grid, spacing, *, periodic):
-    return GridCompliance(HalfSpaceGrid(grid, spacing, periodic=periodic))
+    return Compliance(periodic=periodic).on_grid(grid, spacing)
 
 
 def cells_where(mask):
@@ -134,7 +134,7 @@ def test_new_boxes_do_not_evict_half_spaces_in_use():
     used = grids.half_space((2, 2), SPACING)
     for n in range(5, 60):
         grids.on_grid((4, n), SPACING)
-        grids.on_coarse((2, 2), SPACING, (0.0, 0.0))
+        grids.on_grid((2, 2), SPACING, coarse=True)
     assert grids.half_space((2, 2), SPACING) is used
 
 

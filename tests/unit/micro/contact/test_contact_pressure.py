@@ -2,16 +2,14 @@
 
 import numpy as np
 import pytest
+from free_motions import approach, contact_problem, solved
 from scipy.optimize import nnls
 
 from geometry import NotConverged
-from micro.compliance.grid_compliance import Compliance, GridCompliance
-from micro.compliance.half_space_grid import HalfSpaceGrid
+from micro.compliance.grid_compliance import Compliance
 from micro.contact.active_set import solve
-from micro.contact.nested_grids import SurfaceProblem, coarsened, refined
-from micro.contact.problem import ContactProblem
-from micro.contact.rigid_motions import Motions
-from micro.contact.solver import ContactSolver
+from micro.contact.rigid_motions import coarsened
+from micro.contact.solver import nested_start, refined
 
 CASES = {
     "square": ((8, 8), (1.0, 1.0)),
@@ -22,7 +20,7 @@ CASES = {
 
 
 def half_space(grid, spacing, *, periodic):
-    return GridCompliance(HalfSpaceGrid(grid, spacing, periodic=periodic))
+    return Compliance(periodic=periodic).on_grid(grid, spacing)
 
 
 @pytest.fixture(params=CASES)
@@ -51,10 +49,7 @@ def test_least_squares_finds_the_same(case, share, periodic):
     grid, spacing, below = case
     # a part of the height range, or of the way to full contact
     interference = below + share * (-below.mean() if periodic else 2.0 * np.ptp(below))
-    solver = ContactSolver(
-        compliance=Compliance(periodic=periodic), spacing=spacing, tolerance=1e-11
-    )
-    found = solver.solve(interference).pressure
+    found = solved(interference, spacing, periodic=periodic).pressure
     expected = oracle(grid, spacing, interference, periodic=periodic)
     # round-off of a factor whose condition number is at most 1e6, squared in the periodic case
     assert found == pytest.approx(expected, abs=1e-7 * expected.max())
@@ -64,12 +59,10 @@ def test_least_squares_finds_the_same(case, share, periodic):
 @pytest.mark.parametrize("periodic", [False, True])
 def test_given_force_is_the_same_contact(case, periodic):
     _, spacing, below = case
-    solver = ContactSolver(
-        compliance=Compliance(periodic=periodic), spacing=spacing, tolerance=1e-11
-    )
     asked = 0.6 * (-below.mean() if periodic else np.ptp(below))
-    by_approach = solver.solve(below + asked)
-    by_force = solver.solve(below, Motions.approach(below.shape, by_approach.pressure.sum()))
+    by_approach = solved(below + asked, spacing, periodic=periodic)
+    motions = approach(below.shape, by_approach.pressure.sum())
+    by_force = solved(below, spacing, motions, periodic=periodic)
     assert by_force.motion == pytest.approx([asked], rel=1e-9)  # both within 1e-11 in δ
     peak = by_approach.pressure.max()
     assert by_force.pressure == pytest.approx(by_approach.pressure, abs=1e-8 * peak)
@@ -82,8 +75,7 @@ def test_full_contact_of_a_period(case, share):
     stiffness = 0.5 * np.hypot(q[0][:, None], q[1])
     flattening = np.fft.ifft2(stiffness * np.fft.fft2(below)).real
     mean = share * 1.001 * -flattening.min()  # just enough to close the deepest point, and more
-    solver = ContactSolver(compliance=Compliance(periodic=True), spacing=spacing, tolerance=1e-11)
-    found = solver.solve(below, Motions.approach(below.shape, mean * below.size))
+    found = solved(below, spacing, approach(below.shape, mean * below.size), periodic=True)
     # flattening is linear; residual 1e-11, amplified by the stiffness of a single cell
     assert found.pressure == pytest.approx(mean + flattening, abs=1e-9 * mean)
     assert found.motion == pytest.approx([-below.mean()], rel=1e-10)
@@ -92,10 +84,7 @@ def test_full_contact_of_a_period(case, share):
 def test_full_contact_without_periodicity():
     below = 1e-3 * np.random.default_rng(0).standard_normal((12, 10))
     interference = below - below.max() + 1.0  # a thousandth of the approach
-    solver = ContactSolver(
-        compliance=Compliance(periodic=False), spacing=(1.0, 1.0), tolerance=1e-11
-    )
-    found = solver.solve(interference)
+    found = solved(interference, (1.0, 1.0))
     assert np.all(found.pressure > 0.0)
     elastic = half_space((12, 10), (1.0, 1.0), periodic=False)
     assert elastic.displacement(found.pressure) == pytest.approx(interference, abs=1e-10)
@@ -109,12 +98,10 @@ def test_single_cell(periodic):
     alone = np.zeros((17, 20))
     alone[5, 11] = 1.0
     compliance = elastic.displacement(alone)[5, 11]
-    solver = ContactSolver(
-        compliance=Compliance(periodic=periodic), spacing=(0.1, 0.1), tolerance=1e-11
-    )
+    loaded = approach(below.shape, 1e-3 / compliance)
     for found in (
-        solver.solve(below + 1e-3),
-        solver.solve(below, Motions.approach(below.shape, 1e-3 / compliance)),
+        solved(below + 1e-3, (0.1, 0.1), periodic=periodic),
+        solved(below, (0.1, 0.1), loaded, periodic=periodic),
     ):
         assert np.count_nonzero(found.pressure) == 1
         assert found.pressure[5, 11] == pytest.approx(1e-3 / compliance, rel=1e-10)
@@ -127,10 +114,8 @@ def test_hostile_bodies(seed):
     grid = tuple(rng.integers(20, 80, 2))
     heights = -(rng.exponential(1.0, grid) ** 3) if seed % 2 else np.round(rng.normal(0, 2, grid))
     below = heights - heights.max()
-    solver = ContactSolver(
-        compliance=Compliance(periodic=True), spacing=(1.0, 10.0), tolerance=1e-9
-    )
-    found = solver.solve(below - 0.85 * below.mean())
+    interference = below - 0.85 * below.mean()
+    found = solved(interference, (1.0, 10.0), periodic=True, tolerance=1e-9)
     gap = half_space(grid, (1.0, 10.0), periodic=True).displacement(found.pressure) - below
     gap += 0.85 * below.mean()
     assert found.residual <= 1e-9
@@ -144,16 +129,9 @@ def test_coarse_start_saves_products_on_the_fine_grid():
     n = 128
     x = (np.arange(n) + 0.5) / n - 0.5
     interference = 0.02 - 0.5 * (x[:, None] ** 2 + x**2)
-    problem = SurfaceProblem(
-        compliance=Compliance(periodic=False),
-        interference=interference,
-        motions=None,
-        upper=np.inf,
-        spacing=(1 / n, 1 / n),
-    )
-    grid = problem.compliance.on_grid((n, n), problem.spacing)
-    cold = solve(problem.with_compliance(grid), np.zeros((n, n)), 1e-8)
-    nested = solve(problem.with_compliance(grid), problem.nested_start(), 1e-8)
+    problem = contact_problem(interference, (1 / n, 1 / n), tolerance=1e-8)
+    cold = solve(problem, np.zeros((n, n)))
+    nested = solve(problem, nested_start(problem))
     assert nested.iterations < 0.8 * cold.iterations
     assert nested.pressure.sum() == pytest.approx(cold.pressure.sum(), rel=1e-7)  # 2 ε dlnF/dlnδ
 
@@ -169,8 +147,7 @@ def test_coarse_grids():
 
 
 def test_gives_up_with_a_reason():
-    elastic = half_space((8, 8), (1.0, 1.0), periodic=False)
     interference = np.random.default_rng(0).random((8, 8))
-    problem = ContactProblem(compliance=elastic, interference=interference)
+    problem = contact_problem(interference, (1.0, 1.0), tolerance=1e-9)
     with pytest.raises(NotConverged, match=r"contact pressure \(residual .*, asked 1.0e-09\)"):
-        solve(problem, np.zeros((8, 8)), 1e-9, most_steps=2)
+        solve(problem, np.zeros((8, 8)), most_steps=2)

@@ -2,9 +2,7 @@
 
 import numpy as np
 import pytest
-
-from micro.compliance.cells import Box
-from micro.contact.rigid_motions import Motions
+from free_motions import approach, turning
 
 GRID = (9, 8)
 X, Y = np.linspace(-0.7, 0.7, 9), np.linspace(-0.6, 0.6, 8)
@@ -23,7 +21,7 @@ def loads(motions, pressure):
 
 @pytest.mark.parametrize("total", [None, 0.3, 400.0], ids=["approach", "light", "heavy"])
 def test_scaled_pressures_meets_the_loads(pressure, total):
-    motions = Motions.turning(X, Y, total)
+    motions = turning(X, Y, total)
     found = motions.scaled_to_loads(pressure)
     scale = np.abs(motions.levers_of(np.arange(72))) @ found.ravel()
     assert np.abs(loads(motions, found) - motions.loads).max() < 1e-13 * scale.max()
@@ -37,25 +35,25 @@ def test_scaled_pressures_meets_the_loads(pressure, total):
 
 
 def test_scaled_pressures_leaves_what_is_in_balance(pressure):
-    motions = Motions.turning(X, Y, 5.0)
+    motions = turning(X, Y, 5.0)
     once = motions.scaled_to_loads(pressure)
     assert motions.scaled_to_loads(once) == pytest.approx(once, rel=1e-13)
 
 
 def test_approach_alone_scales(pressure):
-    motions = Motions.approach(GRID, 2.0)
+    motions = approach(GRID, 2.0)
     assert motions.scaled_to_loads(pressure) == pytest.approx(
         pressure * (2.0 / pressure.sum()), rel=1e-15
     )
-    assert not motions.turns and Motions.turning(X, Y, None).turns
+    assert not motions.turns and turning(X, Y, None).turns
 
 
 @pytest.mark.parametrize("share", [0.3, 0.9, 0.999])
 def test_scaled_pressures_keeps_the_upper_bound(pressure, share):
     """A share of the most that the cells can carry without a moment, up to nearly all."""
-    even = Motions.turning(X, Y, 1.0).scaled_to_loads(np.where(pressure > 0.0, 1.0, 0.0))
+    even = turning(X, Y, 1.0).scaled_to_loads(np.where(pressure > 0.0, 1.0, 0.0))
     upper = 0.2
-    motions = Motions.turning(X, Y, share * upper * even.sum() / even.max())
+    motions = turning(X, Y, share * upper * even.sum() / even.max())
     found = motions.scaled_to_loads(pressure, upper)
     assert found.max() <= upper
     assert loads(motions, found) == pytest.approx(motions.loads, abs=1e-12 * found.sum())
@@ -64,26 +62,26 @@ def test_scaled_pressures_keeps_the_upper_bound(pressure, share):
 
 def test_loads_beyond_reach_are_told(pressure):
     full = np.ones(GRID)
-    assert Motions.turning(X, Y, 72.001).scaled_to_loads(full, 1.0) is None
-    assert Motions.turning(X, Y, 71.999).scaled_to_loads(full, 1.0) is not None
-    assert Motions.approach(GRID, 72.001).scaled_to_loads(full, 1.0) is None
+    assert turning(X, Y, 72.001).scaled_to_loads(full, 1.0) is None
+    assert turning(X, Y, 71.999).scaled_to_loads(full, 1.0) is not None
+    assert approach(GRID, 72.001).scaled_to_loads(full, 1.0) is None
     one_side = np.where(X[:, None] > 0.0, pressure, 0.0)
-    assert Motions.turning(X, Y, 1.0).scaled_to_loads(one_side) is None
-    assert Motions.turning(X, Y, None).scaled_to_loads(one_side) is None
+    assert turning(X, Y, 1.0).scaled_to_loads(one_side) is None
+    assert turning(X, Y, None).scaled_to_loads(one_side) is None
     corner = np.zeros(GRID)
     corner[0, 0] = 1.0
-    assert Motions.turning(X, Y, 1.0).scaled_to_loads(corner) is None
+    assert turning(X, Y, 1.0).scaled_to_loads(corner) is None
 
 
 def test_nothing_carries_nothing():
     nothing = np.zeros(GRID)
-    for motions in (Motions.turning(X, Y, 1.0), Motions.approach(GRID, 1.0)):
+    for motions in (turning(X, Y, 1.0), approach(GRID, 1.0)):
         assert motions.scaled_to_loads(nothing) is None
-    assert not Motions.turning(X, Y, None).scaled_to_loads(nothing).any()
+    assert not turning(X, Y, None).scaled_to_loads(nothing).any()
 
 
 def test_best_motion_closes_the_gaps_of_a_motion(pressure):
-    motions = Motions.turning(X, Y, 1.0)
+    motions = turning(X, Y, 1.0)
     asked = np.array([2e-3, -1e-3, 5e-4])
     gap = motions.displacement(asked)
     assert gap == pytest.approx(2e-3 - 1e-3 * X[:, None] + 5e-4 * Y)
@@ -93,7 +91,7 @@ def test_best_motion_closes_the_gaps_of_a_motion(pressure):
 
 def test_best_motion_is_exact_for_light_cells_too():
     """Cells that touch without pressure have a weight of 1e-8 of the others."""
-    motions, cells = Motions.turning(X, Y, 1.0), np.array([3, 60, 29])
+    motions, cells = turning(X, Y, 1.0), np.array([3, 60, 29])
     weights, gap = np.zeros(GRID), motions.displacement(np.array([1.0, -0.3, 0.7]))
     weights.ravel()[cells] = [1.0, 0.8, 1e-8]
     left = gap - motions.displacement(motions.closing(weights, gap))
@@ -101,7 +99,7 @@ def test_best_motion_is_exact_for_light_cells_too():
 
 
 def test_a_box_carries_all_loads(pressure):
-    motions, box = Motions.turning(X, Y, 3.0), Box(slice(2, 9), slice(0, 5))
+    motions, box = turning(X, Y, 3.0), (slice(2, 9), slice(0, 5))
     part = motions.on(box)
     assert part.loads.tolist() == motions.loads.tolist()
     asked = np.array([1.0, 2.0, 3.0])
@@ -110,7 +108,7 @@ def test_a_box_carries_all_loads(pressure):
 
 def test_coarse_pressures_meet_the_loads_on_fine_cells():
     x, y = np.linspace(-0.7, 0.7, 12), np.linspace(-0.6, 0.6, 8)
-    motions = Motions.turning(x, y, 5.0)
+    motions = turning(x, y, 5.0)
     coarse = motions.coarsened((3, 2))
     found = coarse.scaled_to_loads(DICE.random((4, 4)))
     fine = np.repeat(np.repeat(found, 3, axis=0), 2, axis=1)
@@ -118,7 +116,7 @@ def test_coarse_pressures_meet_the_loads_on_fine_cells():
 
 
 def test_an_incomplete_block_repeats_its_last_cell():
-    coarse = Motions.turning(X, Y, 1.0).coarsened((2, 3))
+    coarse = turning(X, Y, 1.0).coarsened((2, 3))
     assert coarse.displacement(np.array([0.0, 1.0, 0.0]))[-1, 0] == pytest.approx(X[-1])
     assert coarse.displacement(np.array([0.0, 0.0, 1.0]))[0, -1] == pytest.approx(
         (Y[-2] + 2.0 * Y[-1]) / 3.0

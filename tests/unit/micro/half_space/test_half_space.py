@@ -185,7 +185,7 @@ def test_refusals(surface):
     with pytest.raises(InputError, match=r"\(24, 48\): the solution to start from is of another"):
         free.solve(1e-3, start=other)
     periodic = HalfSpaceModel(surface=surface, contact_modulus=1.0, periodic=True)
-    with pytest.raises(InputError, match="a tilted plane does not continue periodically"):
+    with pytest.raises(InputError, match="a plane over a periodic surface must be level"):
         periodic.solve(1e-3, tilt=(1e-3, 0.0))
     with pytest.raises(InputError, match=r"no gap left at this approach.*beyond it give the force"):
         periodic.solve(1.001 * (surface.highest - surface.mean_height))

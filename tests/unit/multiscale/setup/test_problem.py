@@ -14,6 +14,8 @@ from multiscale.resolution.problem_setup import plane_at_largest_load
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 
+PEAKS = {"hurst": 0.8, "waves": [2, 16], "rms_slope": 0.2, "seed": 2}
+
 
 def scene(seed=1, coupling="consistent", **load):
     small = [f"surface.spectrum.seed={seed}", "surface.grid=[33, 33]", "block.cells=[8, 8, 6]"]
@@ -151,3 +153,17 @@ def test_approaches_below_the_rounding_of_heights_are_refused(tmp_path):
     with pytest.raises(InputError, match="is lost in the rounding of the heights") as told:
         make_setup(Scene.from_dict(given))
     assert told.value.key == "load.approach"
+
+
+@pytest.mark.parametrize("coupling", ["analytic", "concurrent"])
+def test_a_force_that_load_steps_solve_for_is_only_estimated_ahead(coupling):
+    asked = Scene.from_dict(
+        scene(coupling=coupling, force=1.0).model_dump(by_alias=True, exclude={"surface"})
+        | {"surface": {"spectrum": PEAKS, "grid": [160, 160], "lengths": [1.0, 1.0]}}
+    )
+    setup = make_setup(asked)
+    solved = setup.model.solve_force(1.0)
+    found = setup.plane_at_largest_load.approach
+    assert found == pytest.approx(solved.approach, rel=0.03)  # 96² of 160² cells
+    assert found != solved.approach
+    assert f"about {1e3 * found:.3g} µm" in dict(statements(setup))["load"]

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from free_motions import turning
 from scipy.optimize import linprog
 
-from micro.contact.clear_plane import clearance
-from micro.contact.rigid_motions import Motions
+from micro.contact.start import clearance
 
 
 def brute_force(required, levers):
@@ -27,9 +27,7 @@ def test_is_that_of_all_cells(seed, scale):
     dice = np.random.default_rng(seed)
     grid = tuple(dice.integers(3, 14, 2))
     required = scale * (dice.standard_normal(grid) - dice.uniform(0.0, 2.0))
-    motions = Motions.turning(
-        np.linspace(-0.7, 0.7, grid[0]), np.linspace(-0.6, 0.6, grid[1]), None
-    )
+    motions = turning(np.linspace(-0.7, 0.7, grid[0]), np.linspace(-0.6, 0.6, grid[1]), None)
     found = clearance(required, motions)
     levers = motions.levers_of(np.arange(required.size))
     best = scale * brute_force(required / scale, levers)
@@ -47,7 +45,7 @@ def test_turns_clear_of_a_corner():
     x = np.linspace(-0.7, 0.7, 10)
     required = np.full((10, 10), -1.1e-2)
     required[0, 0] = 1e-2
-    found = clearance(required, Motions.turning(x, x, None))
+    found = clearance(required, turning(x, x, None))
     # the corner opposite comes as much nearer: they meet halfway
     assert found.interference == pytest.approx(-5e-4, rel=1e-9)
     assert found.motion.sum() == pytest.approx(1.05e-2 / 0.7, rel=1e-9)
@@ -57,4 +55,4 @@ def test_a_contact_in_the_middle_cannot_be_turned_away():
     x = np.linspace(-0.7, 0.7, 11)
     required = np.full((11, 11), -1.0)
     required[5, 5] = 3e-3
-    assert clearance(required, Motions.turning(x, x, None)).interference == pytest.approx(3e-3)
+    assert clearance(required, turning(x, x, None)).interference == pytest.approx(3e-3)

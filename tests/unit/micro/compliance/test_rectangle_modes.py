@@ -8,9 +8,8 @@ from geometry import PatchGrid, UnevenPartition
 from geometry.legendre_modes import mode_means
 from micro import FreeSides, influence_matrix
 from micro.closed_forms.love import love_mean
-from micro.compliance.half_space_modes import half_space_modes
+from micro.compliance.rectangle_modes import half_space_modes, side_modes
 from micro.compliance.side_cells import side_cells
-from micro.compliance.side_modes import side_modes
 
 SHAPES = [(1.0, 1.0), (1.0, 2.5), (3.0, 0.2)]
 
