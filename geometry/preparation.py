@@ -99,10 +99,13 @@ def completed(
     Raises:
         InputError: When the crop does not fit, or heights are missing that are not to be filled.
     """
-    done, notes = [], []
+    done: list[str] = []
+    notes: list[str] = []
     if steps.crop != (None, None):
         heights, lengths, sentence = _cropped(heights, lengths, steps.crop)
         done.append(sentence)
+    if np.isinf(heights).any():  # refused as a surface
+        return heights, lengths, done, notes
     gaps = np.isnan(heights)
     if steps.missing == "refuse" and gaps.any():
         first = np.argwhere(gaps)[0]

@@ -34,25 +34,31 @@ def read_instrument(file: Path, channel: str | int | None = None) -> FileContent
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of readers, about metadata
-            reader = library.open_topography(str(file))
-            found = _channel(reader, channel)
-            # what a file lacks must be given; what is made up here is not used
-            sizes = {} if found.physical_sizes is not None else {"physical_sizes": (1.0, 1.0)}
-            topography = found.topography(**sizes)
-            heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=np.float64), np.nan)
+            with library.open_topography(str(file)) as reader:
+                return _content(reader, _channel(reader, channel))
     except InputError:
         raise
     except Exception as error:  # its readers raise errors of many families
         several = len(str(error).splitlines()) > 1  # it tried all its readers in vain
         reason = type(error).__name__ if several else first_line(error)
         raise InputError(f"SurfaceTopography cannot read it: {reason}") from None
+
+
+def _content(reader: Any, channel: Any) -> FileContent:
+    """Return what a channel holds, in memory of its own."""
+    # sizes that a file lacks must be given; what is made up here is not used
+    sizes = {} if channel.physical_sizes is not None else {"physical_sizes": (1.0, 1.0)}
+    topography = channel.topography(**sizes)
+    measured = np.ma.array(topography.heights(), dtype=np.float64, copy=True)
     unit, lengths = topography.unit and length_unit(topography.unit), None
     if not sizes and unit:
-        length_x, length_y = (float(size) * LENGTH_UNITS[unit] for size in found.physical_sizes)
+        length_x, length_y = (float(side) * LENGTH_UNITS[unit] for side in channel.physical_sizes)
         lengths = length_x, length_y
-    several = len(reader.channels) > 1
     return FileContent(
-        heights=heights, lengths=lengths, unit=unit, channel=found.name if several else ""
+        heights=np.ma.filled(measured, np.nan),
+        lengths=lengths,
+        unit=unit,
+        channel=channel.name if len(reader.channels) > 1 else "",
     )
 
 

@@ -23,16 +23,21 @@ def expected(name):
     return heights, (files.NX * files.STEP[0], files.NY * y)
 
 
-def same_as_the_library(path, channel=None):
-    """Compare a surface with what SurfaceTopography itself says of the file."""
-    reader = library().open_topography(str(path))
+def what_the_library_reads(reader, channel):
+    """Return heights, masked where missing, and sides [mm] of a channel."""
     chosen = reader.default_channel if channel is None else reader.channels[channel]
     topography = chosen.topography().to_unit("mm")
-    heights = np.ma.asarray(topography.heights())
+    return np.ma.array(topography.heights(), copy=True), topography.physical_sizes
+
+
+def same_as_the_library(path, channel=None):
+    """Compare a surface with what SurfaceTopography itself says of the file."""
+    with library().open_topography(str(path)) as reader:
+        heights, lengths = what_the_library_reads(reader, channel)
     surface = read_surface(path, missing="fill", channel=channel)
     known = ~np.ma.getmaskarray(heights)
     np.testing.assert_allclose(surface.heights[known], heights.data[known], rtol=1e-13)
-    assert surface.lengths == pytest.approx(topography.physical_sizes, rel=1e-13)
+    assert surface.lengths == pytest.approx(lengths, rel=1e-13)
     assert ("missing and filled" in surface.source) == (not known.all())
     return surface, known
 
