@@ -25,7 +25,7 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time `_HOMES` says wh
     from multiscale.laws.patch_law import PatchLaw
     from multiscale.loading.load_step import LoadStep
     from multiscale.loading.stepper import LoadHistory, load_steps
-    from multiscale.resolution.problem_setup import make_setup
+    from multiscale.planning.problem_setup import make_setup
     from multiscale.results.extrapolation import extrapolated
     from multiscale.results.history import History
     from multiscale.run import Run, run
@@ -43,7 +43,7 @@ _MODULES = {
     "laws.patch_law": "PatchLaw",
     "loading.load_step": "LoadStep",
     "loading.stepper": "LoadHistory load_steps",
-    "resolution.problem_setup": "make_setup",
+    "planning.problem_setup": "make_setup",
     "results.extrapolation": "extrapolated",
     "results.history": "History",
     "run": "Run run",

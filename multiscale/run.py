@@ -21,16 +21,15 @@ from multiscale.laws.files import law_bytes, read_laws
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling, LoadPosition, LoadStepper, Restorable
-from multiscale.machine.mpi_job import large_object_comm
-from multiscale.machine.nodes import cluster_nodes
+from multiscale.machine import cluster_nodes, large_object_comm
 from multiscale.measured_errors import checked, error_probe
 from multiscale.notes import noted_history
-from multiscale.resolution.auto_keys import resolved_keys
-from multiscale.resolution.problem_setup import make_setup
+from multiscale.planning.auto_keys import resolved_sections
+from multiscale.planning.problem_setup import make_setup
 from multiscale.results.history import History
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
-from multiscale.storage.serialisation import Arrays, digest
+from multiscale.storage import Arrays, digest
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import Interface
@@ -44,7 +43,7 @@ class Run:
     Args:
         scene: What to run.
         comm: MPI communicator (mpi4py); None runs on this process alone.
-        resolved: Values of the scene's auto keys when the run began; see `resolved_keys`.
+        resolved: Values of the scene's auto keys when the run began; see `resolved_sections`.
 
     Attributes:
         given: The scene as the user wrote it.
@@ -140,7 +139,7 @@ class Run:
     @cached_property
     def resolved(self) -> dict[str, Any]:
         """Values of the scene's auto keys."""
-        return resolved_keys(self.setup, self.given)
+        return resolved_sections(self.setup, self.given)
 
     def state(self) -> Arrays:
         """Return what the coupling's next load step starts from.

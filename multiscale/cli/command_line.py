@@ -91,7 +91,7 @@ def _run(words: list[str]) -> int:
         choice = parser().parse_args(words[:cut])
     except UsageError as error:  # for rank 0 to say, which is known once MPI has started
         choice = str(error)
-    from multiscale.machine.installation import works_together
+    from multiscale.installation import works_together
 
     if not works_together():
         return _WRONG_INPUT

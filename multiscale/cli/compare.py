@@ -15,7 +15,7 @@ from multiscale.comparison.launching import Launch, check_launchable
 from multiscale.comparison.report import frontier_lines, headline, write_comparison
 from multiscale.comparison.run_result import RunResult
 from multiscale.output import terminal
-from multiscale.restart.folder_lock import locked
+from multiscale.restart.results_folder import locked
 from multiscale.scene.scene import Scene
 
 RESULTS = "configurations"

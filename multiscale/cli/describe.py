@@ -11,21 +11,20 @@ from typing import Any
 from geometry.collective import on_root
 from geometry.statistics import roughness
 from multiscale.cli.inputs import scene_and_folder
-from multiscale.costs.prediction import Cost, predicted_cost
 from multiscale.couplings.blocks import load_finite_elements
 from multiscale.laws.files import write_laws
-from multiscale.machine.mpi_job import large_object_comm
-from multiscale.machine.nodes import cluster_nodes
+from multiscale.machine import cluster_nodes, large_object_comm
 from multiscale.output import terminal
 from multiscale.output.results import write_figure
 from multiscale.planning import plan
 from multiscale.planning.block_plan import memory_warnings
-from multiscale.resolution.problem_setup import make_setup
-from multiscale.restart.folder_lock import locked
+from multiscale.planning.costs import Cost, predicted_cost
+from multiscale.planning.problem_setup import make_setup
+from multiscale.restart.results_folder import locked
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
-from multiscale.storage.whole_files import write_whole
+from multiscale.storage import write_whole
 
 
 def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:

@@ -4,29 +4,29 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
 
-from multiscale.doctor import forms, machine
-from multiscale.doctor.examination import Check, CheckResult, examine, refuse_failures
+from multiscale import compiled_forms, doctor
+from multiscale.doctor import Check, CheckResult, examine, refuse_failures
 from multiscale.output import terminal
 
-CHECKS: tuple[tuple[str, Check], ...] = (
-    ("packages", machine.packages),
-    ("PETSc", machine.petsc),
-    ("BLAS", machine.blas),
-    ("launcher", machine.launcher),
-    ("ranks", machine.ranks),
-    ("threads", machine.threads),
-    ("memory", machine.memory),
-    ("form compiler", forms.compiler_works),
-    ("form cache", forms.cache),
-    ("test solve", forms.known_solve),
-)
+CHECKS: dict[str, Check] = {
+    "packages": doctor.packages,
+    "PETSc": doctor.petsc,
+    "BLAS": doctor.blas,
+    "launcher": doctor.launcher,
+    "ranks": doctor.ranks,
+    "threads": doctor.threads,
+    "memory": doctor.memory,
+    "form compiler": compiled_forms.compiler_works,
+    "form cache": compiled_forms.cache,
+    "test solve": compiled_forms.known_solve,
+}
 """Topics and checks of the doctor, in the order in which they are made and shown."""
 
 _COLOUR = {"ok": "green", "warning": "yellow", "fail": "bold red"}
@@ -46,7 +46,8 @@ def examine_machine(choice: argparse.Namespace, options: list[str], comm: Any) -
     results = examine(comm, CHECKS)
     if terminal.speaks(comm):
         if choice.json:
-            print(json.dumps([asdict(result) for result in results], indent=2))
+            listed = [{"topic": topic} | asdict(result) for topic, result in results.items()]
+            print(json.dumps(listed, indent=2))
         else:
             show(results)
     refuse_failures(results)
@@ -60,20 +61,20 @@ def compile_ahead(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    folder, count = forms.warm(choice.element, comm)
+    folder, count = compiled_forms.warm(choice.element, comm)
     terminal.say(comm, f"{count} compiled forms in {folder}")
 
 
-def show(results: Sequence[CheckResult]) -> None:
+def show(results: Mapping[str, CheckResult]) -> None:
     """Print a line for each result, and its remedy below it.
 
     Args:
-        results: The results.
+        results: The results by topic.
     """
     console = Console(highlight=False, soft_wrap=True)
-    for result in results:
+    for topic, result in results.items():
         colour = _COLOUR[result.state]
-        head = f"[{colour}]{result.state:8}[/][bold]{result.topic:14}[/]"
+        head = f"[{colour}]{result.state:8}[/][bold]{topic:14}[/]"
         console.print(f"{head}{escape(result.text)}")
         if result.remedy:
             console.print(f"{'':22}→ {escape(result.remedy)}")

@@ -12,7 +12,7 @@ from importlib import import_module
 from typing import Any
 
 from geometry.errors import InputError, NotWritten, OutOfMemory, PatchlawError
-from multiscale.machine.mpi_job import check_address_space, keep_petsc_from_signals, world
+from multiscale.machine import check_address_space, keep_petsc_from_signals, world
 from multiscale.output import terminal
 
 _COMMANDS = {

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from geometry.collective import on_root
-from multiscale.machine.mpi_job import refuse_detached_processes
+from multiscale.machine import refuse_detached_processes
 from multiscale.scene.scene import Scene
 
 

@@ -11,10 +11,9 @@ from multiscale.cli.inputs import scene_and_folder
 from multiscale.output import terminal
 from multiscale.output.field_files import write_fields
 from multiscale.output.results import write_results
-from multiscale.restart.checkpoint import Checkpoint
-from multiscale.restart.folder_lock import locked
+from multiscale.restart.checkpoint import Checkpoint, CheckpointWriter
 from multiscale.restart.interruption import Interruption, Stopped
-from multiscale.restart.resuming import CheckpointWriter, find_checkpoint, go_on, is_finished
+from multiscale.restart.results_folder import find_checkpoint, go_on, is_finished, locked
 from multiscale.run import Run
 
 
@@ -33,7 +32,7 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
             if choice.resume:
                 found = on_root(comm, lambda: find_checkpoint(folder, scene))
             run = Run(scene, comm, None if found is None else found.resolved)
-            with CheckpointWriter(folder, run, lock) as checkpoints:
+            with CheckpointWriter(folder, run, lock.hold) as checkpoints:
                 if _announce(choice.resume, found, run, checkpoints):
                     _run(run, checkpoints, interruption, options)
 

@@ -25,9 +25,8 @@ from multiscale.comparison.configuration import (
     pressure_grid,
     scaled,
 )
-from multiscale.costs.prediction import predicted_cost
-from multiscale.costs.work import Machine
-from multiscale.resolution.problem_setup import make_setup
+from multiscale.planning.costs import Machine, predicted_cost
+from multiscale.planning.problem_setup import make_setup
 from multiscale.scene.scene import Scene
 from multiscale.setup.checks import LAW_BLOCK_CELLS, patch_grid
 from multiscale.setup.surface import make_surface

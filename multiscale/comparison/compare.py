@@ -18,10 +18,10 @@ from multiscale.comparison.error_breakdown import error_breakdowns
 from multiscale.comparison.error_measures import ErrorMeasures, error_measures, uncertainty
 from multiscale.comparison.launching import Launch, check_launchable, run_all
 from multiscale.comparison.run_result import RunResult
-from multiscale.resolution.auto_keys import auto_keys, provisional, resolved_keys, with_resolved
-from multiscale.resolution.problem_setup import make_setup
+from multiscale.planning.auto_keys import auto_keys, provisional, resolved_sections, with_resolved
+from multiscale.planning.problem_setup import make_setup
 from multiscale.scene.scene import Scene
-from multiscale.storage.whole_files import write_json
+from multiscale.storage import write_json
 
 AGAINST = {"reference": "reference", "concurrent": "concurrent", "half-space": "analytic"}
 """Coupling of each kind of measure; the best kind is the first."""
@@ -106,12 +106,12 @@ def resolved_scene(scene: Scene, folder: Path) -> Scene:
     path, given = folder / AUTO_VALUES, scene.model_dump(by_alias=True, mode="json")
     try:
         stored = json.loads(path.read_text(encoding="utf-8"))
-        values = stored["values"] if stored["scene"] == given else None
+        values = stored["sections"] if stored["scene"] == given else None
     except (OSError, ValueError, KeyError, TypeError):
         values = None
     if values is None:
-        values = resolved_keys(make_setup(scene), scene)
-        write_json(path, {"scene": given, "values": values})
+        values = resolved_sections(make_setup(scene), scene)
+        write_json(path, {"scene": given, "sections": values})
     return provisional(with_resolved(scene, values), auto & {"micro.model"})
 
 

@@ -11,7 +11,7 @@ from multiscale.comparison.comparison import Comparison
 from multiscale.comparison.error_measures import __doc__ as measures_text
 from multiscale.output.results import Drawing, png
 from multiscale.results.html_page import Section, Table, page_html
-from multiscale.storage.whole_files import write_bytes, write_csv, write_text
+from multiscale.storage import write_bytes, write_csv, write_text
 
 
 def write_comparison(folder: Path, comparison: Comparison) -> list[Path]:

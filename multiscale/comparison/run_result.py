@@ -21,11 +21,11 @@ from geometry.errors import PatchlawError
 from geometry.patches import PatchGrid
 from multiscale.comparison.configuration import Configuration
 from multiscale.comparison.error_measures import Curves
-from multiscale.machine.mpi_job import world
+from multiscale.machine import world
 from multiscale.results.history import History
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
-from multiscale.storage.whole_files import write_json
+from multiscale.storage import write_json
 
 Status = Literal["done", "not converged", "refused", "failed", "over budget", "not started"]
 

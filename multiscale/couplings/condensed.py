@@ -14,7 +14,7 @@ from multiscale.laws.consistent import Displacements
 from multiscale.laws.interpolation import LawPoint
 from multiscale.laws.law_table import LawTable, PatchLaws
 from multiscale.loading.load_step import LoadStep
-from multiscale.storage.serialisation import Arrays, packed, unpacked
+from multiscale.storage import Arrays, packed, unpacked
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from micro import START_KINDS, MicroModel
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import BeyondLaws
-from multiscale.storage.serialisation import Arrays, packed, unpacked
+from multiscale.storage import Arrays, packed, unpacked
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import Block, Interface, LawContactProblem, LawContactState

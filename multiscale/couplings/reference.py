@@ -14,7 +14,7 @@ from multiscale.couplings.blocks import block_material
 from multiscale.loading.load_step import LoadStep
 from multiscale.results.reference_record import ReferenceRecord, reference_record
 from multiscale.setup.problem import ProblemSetup
-from multiscale.storage.serialisation import Arrays, packed, unpacked
+from multiscale.storage import Arrays, packed, unpacked
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import Block, MeshQuality, UnilateralContactProblem, UnilateralContactState

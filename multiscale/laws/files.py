@@ -17,7 +17,7 @@ from geometry.patches import PatchGrid
 from multiscale.laws.law_table import LawTable, PlanePath
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.rows import LawRows
-from multiscale.storage.serialisation import checksummed, stored_numbers, verified
+from multiscale.storage import checksummed, stored_numbers, verified
 
 FORMAT = "patchlaw laws 3"
 _COLUMNS = {one.metadata.get("stored", one.name): one for one in fields(LawRows)}
@@ -49,7 +49,7 @@ def law_bytes(table: LawTable) -> bytes:
 
     It has a group ``patch_IX_IY`` per patch with a dataset per column, and a group for the path of
     the plane where there is one. A checksum stands before the content; see
-    `multiscale.storage.serialisation`.
+    `multiscale.storage`.
 
     Args:
         table: The laws.

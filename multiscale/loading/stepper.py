@@ -12,7 +12,7 @@ import numpy as np
 from geometry.errors import NotConverged
 from geometry.rigid_plane import Control
 from multiscale.loading.load_step import LoadStep
-from multiscale.storage.serialisation import Arrays
+from multiscale.storage import Arrays
 
 _MOST_HALVINGS = 8
 """Halvings of a load step that does not converge, or that changes the force by too much."""

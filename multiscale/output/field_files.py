@@ -18,7 +18,7 @@ from geometry.collective import on_root
 from geometry.errors import NotWritten, PatchlawError
 from multiscale.couplings.reference import ReferenceCoupling
 from multiscale.run import Run
-from multiscale.storage.whole_files import remove, written
+from multiscale.storage import remove, written
 
 PARTIAL_FOLDER = ".fields.partial-files"
 """Folder of files that are not complete; `remove_partial` knows it by ``.partial-``."""

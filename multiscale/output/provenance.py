@@ -13,7 +13,7 @@ from importlib.metadata import version
 from typing import Any
 
 from multiscale.couplings.reference import ReferenceCoupling
-from multiscale.machine.nodes import peak_memory
+from multiscale.machine import peak_memory
 from multiscale.run import Run
 from multiscale.setup.problem import ProblemSetup
 

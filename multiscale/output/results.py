@@ -15,7 +15,7 @@ from multiscale.output.report import report_html
 from multiscale.planning import plan
 from multiscale.results.history import COLUMNS, PATCH_COLUMNS, History
 from multiscale.run import Run
-from multiscale.storage.whole_files import (
+from multiscale.storage import (
     remove,
     write_bytes,
     write_csv,

@@ -13,11 +13,11 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from geometry.errors import PatchlawError
-from multiscale.costs.prediction import Cost
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import LoadHistory
-from multiscale.machine.nodes import peak_memory
+from multiscale.machine import peak_memory
 from multiscale.planning import plan
+from multiscale.planning.costs import Cost
 from multiscale.results.history import History
 from multiscale.setup.problem import ProblemSetup
 

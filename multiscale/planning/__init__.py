@@ -1,1 +1,7 @@
-"""What a run will do, take and err by, before anything expensive starts."""
+"""Resolves what a scene leaves open, predicts what its run takes, and says what it will do.
+
+`auto_keys` says which keys are open, `problem_setup` sets up the problem with values for them,
+`accuracy` finds values whose errors, measured at the largest load, keep an accuracy, and
+`mesh_accuracy` does so with the meshes of a reference. `costs` predicts time and memory; `plan` and
+`block_plan` put all of it into sentences before anything expensive starts.
+"""

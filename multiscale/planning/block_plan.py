@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from geometry.meshes.block import BlockShape, alignment
-from multiscale.machine.nodes import ClusterNodes
-from multiscale.setup.checks import memory_requests
+from multiscale.machine import ClusterNodes
+from multiscale.planning.costs import run_memory_requests
 from multiscale.setup.problem import ProblemSetup
-from multiscale.setup.reference_meshes import ReferenceMeshes, reference_requests
+from multiscale.setup.reference_meshes import ReferenceMeshes
 
 LOCKING_FROM = 0.45
 """Poisson's ratio above which linear elements lock. Two by two patches on 8 × 8 × 6 trilinear
@@ -88,10 +88,7 @@ def memory_warnings(setup: ProblemSetup, nodes: ClusterNodes) -> Iterator[str]:
         setup: The problem.
         nodes: The nodes there are.
     """
-    requests = [*memory_requests(setup.scene)]
-    if setup.meshes is not None:
-        requests += reference_requests(setup.scene, setup.meshes)
-    for request in requests:
+    for request in run_memory_requests(setup):
         if not nodes.fits(request):
             key = "" if request.value is None else f"{request.key} = {request.value}: "
             yield f"{key}{request.sentence}; there is {nodes.remedy(request)}"

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 from geometry.statistics import roughness
 from micro import MODELS, AsperityModel, HalfSpaceModel
-from multiscale.costs.prediction import Cost
 from multiscale.couplings.newton_choice import newton_choice
+from multiscale.planning.auto_keys import heights_per_wave
 from multiscale.planning.block_plan import block_statement, block_warnings
-from multiscale.resolution.auto_keys import heights_per_wave
+from multiscale.planning.costs import Cost
 from multiscale.setup.problem import ProblemSetup
 
 _INTERACTING = ("elliptic", "circular")
@@ -100,10 +100,10 @@ def surface_statement(setup: ProblemSetup) -> str:
 
 def _contact(setup: ProblemSetup) -> str:
     if setup.uses_summits:
-        reached, rest = int(setup.interfering_summits.sum()), "; the others cost nothing"
-        return f"{len(setup.asperities)} summits, {reached} within the largest approach{rest}"
-    reached = int((setup.cell_interference > 0.0).sum())
-    return f"{setup.surface.heights.size} cells, {reached} within the largest approach"
+        within = f"{int(setup.interfering_summits.sum())} within the largest approach"
+        return f"{len(setup.asperities)} summits, {within}; the others cost nothing"
+    within = f"{int((setup.cell_interference > 0.0).sum())} within the largest approach"
+    return f"{setup.surface.heights.size} cells, {within}"
 
 
 def _model(setup: ProblemSetup) -> str:
@@ -112,17 +112,12 @@ def _model(setup: ProblemSetup) -> str:
     if setup.choice is not None:
         return f"auto: {setup.choice.sentence}"
     micro = setup.scene.micro
-    solver = f", solved by {micro.solver}" if micro.model in _INTERACTING else ""
-    of_summits = micro.model in MODELS
-    used = {"solver": solver, "curvature": of_summits, "border": of_summits}
-    fields = type(micro).model_fields
-    unused = [
-        f"micro.{key}"
-        for key in used
-        if not used[key] and getattr(micro, key) != fields[key].default
-    ]
-    no_use = f"; it has no use for {', '.join(unused)}" if unused else ""
-    return setup.model.name + solver + no_use
+    interacts, of_summits = micro.model in _INTERACTING, micro.model in MODELS
+    uses = {"solver": interacts, "curvature": of_summits, "border": of_summits}
+    stated = {key for key in uses if getattr(micro, key) != getattr(type(micro)(), key)}
+    unused = ", ".join(f"micro.{key}" for key in uses if key in stated and not uses[key])
+    text = f"{setup.model.name}, solved by {micro.solver}" if interacts else setup.model.name
+    return f"{text}; it has no use for {unused}" if unused else text
 
 
 def _coupling(setup: ProblemSetup) -> str:
@@ -193,5 +188,5 @@ def _error(setup: ProblemSetup) -> str:
     if check == "none":
         return "not measured (output.check = 'none')"
     which = "every load step" if check == "all" else "the last load step"
-    body = ", body" if setup.has_block else "; a block is not thought of"
+    body = ", body" if setup.has_block else "; there is no block"
     return f"measured at {which}, by cause: grid, slopes{body}{' and laws' * setup.uses_laws}"

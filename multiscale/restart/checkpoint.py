@@ -1,8 +1,11 @@
-"""What a run needs to go on where it was interrupted, as an HDF5 file with a checksum."""
+"""The checkpoint of a run: what it needs to go on, in an HDF5 file that is replaced whole."""
 
 from __future__ import annotations
 
 import json
+import time
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -10,26 +13,32 @@ from typing import Any
 import h5py
 import numpy as np
 
-from geometry.errors import InputError
+from geometry.collective import on_root
+from geometry.errors import InputError, NotWritten
 from multiscale.loading.load_step import LoadStep, PatchState
 from multiscale.loading.stepper import LoadPosition
 from multiscale.run import Run
-from multiscale.scene.scene import Scene
-from multiscale.storage.serialisation import (
+from multiscale.storage import (
     Arrays,
-    as_text,
     checksummed,
     packed,
-    part,
-    prefixed,
+    remove_partial,
     stored_numbers,
-    text_array,
     unpacked,
     verified,
+    write_bytes,
 )
-from multiscale.storage.whole_files import write_bytes
 
-FORMAT = "patchlaw checkpoint 3"
+FORMAT = "patchlaw checkpoint 4"
+FILE_NAME = "checkpoint.h5"
+
+LEAST_INTERVAL = 1.0
+"""Least wall time between two writes [s]; a kill loses the load steps of this time."""
+LEAST_RATIO = 20.0
+"""Least wall time between two writes over that of a write; so writing takes 5 % at most."""
+
+_COLUMNS = [field.name for field in fields(LoadStep) if field.name != "patches"]
+_PATCH_COLUMNS = [field.name for field in fields(PatchState)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -38,7 +47,7 @@ class Checkpoint:
 
     Attributes:
         scene: The scene as it was given, as nested dictionaries.
-        resolved: Values of the scene's keys that are "auto" or not stated, by dotted key.
+        resolved: What the auto values of the scene became, see `resolved_sections`.
         heights: SHA-256 of the surface's heights.
         laws: Bytes of the law file; empty without laws.
         steps: The accepted load steps.
@@ -63,7 +72,7 @@ def checkpoint_of(run: Run, state: Arrays) -> Checkpoint:
         state: What `Run.state` returned.
     """
     return Checkpoint(
-        scene=given_keys(run.given),
+        scene=run.given.model_dump(by_alias=True, mode="json"),
         resolved=run.resolved,
         heights=run.heights,
         laws=run.law_bytes,
@@ -71,15 +80,6 @@ def checkpoint_of(run: Run, state: Arrays) -> Checkpoint:
         position=run.position,
         state=state,
     )
-
-
-def given_keys(scene: Scene) -> dict[str, Any]:
-    """Return a scene as it was given, as nested dictionaries.
-
-    Args:
-        scene: The scene.
-    """
-    return scene.model_dump(by_alias=True, mode="json")
 
 
 def write_checkpoint(path: Path, checkpoint: Checkpoint) -> Path:
@@ -92,26 +92,21 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> Path:
     Raises:
         NotWritten: When the file cannot be written.
     """
+    steps = checkpoint.steps
     facts = {name: getattr(checkpoint, name) for name in ("scene", "resolved", "heights")}
-    columns = [field.name for field in fields(LoadStep) if field.name != "patches"]
-    rows = [[getattr(step, name) for name in columns] for step in checkpoint.steps]
-    patches = {
-        field.name: np.array([getattr(step.patches, field.name) for step in checkpoint.steps])
-        for field in fields(PatchState)
-    }
-    arrays = {
-        "facts": text_array(json.dumps(facts)),
-        "laws": np.frombuffer(checkpoint.laws, np.uint8),
-        "steps": text_array(json.dumps([columns, rows], default=np.generic.item)),
-        **prefixed("position/", packed(checkpoint.position)),
-        **prefixed("patches/", patches),
-        **prefixed("state/", checkpoint.state),
-    }
+    facts["steps"] = [[getattr(step, name) for name in _COLUMNS] for step in steps]
+    record = (
+        json.dumps(facts, default=np.generic.item),
+        np.frombuffer(checkpoint.laws, np.uint8),
+        [np.array([getattr(step.patches, name) for step in steps]) for name in _PATCH_COLUMNS],
+        checkpoint.position,
+    )
 
     def fill(file: Any) -> None:
         file.attrs["format"] = FORMAT
-        for name, array in arrays.items():
-            file.create_dataset(name, data=array)
+        for group, arrays in (("run", packed(record)), ("state", checkpoint.state)):
+            for name, array in arrays.items():
+                file.create_dataset(f"{group}/{name}", data=array)
 
     return write_bytes(path, checksummed(fill))
 
@@ -135,43 +130,124 @@ def read_checkpoint(path: Path) -> Checkpoint:
         found = InputError(f"cannot be read: {error}")
     except Exception as error:  # the checksum fits content that this version does not know
         found = InputError(f"is not understood: {error!r}")
-    raise InputError(
-        f"{found.problem}; remove it, or run without --resume to begin anew",
-        file=str(path),
-        value=found.value,
-        allowed=found.allowed,
-    )
+    problem = f"{found.problem}; remove it, or run without --resume to begin anew"
+    raise InputError(problem, file=str(path), value=found.value, allowed=found.allowed)
 
 
 def _read(path: Path) -> Checkpoint:
-    arrays: Arrays = {}
-
-    def read(name: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset):
-            arrays[name] = stored_numbers(item)
-
     with h5py.File(verified(path), "r") as file:
         form = str(file.attrs.get("format", ""))
         if form != FORMAT:
             raise InputError("was written by another patchlaw", value=form, allowed=FORMAT)
-        file.visititems(read)
-    columns, rows = json.loads(as_text(arrays["steps"]))
-    patches = part(arrays, "patches/")
+        run, state = (
+            {name: stored_numbers(item) for name, item in file.get(group, {}).items()}
+            for group in ("run", "state")
+        )
+    text, laws, patches, position = unpacked(run, (LoadPosition,))
+    facts = json.loads(text)
+    steps = [
+        LoadStep(
+            **dict(zip(_COLUMNS, map(_tuples, row), strict=True)),
+            patches=PatchState(**dict(zip(_PATCH_COLUMNS, columns, strict=True))),
+        )
+        for row, *columns in zip(facts.pop("steps"), *patches, strict=True)
+    ]
     return Checkpoint(
-        **json.loads(as_text(arrays["facts"])),
-        laws=arrays["laws"].tobytes(),
-        steps=tuple(
-            LoadStep(
-                **dict(zip(columns, map(_tuples, row), strict=True)),
-                patches=PatchState(**{name: array[number] for name, array in patches.items()}),
-            )
-            for number, row in enumerate(rows)
-        ),
-        position=unpacked(part(arrays, "position/"), (LoadPosition,)),
-        state=part(arrays, "state/"),
+        **facts, laws=laws.tobytes(), steps=tuple(steps), position=position, state=state
     )
 
 
 def _tuples(value: Any) -> Any:
     """Return a value read from JSON with its lists as tuples."""
     return tuple(map(_tuples, value)) if isinstance(value, list) else value
+
+
+class CheckpointWriter:
+    """Writes the checkpoint of a run to its results folder, as one file that is replaced whole.
+
+    Every accepted load step is kept in memory, and written at once unless the last write was less
+    than a second or 20 times its own duration ago. On 16 patches, 200 load steps take 5 ms and
+    0.14 MB, and 10,000 take 0.12 s and 6.4 MB. What is not written yet is written when the run
+    ends, by an error or a signal too. A process that is killed loses it, and the resumed run
+    computes it again.
+
+    Args:
+        folder: Folder of the results.
+        run: The run.
+        hold: Makes the folder where it is missing and takes the lock on it, on rank 0.
+
+    Attributes:
+        path: The file.
+    """
+
+    def __init__(self, folder: Path, run: Run, hold: Callable[[], None]) -> None:
+        self.path = folder / FILE_NAME
+        self._run, self._hold = run, hold
+        self._pending: Checkpoint | None = None
+        self._due = 0.0
+
+    def __enter__(self) -> CheckpointWriter:
+        """Return the writer."""
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Write what is not written yet, on rank 0; an error that ends the run is what to tell."""
+        with suppress(NotWritten, MemoryError):
+            self._write_pending()
+
+    def accept(self) -> None:
+        """Keep the load steps that the run has accepted so far, and write them if it is time.
+
+        Raises:
+            NotWritten: When that fails; the earlier file stays.
+
+        Note:
+            Collective.
+        """
+        state = self._run.state()
+
+        def keep() -> None:
+            self._pending = checkpoint_of(self._run, state)
+            if time.monotonic() >= self._due:
+                self._write_pending()
+
+        on_root(self._run.comm, keep)
+
+    def write(self) -> None:
+        """Write the run as it is now, like `accept`, but at once."""
+        self._due = 0.0
+        self.accept()
+
+    def write_pending(self) -> None:
+        """Write what was accepted since the last write.
+
+        Raises:
+            NotWritten: When that fails; the earlier file stays.
+
+        Note:
+            Collective.
+        """
+        on_root(self._run.comm, self._write_pending)
+
+    def remove(self) -> None:
+        """Remove the file and forget what is not written; the run needs it no longer.
+
+        Note:
+            Collective.
+        """
+        self._pending = None
+        on_root(self._run.comm, lambda: self.path.unlink(missing_ok=True))
+
+    def _write_pending(self) -> None:
+        if self._pending is None:
+            return
+        began = time.monotonic()
+        try:
+            self._hold()  # again, where the folder was removed in the meantime
+        except InputError as error:  # the folder was good when the run began
+            raise NotWritten(f"{self.path.parent}: {error.problem}") from None
+        remove_partial(self.path.parent)
+        write_checkpoint(self.path, self._pending)
+        self._pending = None
+        now = time.monotonic()
+        self._due = now + max(LEAST_INTERVAL, LEAST_RATIO * (now - began))

@@ -12,7 +12,7 @@ import numpy as np
 from geometry.errors import InputError
 from geometry.files.content import BYTES_PER_HEIGHT
 from geometry.surface import Surface
-from multiscale.machine.nodes import ClusterNodes, MemoryRequest
+from multiscale.machine import ClusterNodes, MemoryRequest
 from multiscale.scene.scene import Scene
 
 BYTES_PER_CELL = 5000

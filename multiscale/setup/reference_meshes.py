@@ -18,7 +18,7 @@ from geometry.meshes.families import characteristic_size, contact_radius, refere
 from geometry.meshes.refined_block import RefinedShape
 from geometry.rigid_plane import RigidPlane
 from geometry.surface import Surface
-from multiscale.machine.nodes import ClusterNodes, MemoryRequest
+from multiscale.machine import ClusterNodes, MemoryRequest
 from multiscale.scene.scene import Scene
 from multiscale.setup.checks import check_memory
 

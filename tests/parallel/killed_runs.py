@@ -122,10 +122,10 @@ def enter(words, log, root):
     os.dup2(file, 1)
     os.dup2(file, 2)
     from multiscale.cli.command_line import main
-    from multiscale.restart import resuming
+    from multiscale.restart import checkpoint
 
     # these runs take less than the second between two writes
-    resuming.LEAST_INTERVAL = resuming.LEAST_RATIO = 0.0
+    checkpoint.LEAST_INTERVAL = checkpoint.LEAST_RATIO = 0.0
     sys.exit(main(words))
 
 

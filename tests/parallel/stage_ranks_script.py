@@ -7,7 +7,7 @@ from pathlib import Path
 from mpi4py import MPI
 
 from multiscale import Run, Scene
-from multiscale.machine.nodes import cluster_nodes
+from multiscale.machine import cluster_nodes
 
 COMM = MPI.COMM_WORLD
 PAPER = Path(__file__).parents[2] / "demos" / "scenes" / "paper.toml"

@@ -19,8 +19,8 @@ def test_a_check_that_fails_on_one_rank_fails_for_all(mpirun):
         "import sys; from mpi4py import MPI; from multiscale.cli import doctor, main\n"
         "def broken(comm):\n"
         "    if comm.rank == 1: raise OSError('only here')\n"
-        "    return []\n"
-        "doctor.CHECKS = (('BLAS', broken),)\n"
+        "    return doctor.CheckResult('ok', '')\n"
+        "doctor.CHECKS = {'BLAS': broken}\n"
         "sys.exit(main(['doctor']))"
     )
     done = mpirun(2, "-c", code, timeout=100)

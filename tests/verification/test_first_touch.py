@@ -10,7 +10,7 @@ from hard_cases import KINDS, history, scene
 
 from geometry import PatchGrid, patch_means
 from micro.factory import MODEL_NAMES
-from multiscale.resolution.problem_setup import stated_model
+from multiscale.planning.problem_setup import stated_model
 from multiscale.setup.surface import make_surface
 
 MODULUS = 4000.0 / (1.0 - 0.15**2)

@@ -15,7 +15,7 @@ from multiscale.comparison.error_measures import Curves
 from multiscale.comparison.report import comparison_html
 from multiscale.comparison.run_result import RunResult
 from multiscale.scene.scene import Scene
-from multiscale.storage.whole_files import write_csv
+from multiscale.storage import write_csv
 
 STATUSES = ("done", "done", "done", "not converged", "refused", "failed", "over budget")
 SIZES = (0.0, 1.0, 1.0, 1.0, 1e-30, 1e30)

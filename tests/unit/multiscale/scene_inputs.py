@@ -9,9 +9,9 @@ import numpy as np
 from hypothesis import strategies as st
 
 from geometry.errors import InputError, NotConverged
-from multiscale.costs.prediction import predicted_cost
+from multiscale.planning.costs import predicted_cost
 from multiscale.planning.plan import statements, warnings
-from multiscale.resolution.problem_setup import make_setup
+from multiscale.planning.problem_setup import make_setup
 from multiscale.run import run
 from multiscale.scene.scene import Scene
 

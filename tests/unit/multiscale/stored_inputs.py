@@ -11,7 +11,7 @@ from multiscale.laws.files import read_laws, write_laws
 from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
-from multiscale.storage.serialisation import checksum
+from multiscale.storage import checksum
 
 ODD = (
     np.zeros(0), np.zeros(1), np.zeros((3, 3)), np.full(5, np.nan), np.full(5, 1e308), np.arange(5),

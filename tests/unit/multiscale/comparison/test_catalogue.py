@@ -13,7 +13,7 @@ from multiscale.comparison.compare import ranked, refinements, resolved_scene
 from multiscale.comparison.configuration import pressure_grid
 from multiscale.comparison.error_measures import Curves
 from multiscale.comparison.run_result import RunResult
-from multiscale.resolution.auto_keys import auto_keys
+from multiscale.planning.auto_keys import auto_keys
 from multiscale.scene.scene import Scene
 from multiscale.setup.checks import LAW_BLOCK_CELLS
 

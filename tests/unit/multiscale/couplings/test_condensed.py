@@ -11,7 +11,7 @@ from multiscale import Run, Scene, run
 from multiscale.couplings.blocks import patch_compliance
 from multiscale.couplings.newton_choice import newton_choice
 from multiscale.planning.plan import statements
-from multiscale.resolution.problem_setup import make_setup
+from multiscale.planning.problem_setup import make_setup
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 SMALL = [

@@ -12,7 +12,7 @@ from multiscale.laws.files import read_laws, write_laws
 from multiscale.laws.law_table import LawTable, PlanePath
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.rows import LawRows
-from multiscale.storage.serialisation import checksum, checksummed
+from multiscale.storage import checksum, checksummed
 
 SCALARS = (
     "first_touch", "initial_separation", "interpolation_error", "stiffness_error",

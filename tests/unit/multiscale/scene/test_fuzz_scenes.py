@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from scene_inputs import BASE, KEYS, damaged, odd_text, planned, put, ran, scenes, toml
 
 from geometry.errors import InputError
-from multiscale.resolution.problem_setup import make_setup
+from multiscale.machine import ClusterNodes
+from multiscale.planning.problem_setup import make_setup
 from multiscale.scene.scene import MOST_BYTES, Scene, parsed
 
 few = settings(
@@ -82,15 +83,14 @@ def test_sizes_are_refused_before_anything_is_allocated(tmp_path, key, value, te
     assert text in refused(tmp_path, key, value)
 
 
-def test_a_law_for_every_patch_takes_memory(tmp_path, monkeypatch):
-    monkeypatch.setattr(os, "sysconf", lambda name: 1200)  # of 1.4 MB
+def test_a_law_for_every_patch_takes_memory(tmp_path):
     path = tmp_path / "scene.toml"
     data = put(put(BASE, "coupling.kind", "isolated"), "block.cells", [4, 4, 2])
     path.write_text(toml(put(data, "patches.grid", [12, 12])), encoding="utf-8")
     with pytest.raises(
         InputError, match=r"\[12, 12\]: a law for every patch needs about 0.00216 GB"
     ):
-        make_setup(Scene.load(path))
+        make_setup(Scene.load(path), nodes=ClusterNodes(memory=1.44e6))
 
 
 def test_more_bombs(tmp_path):

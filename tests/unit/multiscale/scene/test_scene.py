@@ -10,7 +10,7 @@ import pint
 import pytest
 
 from geometry.errors import InputError
-from multiscale.resolution.problem_setup import make_setup
+from multiscale.planning.problem_setup import make_setup
 from multiscale.scene.scene import Scene
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"

@@ -10,7 +10,7 @@ from geometry.errors import NotConverged
 from multiscale import Scene, make_setup, run
 from multiscale.couplings.load_steps import ContactCoupling
 from multiscale.planning.plan import statements, warnings
-from multiscale.resolution.problem_setup import plane_at_largest_load
+from multiscale.planning.problem_setup import plane_at_largest_load
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 

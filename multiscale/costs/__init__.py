@@ -1,1 +1,0 @@
-"""Time and memory that a run is predicted to take."""

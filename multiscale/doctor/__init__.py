@@ -1,1 +1,0 @@
-"""Checks whether this machine is fit for runs, and prepares it for them."""

@@ -1,0 +1,217 @@
+"""Auto values of a scene: which keys have one, what to start from, and what they became."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from pydantic import ValidationError
+
+from geometry.surface import Surface
+from micro import HalfSpaceModel
+from multiscale.scene.coupling_sections import CouplingSection
+from multiscale.scene.scene import Scene
+from multiscale.scene.sections import SpectrumSection
+from multiscale.setup.checks import PROVISIONAL_PATCHES
+from multiscale.setup.problem import ProblemSetup
+
+DEFAULT_ACCURACY = 0.02
+"""Relative error of the force that is kept unless the scene says."""
+PATCHES_ACROSS = 8
+"""Patches along the shorter side, enough for a map."""
+LEAST_HEIGHTS, MOST_HEIGHTS = 32, 2048
+"""Heights along a side of grids that are chosen."""
+
+_KEYS = ("surface.grid", "micro.model", "coupling.kind", "patches.grid", "block.cells")
+
+
+def auto_keys(scene: Scene) -> frozenset[str]:
+    """Return the keys with auto values: ``"auto"``, or not stated beside an accuracy.
+
+    The block's cells are one of them only under laws on its mesh.
+
+    Args:
+        scene: The scene as it was given.
+    """
+    found = set()
+    for key in _KEYS:
+        name, _, field = key.partition(".")
+        section = getattr(scene, name)
+        unstated = scene.accuracy is not None and field not in section.model_fields_set
+        if name == "micro":  # its other keys belong to a model that is stated
+            unstated = unstated and not section.model_fields_set
+        if getattr(section, field) == "auto" or (unstated and name != "surface"):
+            found.add(key)
+    return frozenset(found if scene.coupling.on_mesh else found - {"block.cells"})
+
+
+def accuracy_of(scene: Scene) -> float:
+    """Return the relative error of the force that a scene may be left with.
+
+    Args:
+        scene: The scene.
+    """
+    return scene.accuracy or DEFAULT_ACCURACY
+
+
+def is_measured(scene: Scene) -> bool:
+    """Tell whether errors are measured before the run to resolve auto values.
+
+    Without an accuracy, a micro model that is the only auto value besides patches and cells is
+    chosen by its own error, see `micro.choose`.
+
+    Args:
+        scene: The scene as it was given.
+    """
+    auto = auto_keys(scene)
+    if scene.accuracy is None:
+        return not auto <= {"micro.model", "patches.grid", "block.cells"}
+    return bool(auto & {"surface.grid", "micro.model", "coupling.kind"}) or (
+        scene.coupling.kind == "reference"
+    )
+
+
+def provisional(scene: Scene, auto: frozenset[str]) -> Scene:
+    """Return a scene with values to start from for its auto keys, but for the surface's grid.
+
+    Args:
+        scene: The scene as it was given.
+        auto: Its auto keys.
+    """
+    measured = is_measured(scene) and scene.micro.tolerance is None
+    start: dict[str, Any] = {
+        "micro.model": "half-space" if measured else "auto",
+        "block.cells": None,
+        "patches.grid": PROVISIONAL_PATCHES,
+    }
+    changed = scene
+    if "coupling.kind" in auto:
+        changed = scene.model_copy(update={"coupling": next(couplings(scene))})
+    for key in auto & set(start):
+        changed = with_value(changed, key, start[key])
+    return changed
+
+
+def with_value(scene: Scene, key: str, value: Any) -> Scene:
+    """Return a scene with another value of a key, which is not checked.
+
+    Args:
+        scene: The scene.
+        key: Section and name, such as ``"patches.grid"``.
+        value: The value.
+    """
+    name, _, field = key.partition(".")
+    section = getattr(scene, name).model_copy(update={field: value})
+    return scene.model_copy(update={name: section})
+
+
+def resolved_sections(setup: ProblemSetup, given: Scene) -> dict[str, Any]:
+    """Return what the auto values of a scene became, so that a run goes on as it began.
+
+    The speed of the machine decides near ties, and another session may run on another machine.
+
+    Args:
+        setup: The problem.
+        given: The scene as it was given.
+
+    Returns:
+        The sections with auto values by name, as JSON can hold them. That of the micro model is the
+        label of the candidate that was chosen, or the cells of the half-space.
+    """
+    names = {key.partition(".")[0] for key in auto_keys(given)}
+    if is_measured(given):
+        names.add("reference")
+    found = {}
+    for name in sorted(names):
+        section = getattr(setup.scene, name)
+        found[name] = section.model_dump(mode="json", by_alias=True, exclude_unset=True)
+    if setup.choice is not None:
+        found["micro"] = setup.choice.taken.label
+    elif "micro" in names:
+        model = setup.micro
+        found["micro"] = list(model.surface.grid) if isinstance(model, HalfSpaceModel) else None
+    return found
+
+
+def with_resolved(scene: Scene, resolved: Mapping[str, Any]) -> Scene:
+    """Return a scene whose auto values are what they became, but for the micro model's cells.
+
+    Args:
+        scene: The scene as it was given.
+        resolved: What `resolved_sections` returned.
+    """
+    changed: dict[str, Any] = {
+        name: type(getattr(scene, name)).model_validate(content)
+        for name, content in resolved.items()
+        if name != "micro"
+    }
+    if isinstance(resolved.get("micro"), list):
+        changed["micro"] = scene.micro.model_copy(update={"model": "half-space"})
+    return scene.model_copy(update=changed)
+
+
+def couplings(scene: Scene) -> Iterator[CouplingSection]:
+    """Yield the couplings that may be chosen beside what a scene states of its coupling.
+
+    They are concurrent and consistent; neither isolated laws nor meshed roughness are among them.
+
+    Args:
+        scene: The scene as it was given.
+    """
+    stated = scene.coupling.model_dump(exclude_unset=True)
+    for kind in ("concurrent", "consistent"):
+        try:
+            yield CouplingSection.model_validate(stated | {"kind": kind})
+        except ValidationError:  # another key does not go with it
+            continue
+
+
+def map_grid(surface: Surface) -> tuple[int, int]:
+    """Return nearly square patches that make a map, no more than heights.
+
+    Args:
+        surface: The surface.
+    """
+    shorter = min(surface.lengths)
+    x, y = (
+        min(max(round(PATCHES_ACROSS * length / shorter), 1), most)
+        for length, most in zip(surface.lengths, surface.grid, strict=True)
+    )
+    return x, y
+
+
+def heights_per_wave(
+    spectrum: SpectrumSection, grid: tuple[int, int], lengths: tuple[float, float]
+) -> float:
+    """Return the heights along the shortest wavelength of a spectrum.
+
+    Args:
+        spectrum: The spectrum.
+        grid: Heights in x and y.
+        lengths: Sides of the surface [mm].
+    """
+    waves = _most_waves(spectrum, lengths)
+    return min(n / most for n, most in zip(grid, waves, strict=True))
+
+
+def on_waves(scene: Scene, count: int) -> Scene:
+    """Return a scene on a grid with so many heights along the shortest wavelength.
+
+    Args:
+        scene: The scene, of a spectrum.
+        count: Heights along the wavelength.
+    """
+    section = scene.surface
+    if section.spectrum is None or section.lengths is None:  # refused when the scene was read
+        return scene
+    waves = _most_waves(section.spectrum, section.lengths)
+    grid = tuple(min(max(8 * math.ceil(count * k / 8), LEAST_HEIGHTS), MOST_HEIGHTS) for k in waves)
+    return with_value(scene, "surface.grid", grid)
+
+
+def _most_waves(spectrum: SpectrumSection, lengths: tuple[float, float]) -> list[float]:
+    """Return the largest number of waves along each side."""
+    if spectrum.waves is not None:  # counted along x
+        return [spectrum.waves[1], spectrum.waves[1] * lengths[1] / lengths[0]]
+    return [band[1] for band in (spectrum.waves_x, spectrum.waves_y) if band]

@@ -1,0 +1,204 @@
+"""Sets up the problem of a scene and resolves its auto values."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from geometry.asperities import find_asperities
+from geometry.errors import InputError
+from geometry.materials import Material
+from geometry.patches import PatchGrid, patch_means
+from geometry.rigid_plane import RigidPlane
+from geometry.surface import Surface
+from micro import Choice, HalfSpaceModel, MicroModel, choose, micro_model
+from multiscale.couplings.load_steps import ContactCoupling
+from multiscale.loading.stepper import Coupling, LoadHistory, load_steps
+from multiscale.machine import ClusterNodes
+from multiscale.planning.accuracy import setup_by_accuracy
+from multiscale.planning.auto_keys import (
+    accuracy_of,
+    auto_keys,
+    is_measured,
+    map_grid,
+    provisional,
+    with_resolved,
+    with_value,
+)
+from multiscale.planning.mesh_accuracy import MeshError, measured_mesh_error
+from multiscale.scene.scene import Scene
+from multiscale.setup.checks import check_load, check_memory, check_patches, patch_grid
+from multiscale.setup.problem import ProblemSetup
+from multiscale.setup.reference_meshes import reference_meshes
+from multiscale.setup.surface import make_shape, make_surface
+
+_ESTIMATE_CELLS = 96
+"""Cells along a side, at most, of the half-space that estimates the plane at the largest load. On
+1024² cells with waves down to a 16th, 64th and 256th of the side the approach was within 1.5 %."""
+SOLUTIONS_OF_LAWS = 40
+"""Approaches that a table of laws takes, roughly, for the cost of a micro model."""
+
+
+def make_setup(
+    scene: Scene,
+    resolved: Mapping[str, Any] | None = None,
+    nodes: ClusterNodes | None = None,
+    *,
+    mesh_error: MeshError = measured_mesh_error,
+) -> ProblemSetup:
+    """Set up the problem of a scene: make the surface, resolve auto values, check that all fits.
+
+    Args:
+        scene: The scene.
+        resolved: What auto values became when the run began; see `resolved_sections`.
+        nodes: The nodes of the run; None for this process alone.
+        mesh_error: Measures the relative error of a reference's meshes at the largest load.
+
+    Raises:
+        InputError: When something cannot be made or does not fit; names file, key and value.
+        NotConverged: When a contact problem cannot be solved.
+    """
+    began, nodes, known = time.perf_counter(), nodes or ClusterNodes(), resolved or {}
+    auto = frozenset() if known else auto_keys(scene)
+    start = provisional(with_resolved(scene, known), auto)
+    if auto and is_measured(scene):
+        found = setup_by_accuracy(scene, start, lambda stated: _setup(stated, nodes), mesh_error)
+        return replace(found, seconds={"surface": 0.0, "choice": time.perf_counter() - began})
+    if "patches.grid" in auto:
+        start = with_value(start, "patches.grid", map_grid(make_surface(start)))
+    return _setup(start, nodes, known.get("micro"))
+
+
+def _setup(scene: Scene, nodes: ClusterNodes, known: Any = None) -> ProblemSetup:
+    """Set up the problem of a scene of which the micro model alone may have an auto value.
+
+    Args:
+        scene: The scene.
+        nodes: The nodes of the run.
+        known: What the micro model became when the run began, a label or cells; None when that is
+            not known.
+    """
+    began = time.perf_counter()
+    check_memory(scene, nodes)
+    surface = make_surface(scene)
+    check_patches(scene, surface)
+    check_load(scene, surface)
+    patches = PatchGrid(grid=patch_grid(scene), lengths=surface.lengths)
+    setup = partial(
+        ProblemSetup,
+        scene=scene,
+        surface=surface,
+        asperities=find_asperities(surface, periodic=False),  # the block's sides are free
+        patches=patches,
+        mean_heights=patch_means(surface, patches),
+        shape=make_shape(scene, surface),
+    )
+    made = time.perf_counter()
+    seconds = {"surface": made - began}
+    if scene.coupling.kind == "reference":
+        plane = _estimated_plane(scene, surface)
+        meshes = reference_meshes(scene, surface, plane, nodes)
+        return setup(micro=None, plane_at_largest_load=plane, meshes=meshes, seconds=seconds)
+    choice = None
+    if scene.micro.model == "auto":
+        choice = _chosen_model(scene, surface, patches, known)
+        seconds["micro choice"] = time.perf_counter() - made
+    model = choice.model if choice else stated_model(scene, surface)
+    if isinstance(known, list) and isinstance(model, HalfSpaceModel):
+        model = model.resampled((int(known[0]), int(known[1])))
+    if not math.isfinite(model.first_touch):
+        raise InputError(
+            "the surface has no summit that could carry load",
+            key="micro.model",
+            value=scene.micro.model,
+            allowed="half-space, islands",
+            file=scene.file,
+        )
+    if isinstance(model, HalfSpaceModel) and scene.coupling.kind in ("analytic", "concurrent"):
+        plane = _estimated_plane(scene, surface)  # its load steps need no plane ahead of them
+    else:
+        coupling = ContactCoupling(model, patches, patch_means(surface, patches))
+        plane = plane_at_largest_load(scene.loading.load_history, coupling, surface)
+    return setup(micro=model, plane_at_largest_load=plane, choice=choice, seconds=seconds)
+
+
+def stated_model(scene: Scene, surface: Surface) -> MicroModel:
+    """Return the micro model that a scene names.
+
+    Args:
+        scene: The scene.
+        surface: Its surface.
+    """
+    model = micro_model(
+        scene.micro.model,
+        surface,
+        contact_modulus=_modulus(scene),
+        solver=scene.micro.solver,
+        curvature=scene.micro.curvature,
+        border=scene.micro.border,
+    )
+    if scene.surface.periodic and isinstance(model, HalfSpaceModel):
+        return replace(model, periodic=True)
+    return model
+
+
+def plane_at_largest_load(
+    load_history: LoadHistory, coupling: Coupling, surface: Surface
+) -> RigidPlane:
+    """Return the rigid plane at the largest load.
+
+    Args:
+        load_history: The loads.
+        coupling: Finds the plane where the force or the moment is prescribed.
+        surface: The surface.
+
+    Raises:
+        NotConverged: When the plane is not found in smaller steps either.
+    """
+    if load_history.quantity == "approach" and load_history.tilt is not None:
+        return RigidPlane.above(surface, load_history.largest, load_history.tilt)
+    largest = replace(load_history, points=(load_history.largest,), steps=1, force_change=None)
+    (step,) = load_steps(coupling, largest)
+    return RigidPlane.above(surface, step.approach_mm, step.tilt)
+
+
+def _estimated_plane(scene: Scene, surface: Surface) -> RigidPlane:
+    """Return the rigid plane at the largest load on a half-space of few cells."""
+    x, y = surface.grid
+    periodic = scene.surface.periodic
+    fine = HalfSpaceModel(surface, contact_modulus=_modulus(scene), periodic=periodic)
+    model = fine.resampled((min(x, _ESTIMATE_CELLS), min(y, _ESTIMATE_CELLS)))
+    whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
+    coupling = ContactCoupling(model, whole, patch_means(surface, whole))
+    return plane_at_largest_load(scene.loading.load_history, coupling, surface)
+
+
+def _chosen_model(scene: Scene, surface: Surface, patches: PatchGrid, label: str | None) -> Choice:
+    """Choose the micro model for the largest approach anywhere, or take the one of a label."""
+    kind, plane = scene.coupling.kind, _estimated_plane(scene, surface)
+    solutions = scene.loading.load_history.count
+    if kind in ("isolated", "consistent"):
+        solutions = SOLUTIONS_OF_LAWS
+    # a tilted plane comes nearest at a corner of the surface
+    tilted = 0.5 * float(np.abs(np.multiply(surface.lengths, plane.tilt)).sum())
+    return choose(
+        surface,
+        contact_modulus=_modulus(scene),
+        approach=plane.approach + tilted,
+        tolerance=scene.micro.tolerance or accuracy_of(scene),
+        patches=patches if kind != "analytic" else None,
+        solutions=solutions,
+        label=label,
+    )
+
+
+def _modulus(scene: Scene) -> float:
+    block = scene.block
+    material = Material(young_modulus=block.young_modulus, poisson_ratio=block.poisson_ratio)
+    return material.contact_modulus

@@ -1,0 +1,255 @@
+"""What a scene leaves open: chosen by measured errors, with respect for what is stated."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from geometry.errors import InputError
+from multiscale import Scene, make_setup
+from multiscale.machine import ClusterNodes
+from multiscale.planning.auto_keys import auto_keys, couplings, resolved_sections
+from multiscale.planning.plan import statements, warnings
+
+
+def scene(source=None, **sections):
+    spectrum = {"hurst": 0.95, "waves": [2, 6], "rms_slope": 0.2, "seed": 1}
+    surface = {"spectrum": spectrum, "grid": [48, 48], "lengths": [1.0, 1.0]} | (source or {})
+    given = {
+        "surface": surface,
+        "block": {"young_modulus": 4000.0, "poisson_ratio": 0.15},
+        "load": {"approach": 0.008, "steps": 2},
+    }
+    return Scene.from_dict(given | sections)
+
+
+def block(**keys):
+    return {"young_modulus": 4000.0, "poisson_ratio": 0.15} | keys
+
+
+OPEN = {
+    "patches": {"grid": "auto"},
+    "micro": {"model": "auto"},
+    "coupling": {"kind": "auto"},
+    "block": block(cells="auto"),
+}
+
+
+def test_tighter_accuracies_measure_smaller_errors_on_finer_grids():
+    source = {"spectrum": {"hurst": 0.7, "waves": [2, 8], "rms_slope": 0.2}, "grid": "auto"}
+    coupling = {"kind": "analytic"}
+    found = [
+        make_setup(scene(source, accuracy=accuracy, coupling=coupling))
+        for accuracy in (0.2, 0.02, 0.005)
+    ]
+    errors = [setup.decision.error for setup in found]
+    grids = [setup.surface.grid for setup in found]
+    assert errors == sorted(errors, reverse=True)
+    assert grids == sorted(grids)
+    assert grids[0] < grids[-1]
+    for setup in found:
+        assert setup.decision.kept
+        assert not [text for text in warnings(setup) if "accuracy" in text]
+
+
+def test_auto_values_are_resolved_and_the_plan_says_what_was_measured():
+    setup = make_setup(scene({"grid": "auto"}, accuracy=0.05, **OPEN))
+    resolved = setup.scene
+    assert resolved.coupling.kind in ("concurrent", "consistent")
+    assert resolved.patches.grid == (8, 8)
+    assert resolved.surface.grid == setup.surface.grid == setup.micro.surface.grid
+    assert resolved.micro.model == "half-space"
+    assert resolved.block.cells == "auto"  # of no mesh
+    assert set(setup.decision.errors) == {"body", "slopes", "grid"}
+    assert setup.decision.error <= setup.decision.accuracy == 0.05
+    assert dict(statements(setup))["choice"] == setup.decision.sentence
+
+
+def test_what_a_run_began_with_is_what_it_goes_on_with():
+    given = scene(accuracy=0.05)
+    setup = make_setup(given)
+    kept = json.loads(json.dumps(resolved_sections(setup, given)))
+    again = make_setup(given, kept)
+    assert again.scene == setup.scene
+    np.testing.assert_array_equal(again.micro.surface.heights, setup.micro.surface.heights)
+    assert again.micro.reference_height == setup.micro.reference_height == setup.surface.highest
+
+
+def test_a_grid_of_heights_is_resampled_for_the_accuracy():
+    fine = make_setup(scene({"grid": [256, 256]}, accuracy=0.1))
+    assert fine.surface.grid == (256, 256)
+    assert fine.micro.surface.grid[0] < 256  # a coarse one will do
+    assert fine.decision.kept
+
+
+def test_finite_slopes_left_out_are_an_error():
+    stated = {"model": "half-space", "finite_slopes": False}
+    setup = make_setup(scene({"grid": "auto"}, accuracy=0.01, micro=stated))
+    assert setup.decision.errors["slopes"] > 0.01
+    (said,) = [text for text in warnings(setup) if "accuracy" in text]
+    assert "an accuracy of 1 % is not kept" in said
+    assert "most of it by slopes" in said
+
+
+def test_few_steps_press_together_and_many_steps_make_laws():
+    for steps, kind in ((1, "concurrent"), (3000, "consistent")):
+        load = {"approach": 0.004, "steps": steps}
+        setup = make_setup(scene(load=load, accuracy=0.2, micro={"model": "half-space"}))
+        assert setup.decision.kept
+        assert setup.scene.coupling.kind == kind
+    assert setup.table_tolerance == pytest.approx(0.02)  # a tenth of the accuracy
+
+
+def test_cells_are_left_to_the_plan_only_under_laws_on_a_mesh():
+    meshed = {"kind": "consistent", "compliance": "finite-element"}
+    for coupling, free in (({}, False), ({"kind": "concurrent"}, False), (meshed, True)):
+        given = scene(coupling=coupling, block=block(cells="auto"))
+        assert auto_keys(given) == ({"block.cells"} if free else set())
+    assert make_setup(given).scene.block.cells is None  # as by default
+
+
+@pytest.mark.parametrize(
+    "stated",
+    [
+        {"patches": {"grid": [3, 5]}},
+        {"coupling": {"kind": "consistent"}},
+        {"coupling": {"kind": "isolated"}},
+        {"block": block(cells=[10, 10, 6])},
+        {"micro": {"model": "elliptic"}},
+        {"micro": {"border": "include"}},
+    ],
+)
+def test_stated_keys_are_respected(stated):
+    resolved = make_setup(scene(accuracy=0.05, **stated)).scene
+    for section, keys in stated.items():
+        for key, value in keys.items():
+            found = getattr(getattr(resolved, section), key)
+            assert list(found) == value if isinstance(value, list) else found == value
+    assert resolved.surface.grid == (48, 48)
+
+
+@pytest.mark.parametrize(
+    ("coupling", "kinds"),
+    [
+        ({"compliance": "finite-element"}, {"consistent"}),
+        ({"newton": "full"}, {"consistent"}),
+        ({"table_tolerance": 0.01}, {"consistent"}),
+        ({"compliance": "decomposed"}, {"concurrent", "consistent"}),
+    ],
+)
+def test_other_keys_narrow_the_couplings(coupling, kinds):
+    given = scene(coupling=coupling | {"kind": "auto"})
+    assert {section.kind for section in couplings(given)} == kinds
+    assert make_setup(given).scene.coupling.kind in kinds
+
+
+def test_without_accuracy_and_auto_nothing_is_open():
+    assert auto_keys(scene()) == frozenset()
+    assert auto_keys(scene(accuracy=0.1)) == {"micro.model", "coupling.kind", "patches.grid"}
+    assert make_setup(scene()).decision is None
+
+
+def test_patches_are_nearly_square():
+    setup = make_setup(scene({"grid": [96, 48], "lengths": [2.0, 1.0]}, patches={"grid": "auto"}))
+    assert setup.patches.grid == (16, 8)
+    assert setup.decision is None  # patches gather results, and have no error
+
+
+def test_a_stated_reference_gets_a_grid_and_patches():
+    given = scene({"grid": "auto"}, accuracy=0.05, coupling={"kind": "reference"})
+    setup = make_setup(given, mesh_error=lambda setup: 0.001)
+    assert setup.surface.grid == (96, 96)  # 16 heights along each of 6 waves
+    assert setup.patches.grid == (8, 8)
+    assert setup.decision.kept
+
+
+def test_models_without_measure_say_so():
+    setup = make_setup(scene(accuracy=0.05, micro={"model": "elliptic"}))
+    assert not setup.decision.errors
+    assert not setup.decision.kept
+    assert "which is not measured beforehand" in setup.decision.sentence
+    assert dict(statements(setup))["error"].startswith("not known: elliptic")
+
+
+def test_a_reference_is_taken_where_nothing_else_keeps_the_accuracy():
+    setup = make_setup(scene(accuracy=0.0015), mesh_error=lambda setup: 0.001)
+    assert setup.scene.coupling.kind == "reference"
+    assert setup.micro is None
+    assert setup.decision.kept
+    assert sum(setup.decision.missed.values()) > 0.0015
+    assert "without meshing the roughness measured" in setup.decision.sentence
+
+
+def test_meshes_are_refined_until_their_error_keeps_the_accuracy():
+    def made(accuracy, **reference):
+        given = scene(accuracy=accuracy, coupling={"kind": "reference"}, reference=reference)
+        return make_setup(given, mesh_error=lambda s: (float(s.meshes.sizes[-1]) / 0.03) ** 3)
+
+    coarse, fine = made(0.1), made(0.01)
+    assert fine.meshes.sizes[-1] < coarse.meshes.sizes[-1]
+    assert fine.decision.error <= 0.01
+    stated = made(0.01, fine=0.03)
+    assert stated.meshes.sizes[-1] == pytest.approx(0.03)
+    assert "most of it by mesh" in stated.decision.warning
+
+
+@pytest.mark.parametrize(
+    ("wrong", "problem"),
+    [
+        ({"accuracy": 0.5}, r"accuracy = 0.5: must be less than 0.5"),
+        (
+            {"accuracy": "2 %"},
+            r"accuracy = '2 %': is not a number \(allowed: a number without quotes",
+        ),
+        ({"patches": {"grid": "many"}}, r"patches.grid = 'many': must be a valid tuple"),
+        ({"coupling": {"kind": "auto", "love": "centre"}}, r"love = 'centre' does not go with"),
+        ({"source": {"spectrum": None, "file": "a.npy", "grid": "auto"}}, r"needs a 'spectrum'"),
+    ],
+)
+def test_refuses(wrong, problem):
+    with pytest.raises(InputError, match=problem):
+        scene(**wrong)
+
+
+@pytest.mark.parametrize(
+    ("sections", "problem"),
+    [
+        ({"patches": {"grid": [1000, 1000]}}, r"patches\.grid = \[1000, 1000\]: the interaction"),
+        (
+            {"coupling": {"kind": "concurrent"}, "patches": {"grid": [600, 600]}},
+            r"patches\.grid = \[600, 600\]: the interaction of all patches with each other needs",
+        ),
+        (
+            {"patches": {"grid": [40, 40]}, "load": {"approach": 0.01, "steps": 1_000_000}},
+            r"load\.steps = 1000000: the history of 1600 patches needs .* GB .*allowed: what fits",
+        ),
+        (
+            {"coupling": {"kind": "analytic"}, "patches": {"grid": [1000, 1000]},
+             "load": {"approach": 0.01, "steps": 10_000}},
+            r"load\.steps = 10000: the history of 1000000 patches",
+        ),
+        ({"source": {"grid": [1_000_000, 1_000_000]}}, r"surface\.grid = \[1000000, 1000000\]"),
+    ],
+)  # fmt: skip
+def test_sizes_that_fit_no_memory_are_refused_before_anything_is_made(sections, problem):
+    source = {"spectrum": None, "file": "nowhere.npy", "grid": None}  # could not be read
+    given = scene(**{"source": source} | sections)
+    with pytest.raises(InputError, match=problem):
+        make_setup(given, nodes=ClusterNodes(memory=16e9))
+
+
+def test_auto_values_survive_a_dump_and_are_in_the_schema():
+    given = scene({"grid": "auto"}, accuracy=0.03, **OPEN)
+    again = Scene.from_dict(given.model_dump(by_alias=True, mode="json"))
+    assert auto_keys(again) == auto_keys(given) == {
+        "surface.grid", "micro.model", "coupling.kind", "patches.grid",
+    }  # fmt: skip
+    patches = Scene.model_json_schema(by_alias=True)["$defs"]["PatchesSection"]
+    assert {"const": "auto"} in patches["properties"]["grid"]["anyOf"]
+
+
+def test_the_plan_says_how_fine_the_heights_are():
+    said = dict(statements(make_setup(scene())))["surface"]
+    assert "8 heights along the shortest wavelength" in said  # 48 heights, 6 waves

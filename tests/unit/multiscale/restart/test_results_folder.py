@@ -1,0 +1,93 @@
+"""One run at a time writes to a folder, and a lock leaves nothing behind."""
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from geometry.errors import InputError
+from multiscale.cli.command_line import main
+from multiscale.restart.results_folder import FolderLock
+
+PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
+
+
+def test_two_runs_do_not_share_a_folder(tmp_path):
+    one, other = FolderLock(tmp_path / "out"), FolderLock(tmp_path / "out")
+    one.hold()
+    with pytest.raises(InputError, match=r"--out = '.*out': another run is writing to this folder"):
+        other.hold()
+    one.release()
+    other.hold()
+    other.release()
+    assert not (tmp_path / "out").exists()  # neither wrote anything
+
+
+@pytest.mark.parametrize("command", ["laws", "surface", "run", "compare"])
+def test_no_command_writes_where_a_run_does(tmp_path, capsys, command):
+    out = tmp_path / "out"
+    lock = FolderLock(out)
+    lock.hold()
+    assert main([command, str(PAPER), "--out", str(out), "--set", "surface.grid=[32, 32]"]) == 2
+    assert "another run is writing to this folder" in capsys.readouterr().err
+    assert [path.name for path in out.iterdir()] == [".lock"]
+    lock.release()
+
+
+def test_empty_folder_that_was_there_stays(tmp_path):
+    lock = FolderLock(tmp_path)
+    lock.hold()
+    lock.release()
+    assert tmp_path.is_dir() and not list(tmp_path.iterdir())
+
+
+def test_lock_is_lifted_where_its_file_must_stay(tmp_path, monkeypatch):
+    def refused(path, missing_ok=False):
+        raise PermissionError(13, "Permission denied", str(path))
+
+    lock, other = FolderLock(tmp_path), FolderLock(tmp_path)
+    lock.hold()
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", refused)
+        lock.release()
+    other.hold()
+    other.release()
+    assert not (tmp_path / ".lock").exists()
+
+
+def test_folder_of_a_file_cannot_be_locked(tmp_path):
+    (tmp_path / "file").touch()
+    for path in (tmp_path / "file", tmp_path / "file" / "out"):
+        with pytest.raises(InputError, match=f"--out = '{path}': is not a folder"):
+            FolderLock(path).hold()
+
+
+def test_folder_that_cannot_be_made_is_refused():
+    with pytest.raises(InputError, match="'/proc/nothing': cannot be written to"):
+        FolderLock(Path("/proc/nothing")).hold()
+
+
+def test_folders_above_are_removed_as_well(tmp_path):
+    lock = FolderLock(tmp_path / "results" / "scene")
+    lock.hold()
+    assert (tmp_path / "results" / "scene" / ".lock").exists()
+    lock.release()
+    assert not list(tmp_path.iterdir())
+
+
+def test_lock_of_a_killed_process_is_lifted(tmp_path, root):
+    code = (
+        "import os, signal, sys; from pathlib import Path\n"
+        "from multiscale.restart.results_folder import FolderLock\n"
+        "lock = FolderLock(Path(sys.argv[1])); lock.hold()\n"
+        "os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    words = [sys.executable, "-c", code, str(tmp_path / "out")]
+    assert subprocess.run(words, cwd=root, check=False).returncode == -signal.SIGKILL
+    assert (tmp_path / "out" / ".lock").exists()
+    lock = FolderLock(tmp_path / "out")
+    lock.hold()
+    lock.release()
+    assert not (tmp_path / "out" / ".lock").exists()

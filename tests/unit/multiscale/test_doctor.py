@@ -1,0 +1,178 @@
+"""The doctor: what it finds, and what it makes of machines that are not well."""
+
+import json
+import os
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from geometry.errors import InputError
+from multiscale import compiled_forms, doctor
+from multiscale.cli.command_line import main
+from multiscale.cli.doctor import show
+from multiscale.doctor import CheckResult, examine, refuse_failures
+
+OPEN_MPI = "Open MPI v4.1.4"
+
+
+def test_a_tested_machine_is_well(capsys):
+    assert main(["doctor", "--json"]) == 0
+    findings = {found["topic"]: found for found in json.loads(capsys.readouterr().out)}
+    assert {"packages", "PETSc", "ranks", "threads", "memory", "form cache"} <= set(findings)
+    assert all(found["state"] != "fail" for found in findings.values())
+    assert findings["test solve"]["state"] == "ok"
+    assert "dolfinx" in findings["packages"]["text"]
+
+
+def test_lines_come_with_remedies(capsys):
+    show({"BLAS": CheckResult("warning", "the reference [BLAS]", "apt-get install it")})
+    shown = capsys.readouterr().out
+    assert "the reference [BLAS]" in shown  # no markup
+    assert "→ apt-get install it" in shown
+
+
+def test_a_check_that_raises_has_failed():
+    def broken(comm):
+        raise RuntimeError("no such device")
+
+    def refused(comm):
+        raise InputError("has none", key="HOME")
+
+    found = examine(None, {"memory": broken, "ranks": doctor.ranks, "form cache": refused})
+    memory, ranks, cache = found.values()
+    assert (memory.state, memory.text) == ("fail", "RuntimeError: no such device")
+    assert ranks.text.startswith("1: 1 on ")
+    assert (cache.state, cache.text) == ("fail", "HOME: has none")
+    with pytest.raises(InputError, match=r"doctor: not fit to run: memory, form cache$"):
+        refuse_failures(found)
+
+
+def test_a_warning_is_no_failure():
+    refuse_failures({"b": CheckResult("warning", "")})
+
+
+@pytest.mark.parametrize(
+    ("library", "shown", "state", "text"),
+    [
+        (OPEN_MPI, "mpirun (Open MPI) 4.1.4 Report bugs to", "ok", "same family"),
+        (OPEN_MPI, "mpirun (Open MPI) 5.0.7", "warning", "mpirun is version 5.0"),
+        (OPEN_MPI, "HYDRA build details: Version: 4.0.2", "fail", "belongs to MPICH"),
+        (
+            OPEN_MPI,
+            "Intel(R) MPI Library for Linux* OS, Version 2021.5",
+            "fail",
+            "belongs to Intel",
+        ),
+        ("MPICH Version: 4.0.2", "HYDRA build details: Version: 4.0.2", "ok", "same family"),
+        (OPEN_MPI, "", "warning", "no mpirun on PATH"),
+    ],
+)
+def test_launcher_is_compared_with_the_library(library, shown, state, text):
+    found = doctor.launcher_of(library, shown)
+    assert (found.state, text in found.text) == (state, True), found
+
+
+def test_singletons_under_a_foreign_launcher_are_seen(monkeypatch):
+    monkeypatch.setenv("PMI_SIZE", "4")
+    found = doctor.launcher(None)
+    assert found.state == "fail"
+    assert "one of 4 processes" in found.text
+    assert "Open MPI" in found.remedy or "MPICH" in found.remedy
+
+
+def test_too_many_threads_are_seen(monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", str(4 * os.cpu_count()))
+    found = doctor.threads(None)
+    assert found.state == "warning"
+
+
+class Ranks:
+    """Two ranks of one host, both saying what this one says."""
+
+    size, rank = 2, 0
+
+    @staticmethod
+    def allgather(value):
+        return [value, value]
+
+
+def test_threads_of_all_ranks_count(monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", str(len(os.sched_getaffinity(0))))
+    assert doctor.threads(None).state == "ok"
+    assert doctor.threads(Ranks).state == "warning"
+    monkeypatch.delenv("OMP_NUM_THREADS")  # every rank would take all cores
+    assert doctor.threads(Ranks).state == "warning"
+
+
+def test_memory_is_shared_by_the_ranks_of_a_host():
+    assert doctor.memory(None, free=1.5e9) == CheckResult("ok", "1.5 GB free per rank")
+    assert doctor.memory(Ranks, free=1.5e9).state == "warning"
+
+
+def test_memory_of_a_control_group_is_what_is_left_of_it():
+    assert doctor.free_memory([(9e18, 1e9), (3e9, 2.5e9)]) == 0.5e9
+
+
+def test_reference_blas_is_told():
+    found = doctor.blas(None, libraries=[])
+    assert "libopenblas0" in found.remedy
+
+
+def test_old_and_missing_packages_are_seen():
+    def load(name):
+        if name == "gmsh":
+            raise ImportError("no module named gmsh")
+        return SimpleNamespace(__version__="0.1")
+
+    found = doctor.packages(None, load)
+    assert found.state == "fail"
+    assert "gmsh: no module named gmsh" in found.text
+    assert "scipy 0.1 is older than 1.10" in found.text
+
+
+def test_missing_pictures_are_a_warning():
+    def load(name):
+        if name == "matplotlib":
+            raise ImportError("no module named matplotlib")
+        return SimpleNamespace(__version__="99.0")
+
+    assert doctor.packages(None, load).state == "warning"
+
+
+def test_the_worst_result_of_all_ranks_counts():
+    class OtherRank:
+        """A rank beside one that lacks a package."""
+
+        @staticmethod
+        def allgather(value):
+            return [value, CheckResult("fail", "gmsh: no module named gmsh")]
+
+    found = examine(OtherRank, {"packages": lambda comm: CheckResult("ok", "all")})
+    assert found["packages"].state == "fail"
+
+
+def test_left_lock_fails_and_names_the_command(tmp_path):
+    assert compiled_forms.cache(None, tmp_path).state == "ok"
+    left = tmp_path / "libffcx_forms_1.c"
+    left.touch()
+    os.utime(left, (0, 0))
+    found = compiled_forms.cache(None, tmp_path)
+    assert (found.state, "patchlaw warm" in found.remedy) == ("fail", True)
+
+
+def test_cache_that_may_not_be_entered_is_a_warning(monkeypatch, tmp_path):
+    def refused(path, pattern=""):
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr(Path, "exists", refused)
+    monkeypatch.setattr(Path, "glob", refused)
+    found = compiled_forms.cache(None, tmp_path)
+    assert (found.state, "XDG_CACHE_HOME" in found.remedy) == ("warning", True)
+
+
+def test_compiler_that_fails_is_a_warning(monkeypatch):
+    assert compiled_forms.compiler_works(None).state == "ok"
+    monkeypatch.setenv("CC", "/bin/false")
+    found = compiled_forms.compiler_works(None)
+    assert (found.state, "patchlaw warm" in found.remedy) == ("warning", True)

@@ -1,0 +1,107 @@
+"""Files appear whole or not at all."""
+
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry.errors import NotWritten
+from geometry.patches import PatchGrid
+from multiscale.loading.load_step import LoadStep, PatchState
+from multiscale.output.results import write_tables
+from multiscale.output.terminal import show_history
+from multiscale.results.history import PATCH_COLUMNS, History
+from multiscale.storage import write_csv, write_text, write_whole
+
+
+@pytest.fixture
+def history():
+    def step(number):
+        return LoadStep(
+            step=number,
+            approach_mm=number / 3,
+            force_N=np.float64(number / 7),
+            mean_pressure_MPa=0.1,
+            contact_area_fraction=0.01,
+            mean_separation_mm=0.02,
+            contacts=number,
+            newton_iterations=3,
+            linear_iterations=20,
+            wall_s=0.5,
+            reason="CONVERGED",
+            patches=PatchState(
+                closure_mm=np.arange(6.0) / 3,
+                pressure_MPa=np.arange(6.0) / 9,
+                contact_area_fraction=np.arange(6.0) / 11,
+            ),
+        )
+
+    return History(steps=(step(1), step(2)), patches=PatchGrid(grid=(2, 3), lengths=(1.0, 1.0)))
+
+
+def read(path):
+    with path.open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_history_keeps_every_digit(history, tmp_path):
+    write_tables(tmp_path / "deep" / "folder", history)
+    rows = read(tmp_path / "deep" / "folder" / "history.csv")
+    assert list(rows[0])[:3] == ["step", "approach_mm", "force_N"]
+    assert [float(row["force_N"]) for row in rows] == [1 / 7, 2 / 7]
+    assert rows[1]["contacts"] == "2"
+
+
+def test_patch_rows_follow_the_flat_index(history, tmp_path):
+    write_tables(tmp_path, history)
+    rows = read(tmp_path / "patches.csv")
+    assert list(rows[0]) == list(PATCH_COLUMNS)
+    assert [(row["ix"], row["iy"]) for row in rows[:4]] == [
+        ("0", "0"),
+        ("0", "1"),
+        ("0", "2"),
+        ("1", "0"),
+    ]
+    assert [float(row["closure_mm"]) for row in rows[:6]] == [i / 3 for i in range(6)]
+
+
+def test_what_is_not_known_is_empty(tmp_path):
+    rows = [(1, None, float("nan"), np.float64("nan")), (2, 0.5, np.float64(0.25), np.int64(3))]
+    path = write_csv(tmp_path / "a.csv", list("abcd"), rows)
+    assert path.read_text(encoding="utf-8").split() == ["a,b,c,d", "1,,,", "2,0.5,0.25,3"]
+    found = np.genfromtxt(path, delimiter=",", names=True)  # what readers make of it
+    assert np.isnan([found[name][0] for name in "bcd"]).all()
+
+
+def test_columns_are_attributes(history):
+    assert history.force_N.tolist() == [1 / 7, 2 / 7]
+    assert history.patch_pressure_MPa.shape == (2, 6)
+    with pytest.raises(AttributeError, match="'History' object has no attribute 'forze_N'"):
+        _ = history.forze_N
+
+
+def test_failed_write_leaves_the_old_file(tmp_path):
+    path = write_text(tmp_path / "report.html", "old")
+
+    def fail(partial):
+        partial.write_text("half", encoding="utf-8")
+        raise OSError("disk full")
+
+    with pytest.raises(NotWritten, match=r"report.html: cannot be written: disk full"):
+        write_whole(path, fail)
+    assert path.read_text(encoding="utf-8") == "old"
+    assert [entry.name for entry in tmp_path.iterdir()] == ["report.html"]
+
+
+def test_a_long_history_is_printed_in_part(history, capsys):
+    """Ten thousand rows would take the terminal longer than the solution; files have them all."""
+    steps = tuple(replace(history.steps[0], step=number) for number in range(1, 1001))
+    show_history(None, replace(history, steps=steps))
+    told = capsys.readouterr().out.splitlines()
+    first = [line.split()[0] for line in told if line.strip()]
+    assert "940 more" in " ".join(told)
+    rows = [word for word in first if word.isdigit()]
+    assert rows == [str(n) for n in (*range(1, 31), *range(971, 1001))]
+    show_history(None, history)
+    assert "more" not in capsys.readouterr().out
