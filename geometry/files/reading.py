@@ -96,7 +96,7 @@ def _surface(
 ) -> Surface:
     """Return the surface of what a file holds."""
     said = [str(file), *([f"channel {content.channel!r}"] if content.channel else [])]
-    if content.unit is None and unit != "mm":
+    if content.unit is None:  # a factor of 1000 is not to go unnoticed
         said.append(f"heights taken in {unit}")
     notes: list[str] = []
     heights = content.heights

@@ -26,7 +26,11 @@ def test_text_matrices_have_rows_along_x(tmp_path, suffix, separator):
     file.write_text("# heights, in mm; [ix, iy]\n\n" + "\n".join(rows) + "\n")
     surface = read_surface(file, lengths=SIDES, grid=(5, 4), periodic=True)
     np.testing.assert_array_equal(surface.heights, HEIGHTS)
-    assert surface.lengths == SIDES and surface.periodic and surface.source == str(file)
+    assert (
+        surface.lengths == SIDES
+        and surface.periodic
+        and surface.source == f"{file}, heights taken in mm"
+    )
 
 
 @pytest.mark.parametrize("dtype", ["float64", "float32", "int16"])

@@ -38,6 +38,7 @@ def test_a_map_is_cropped_filled_levelled_filtered_and_resampled(tmp_path):
     )
     assert surface.grid == (16, 32) and surface.lengths == (0.5, 1.0)
     assert surface.source.removeprefix(f"{tmp_path}/map.npy, ").split(", ") == [
+        "heights taken in mm",
         "cropped to 500 × 1000 µm from x = 500 µm",
         "y = 0 µm",
         "0.000488 of the heights missing and filled by a membrane",

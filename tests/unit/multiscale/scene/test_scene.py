@@ -241,7 +241,7 @@ def test_where_files_of_heights_are_looked_for(tmp_path, named, found):
     path.write_text(text + "load.approach = 0.01\n", encoding="utf-8")
     scene = Scene.load(path)
     assert scene.surface_path.resolve() == tmp_path / found
-    assert make_setup(scene).surface.source == str(scene.surface_path)
+    assert make_setup(scene).surface.source == f"{scene.surface_path}, heights taken in mm"
 
 
 def test_scene_is_frozen():

@@ -7,7 +7,7 @@ import pytest
 
 from geometry.errors import InputError
 from micro import HalfSpaceModel
-from multiscale.resolution.problem_setup import make_setup
+from multiscale.planning.problem_setup import make_setup
 from multiscale.run import run
 from multiscale.scene.scene import Scene
 
