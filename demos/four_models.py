@@ -17,6 +17,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+from paper.models_figure import models_figure
 
 from geometry import (
     Material,
@@ -27,8 +28,8 @@ from geometry import (
     roughness,
     synthesise,
 )
-from micro import MODELS, asperity_model
-from multiscale.output.figures import models_figure, surface_figure
+from micro import MODELS, AsperityModel
+from multiscale.output.figures import surface_figure
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -56,7 +57,7 @@ surface_figure(surface, asperities, PatchGrid(grid=(4, 4), lengths=(1.0, 1.0))).
 MODULUS = Material(young_modulus=4000.0, poisson_ratio=0.15).contact_modulus
 approaches = np.linspace(0.0, 16e-3, 9 if choice.quick else 81)[1:]
 responses = {
-    name: asperity_model(name, asperities, contact_modulus=MODULUS).respond(
+    name: AsperityModel(name, asperities, contact_modulus=MODULUS).respond(
         approaches, patches=whole, mean_heights=patch_means(surface, whole)
     )
     for name in MODELS

@@ -18,12 +18,7 @@ from paper.page import Page
 
 from geometry import Material, PatchGrid, Spectrum, find_asperities, power_spectrum, synthesise
 from micro import HertzContact
-from micro.closed_forms.ellipse import (
-    area_factor,
-    eccentricity,
-    eccentricity_approximate,
-    force_factor,
-)
+from micro.closed_forms.hertz import factors_at, shape_factors
 from multiscale.output.figures import draw_surface
 
 parser = argparse.ArgumentParser()
@@ -40,18 +35,18 @@ BLUE, RED, GREEN = "#0b3c5d", "#d1495b", "#1b998b"
 
 # %%
 ratio = np.geomspace(1.0, 100.0, 200)
-shapes = {"exact": eccentricity(ratio, 1.0), "paper's eq. 2": eccentricity_approximate(ratio, 1.0)}
+exact, paper = shape_factors(ratio, 1.0), factors_at(np.sqrt(1.0 - ratio ** (-4.0 / 3.0)))
 figure = Figure(figsize=(9.6, 4.0), layout="constrained")
 over_ratio, over_e = figure.subplots(1, 2)
-for (name, e), style in zip(shapes.items(), ("-", "--"), strict=True):
-    for label, factor, colour in (("F1", force_factor, BLUE), ("A1", area_factor, RED)):
-        over_ratio.semilogx(ratio, factor(e), style, color=colour, label=f"{label}, {name}")
+for shape, name, style in ((exact, "exact", "-"), (paper, "paper's eq. 2", "--")):
+    over_ratio.semilogx(ratio, shape.force, style, color=BLUE, label=f"F1, {name}")
+    over_ratio.semilogx(ratio, shape.area, style, color=RED, label=f"A1, {name}")
 e = np.linspace(0.0, 0.999, 500)
-over_e.plot(e, force_factor(e), color=BLUE, label="F1")
-over_e.plot(e, area_factor(e), color=RED, label="A1")
+over_e.plot(e, factors_at(e).force, color=BLUE, label="F1")
+over_e.plot(e, factors_at(e).area, color=RED, label="A1")
 over_ratio.set(xlabel="radius ratio R'/R'' [-]", ylabel="F1, A1 [-]")
 over_e.set(xlabel="eccentricity e [-]", ylabel="F1, A1 [-]")
-(f, a), (f2, a2) = ((force_factor(e), area_factor(e)) for e in shapes.values())
+(f, a), (f2, a2) = ((shape.force, shape.area) for shape in (exact, paper))
 ten = np.searchsorted(ratio, 10.0)
 for axes in (over_ratio, over_e):
     axes.grid(alpha=0.3)
@@ -62,7 +57,7 @@ claim = "circles overestimate the area and underestimate the force where e is hi
 page.add("Figure 3", "factors of an elliptic contact", figure, claim, found)
 thin, log = 1e-6, np.log(4.0 / 1e-6)
 slender = np.pi / np.sqrt(2.0 * thin) * (log - 1.0) ** 0.25 * log**-1.5
-assert abs(force_factor(np.sqrt(1 - thin**2)) / slender - 1) < 1e-3
+assert abs(factors_at(np.sqrt(1 - thin**2)).force / slender - 1) < 1e-3
 assert abs(f[0] - 1) + abs(a[0] - 1) < 1e-12 and f[ten] > 1.0 > a[ten]
 
 # %% [markdown]

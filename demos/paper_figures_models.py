@@ -13,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from paper.models_figure import models_figure
 from paper.page import Page
 
 from geometry import Material, PatchGrid, Spectrum, patch_means, synthesise
 from micro import micro_model
-from multiscale.output.figures import models_figure
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -22,7 +22,8 @@ from mpi4py import MPI
 
 from geometry import Control
 from multiscale import CondensedCoupling, Scene, consistent_laws, load_steps, make_setup, run
-from multiscale.couplings.blocks import on_body, patch_compliance, scene_body
+from multiscale.couplings.body import patch_compliance, scene_body
+from multiscale.couplings.contact import on_body
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -9,7 +9,7 @@ from geometry.asperities import Asperities, find_asperities
 from geometry.errors import InputError, NotConverged, PatchlawError
 from geometry.files.reading import read_surface
 from geometry.materials import Material, MaterialPair
-from geometry.meshes.block import Alignment, BlockShape, alignment
+from geometry.meshes.block import BlockShape, misalignment
 from geometry.meshes.families import (
     characteristic_size,
     places_in_reach,
@@ -25,7 +25,6 @@ from geometry.surface import Surface
 from geometry.synthesis import synthesise
 
 __all__ = [
-    "Alignment",
     "Asperities",
     "BlockShape",
     "Control",
@@ -43,9 +42,9 @@ __all__ = [
     "Spectrum",
     "Surface",
     "UnevenPartition",
-    "alignment",
     "characteristic_size",
     "find_asperities",
+    "misalignment",
     "overlaps",
     "patch_means",
     "places_in_reach",

@@ -10,8 +10,12 @@ BlockShape → block_mesh → Block (with a Material) → Interface (with a Patc
 from geometry.materials import Material
 from macro.block import Block
 from macro.compliance.face_compliance import FaceCompliance, face_compliance
-from macro.compliance.patch_compliance import displacements_under, patch_compliance_matrix
-from macro.contact.law_interface import ContactLaw, Interface
+from macro.contact.law_interface import (
+    ContactLaw,
+    Interface,
+    displacements_under,
+    patch_compliance_matrix,
+)
 from macro.contact.law_problem import LawContactProblem, LawContactState
 from macro.contact.unilateral_problem import UnilateralContactProblem, UnilateralContactState
 from macro.fields import write_fields, write_rough_fields

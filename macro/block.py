@@ -12,7 +12,6 @@ from typing import Any, Literal, get_args
 import numpy as np
 import ufl
 from dolfinx import fem
-from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
@@ -23,9 +22,12 @@ from macro.elasticity import rigid_body_modes, stiffness_form
 from macro.linear_solvers.multigrid import Lattice, lattice_of
 from macro.linear_solvers.options import solve_linear
 from macro.linear_solvers.selection import block_solver
-from macro.mesh.block import BOTTOM, SIDES, BlockMesh
+from macro.mesh.block import BlockMesh
 
 Sides = Literal["free", "roller"]
+
+_FLAT = 1e-9
+"""Distance from a face, relative to the size of the block, that is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,11 +82,9 @@ class Block:
     @cached_property
     def conditions(self) -> list[Any]:
         """Dirichlet conditions: the clamped bottom and, on request, the rollers."""
-        clamped = self._nodes(self.mesh.facet_tags.find(BOTTOM))
-        conditions = [fem.dirichletbc(np.zeros(3, PETSc.ScalarType), clamped, self.space)]
-        if self.sides == "roller":
-            conditions += [self._roller(axis) for axis in (0, 1)]
-        return conditions
+        clamped = fem.dirichletbc(np.zeros(3, PETSc.ScalarType), self._bottom, self.space)
+        rollers = [self._roller(axis) for axis in (0, 1)] if self.sides == "roller" else []
+        return [clamped, *rollers]
 
     @cached_property
     def stiffness(self) -> PETSc.Mat:
@@ -166,28 +166,20 @@ class Block:
     def _bottom_row(self) -> PETSc.Vec:
         """Sum of the unconstrained stiffness' rows of the bottom's vertical displacements."""
         lift = fem.Function(self.space)
-        lift.x.array[3 * self._nodes(self.mesh.facet_tags.find(BOTTOM)) + 2] = 1.0
+        lift.x.array[3 * self._bottom + 2] = 1.0
         return compat.assemble_vector(compat.compile_form(ufl.action(self.form, lift)))
 
-    def _nodes(self, facets: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Return this rank's nodes and ghosts on some facets of any rank, ascending.
-
-        `locate_dofs_topological` finds the nodes of this rank's facets, and those that neighbouring
-        ranks report. Two ranks may both have a node of a third rank without being neighbours; the
-        owner of the node knows of it, so that its ghosts are updated from the owner.
-        """
-        marks = fem.Function(self.space)
-        marks.x.array[3 * fem.locate_dofs_topological(self.space, 2, facets)] = 1.0
-        marks.x.scatter_forward()
-        return np.flatnonzero(marks.x.array[::3]).astype(np.int32)
+    @property
+    def _bottom(self) -> NDArray[np.int32]:
+        """This rank's nodes and ghosts on the bottom, ascending; the roughness does not move it."""
+        above = self.space.tabulate_dof_coordinates()[:, 2] + self.mesh.shape.height
+        return np.flatnonzero(above < _FLAT * self.mesh.shape.height).astype(np.int32)
 
     def _roller(self, axis: int) -> Any:
         """Fix the normal displacement on the two side planes across an axis."""
-        facets = self.mesh.facet_tags.find(SIDES)
-        shape = self.mesh.shape
+        shape, place = self.mesh.shape, self.space.tabulate_dof_coordinates()[:, axis]
         low, high = -shape.margin, shape.interface[axis] + shape.margin
-        place = dmesh.compute_midpoints(self.mesh.mesh, 2, facets)[:, axis]
-        slack = 1e-6 * (high - low)  # far below a cell, far above rounding
-        across = facets[(place < low + slack) | (place > high - slack)]
-        dofs = 3 * self._nodes(across) + axis
+        slack = _FLAT * (high - low)
+        across = np.flatnonzero((place < low + slack) | (place > high - slack))
+        dofs = (3 * across + axis).astype(np.int32)
         return fem.dirichletbc(PETSc.ScalarType(0.0), dofs, self.space.sub(axis))

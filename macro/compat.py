@@ -30,9 +30,6 @@ _JIT = {"timeout": TIMEOUT}  # for a slow machine on which another process compi
 HAS_VTX = hasattr(io, "VTXWriter")
 """Whether this dolfinx was built with ADIOS2."""
 
-_FILES_NOT_CLOSED: list[Any] = []
-"""XDMF files that could not be closed, referenced so that no destructor runs before exit."""
-
 _CELLS = {"hexahedron": basix.CellType.hexahedron, "tetrahedron": basix.CellType.tetrahedron}
 
 
@@ -49,7 +46,7 @@ def quiet_compiler() -> Iterator[None]:
         logging.disable(disabled)
 
 
-def form_cache() -> Path:
+def form_folder() -> Path:
     """Return the folder of the compiled forms.
 
     Raises:
@@ -69,20 +66,20 @@ def form_cache() -> Path:
 @contextmanager
 def _compiling() -> Iterator[None]:
     """Compile without log messages, and explain errors of the compiler."""
-    with quiet_compiler(), explained(form_cache()):
+    with quiet_compiler(), explained(form_folder()):
         yield
 
 
 @quiet_compiler()
-def mesh_from_gmsh(model: Any, comm: Any) -> tuple[Any, Any]:
-    """Distribute the gmsh model of rank 0 as (mesh, facet tags).
+def mesh_from_gmsh(model: Any, comm: Any) -> Any:
+    """Distribute the gmsh model of rank 0.
 
     Args:
         model: ``gmsh.model`` on rank 0; ignored on other ranks.
         comm: MPI communicator.
 
     Note:
-        Collective. Facet tags may include ghost facets (dolfinx 0.5).
+        Collective. There are ghost cells in dolfinx 0.5, and none later.
     """
     with sigint_untouched():  # the import loads gmsh, which lattices do not need
         try:
@@ -90,7 +87,7 @@ def mesh_from_gmsh(model: Any, comm: Any) -> tuple[Any, Any]:
         except ImportError:
             from dolfinx.io import gmshio as reader
     data = reader.model_to_mesh(model, comm, 0, gdim=3)
-    return (data.mesh, data.facet_tags) if hasattr(data, "mesh") else (data[0], data[2])
+    return data.mesh if hasattr(data, "mesh") else data[0]
 
 
 @quiet_compiler()
@@ -300,26 +297,3 @@ def write_vtx(path: str, function: Any) -> None:
     """
     with io.VTXWriter(function.function_space.mesh.comm, path, [function]) as file:
         file.write(0.0)
-
-
-def write_xdmf(path: str, mesh: Any, functions: Sequence[Any]) -> None:
-    """Write a mesh and functions of its degree, or constant on cells, as XDMF with HDF5.
-
-    Args:
-        path: File to write, ending in ``.xdmf``.
-        mesh: dolfinx mesh.
-        functions: Functions on the mesh.
-
-    Note:
-        Collective.
-    """
-    file = io.XDMFFile(mesh.comm, path, "w")
-    try:
-        file.write_mesh(mesh)
-        for function in functions:
-            file.write_function(function)
-        file.close()
-    except RuntimeError:
-        # On a full disk it cannot be closed, and its destructor would end the process
-        _FILES_NOT_CLOSED.append(file)
-        raise

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from dolfinx import fem
+from dolfinx import fem, io
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
@@ -16,6 +17,9 @@ from macro.contact.unilateral_problem import UnilateralContactProblem, Unilatera
 from macro.mesh.contact_face import top_facets
 
 Array = NDArray[np.float64]
+
+_FILES_NOT_CLOSED: list[Any] = []
+"""XDMF files that could not be closed, referenced so that no destructor runs before exit."""
 
 _ZERO = 1e-9
 """Value below which a basis function counts as zero at a node."""
@@ -55,7 +59,7 @@ def write_fields(
     loaded = cells[facets.cell]
     pressures.x.array[loaded] = total[loaded] / facets.area
     pressures.x.scatter_forward()
-    compat.write_xdmf(str(path), mesh, [shown, pressures])
+    _write_xdmf(str(path), mesh, [shown, pressures])
 
 
 def write_rough_fields(
@@ -84,7 +88,7 @@ def write_rough_fields(
     pressures = _interpolated(
         compat.scalar_space(mesh, degree), _vertex_pressures(problem, state), "pressure"
     )
-    compat.write_xdmf(str(path), mesh, [displacements, pressures])
+    _write_xdmf(str(path), mesh, [displacements, pressures])
 
 
 def _vertex_pressures(problem: UnilateralContactProblem, state: UnilateralContactState) -> Any:
@@ -123,3 +127,17 @@ def _interpolated(space: Any, function: Any, name: str) -> Any:
     other = fem.Function(space, name=name)
     other.interpolate(function)
     return other
+
+
+def _write_xdmf(path: str, mesh: Any, functions: Sequence[Any]) -> None:
+    """Write a mesh and functions of its degree, or constant on cells, as XDMF with HDF5."""
+    file = io.XDMFFile(mesh.comm, path, "w")
+    try:
+        file.write_mesh(mesh)
+        for function in functions:
+            file.write_function(function)
+        file.close()
+    except RuntimeError:
+        # On a full disk it cannot be closed, and its destructor would end the process
+        _FILES_NOT_CLOSED.append(file)
+        raise

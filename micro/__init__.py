@@ -6,17 +6,17 @@ given asperities, `ScaledModel` asperities whose curvature follows the load, and
 regions above the plane. `micro_model` makes any of them by name, and `choose` the cheapest one that
 keeps a tolerance.
 
-    closed_forms                                      Hertz, Love, Boussinesq
+    closed_forms                                      Hertz, Love
     compliance → contact → half_space                 the contact problem on cells
     interaction → islands, asperities                 contacts that interact pair by pair
-    factory → choice                                  models by name and by accuracy
+    choice                                            models by name and by accuracy
 """
 
 from geometry.rigid_plane import RigidPlane
-from micro.asperities.contacts import SOLVERS, AsperityState
-from micro.asperities.model import MODELS, AsperityModel, ModelKind, asperity_model
+from micro.asperities.contacts import SOLVERS
+from micro.asperities.model import MODELS, AsperityModel
 from micro.asperities.scaled_model import BORDERS, CURVATURES, ScaledModel
-from micro.choice.candidates import Candidate
+from micro.choice.models import MODEL_NAMES, START_KINDS, micro_model
 from micro.choice.selection import Choice, choose
 from micro.closed_forms.hertz import HertzContact
 from micro.closed_forms.love import influence_matrix
@@ -30,14 +30,11 @@ from micro.compliance.rectangle_modes import (
     side_stress_modes,
 )
 from micro.compliance.side_cells import SideStresses, side_stresses
-from micro.factory import MODEL_NAMES, START_KINDS, micro_model
 from micro.half_space.contact_spots import Contacts, find_contacts
 from micro.half_space.model import HalfSpaceModel
 from micro.half_space.plane_contact import HalfSpaceState
 from micro.islands.model import IslandModel
-from micro.islands.shapes import IslandState
-from micro.model import MicroModel
-from micro.response import Pressed, Response
+from micro.model import MicroModel, Pressed, Response
 
 __all__ = [
     "BORDERS",
@@ -47,10 +44,8 @@ __all__ = [
     "SOLVERS",
     "START_KINDS",
     "AsperityModel",
-    "AsperityState",
     "BodyModes",
     "BodyStresses",
-    "Candidate",
     "Choice",
     "Contacts",
     "FiniteSlopes",
@@ -59,16 +54,13 @@ __all__ = [
     "HalfSpaceState",
     "HertzContact",
     "IslandModel",
-    "IslandState",
     "MicroModel",
-    "ModelKind",
     "Pressed",
     "Response",
     "RigidPlane",
     "ScaledModel",
     "SideStresses",
     "SurfaceStress",
-    "asperity_model",
     "choose",
     "coarse_grid",
     "find_contacts",

@@ -1,17 +1,20 @@
-"""The protocol of all micro models, and the checks of the arguments that they share."""
+"""The protocol of all micro models, their response, and the checks of arguments that they share."""
 
 from __future__ import annotations
 
-from typing import Any, Protocol, Self
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geometry import Asperities, Control, Partition, PatchGrid, Surface, patch_means
 from geometry.errors import InputError
-from micro.response import Pressed, Response
+from geometry.rigid_plane import RigidPlane
 
 Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
 
 
 class MicroModel(Protocol):
@@ -102,6 +105,129 @@ class MicroModel(Protocol):
         """
 
 
+class Pressed(NamedTuple):
+    """The result of one load step.
+
+    Attributes:
+        response: The response, of one row.
+        plane: The plane in equilibrium.
+        start: Initial guess of the same model for a load step nearby.
+    """
+
+    response: Response
+    plane: RigidPlane
+    start: Any
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Response:
+    """Results at n approaches on N patches.
+
+    The separation of a patch is the average gap between the plane and the *displaced* surface,
+    g_i = z_M − mean height − mean approach + mean displacement. The paper's eq. 9 leaves the
+    displacement out. It is the displacement by the model's pressures, to the errors stated in
+    `micro.interaction.patch_sums`, also for the models without interaction.
+
+    Args:
+        model: Name of the micro model.
+        contact_modulus: E* [MPa].
+        nominal_area: Area of all patches [mm²].
+        approach: Rigid approach at the centre, counted from first touch, shape (n,) [mm].
+        force: Normal force, shape (n,) [N].
+        moment: First moments Σ P (x − xc), Σ P (y − yc) of the pressures about the centre of the
+            surface's rectangle, shape (n, 2) [N mm].
+        contact_area: Real contact area, shape (n,) [mm²].
+        contacts: Number of asperities in contact, shape (n,).
+        mean_separation: Average gap, shape (n,) [mm].
+        iterations: Iterations of the solver, shape (n,).
+        residual: Complementarity error relative to the largest interference, shape (n,).
+        overlapping_contacts: Number of pairs of contacts that have grown into each other, (n,).
+        patch_force: Force on the patch, contacts across its border shared, shape (n, N) [N].
+        patch_contact_area: Real contact area in the patch, shared likewise, shape (n, N) [mm²].
+        patch_contacts: Number of contacts with their summit in the patch, shape (n, N).
+        patch_displacement: Mean normal displacement of the patch by all contacts, (n, N) [mm].
+        patch_separation: Average gap of the patch, shape (n, N) [mm].
+        warning: Why the approach lies outside the model's range of validity, shape (n,); empty
+            within it.
+    """
+
+    model: str
+    contact_modulus: float
+    nominal_area: float
+    approach: Array
+    force: Array
+    moment: Array
+    contact_area: Array
+    contacts: Counts
+    mean_separation: Array
+    iterations: Counts
+    residual: Array
+    overlapping_contacts: Counts
+    patch_force: Array
+    patch_contact_area: Array
+    patch_contacts: Counts
+    patch_displacement: Array
+    patch_separation: Array
+    warning: NDArray[np.str_]
+
+    @classmethod
+    def of(
+        cls,
+        rows: Sequence[dict[str, Any]],
+        model: str,
+        contact_modulus: float,
+        patches: Partition,
+    ) -> Self:
+        """Put together the fields at single approaches, in their order.
+
+        Args:
+            rows: For each approach the fields that have one entry per approach.
+            model: Name of the micro model.
+            contact_modulus: E* [MPa].
+            patches: The patches.
+        """
+        columns = {key: np.array([row[key] for row in rows]) for key in rows[0]}
+        return cls(
+            model=model,
+            contact_modulus=contact_modulus,
+            nominal_area=float(np.prod(patches.sides)),
+            **columns,
+        )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """A sentence for each approach that lies outside the model's range of validity."""
+        return tuple(str(sentence) for sentence in self.warning if sentence)
+
+    @property
+    def mean_pressure(self) -> Array:
+        """Force per nominal area, shape (n,) [MPa]."""
+        return np.divide(self.force, self.nominal_area)
+
+    @property
+    def patch_pressure(self) -> Array:
+        """Force per area of each of N equal patches, shape (n, N) [MPa]."""
+        return self.patch_force * (self.patch_force.shape[1] / self.nominal_area)
+
+    @property
+    def contact_area_fraction(self) -> Array:
+        """Real over nominal contact area A/A0, shape (n,)."""
+        return np.divide(self.contact_area, self.nominal_area)
+
+    def kappa(self, rms_slope: float) -> Array:
+        """Return κ of A/A0 = κ p/(rms slope · E*), shape (n,); NaN where nothing touches.
+
+        Args:
+            rms_slope: Root of the mean squared gradient of the surface, sqrt<|∇h|²>.
+
+        Source:
+            Waddad et al. 2016, section 2.2, doi 10.1016/j.triboint.2015.12.023.
+        """
+        area = self.contact_area_fraction * rms_slope * self.contact_modulus
+        result = np.full_like(area, np.nan)
+        return np.divide(area, self.mean_pressure, out=result, where=self.force > 0.0)
+
+
 def whole_patch(rough: Surface | Asperities) -> PatchGrid:
     """Return the single patch that a surface's rectangle is."""
     return PatchGrid(grid=(1, 1), lengths=rough.lengths)
@@ -114,12 +240,7 @@ def checked_approaches(approaches: ArrayLike) -> Array:
         InputError: When they are no finite, non-empty list of numbers.
     """
     allowed = "a number or a list of finite numbers in mm"
-    try:
-        given = np.atleast_1d(np.asarray(approaches, float))
-    except (TypeError, ValueError):
-        raise InputError(
-            "the approaches are no numbers", value=approaches, allowed=allowed
-        ) from None
+    given = np.atleast_1d(_numbers(approaches, "the approaches are no numbers", allowed))
     if given.size == 0:
         raise InputError("a response needs at least one approach", value=[])
     if given.ndim != 1:
@@ -156,14 +277,16 @@ def checked_patches(
         )
     mean_heights = [rough.mean_height] if mean_heights is None else mean_heights
     allowed = f"shape ({patches.count},)"
-    try:
-        means = np.asarray(mean_heights, float)
-    except (TypeError, ValueError):
-        raise InputError(
-            "the mean heights are no numbers", value=mean_heights, allowed=allowed
-        ) from None
+    means = _numbers(mean_heights, "the mean heights are no numbers", allowed)
     if means.shape != (patches.count,):
         raise InputError("every patch needs one mean height", value=means.shape, allowed=allowed)
     if not np.isfinite(means).all():
         raise InputError("a mean height is not finite", value=means.tolist(), allowed="mm")
     return patches, means
+
+
+def _numbers(values: ArrayLike, problem: str, allowed: str) -> Array:
+    try:
+        return np.asarray(values, float)
+    except (TypeError, ValueError):
+        raise InputError(problem, value=values, allowed=allowed) from None

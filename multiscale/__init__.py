@@ -3,66 +3,40 @@
 A `Scene` becomes a problem setup: surface, summits, patches and micro model. The micro model gives
 every patch its law, and the laws act on the flat interface of an elastic block. The load steps
 become a `History`. A reference meshes the rough surface itself instead, and measures its own error.
+
+The public names and their modules stand in the stub ``__init__.pyi``, which editors and type
+checkers read too. A module is imported with the first use of one of its names, for speed.
 """
 
 from __future__ import annotations
 
+import ast
 import sys
+from functools import cache
 from importlib import import_module
+from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-# ruff: noqa: F401
-if TYPE_CHECKING:  # for editors and type checkers; at run time `_HOMES` says where names are
-    from multiscale.comparison.compare import compare
-    from multiscale.comparison.comparison import Comparison
-    from multiscale.couplings.condensed import CondensedCoupling
-    from multiscale.couplings.reference import ReferenceCoupling
-    from multiscale.laws.consistent import consistent_laws
-    from multiscale.laws.files import read_laws, write_laws
-    from multiscale.laws.isolated import isolated_laws
-    from multiscale.laws.law_table import LawTable, PatchLaws
-    from multiscale.laws.patch_law import PatchLaw
-    from multiscale.loading.load_step import LoadStep
-    from multiscale.loading.stepper import LoadHistory, load_steps
-    from multiscale.planning.problem_setup import make_setup
-    from multiscale.results.extrapolation import extrapolated
-    from multiscale.results.history import History
-    from multiscale.run import Run, run
-    from multiscale.scene.scene import Scene
 
-_MODULES = {
-    "comparison.compare": "compare",
-    "comparison.comparison": "Comparison",
-    "couplings.condensed": "CondensedCoupling",
-    "couplings.reference": "ReferenceCoupling",
-    "laws.consistent": "consistent_laws",
-    "laws.files": "read_laws write_laws",
-    "laws.isolated": "isolated_laws",
-    "laws.law_table": "LawTable PatchLaws",
-    "laws.patch_law": "PatchLaw",
-    "loading.load_step": "LoadStep",
-    "loading.stepper": "LoadHistory load_steps",
-    "planning.problem_setup": "make_setup",
-    "results.extrapolation": "extrapolated",
-    "results.history": "History",
-    "run": "Run run",
-    "scene.scene": "Scene",
-}
-_HOMES = {name: module for module, names in _MODULES.items() for name in names.split()}
-"""Module of every public name, which is imported with the first use of the name, for speed."""
-
-__all__ = sorted(_HOMES)
+@cache
+def _homes() -> dict[str, str]:
+    """Return the module of every public name, as the stub says."""
+    stub = ast.parse(Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
+    imports = [node for node in stub.body if isinstance(node, ast.ImportFrom)]
+    return {alias.name: str(node.module) for node in imports for alias in node.names}
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    if name == "__all__":
+        return sorted(_homes())
+    if name not in _homes():
         raise AttributeError(f"module 'multiscale' has no attribute '{name}'")
-    return getattr(import_module(f"multiscale.{_HOMES[name]}"), name)
+    return getattr(import_module(_homes()[name]), name)
 
 
 def __dir__() -> list[str]:
-    return __all__
+    return sorted(_homes())
 
 
 class _Package(ModuleType):

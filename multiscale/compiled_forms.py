@@ -63,9 +63,9 @@ def cache(comm: Any, folder: Path | None = None) -> CheckResult:
         folder: Folder of the cache; by default dolfinx's.
     """
     from macro import form_cache as jit
-    from macro.compat import form_cache
+    from macro.compat import form_folder
 
-    folder = folder or form_cache()
+    folder = folder or form_folder()
     compiled, writable = _compiled(folder), jit.writable(folder)
     slowest = max(gathered(comm, _small_file_seconds(folder) if writable else 0.0))
     fewest = min(gathered(comm, compiled))
@@ -188,9 +188,9 @@ def warm(elements: Sequence[str], comm: Any = None) -> tuple[Path, int]:
 
     def compile_all() -> tuple[Path, int]:
         from macro import form_cache as jit
-        from macro.compat import form_cache
+        from macro.compat import form_folder
 
-        folder = form_cache()
+        folder = form_folder()
         if jit.writable(folder):
             for source in jit.stale_locks(folder):
                 source.unlink(missing_ok=True)

@@ -169,8 +169,16 @@ def memory_of_this_node(groups: Iterable[tuple[float, float]] | None = None) -> 
 
 
 def peak_memory() -> float:
-    """Return the largest memory of this process so far [B]."""
-    return 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    """Return the largest resident memory of this process so far [B].
+
+    Linux counts the memory of the parent at the fork into ``ru_maxrss``. The high-water mark of
+    the process itself starts with the program.
+    """
+    try:
+        status = Path("/proc/self/status").read_text(encoding="utf-8")
+        return 1024.0 * int(status.split("VmHWM:")[1].split()[0])
+    except (OSError, IndexError):
+        return 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,6 +14,8 @@ was within the measured one on 95 %, which was 3.4 × the true one.
 The factors of finite slopes were set against three meshes of the rough block. The force was off by
 0.02 to 0.3 % on Sets 1 and 2 of Waddad et al. 2016 and on a cap in the middle and near a side,
 where error bars were so small, and by 1.4 % on a cap that a side cuts in half.
+
+Theory: demos/theory.md, section 13.
 """
 
 from __future__ import annotations
@@ -26,9 +28,8 @@ from typing import Any
 from geometry import Control
 from geometry.collective import on_root
 from micro import BodyModes, FiniteSlopes, HalfSpaceModel, HalfSpaceState
-from multiscale.couplings.blocks import SLOPES, OnBody
+from multiscale.couplings.contact import SLOPES, OnBody
 from multiscale.loading.load_step import LoadStep
-from multiscale.loading.stepper import LoadHistory
 from multiscale.setup.problem import ProblemSetup
 
 _FINER, _COARSER, _TWICE = 1.5, 1 / 8, 1 / 30
@@ -217,13 +218,13 @@ def error_probe(setup: ProblemSetup, body: OnBody) -> ErrorProbe:
     return ErrorProbe(model=model, on_body=body, order=order, by_laws=setup.uses_laws)
 
 
-def checked(step: LoadStep, probe: ErrorProbe, load_history: LoadHistory, comm: Any) -> LoadStep:
+def checked(step: LoadStep, setup: ProblemSetup, body: OnBody, comm: Any) -> LoadStep:
     """Return a load step with its errors measured; rank 0 solves for all.
 
     Args:
         step: The load step.
-        probe: What measures.
-        load_history: What is prescribed of the plane.
+        setup: The problem, with a half-space model.
+        body: Puts this model on the scene's body, see `on_body`.
         comm: MPI communicator; None for this process alone.
 
     Raises:
@@ -232,6 +233,7 @@ def checked(step: LoadStep, probe: ErrorProbe, load_history: LoadHistory, comm: 
     Note:
         Collective.
     """
+    load_history, probe = setup.scene.loading.load_history, error_probe(setup, body)
     by_force, turns = load_history.quantity == "force", load_history.tilt is None
     plane = step.force_N, step.approach_mm, step.tilt
     found = on_root(comm, lambda: probe.measure(*plane, turns=turns, stiffness=by_force))

@@ -11,19 +11,17 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
+from geometry import NotConverged
 from geometry.collective import on_root
-from geometry.errors import NotConverged
 from micro import HalfSpaceModel, MicroModel
-from multiscale.couplings import blocks
-from multiscale.couplings.assembly import assemble, make_table, meshed_blocks
-from multiscale.couplings.load_steps import EmbeddedCoupling
-from multiscale.laws.files import law_bytes, read_laws
-from multiscale.laws.law_table import LawTable
+from multiscale.couplings import assembly
+from multiscale.couplings.contact import OnBody, contact_model, on_body
+from multiscale.couplings.law_couplings import EmbeddedCoupling
+from multiscale.laws.law_table import LawTable, law_bytes, read_laws
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling, LoadPosition, LoadStepper, Restorable
 from multiscale.machine import cluster_nodes, large_object_comm
-from multiscale.measured_errors import checked, error_probe
-from multiscale.notes import noted_history
+from multiscale.measured_errors import checked, error_notes
 from multiscale.planning.auto_keys import resolved_sections
 from multiscale.planning.problem_setup import make_setup
 from multiscale.results.history import History
@@ -66,39 +64,41 @@ class Run:
         self.coupling: Coupling | None = None
         self._start: Arrays = {}
         self._notes: list[str] = []
-        self._on_body: blocks.OnBody | None = None
-        blocks.load_finite_elements(scene, comm)
+        self._on_body: OnBody | None = None
+        assembly.load_finite_elements(scene, comm)
         nodes, large = cluster_nodes(comm), large_object_comm(comm)
         self.setup: ProblemSetup = on_root(large, lambda: make_setup(scene, resolved, nodes))
         self.scene, self.seconds = self.setup.scene, dict(self.setup.seconds)
 
-    def make_body(self) -> blocks.OnBody | None:
+    def make_body(self) -> OnBody | None:
         """Make what puts the half-space model on its body, once; None for other micro models."""
         if self._on_body is None and isinstance(self.setup.micro, HalfSpaceModel):
             with self.phase("block"):
-                self._on_body = blocks.on_body(self.setup, self.comm)
+                self._on_body = on_body(self.setup, self.comm)
         return self._on_body
 
     def make_model(self) -> MicroModel:
         """Make the micro model that contacts are solved with, on the body unless isolated."""
         body = None if self.scene.coupling.kind == "isolated" else self.make_body()
         with self.phase("block"):
-            return blocks.contact_model(self.setup, self.comm, body)
+            return contact_model(self.setup, self.comm, body)
 
     def make_laws(self) -> LawTable:
         """Tabulate the laws of all patches, once."""
         if self.table is None:
             model = self.make_model()
             with self.phase("laws"):
-                self.table = make_table(self.setup, model, self.comm)
+                self.table = assembly.make_table(self.setup, model, self.comm)
         return self.table
 
     def make_coupling(self) -> Coupling:
         """Make what finds the load steps, once, and what it needs."""
         if self.coupling is None:
             with self.phase("block"):
-                make = self.make_laws if self.setup.uses_laws else self.make_model
-                coupling = assemble(self.setup, make, self.comm)
+                made: LawTable | MicroModel | None = None
+                if self.setup.micro is not None:
+                    made = self.make_laws() if self.setup.uses_laws else self.make_model()
+                coupling = assembly.assemble(self.setup, made, self.comm)
                 if self._start and isinstance(coupling, Restorable):
                     coupling.restore(self._start)
                 self.coupling = coupling
@@ -125,8 +125,7 @@ class Run:
             return step
         with self.phase("check"):
             try:
-                probe, loads = error_probe(self.setup, body), self.scene.loading.load_history
-                return checked(step, probe, loads, self.comm)
+                return checked(step, self.setup, body, self.comm)
             except NotConverged as error:
                 self._notes.append(f"errors of load step {step.step} not measured: {error}")
                 return step
@@ -177,20 +176,20 @@ class Run:
 
     def history(self) -> History:
         """Return the load steps accepted so far, with times and notes."""
-        return noted_history(
-            self.setup,
-            self.steps,
-            coupling=self.coupling,
-            table=self.table,
-            accuracy=self.given.accuracy,
-            seconds=self.seconds,
-            notes=self._notes,
+        steps, record, mesh_notes = assembly.with_mesh_errors(self.coupling, self.steps)
+        notes = [*assembly.approximation_notes(self.setup, self.table, self.steps), *self._notes]
+        return History(
+            steps=steps,
+            patches=self.setup.patches,
+            seconds=dict(self.seconds),
+            notes=(*notes, *error_notes(self.steps, self.given.accuracy), *mesh_notes),
+            reference=record,
         )
 
     @property
     def unknowns(self) -> int | None:
         """Degrees of freedom of the mesh that load steps are solved on, where there is one."""
-        meshed = meshed_blocks(self.coupling)
+        meshed = assembly.meshed_blocks(self.coupling)
         return meshed[-1].dofs if meshed else None
 
     def last_field(self) -> tuple[Interface, NDArray]:
@@ -200,8 +199,9 @@ class Run:
         """
         if isinstance(self.coupling, EmbeddedCoupling):
             return self.coupling.interface, self.coupling.displacement
+        pressure = self.steps[-1].patches.pressure_MPa
         with self.phase("field"):
-            return blocks.field_under(self.setup, self.steps[-1].patches.pressure_MPa, self.comm)
+            return assembly.field_under(self.setup, pressure, self.comm)
 
     def close(self) -> None:
         """Free the blocks. Accepted load steps stay, fields are gone.
@@ -209,8 +209,8 @@ class Run:
         Note:
             Collective.
         """
-        meshed, self.coupling = meshed_blocks(self.coupling), None
-        blocks.free_blocks(meshed)
+        meshed, self.coupling = assembly.meshed_blocks(self.coupling), None
+        assembly.free_blocks(meshed)
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:

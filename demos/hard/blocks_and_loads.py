@@ -13,10 +13,9 @@ from geometry import BlockShape, PatchGrid
 from geometry.rigid_plane import Control
 from macro import Block, Material, block_mesh
 from micro import influence_matrix
-from multiscale.couplings.dense_newton import DenseNewton
-from multiscale.laws.files import repaired_law
-from multiscale.laws.law_table import PatchLaws
-from multiscale.laws.patch_law import PatchLaw
+from multiscale.couplings.condensed import equilibrium
+from multiscale.laws.law_table import repaired_law
+from multiscale.laws.patch_law import PatchLaw, PatchLaws
 from multiscale.laws.rows import LawRows
 
 LAPS, MODULI, UNITS = 10, (4e9, 1e3, 1e12), {"m": 1e3, "um": 1e-3}
@@ -139,7 +138,7 @@ def on_laws(points: tuple[Any, Any], control: Control) -> tuple[Any, ...]:
     patches = PatchGrid(grid=(4, 4), lengths=(1.0, 1.0))
     laws = PatchLaws([law(*points, shift) for shift in np.linspace(0.0, 4e-3, 16)])
     yields = influence_matrix(patches) / (np.pi * 4092.0)
-    state = DenseNewton(laws, yields, patches).solve(control)
+    state = equilibrium(laws, yields, patches, control)
     point = laws.along(state.local)
     lacks = np.abs(point.closure + yields @ point.pressure - state.plane[0]).max()
     lacks /= abs(state.plane[0])

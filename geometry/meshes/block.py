@@ -131,54 +131,52 @@ class BlockShape:
         return np.concatenate([before.ticks[:-1], inner, after.ticks[1:]])
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Alignment:
-    """Whether the borders of patches lie on borders of elements.
+def require_inside(interface: tuple[float, float], patches: PatchGrid) -> None:
+    """Refuse patches that reach beyond a contact interface.
 
     Args:
-        x: Whether they do along x.
-        y: Whether they do along y.
-        sentence: What that means, for people.
+        interface: Sides (Lx, Ly) of the interface, which begins at the origin [mm].
+        patches: The patches.
+
+    Raises:
+        InputError: When they do.
     """
+    low, high = np.array(patches.origin), np.array(patches.origin) + patches.lengths
+    slack = 1e-9 * np.array(interface)
+    if np.any(low < -slack) or np.any(high > interface + slack):
+        raise InputError(
+            "the patches reach beyond the top of the block",
+            value=(patches.origin, patches.lengths),
+            allowed=f"inside the interface {interface} mm",
+        )
 
-    x: bool
-    y: bool
-    sentence: str
 
-    def __bool__(self) -> bool:
-        return self.x and self.y
-
-
-def alignment(shape: BlockShape, patches: PatchGrid) -> Alignment:
-    """Find out whether patch borders lie on element borders, and say so.
+def misalignment(shape: BlockShape, patches: PatchGrid) -> str:
+    """Say where the borders of patches cut elements.
 
     Args:
         shape: The block.
         patches: Patches on its interface.
 
+    Returns:
+        A sentence; empty where all borders of patches lie on borders of elements.
+
     Raises:
         InputError: When a patch reaches beyond the interface.
     """
-    fits, parts = [], []
+    require_inside(shape.interface, patches)
+    parts = []
     for axis, borders in enumerate((patches.borders_x, patches.borders_y)):
-        length, cells, letter = shape.interface[axis], shape.cells[axis], "xy"[axis]
-        if borders[0] < -1e-9 * length or borders[-1] > (1.0 + 1e-9) * length:
-            raise InputError(
-                f"the patches reach beyond the interface along {letter}",
-                value=(float(borders[0]), float(borders[-1])),
-                allowed=f"0 … {length} mm",
-            )
-        position = borders / length * cells
-        fits.append(bool(np.allclose(position, np.round(position), rtol=0.0, atol=1e-6)))
-        if not fits[-1]:
+        cells, letter = shape.cells[axis], "xy"[axis]
+        position = borders / shape.interface[axis] * cells
+        if not np.allclose(position, np.round(position), rtol=0.0, atol=1e-6):
             parts.append(f"{letter} ({patches.grid[axis]} patches on {cells} cells)")
     if not parts:
-        return Alignment(x=True, y=True, sentence="patch borders lie on element borders")
-    sentence = (
+        return ""
+    return (
         f"patch borders cut elements along {' and '.join(parts)}; "
         "a multiple of the number of patches would align them"
     )
-    return Alignment(x=fits[0], y=fits[1], sentence=sentence)
 
 
 def _require_at_least(what: str, value: float, least: float, *, strict: bool = False) -> None:

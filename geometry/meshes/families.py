@@ -16,6 +16,7 @@ tetrahedra err by 3.4 % with n = 6, at the cost of quadratic ones with n = 2.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
@@ -25,6 +26,7 @@ from scipy.ndimage import distance_transform_edt
 from geometry.errors import InputError
 from geometry.meshes.block import BlockShape
 from geometry.meshes.refined_block import RefinedShape
+from geometry.rigid_plane import RigidPlane
 from geometry.surface import Surface
 
 Array = NDArray[np.float64]
@@ -84,7 +86,8 @@ def reference_shapes(
     factors = [_SPAN ** (k / max(count - 1, 1)) for k in reversed(range(count))]
     if mesh == "hexahedra":
         finest = _hexahedra(surface, height, cells, grading, element or "Q1")
-        return _all_finer(tuple(_coarsened(finest, factor) for factor in factors))
+        counts = np.maximum(1, np.rint(np.outer(1.0 / np.array(factors), finest.cells))).astype(int)
+        return _all_finer(tuple(replace(finest, cells=tuple(row)) for row in counts))
     if mesh != "tetrahedra":
         raise InputError(
             "these cells are unknown", value=mesh, allowed=", ".join(map(repr, get_args(Cells)))
@@ -140,26 +143,30 @@ def places_in_reach(
     )
     lattice = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     grid = np.vstack([lattice, surface.highest_point])
-    depth = depth_below_plane(surface, grid, approach, tilt)
+    depth = depth_below_plane(surface, grid[:, 0], grid[:, 1], approach, tilt)
     return grid[depth >= min(0.0, float(depth.max()))]
 
 
 def depth_below_plane(
-    surface: Surface, points: Array, approach: float, tilt: tuple[float, float] = (0.0, 0.0)
+    surface: Surface, x: Array, y: Array, approach: float, tilt: tuple[float, float] = (0.0, 0.0)
 ) -> Array:
     """Return the interference of the undeformed surface and the rigid plane [mm].
 
     Args:
         surface: The rough surface.
-        points: Places on it, shape (…, 2) [mm].
+        x: Abscissae [mm].
+        y: Ordinates, broadcast with the abscissae [mm].
         approach: Approach at the middle of the surface, from first touch of a level plane [mm].
         tilt: Slopes of the approach along x and y.
 
     Returns:
-        Interference, shape (…); negative where there is a gap.
+        Interference at every place; negative where there is a gap.
+
+    Raises:
+        InputError: When a value is not finite.
     """
-    offset = (points - 0.5 * np.array(surface.lengths)) @ np.array(tilt)
-    return surface.height_at(points[..., 0], points[..., 1]) - surface.highest + approach + offset
+    plane = RigidPlane.above(surface, approach, tilt)
+    return surface.height_at(x, y) - surface.highest + plane.at(x, y)
 
 
 def suggested_fine(
@@ -206,15 +213,11 @@ def contact_radius(
     Raises:
         InputError: When a value is not finite.
     """
-    if not np.isfinite([approach, *tilt]).all():
-        raise InputError("approach and tilt must be finite", value=(approach, *tilt))
     x, y = (
         np.linspace(0.0, length, min(max(256, 2 * n), 1024) + 1)
         for length, n in zip(surface.lengths, surface.grid, strict=True)
     )
-    plane = tilt[0] * (x[:, None] - 0.5 * x[-1]) + tilt[1] * (y - 0.5 * y[-1])
-    heights = surface.height_at(x[:, None], y[None, :])
-    depth = heights - surface.highest + approach + plane
+    depth = depth_below_plane(surface, x[:, None], y[None, :], approach, tilt)
     level = float(np.quantile(depth, 1.0 - _MERGING))
     inside = depth >= level if level > 0.0 else depth > 0.0
     least = max(surface.spacing)
@@ -265,18 +268,6 @@ def _hexahedra(
         raise InputError("not an element of hexahedra", value=element, allowed="Q1, Q2")
     return BlockShape(
         interface=surface.lengths, height=height, cells=cells, grading=grading, element=element
-    )
-
-
-def _coarsened(finest: BlockShape, factor: float) -> BlockShape:
-    """Return a block of fewer cells, graded alike."""
-    nx, ny, nz = (max(1, round(n / factor)) for n in finest.cells)
-    return BlockShape(
-        interface=finest.interface,
-        height=finest.height,
-        cells=(nx, ny, nz),
-        grading=finest.grading,
-        element=finest.element,
     )
 
 

@@ -86,14 +86,18 @@ def lattice_part(cells: Counts, ranks: int, rank: int) -> Part:
         Recursive bisection: Berger, Bokhari, IEEE Transactions on Computers C-36 (1987) 570,
         doi 10.1109/TC.1987.1676942.
     """
-    part = _whole(cells)
+    x, y, z = map(range, cells)
+    part = [x, y, z]
     while ranks > 1:
-        lower, upper, few = _halves(part, ranks)
+        few = ranks // 2
+        longest = max(part, key=len)
+        axis = part.index(longest)
+        cut = (2 * len(longest) * few + ranks) // (2 * ranks)  # to the nearest layer
         if rank < few:
-            part, ranks = lower, few
+            part[axis], ranks = longest[:cut], few
         else:
-            part, ranks, rank = upper, ranks - few, rank - few
-    return part
+            part[axis], ranks, rank = longest[cut:], ranks - few, rank - few
+    return part[0], part[1], part[2]
 
 
 def cells_beyond(cells: Counts, ranks: int, part: Part) -> tuple[Numbers, Numbers]:
@@ -108,43 +112,22 @@ def cells_beyond(cells: Counts, ranks: int, part: Part) -> tuple[Numbers, Number
         Numbers of cells in the part, in the order of `lattice_cells`, and the ranks beyond their
         faces, shapes (n,); cells at edges of the part come more than once, with different ranks.
     """
-    size = [len(of) for of in part]
-    numbers = np.arange(np.prod(size)).reshape(size)
+    numbers = np.arange(np.prod([len(of) for of in part])).reshape([len(of) for of in part])
     found, others = [numbers[:0].ravel()], [numbers[:0].ravel()]
-    for axis, of in enumerate(part):
-        for last, beyond in ((0, of.start - 1), (-1, of.stop)):
-            if numbers.size and 0 <= beyond < cells[axis]:
-                layer = [np.array(each) for each in part]
-                layer[axis] = np.array([beyond])
-                places = np.stack(np.meshgrid(*layer, indexing="ij"), axis=-1).reshape(-1, 3)
-                found.append(numbers.take([last], axis=axis).ravel())
-                others.append(_ranks_at(_whole(cells), 0, ranks, places))
+    for rank in range(ranks):
+        beyond = lattice_part(cells, ranks, rank)
+        steps = [*np.eye(3, dtype=int), *-np.eye(3, dtype=int)] if beyond != part else []
+        for step in steps:
+            near = tuple(map(_common, part, beyond, step))
+            found.append(numbers[near].ravel())
+            others.append(np.full(len(found[-1]), rank))
     return np.concatenate(found), np.concatenate(others)
 
 
-def _whole(cells: Counts) -> Part:
-    return range(cells[0]), range(cells[1]), range(cells[2])
-
-
-def _halves(part: Part, ranks: int) -> tuple[Part, Part, int]:
-    """Return two parts of a part for half the ranks each, and the number of the lower ones."""
-    few = ranks // 2
-    axis = max(range(3), key=lambda k: len(part[k]))
-    cut = (2 * len(part[axis]) * few + ranks) // (2 * ranks)  # to the nearest layer
-    lower, upper = list(part), list(part)
-    lower[axis], upper[axis] = part[axis][:cut], part[axis][cut:]
-    return (lower[0], lower[1], lower[2]), (upper[0], upper[1], upper[2]), few
-
-
-def _ranks_at(part: Part, first: int, ranks: int, places: Numbers) -> Numbers:
-    """Return who of some ranks, who share a part, has the cells at some places (n, 3)."""
-    found = np.full(len(places), first)
-    if ranks > 1 and len(places):
-        lower, upper, few = _halves(part, ranks)
-        below = np.all([places[:, k] < of.stop for k, of in enumerate(lower)], axis=0)
-        found[below] = _ranks_at(lower, first, few, places[below])
-        found[~below] = _ranks_at(upper, first + few, ranks - few, places[~below])
-    return found
+def _common(one: range, other: range, step: int) -> slice:
+    """Return which cells of one range, counted from its first, come a step before the other's."""
+    first, last = max(one.start, other.start - step), min(one.stop, other.stop - step)
+    return slice(first - one.start, max(first, last) - one.start)
 
 
 def lattice_cells(cells: Counts, part: Part, *, hexahedra: bool) -> Numbers:

@@ -104,9 +104,9 @@ class RefinedShape:
     def meshed(self) -> Iterator[Any]:
         """Mesh the block in gmsh for as long as the context lasts.
 
-        The cells form the physical volume ``block`` (1); the physical surfaces are ``bottom`` (1),
-        ``top`` (2) and ``sides`` (3). The geometry has the order of the element, and its lengths
-        are in `unit`. A gmsh session of the caller goes on afterwards, with its model and options.
+        The cells form the physical volume 1. The geometry has the order of the element, and its
+        lengths are in `unit`. A gmsh session of the caller goes on afterwards, with its model and
+        options.
         """
         width, depth, height, fine, coarse = (
             float(f"{length / self.unit:.{_DIGITS}g}")
@@ -120,26 +120,11 @@ class RefinedShape:
         with gmsh_session("patchlaw refined block") as gmsh:
             box = gmsh.model.occ.addBox(0.0, 0.0, -shape.height, *shape.interface, shape.height)
             gmsh.model.occ.synchronize()
-            _name_faces(gmsh, box, shape.height)
+            gmsh.model.addPhysicalGroup(3, [box], 1)
             _set_sizes(gmsh, shape)
             _generate(gmsh, shape)
             gmsh.model.mesh.setOrder(shape.degree)
             yield gmsh.model
-
-
-def _name_faces(gmsh: Any, box: int, height: float) -> None:
-    faces = [tag for _, tag in gmsh.model.getBoundary([(3, box)], oriented=False)]
-    level = {tag: gmsh.model.occ.getCenterOfMass(2, tag)[2] / height for tag in faces}
-    groups = {
-        "bottom": [tag for tag in faces if level[tag] < -0.99],
-        "top": [tag for tag in faces if level[tag] > -0.01],
-        "sides": [tag for tag in faces if -0.99 <= level[tag] <= -0.01],
-    }
-    gmsh.model.addPhysicalGroup(3, [box], 1)
-    gmsh.model.setPhysicalName(3, 1, "block")
-    for tag, (name, members) in enumerate(groups.items(), start=1):
-        gmsh.model.addPhysicalGroup(2, members, tag)
-        gmsh.model.setPhysicalName(2, tag, name)
 
 
 def _generate(gmsh: Any, shape: RefinedShape) -> None:

@@ -1,1 +1,1 @@
-"""What loads on a block's contact face displace there: under patches and in smooth modes."""
+"""What pressures on a block's top displace there, in smooth modes, and the cache on disk."""

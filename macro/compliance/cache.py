@@ -6,6 +6,7 @@ The key includes the sources of the packages that make them: other sources do no
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import tempfile
 from collections.abc import Callable, Mapping
@@ -81,8 +82,7 @@ def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], co
         with suppress(OSError):
             _write(path, made)
             _clear(path.parent)
-    made = large.bcast(made, root=0)
-    return made
+    return large.bcast(made, root=0)
 
 
 @cache
@@ -101,24 +101,17 @@ def sources_digest(top: Path = _TOP) -> str:
 
 def _path(kind: str, key: tuple[object, ...]) -> Path | None:
     directory = cache_directory()
-    words = repr(_spelled((_FORMAT, sources_digest(), kind, key)))
+    words = json.dumps((_FORMAT, sources_digest(), kind, key), default=_spelled)
     digest = hashlib.sha256(words.encode()).hexdigest()[:32]
     return directory / f"{kind}-{digest}.npz" if directory else None
 
 
 def _spelled(value: object) -> object:
-    """Return a value in built-in types, so that its text does not depend on numpy's printing."""
+    """Return what JSON does not know in parts that it knows."""
     if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float):
-        return value.hex()
-    if value is None or isinstance(value, bool | int | str):
-        return value
-    if isinstance(value, tuple | list):
-        return tuple(_spelled(part) for part in value)
+        return value.item()
     if is_dataclass(value) and not isinstance(value, type):
-        parts = ((field.name, _spelled(getattr(value, field.name))) for field in fields(value))
-        return type(value).__name__, *parts
+        return [type(value).__name__, {f.name: getattr(value, f.name) for f in fields(value)}]
     raise TypeError(f"{type(value).__name__} in a key of the cache")
 
 

@@ -2,16 +2,15 @@
 
 On an element, t from −1 to 1, the shape functions are (1 ∓ t)/2 and
 (P_k − P_{k−2}) / √(2(2k − 1)) for k = 2 … p (Szabó & Babuška 1991, ch. 3). The slopes of the latter
-are orthogonal, so that all matrices are nearly diagonal. Functions on a line that is symmetric
-about its start are even or odd: its first element extends beyond the start, and has even or odd
-polynomials only.
+are orthogonal, so that all matrices are nearly diagonal. Across the top there is one element, with
+1 and t in place of the first two: its functions are even and odd in turn, as the modes are.
 
 Theory: section 6 of ``demos/theory.md``.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -46,104 +45,81 @@ _AT_TOP, _BETWEEN, _AT_BOTTOM = 9, 6, 4
 """Degrees along z."""
 
 _COARSER = 2
-"""Degrees less, across and along z, in the division that estimates the error of the usual one."""
+"""Degrees less, across and along z, in the elements that estimate the error of the usual ones."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Line:
-    """A line divided into elements.
-
-    Args:
-        ticks: Borders of the elements, ascending [mm].
-        degrees: Degree of every element, at least 1.
-        parity: 0 for functions even about the first tick, 1 for odd ones; None for any function
-            that vanishes there.
-    """
-
-    ticks: tuple[float, ...]
-    degrees: tuple[int, ...]
-    parity: int | None = None
-
-    @property
-    def unknowns(self) -> NDArray[np.intp]:
-        """Element and degree of the shape functions, element by element, shape (n, 2).
-
-        The first function of an element is 1 at its far end and linear on the next; it counts as of
-        degree 1.
-        """
-        found = []
-        for element, degree in enumerate(self.degrees):
-            inner = range(2, degree + 1)
-            if element == 0 and self.parity is not None:
-                inner = range(2 + self.parity, degree + 1, 2)
-            found += [(element, order) for order in (1, *inner)]
-        return np.array(found)
-
-    @property
-    def end(self) -> int:
-        """Index of the one shape function that does not vanish at the last tick, where it is 1."""
-        return int(np.flatnonzero(self.unknowns[:, 1] == 1)[-1])
-
-    def sampled(self, points: int) -> Sampled:
-        """Return the shape functions at the points of Gauss' rule on every element.
-
-        Args:
-            points: Number of points on an element.
-        """
-        nodes, weights = legendre.leggauss(points)
-        unknowns = self.unknowns
-        first = np.flatnonzero(unknowns[:, 1] == 1)
-        values, slopes = np.zeros((2, len(unknowns), len(self.degrees), points))
-        at, width = np.empty((2, len(self.degrees), points))
-        for element, (low, high) in enumerate(zip(self.ticks, self.ticks[1:], strict=False)):
-            half = 0.5 * (high - low)
-            at[element], width[element] = low + half * (1.0 + nodes), half * weights
-            symmetric = element == 0 and self.parity is not None
-            t, half = (0.5 * (1.0 + nodes), 2.0 * half) if symmetric else (nodes, half)
-            shapes, rises = _shape_functions(t, self.degrees[element])
-            if symmetric:  # the linear function is 1 or t over both halves
-                sign = (1.0, -1.0)[self.parity or 0]
-                shapes[1] += sign * shapes[0]
-                rises[1] += sign * rises[0]
-            elif element:
-                values[first[element - 1], element] = shapes[0]
-                slopes[first[element - 1], element] = rises[0] / half
-            own = np.flatnonzero(unknowns[:, 0] == element)
-            values[own, element] = shapes[unknowns[own, 1]]
-            slopes[own, element] = rises[unknowns[own, 1]] / half
-        flat = len(unknowns), -1
-        return Sampled(at.ravel(), width.ravel(), values.reshape(flat), slopes.reshape(flat))
-
-
-class Sampled(NamedTuple):
-    """Shape functions at the points of a quadrature rule.
+class Line(NamedTuple):
+    """Shape functions along one axis, at the points of Gauss' rule on every element.
 
     Attributes:
-        points: Shape (m,) [mm].
-        weights: Shape (m,) [mm].
+        weights: Weights of the points, shape (m,) [mm].
         values: Values of n functions at the points, shape (n, m).
         slopes: Their slopes, shape (n, m) [1/mm].
+        end: Index of the one function that does not vanish at the last point of the line, where it
+            is 1.
+        modes: Integrals of Legendre modes times the functions, shape (modes, n) [mm]; none along z.
+        mode_slopes: Integrals of the modes times the slopes of the functions, shape (modes, n).
     """
 
-    points: Array
     weights: Array
     values: Array
     slopes: Array
+    end: int
+    modes: Array
+    mode_slopes: Array
+
+    def of_parity(self, odd: int) -> Line:
+        """Return the even (0) or the odd (1) functions of a line across the top."""
+        parts = (self.values[odd::2], self.slopes[odd::2])
+        return Line(self.weights, *parts, 0, self.modes[:, odd::2], self.mode_slopes[:, odd::2])
 
 
-def mode_integrals(line: Line, length: float, count: int, *, slopes: bool = False) -> Array:
-    """Return the integrals of Legendre modes times shape functions, shape (modes, n) [mm].
+def across(length: float, degree: int, count: int) -> Line:
+    """Return the functions of one element across the whole top, even and odd in turn.
 
     Args:
-        line: Elements from the middle to the end of the modes, with a parity.
-        length: Length L of the modes, from 0 [mm].
-        count: Modes K, of which those of the line's parity are taken.
-        slopes: Whether the slopes of the shape functions are taken, whose parity is the opposite.
+        length: Length of the top [mm].
+        degree: Degree of the element, larger than the number of modes.
+        count: Number of Legendre modes to integrate.
     """
-    rule = line.sampled((max(line.degrees) + count) // 2 + 1)
-    parity = ((line.parity or 0) + slopes) % 2
-    modes = mode_values(rule.points, length, count)[parity::2]
-    return np.asarray((modes * rule.weights) @ (rule.slopes if slopes else rule.values).T)
+    t, weights = legendre.leggauss(degree + 1)
+    half = 0.5 * length
+    values, slopes = _shape_functions(t, degree)
+    values[:2], slopes[:2] = [np.ones_like(t), t], [np.zeros_like(t), np.ones_like(t)]
+    weights, slopes = half * weights, slopes / half
+    modes = mode_values(half * (1.0 + t), length, count) * weights
+    odd = np.add.outer(np.arange(count), np.arange(degree + 1)) % 2  # of the product with values
+    integrals = np.where(odd, 0.0, modes @ values.T), np.where(odd, modes @ slopes.T, 0.0)
+    return Line(weights, values, slopes, 0, *integrals)
+
+
+def upwards(ticks: Array, degrees: Sequence[int]) -> Line:
+    """Return the functions of elements along z, which vanish at the first tick.
+
+    Args:
+        ticks: Borders of the elements, ascending, shape (n + 1,) [mm].
+        degrees: Degree of every element, at least 1.
+    """
+    t, weights = legendre.leggauss(max(degrees) + 1)
+    first = np.cumsum([0, *degrees])  # of every element: the function that is 1 at its upper end
+    values, slopes = np.zeros((2, first[-1], len(degrees), len(t)))
+    halves = 0.5 * np.diff(ticks)
+    for element, (degree, half) in enumerate(zip(degrees, halves, strict=True)):
+        shapes, rises = _shape_functions(t, degree)
+        own = slice(first[element], first[element + 1])
+        values[own, element], slopes[own, element] = shapes[1:], rises[1:] / half
+        if element:
+            below = first[element - 1]
+            values[below, element], slopes[below, element] = shapes[0], rises[0] / half
+    flat, none = (len(values), -1), np.empty((0, len(values)))
+    return Line(
+        np.outer(halves, weights).ravel(),
+        values.reshape(flat),
+        slopes.reshape(flat),
+        int(first[-2]),
+        none,
+        none,
+    )
 
 
 def _shape_functions(t: Array, degree: int) -> tuple[Array, Array]:
@@ -156,43 +132,35 @@ def _shape_functions(t: Array, degree: int) -> tuple[Array, Array]:
     return np.concatenate([ends, rest]), np.concatenate([[-even, even], slopes])
 
 
-class Division(NamedTuple):
-    """Elements of a quarter of a block.
-
-    Attributes:
-        x: Along x, from the middle to the side; its parity is not used.
-        y: Along y.
-        z: From the bottom up.
-    """
-
-    x: Line
-    y: Line
-    z: Line
-
-
-def division(
+def block_lines(
     lengths: tuple[float, float], height: float, count: int, *, coarse: bool = False
-) -> Division:
-    """Return elements for modes of pressure: one across the whole top, graded in depth.
+) -> tuple[Line, Line, Line]:
+    """Return functions for modes of pressure: one element across the top, more along z.
 
     Args:
         lengths: Sides of the top [mm].
         height: Height of the block [mm].
         count: Modes along a side of the top.
         coarse: Whether to take lower degrees, to estimate the error of the usual ones.
+
+    Returns:
+        Functions along x, y and z.
     """
     less = _COARSER if coarse else 0
-    x, y = (
-        Line(ticks=(0.5 * length, length), degrees=(count + _MORE - less,), parity=0)
-        for length in lengths
-    )
-    ticks = _levels(lengths, height, count)
+    x, y = (across(length, count + _MORE - less, count) for length in lengths)
+    ticks = levels(lengths, height, count)
     degrees = [_AT_BOTTOM, *(_BETWEEN,) * (len(ticks) - 3), _AT_TOP][-(len(ticks) - 1) :]
-    return Division(x, y, Line(ticks=ticks, degrees=tuple(degree - less for degree in degrees)))
+    return x, y, upwards(ticks, [degree - less for degree in degrees])
 
 
-def _levels(lengths: tuple[float, float], height: float, count: int) -> tuple[float, ...]:
-    """Return the borders of the elements along z, ascending [mm]."""
+def levels(lengths: tuple[float, float], height: float, count: int) -> Array:
+    """Return the borders of the elements along z, ascending [mm].
+
+    Args:
+        lengths: Sides of the top [mm].
+        height: Height of the block [mm].
+        count: Modes along a side of the top.
+    """
     width, step = max(lengths), _TOP * min(lengths) / count
     low = height - _LOW * min(height, width)
     depths = [0.0]
@@ -203,4 +171,4 @@ def _levels(lengths: tuple[float, float], height: float, count: int) -> tuple[fl
         depths.append(low - _END * width)
     if len(depths) > 1 or height > step:
         depths.append(low)
-    return tuple(-depth for depth in reversed([*depths, height]))
+    return -np.array([*depths, height])[::-1]

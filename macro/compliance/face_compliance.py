@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.collective import together
+from geometry.collective import shared
 from geometry.errors import InputError
 from geometry.materials import Material
 from macro.block import Sides
 from macro.compliance.cache import cached
-from macro.compliance.elements import division
-from macro.compliance.quarter import Parity, Quarter, Response
+from macro.compliance.elements import block_lines
+from macro.compliance.parity_block import Parity, ParityBlock, Response
 
 Array = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ def face_compliance(
 
     The modes are smooth, and so are the displacements except at the edges of the clamped bottom, so
     that few elements of high order suffice. Modes of different parity are not coupled. Each parity
-    is solved for on a quarter of the block, and the ranks share the parities.
+    is solved for by itself, and the ranks share the parities.
 
     Args:
         lengths: Sides (Lx, Ly) of the block's top, all of which the modes cover [mm].
@@ -94,24 +94,20 @@ def face_compliance(
         )
     if count < 1:
         raise InputError("a top has one mode at least", value=count, allowed="K ≥ 1")
-    elements = division(lengths, height, count, coarse=coarse)
+    lines = block_lines(lengths, height, count, coarse=coarse)
     parities: tuple[Parity, ...] = ((0, 0), (0, 1), (1, 0), (1, 1))
     families = [parity for parity in parities if max(parity) < count]
     alike = lengths[0] == lengths[1]
     if alike and count > 1:
         families.remove((1, 0))
 
-    def solved() -> dict[Parity, Response]:
-        return {
-            parity: Quarter(
-                division=elements, lengths=lengths, material=material, sides=sides, parity=parity
-            ).response(count)
-            for parity in families[comm.rank :: comm.size]
-        }
+    def response(index: int) -> Response:
+        return ParityBlock(
+            lines=lines, height=height, material=material, sides=sides, parity=families[index]
+        ).response()
 
-    found: dict[Parity, Response] = {}
-    for part in comm.allgather(together(comm, solved)):
-        found |= part
+    parts = shared(comm, len(families), response)
+    found = dict(zip(families, parts, strict=True))
     if alike and count > 1:  # exchange x and y
         exchanged = Response(*(part.transpose(1, 0, 3, 2) for part in found[0, 1]))
         found[1, 0] = exchanged._replace(xx=exchanged.yy, yy=exchanged.xx)

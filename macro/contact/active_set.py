@@ -19,7 +19,6 @@ Theory: section 12 of ``demos/theory.md``.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -29,8 +28,14 @@ from petsc4py import PETSc
 from geometry.rigid_plane import Control
 from macro.block import Block
 from macro.contact.face_nodes import TopNodes
-from macro.contact.initial_guess import ContactSolution, Extrapolation, Guess
-from macro.contact.plane_over_nodes import PlaneOverNodes, not_found
+from macro.contact.node_contact import (
+    ContactSolution,
+    Extrapolation,
+    Guess,
+    PlaneOverNodes,
+    largest,
+    not_found,
+)
 from macro.linear_solvers.constrained import ConstrainedSolver, contact_tolerance
 
 Array = NDArray[np.float64]
@@ -101,7 +106,7 @@ class PrimalDualActiveSet:
         self._residual = block.stiffness.createVecRight()
         self._history = Extrapolation(block.owned_dofs, len(top.dofs))
         modulus, half = block.material.contact_modulus, plane.levers.half
-        self._zero_force = _NO_FORCE * modulus * half**2
+        self._zero_force, self._rounding = _NO_FORCE * modulus * half**2, _ROUNDING * half
         self._springs = top.area * modulus * _SOFT / (2.0 * half)
 
     def solve(self, control: Control) -> ContactSolution:
@@ -117,13 +122,13 @@ class PrimalDualActiveSet:
         now = _Iterate(control, placed, displacement, guess.contact > 0.0)
         if control.free.any() and not self._count(now.active):
             self._put_on_springs(now)
-        now.active = now.active | self._penetrating(now)
+        now.active = now.active | (self._depth(now) > self._rounding)
         sets, spent, tolerance, changed, fewest, waited = 1, 0, _LOOSE, 1, np.inf, 0
         for _ in range(self.most_solves):
             motions = self._supported_motions(now)
             if motions is None:
                 self._put_on_springs(now)
-                now.active = now.active | self._penetrating(now)
+                now.active = now.active | (self._depth(now) > self._rounding)
                 sets, changed = sets + 1, 1
                 continue
             if changed:
@@ -131,10 +136,9 @@ class PrimalDualActiveSet:
             iterations, allowed = self._solve_active(now, motions, tolerance)
             spent += iterations
             forces, depth = self._residual.array_r[self._top.dofs], self._depth(now)
-            largest = self._largest(forces[now.active])
-            pulled = now.active & (forces < -self._tolerance * largest)
-            beyond = depth > self._tolerance * self._largest(displacement.array_r)
-            moved = pulled | (~now.active & beyond)
+            tension = -self._tolerance * largest(forces[now.active], self._comm)
+            depths = self._tolerance * largest(displacement.array_r, self._comm)
+            moved = np.where(now.active, forces < tension, depth > depths)
             changed, total = self._count(moved), self._count(now.active)
             # the forces before a solve may be far larger than those after it
             norm = max(self._norm(forces[now.active]), self._zero_force)
@@ -194,7 +198,7 @@ class PrimalDualActiveSet:
         spent = self._solver.improve(now.displacement, residual, allowed)
         if spent:
             self._update_residual(now.displacement)
-        moved = self._sum(motions.T @ (before - now.displacement.array_r[dofs]))
+        moved = levers.summed(motions.T @ (before - now.displacement.array_r[dofs]))
         now.plane[free] += levers.unit[free] * (supported @ moved)
         return spent, allowed
 
@@ -205,13 +209,13 @@ class PrimalDualActiveSet:
         now.displacement.array[self._top.dofs] -= removed
         self._update_residual(now.displacement)
         forces = np.maximum(self._residual.array_r[self._top.dofs], 0.0)
-        largest = self._largest(now.displacement.array_r)
+        slack = _CLOSED * largest(now.displacement.array_r, self._comm)
         found = ContactSolution(
             plane=now.plane,
             displacement=now.displacement.array_r.copy(),
             nodal_force=np.where(now.active, forces, 0.0),
             # vertices of quadratic triangles touch without a force
-            touching=now.active | (depth > -_CLOSED * largest),
+            touching=now.active | (depth > -slack),
             active_sets=sets,
             linear_iterations=spent,
             reason="CONVERGED_ACTIVE_SET" if self._count(now.active) else "CONVERGED_NO_CONTACT",
@@ -228,9 +232,6 @@ class PrimalDualActiveSet:
     def _depth(self, now: _Iterate) -> Array:
         return self._plane.penetration(now.plane, -now.displacement.array_r[self._top.dofs])
 
-    def _penetrating(self, now: _Iterate) -> Flags:
-        return self._depth(now) > _ROUNDING * self._plane.levers.half
-
     def _first(self, moved: Flags) -> Flags:
         """Keep the first of the flags, over all ranks (Murty 1974: such changes cannot cycle)."""
         comm = self._comm
@@ -240,14 +241,8 @@ class PrimalDualActiveSet:
             alone[np.argmax(moved)] = True
         return alone
 
-    def _largest(self, values: Array) -> float:
-        return float(self._comm.allreduce(float(np.abs(values).max(initial=0.0)), op=MPI.MAX))
-
     def _norm(self, values: Array) -> float:
-        return float(np.sqrt(self._sum(float(values @ values))))
+        return float(np.sqrt(self._comm.allreduce(float(values @ values), op=MPI.SUM)))
 
     def _count(self, flags: Flags) -> int:
-        return int(self._sum(int(np.count_nonzero(flags))))
-
-    def _sum(self, values: Any) -> Any:
-        return self._comm.allreduce(values, op=MPI.SUM)
+        return int(self._comm.allreduce(int(np.count_nonzero(flags)), op=MPI.SUM))

@@ -1,11 +1,10 @@
-"""Contact at the quadrature points of a rough top by an augmented Lagrangian, or by a penalty.
+"""Contact at the quadrature points of a rough top by an augmented Lagrangian.
 
 With d the penetration of a point into the plane and k a stiffness, the pressures are
 
     p = ⟨p₀ + k d⟩,   ⟨·⟩ the positive part.
 
-Without multipliers p₀ this is the penalty method, p = k ⟨d⟩. The augmented Lagrangian takes the
-pressures of one solve as the multipliers of the next, until no point in contact penetrates
+The pressures of one solve are the multipliers p₀ of the next, until no point in contact penetrates
 (Alart & Curnier 1991, doi 10.1016/0045-7825(91)90022-X). For every p₀ a generalised Newton's method
 with line search finds the equilibrium.
 
@@ -23,12 +22,17 @@ from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from macro.block import Block
 from macro.contact.augmented_newton import LOOSEST, SPARE, AugmentedLaw, FacetNewton
-from macro.contact.contact_law import LawContact
 from macro.contact.equilibrium import Equilibrium
 from macro.contact.face_nodes import TopNodes
-from macro.contact.initial_guess import ContactSolution, Extrapolation, Guess
 from macro.contact.law_interface import Interface
-from macro.contact.plane_over_nodes import PlaneOverNodes, not_found
+from macro.contact.node_contact import (
+    ContactSolution,
+    Extrapolation,
+    Guess,
+    PlaneOverNodes,
+    largest,
+    not_found,
+)
 from macro.linear_solvers.constrained import contact_tolerance
 
 Array = NDArray[np.float64]
@@ -61,8 +65,6 @@ class AugmentedLagrangian:
         block: The block.
         top: Nodes of its top.
         plane: The plane over the nodes of the top.
-        penalty: The stiffness k [MPa/mm]; None: 1000 E* over the size of each facet.
-        exact: Whether multipliers remove the penetration; otherwise it is the penalty method.
 
     Attributes:
         law: Law of the quadrature points.
@@ -72,29 +74,19 @@ class AugmentedLagrangian:
         Everything here is collective.
     """
 
-    def __init__(
-        self,
-        block: Block,
-        top: TopNodes,
-        plane: PlaneOverNodes,
-        penalty: float | None,
-        *,
-        exact: bool,
-    ) -> None:
-        self._block, self._top, self._plane, self._exact = block, top, plane, exact
+    def __init__(self, block: Block, top: TopNodes, plane: PlaneOverNodes) -> None:
+        self._block, self._top, self._plane = block, top, plane
         whole = PatchGrid(grid=(1, 1), lengths=block.mesh.shape.interface)
         self._interface = interface = Interface(block, whole, degree=2 * block.degree)
         self._sampling = sampling = interface.pointwise
         (distance,) = top.with_ghosts(plane.distance)
         points = interface.quadrature
         unit = block.material.contact_modulus / _facet_sizes(points.cell, points.weight)
-        self._stiff = _HARD * unit if penalty is None else np.full_like(unit, penalty)
-        self._soft = np.minimum(_SOFT * unit, self._stiff)
+        self._stiff, self._soft = _HARD * unit, _SOFT * unit
         self._tolerance = contact_tolerance()
         self._penetration = PENETRATION[block.degree]
         self.law = AugmentedLaw(np.sum(points.values * distance[points.nodes], axis=1))
-        self._contact = LawContact(interface, sampling, [self.law])
-        self.equilibrium = Equilibrium(block, sampling, self._contact)
+        self.equilibrium = Equilibrium(interface, sampling, [self.law])
         self._newton = FacetNewton(self.equilibrium, self.law, interface, top, plane)
         self._history = Extrapolation(block.owned_dofs, len(points.x))
 
@@ -106,11 +98,12 @@ class AugmentedLagrangian:
                 stay what they were.
         """
         guess = self._history.guess(control)
-        contact, law = self._contact, self.law
-        contact.control, contact.plane = control, self._plane.placed(control, guess.plane)
-        law.multiplier = np.maximum(guess.contact, 0.0) if self._exact else 0.0 * guess.contact
+        equilibrium, law = self.equilibrium, self.law
+        equilibrium.control, equilibrium.plane = control, self._plane.placed(control, guess.plane)
+        law.multiplier = np.maximum(guess.contact, 0.0)
         displacement = self._block.stiffness.createVecRight()
         displacement.array[:] = guess.displacement
+        comm = self._block.mesh.comm
         steps, spent, tolerance, before = 0, 0, LOOSEST, np.inf
         law.slope, hardest = self._soft, self._stiff
         for _ in range(_MOST_UPDATES):
@@ -118,39 +111,40 @@ class AugmentedLagrangian:
             steps, spent = steps + more, spent + cycles
             closure = self.equilibrium.closure(displacement)
             # penetration of points without pressure, penetration or gap of points under pressure
-            depth = self._largest((law.pressure(closure) - law.multiplier) / law.slope)
-            allowed = self._penetration * self._largest(displacement.array_r)
+            depth = largest((law.pressure(closure) - law.multiplier) / law.slope, comm)
+            allowed = self._penetration * largest(displacement.array_r, comm)
             ratio = depth / max(allowed, _TINY)
             hard = bool(np.all(law.slope >= self._stiff))
-            hard = bool(self._block.mesh.comm.allreduce(hard, op=MPI.LAND))
-            if hard and tolerance <= self._tolerance and (ratio <= 1.0 or not self._exact):
+            hard = bool(comm.allreduce(hard, op=MPI.LAND))
+            if hard and tolerance <= self._tolerance and ratio <= 1.0:
                 return self._converged(displacement, steps, spent)
-            if self._exact:
-                law.multiplier = law.pressure(closure)
-            if self._exact and hard and ratio > _FALL * before:
+            law.multiplier = law.pressure(closure)
+            if hard and ratio > _FALL * before:
                 hardest = np.minimum(_HARDER * hardest, _HARDEST * self._stiff)
             before = ratio
             law.slope = np.minimum(_HARDER * law.slope, hardest)
-            near = min(0.1 * tolerance, SPARE * self._penetration * ratio) if self._exact else 0.0
-            tolerance = max(self._tolerance, near) if hard or not self._exact else tolerance
+            if hard:
+                near = min(0.1 * tolerance, SPARE * self._penetration * ratio)
+                tolerance = max(self._tolerance, near)
         raise not_found(control, "MULTIPLIERS", _MOST_UPDATES)
 
     def _converged(self, displacement: PETSc.Vec, steps: int, spent: int) -> ContactSolution:
-        closure, plane = self.equilibrium.closure(displacement), self._contact.plane.copy()
+        closure, plane = self.equilibrium.closure(displacement), self.equilibrium.plane.copy()
         pressure, load = self.law.pressure(closure), displacement.duplicate()
         samples = self._sampling.operator.createVecRight()
         samples.array[:] = pressure
         self._sampling.operator.mult(samples, load)
         nodal_force = -load.array_r[self._top.dofs]
         gap = -self._plane.penetration(plane, -displacement.array_r[self._top.dofs])
-        touching = nodal_force > _NO_FORCE * self._largest(nodal_force)
-        if self._exact and self._largest(nodal_force):
-            touching |= gap < self._penetration * self._largest(displacement.array_r)
+        comm = self._block.mesh.comm
+        pressed = largest(nodal_force, comm)
+        touching = nodal_force > _NO_FORCE * pressed
+        if pressed:
+            touching |= gap < self._penetration * largest(displacement.array_r, comm)
         values = displacement.array_r.copy()
         self._history.add(
             Guess(plane, values, pressure), float(self._plane.levers.loads(nodal_force)[0])
         )
-        reason = "CONVERGED_MULTIPLIERS" if self._exact else "CONVERGED_PENALTY"
         return ContactSolution(
             plane=plane,
             displacement=values,
@@ -158,12 +152,8 @@ class AugmentedLagrangian:
             touching=touching,
             active_sets=steps,
             linear_iterations=spent,
-            reason=reason if self._largest(nodal_force) else "CONVERGED_NO_CONTACT",
+            reason="CONVERGED_MULTIPLIERS" if pressed else "CONVERGED_NO_CONTACT",
         )
-
-    def _largest(self, values: Array) -> float:
-        largest = float(np.abs(values).max(initial=0.0))
-        return float(self._block.mesh.comm.allreduce(largest, op=MPI.MAX))
 
 
 def _facet_sizes(cell: NDArray[np.int32], weight: Array) -> Array:

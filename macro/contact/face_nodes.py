@@ -22,7 +22,7 @@ from macro import compat
 from macro.block import Block
 from macro.contact.facet_area import FacetLattice, covered, facet_lattice
 from macro.mesh.block import TOP
-from macro.mesh.contact_face import top_facets
+from macro.mesh.contact_face import top_facets, triangle_areas
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -77,9 +77,8 @@ class TopNodes:
         """Rank-local nodes of the triangles, shape (m, 3), and their weighted areas (m,) [mm²]."""
         triangles = self.facets[:, self._lattice.corners].reshape(-1, 3)
         place = self._block.space.tabulate_dof_coordinates()[triangles, :2]
-        u, v = place[:, 1] - place[:, 0], place[:, 2] - place[:, 0]
-        weight = np.tile(0.5 * self._lattice.weight, len(self.facets))
-        return triangles, weight * np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+        weight = np.tile(self._lattice.weight, len(self.facets))
+        return triangles, weight * triangle_areas(place)
 
     @cached_property
     def edges(self) -> Array:
@@ -174,24 +173,16 @@ class TopNodes:
     @cached_property
     def _shares(self) -> csr_array:
         """Share of every node of this rank that belongs to every patch, shape (n, N)."""
-        slack = 1e-9 * max(self.patches.lengths)
-        sides = [
-            [np.searchsorted(borders, place + offset) - 1 for offset in (-slack, slack)]
-            for borders, place in (
-                (self.patches.borders_x, self.x),
-                (self.patches.borders_y, self.y),
-            )
-        ]
-        counts, at = self.patches.grid, np.arange(len(self.x))
-        parts = []
-        for ix in sides[0]:
-            for iy in sides[1]:
-                inside = (ix >= 0) & (ix < counts[0]) & (iy >= 0) & (iy < counts[1])
-                parts.append((at[inside], (ix * counts[1] + iy)[inside]))
-        rows, columns = (np.concatenate(part) for part in zip(*parts, strict=True))
-        found = np.bincount(rows, minlength=len(at))
-        entries = 1.0 / found[rows]
-        return coo_array((entries, (rows, columns)), shape=(len(at), self.patches.count)).tocsr()
+        # four points around each node, of which two or four may lie in other patches
+        slack, count = 1e-9 * max(self.patches.lengths), len(self.x)
+        x = np.concatenate([self.x - slack, self.x - slack, self.x + slack, self.x + slack])
+        y = np.concatenate([self.y - slack, self.y + slack, self.y - slack, self.y + slack])
+        across, along = self.patches.borders_x, self.patches.borders_y
+        inside = (x > across[0]) & (x < across[-1]) & (y > along[0]) & (y < along[-1])
+        rows = np.tile(np.arange(count), 4)[inside]
+        columns = self.patches.index_of(x[inside], y[inside])
+        entries = 1.0 / np.bincount(rows, minlength=count)[rows]
+        return coo_array((entries, (rows, columns)), shape=(count, self.patches.count)).tocsr()
 
     def _areas(self) -> Array:
         space, mesh = self._block.space, self._block.mesh

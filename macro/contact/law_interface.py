@@ -8,16 +8,21 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, Protocol, get_args
+from typing import Literal, Protocol, get_args
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
+from scipy.sparse import csr_matrix
 
 from geometry.errors import InputError
+from geometry.meshes.block import require_inside
 from geometry.patches import PatchGrid
+from macro import compat
 from macro.block import Block
+from macro.linear_solvers.node_matrices import distributed
+from macro.linear_solvers.options import solve_linear
 from macro.mesh.contact_face import FacetQuadrature, facet_quadrature
 
 Array = NDArray[np.float64]
@@ -108,12 +113,7 @@ class Interface:
     degree: int | None = None
 
     def __post_init__(self) -> None:
-        if not np.allclose(self.areas, self.patches.area, rtol=1e-6, atol=0.0):
-            raise InputError(
-                "the patches reach beyond the top of the block",
-                value=(self.patches.origin, self.patches.lengths),
-                allowed=f"inside the interface {self.block.mesh.shape.interface} mm",
-            )
+        require_inside(self.block.mesh.shape.interface, self.patches)
 
     @cached_property
     def quadrature(self) -> FacetQuadrature:
@@ -158,12 +158,13 @@ class Interface:
     def patchwise(self) -> Sampling:
         """Laws at the mean closures of the patches, which are distributed over the ranks."""
         points, comm = self.quadrature, self.block.mesh.comm
-        member = PETSc.Mat().createAIJ(
-            ((len(points.x), None), (None, self.patches.count)),
-            csr=_csr(np.arange(len(points.x) + 1), points.patch, np.ones(len(points.x))),
-            comm=comm,
+        count = self.patches.count
+        member = csr_matrix(
+            (np.ones(len(points.x)), points.patch, np.arange(len(points.x) + 1)),
+            shape=(len(points.x), count),
         )
-        operator = self.points_by_dofs.transposeMatMult(member)
+        columns = count // comm.size + (comm.rank < count % comm.size)
+        operator = self.points_by_dofs.transposeMatMult(distributed(member, columns, comm))
         own = np.arange(*operator.getOwnershipRangeColumn())
         centres = self.patches.centres[own]
         return Sampling(
@@ -203,13 +204,50 @@ class Interface:
         columns = 3 * nodes.local_to_global(points.nodes[used]).astype(np.int64) + 2
         starts = np.concatenate([[0], np.cumsum(used.sum(axis=1))])
         entries = -(points.weight[:, None] * points.values)[used]
-        owned = self.block.owned_dofs
-        return PETSc.Mat().createAIJ(
-            ((len(points.x), None), (owned, None)),
-            csr=_csr(starts, columns, entries),
-            comm=self.block.mesh.comm,
-        )
+        shape = (len(points.x), 3 * nodes.size_global)
+        rows = csr_matrix((entries, columns, starts), shape=shape)
+        return distributed(rows, self.block.owned_dofs, self.block.mesh.comm)
 
 
-def _csr(starts: Any, columns: Any, entries: Array) -> tuple[Any, Any, Array]:
-    return starts.astype(PETSc.IntType), columns.astype(PETSc.IntType), entries
+def patch_compliance_matrix(interface: Interface) -> Array:
+    """Return the mean downward displacement of patch i by unit pressure on patch j.
+
+    By reciprocity the matrix is symmetric for patches of equal area. Errors of the linear solver
+    are averaged between the two triangles.
+
+    Args:
+        interface: Patches on the block's top.
+
+    Returns:
+        The compliance, the same on every rank, shape (N, N) [mm/MPa].
+
+    Raises:
+        NotConverged: When a linear solve fails.
+
+    Note:
+        Collective.
+    """
+    compliance = displacements_under(interface, np.eye(interface.patches.count))
+    return np.asarray(0.5 * (compliance + compliance.T))
+
+
+def displacements_under(interface: Interface, pressures: Array) -> Array:
+    """Return the mean displacements of patches under pressures on them, shape (m, N) [mm].
+
+    Args:
+        interface: Patches on the block's top.
+        pressures: Pressures of all patches, the same on every rank, shape (m, N) [MPa].
+
+    Raises:
+        NotConverged: When a linear solve fails.
+
+    Note:
+        Collective.
+    """
+    block, rows = interface.block, []
+    work = block.stiffness.createVecRight()
+    for row in pressures:
+        solve_linear(block.solver, interface.load(row), work)
+        rows.append(interface.patch_displacements(work))
+        compat.collect_garbage(work.comm)
+    return np.array(rows)

@@ -17,11 +17,10 @@ from geometry.errors import InputError
 from geometry.rigid_plane import Control
 from macro import compat
 from macro.block import Block
-from macro.contact.contact_law import LawContact
 from macro.contact.equilibrium import Equilibrium
-from macro.contact.initial_guess import DisplacementBasis
 from macro.contact.law_interface import ContactLaw, Interface, Mode
-from macro.contact.newton import NewtonReport, NewtonSolver
+from macro.contact.newton import DisplacementBasis, NewtonReport, NewtonSolver
+from macro.linear_solvers.options import solve_linear
 
 Array = NDArray[np.float64]
 
@@ -97,8 +96,7 @@ class LawContactProblem:
                 "every patch needs a law", value=len(laws), allowed=f"{interface.patches.count}"
             )
         self._interface, self._sampling = interface, interface.sampling(mode)
-        contact = LawContact(interface, self._sampling, laws)
-        self.equilibrium = Equilibrium(block, self._sampling, contact)
+        self.equilibrium = Equilibrium(interface, self._sampling, laws)
         self.newton = NewtonSolver(self.equilibrium, block.solver)
         self.basis = DisplacementBasis(self.equilibrium, self._sampling)
         self._plane: Array = np.zeros(3)
@@ -118,12 +116,10 @@ class LawContactProblem:
                 solutions stay what they were, so that a smaller step can be tried.
         """
         equilibrium = self.equilibrium
-        equilibrium.contact.prescribe(control, self._plane)
+        equilibrium.prescribe(control, self._plane)
         solution = equilibrium.block.stiffness.createVecRight()
         self.basis.write_guess(solution)
-        report = self.newton.solve(
-            solution, what=f"the block at {control}", remedy="take more load steps (load.steps)"
-        )
+        report = self.newton.solve(solution, control)
         self.basis.add(solution)
         state = self._state(solution, report)
         compat.collect_garbage(solution.comm)
@@ -142,8 +138,7 @@ class LawContactProblem:
             return
         block = self.equilibrium.block
         displacement = block.stiffness.createVecRight()
-        found = block.solve(self._interface.load(pressure))
-        displacement.array[:] = found.x.array[: block.owned_dofs]
+        solve_linear(block.solver, self._interface.load(pressure), displacement)
         self.basis.add(displacement)
 
     def patch_means(self, functions: Sequence[Callable[[Array], Array]]) -> Array:
@@ -166,11 +161,11 @@ class LawContactProblem:
         return sampling.patch_sums(values) / self._interface.areas
 
     def _state(self, solution: PETSc.Vec, report: NewtonReport) -> LawContactState:
-        contact, sampling = self.equilibrium.contact, self._sampling
-        self._closure = closure = self.equilibrium.closure(solution)
-        self._plane = plane = contact.plane.copy()
-        pressure = contact.pressure(closure)
-        forces, load = sampling.patch_sums(pressure), contact.loads(pressure)
+        equilibrium, sampling = self.equilibrium, self._sampling
+        self._closure = closure = equilibrium.closure(solution)
+        self._plane = plane = equilibrium.plane.copy()
+        pressure = equilibrium.pressure(closure)
+        forces, load = sampling.patch_sums(pressure), equilibrium.loads(pressure)
         areas = self._interface.areas
         return LawContactState(
             approach=float(plane[0]),
@@ -180,7 +175,7 @@ class LawContactProblem:
             pressure=forces / areas,
             force=float(forces.sum()),
             moment=load[1:],
-            reaction=self.equilibrium.block.reaction(solution),
+            reaction=equilibrium.block.reaction(solution),
             newton_iterations=report.iterations,
             linear_iterations=report.linear_iterations,
             residuals=report.residuals,

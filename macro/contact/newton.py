@@ -1,16 +1,27 @@
-"""Newton's method by PETSc's SNES, with inner tolerances that follow the residual."""
+"""Newton's method by PETSc's SNES for load steps with laws, and its initial guesses.
+
+Guesses minimise the energy in the space of earlier solutions. Extrapolation took 1.8 to 3.2 times
+as many linear iterations over eight load steps with 4 patches and one closure for each, and 3 to
+24 % more with 16 and 64 patches or laws at points.
+
+Theory: section 11 of ``demos/theory.md``.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.errors import NotConverged
+from geometry.rigid_plane import Control
 from macro.contact.equilibrium import Equilibrium
+from macro.contact.law_interface import Sampling
 from macro.linear_solvers.options import (
     KRYLOV_DEFAULTS,
     PREFIX,
@@ -18,6 +29,8 @@ from macro.linear_solvers.options import (
     default_options,
     reason_name,
 )
+
+Array = NDArray[np.float64]
 
 NONLINEAR_DEFAULTS: Mapping[str, object] = {
     "snes_type": "newtonls",
@@ -33,6 +46,13 @@ _LOOSEST = 0.1
 
 _SPARE = 0.3
 """Share of the tolerance that the last linear solve aims at."""
+
+
+_ROUNDING = 1e-7
+"""Smallest part of a displacement that must be new to the basis; less only adds rounding."""
+
+_STEPS, _HALVINGS = 30, 10
+"""Newton steps in the basis, and halvings of each."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,13 +109,12 @@ class NewtonSolver:
         self._preconditioner = _SharedPreconditioner(preconditioner.pc)
         self.snes.ksp.pc.setPythonContext(WeakContext(self._preconditioner))
 
-    def solve(self, solution: PETSc.Vec, *, what: str, remedy: str) -> NewtonReport:
+    def solve(self, solution: PETSc.Vec, control: Control) -> NewtonReport:
         """Solve from an initial guess.
 
         Args:
             solution: The initial guess; receives the solution.
-            what: What is being solved, for the error.
-            remedy: What to change when it fails, for the error.
+            control: What the load step prescribes, for the error.
 
         Raises:
             NotConverged: With the name of PETSc's reason.
@@ -104,7 +123,12 @@ class NewtonSolver:
         self.snes.solve(None, solution)
         reason = reason_name(PETSc.SNES.ConvergedReason, self.snes.reason)
         if self.snes.reason < 0:
-            raise NotConverged(what, reason=reason, iterations=int(self.snes.its), remedy=remedy)
+            raise NotConverged(
+                f"the block at {control}",
+                reason=reason,
+                iterations=int(self.snes.its),
+                remedy="take more load steps (load.steps)",
+            )
         return NewtonReport(
             iterations=int(self.snes.its),
             linear_iterations=int(self.snes.getLinearSolveIterations()),
@@ -140,3 +164,97 @@ class _SharedPreconditioner:
     def apply(self, _pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write the preconditioner's y for x."""
         self._preconditioner.apply(x, y)
+
+
+class DisplacementBasis:
+    """Earlier displacements, orthonormal in the block's energy, as a basis for initial guesses.
+
+    The block is linear, so every solution lies in the space K⁻¹ range(B), which has as many
+    dimensions as there are samples. Galerkin's method in the span of the earlier solutions needs no
+    linear solve and gives the initial guess of least error in the energy norm, which includes
+    extrapolation. Once the basis has as many dimensions as there are patches, the guess is the
+    solution.
+
+    Args:
+        equilibrium: The equations that are being solved.
+        sampling: Their samples of the interface.
+        size: Largest number of vectors; the oldest are dropped first.
+
+    Attributes:
+        vectors: W, this rank's degrees of freedom of the vectors, shape (k, n) [mm].
+        forces: K W, their forces, shape (k, n) [N].
+
+    Note:
+        Collective.
+    """
+
+    def __init__(self, equilibrium: Equilibrium, sampling: Sampling, *, size: int = 32) -> None:
+        self._equilibrium, self._sampling, self._size = equilibrium, sampling, size
+        self._comm = equilibrium.block.mesh.comm
+        self.vectors: Array = np.empty((0, equilibrium.block.owned_dofs))
+        self.forces: Array = np.empty_like(self.vectors)
+        self._sampled: Array = np.empty((0, len(sampling.weight)))  # Wᵀ B of this rank's samples
+
+    def __len__(self) -> int:
+        return len(self.vectors)
+
+    def add(self, displacement: PETSc.Vec) -> None:
+        """Add the part of a displacement that is new to the basis; collective."""
+        work = displacement.duplicate()
+        self._equilibrium.block.stiffness.mult(displacement, work)
+        vector, force = displacement.array_r.copy(), work.array_r.copy()
+        before = self._sum(vector @ force)
+        for _ in range(2):  # a second pass removes what rounding left
+            shares = self._sum(self.vectors @ force)
+            vector -= shares @ self.vectors
+            force -= shares @ self.forces
+        square = self._sum(vector @ force)
+        if not square > _ROUNDING**2 * before:
+            return
+        vector, force = vector / square**0.5, force / square**0.5
+        work.array[:] = vector
+        sampled = self._sampling.operator.createVecRight()
+        self._sampling.operator.multTranspose(work, sampled)
+        first = max(0, len(self) + 1 - self._size)
+        self.vectors = np.vstack([self.vectors, vector])[first:]
+        self.forces = np.vstack([self.forces, force])[first:]
+        self._sampled = np.vstack([self._sampled, sampled.array_r])[first:]
+
+    def write_guess(self, into: PETSc.Vec) -> None:
+        """Write the state of least energy in the basis under what is prescribed of the plane.
+
+        It solves y = Wᵀ B p(closure(W y)) by damped Newton steps, which need not converge.
+        """
+        y = np.zeros(len(self))
+        value, slope = self._projected(y)
+        first = float(np.linalg.norm(value))
+        for _ in range(_STEPS):
+            if np.linalg.norm(value) <= _ROUNDING**2 * first:
+                break
+            step = np.linalg.solve(slope, value)
+            for share in 0.5 ** np.arange(_HALVINGS):
+                trial = y - share * step
+                trial_value, trial_slope = self._projected(trial)
+                if np.linalg.norm(trial_value) < np.linalg.norm(value):
+                    break
+            else:
+                break
+            y, value, slope = trial, trial_value, trial_slope
+        into.array[:] = y @ self.vectors
+
+    def _projected(self, y: Array) -> tuple[Array, Array]:
+        """Return the equilibrium's residual and tangent in the basis."""
+        equations, weight, columns = self._equilibrium, self._sampling.weight, self._sampled
+        closure = equations.closure_of((y @ columns) / weight)
+        pressure, stiffness = equations.pressure(closure), equations.stiffness(closure)
+        parts = np.vstack([
+            -columns @ pressure,
+            (columns * (stiffness / weight)) @ columns.T,
+            (columns @ equations.border(stiffness)).T,
+        ])  # fmt: skip
+        parts = self._sum(parts)
+        stiff, border = parts[1 : len(y) + 1], parts[len(y) + 1 :]
+        return y + parts[0], np.eye(len(y)) + stiff - border.T @ border
+
+    def _sum(self, values: Any) -> Any:
+        return self._comm.allreduce(values, op=MPI.SUM)

@@ -13,6 +13,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from geometry.errors import InputError
+from geometry.meshes.block import require_inside
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from macro import compat
@@ -20,11 +21,10 @@ from macro.block import Block
 from macro.contact.active_set import PrimalDualActiveSet
 from macro.contact.augmented_lagrangian import AugmentedLagrangian
 from macro.contact.face_nodes import TopNodes
-from macro.contact.initial_guess import ContactSolution
-from macro.contact.plane_over_nodes import PlaneOverNodes
+from macro.contact.node_contact import ContactSolution, PlaneOverNodes
 
 Array = NDArray[np.float64]
-Method = Literal["active-set", "augmented-lagrangian", "penalty"]
+Method = Literal["active-set", "augmented-lagrangian"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -84,18 +84,16 @@ class UnilateralContactProblem:
         reference_height: Height of the highest point of the top, from which the approach counts
             [mm].
         method: ``"active-set"``: no node of the top penetrates; ``"augmented-lagrangian"``: no
-            quadrature point of its facets does; ``"penalty"``: quadrature points penetrate in
-            proportion to their pressure.
+            quadrature point of its facets does.
         patches: Patches on the top, for forces and areas by patch; None: one of the whole top.
-        penalty: Pressure per penetration, for the last two methods [MPa/mm]; None: from the mesh.
 
     Attributes:
         top: Nodes of the top, of this rank.
         method: The method that finds the contact.
 
     Raises:
-        InputError: When there is no such method, the penalty is not positive, the block's top has
-            a margin, or a patch reaches beyond the top.
+        InputError: When there is no such method, the block's top has a margin, or a patch reaches
+            beyond the top.
 
     Note:
         Everything here is collective.
@@ -108,7 +106,6 @@ class UnilateralContactProblem:
         *,
         method: Method = "active-set",
         patches: PatchGrid | None = None,
-        penalty: float | None = None,
     ) -> None:
         if method not in get_args(Method):
             raise InputError(
@@ -116,21 +113,21 @@ class UnilateralContactProblem:
                 value=method,
                 allowed=", ".join(get_args(Method)),
             )
-        if penalty is not None and not 0.0 < penalty < np.inf:
-            raise InputError("the penalty must be positive", value=penalty, allowed="> 0 MPa/mm")
         lengths = block.mesh.shape.interface
         patches = patches or PatchGrid(grid=(1, 1), lengths=lengths)
-        _check_top(block, patches)
+        require_inside(lengths, patches)
+        if block.mesh.shape.margin:
+            raise InputError(
+                "the plane presses on the whole top, which has no margin",
+                value=block.mesh.shape.margin,
+                allowed="0 mm",
+            )
         self.block, self.top = block, TopNodes(block, patches)
         self._plane = PlaneOverNodes(
             self.top.x, self.top.y, reference_height - self.top.height, lengths, block.mesh.comm
         )
-        self.method: PrimalDualActiveSet | AugmentedLagrangian
-        if method == "active-set":
-            self.method = PrimalDualActiveSet(block, self.top, self._plane)
-        else:
-            exact = method == "augmented-lagrangian"
-            self.method = AugmentedLagrangian(block, self.top, self._plane, penalty, exact=exact)
+        kind = PrimalDualActiveSet if method == "active-set" else AugmentedLagrangian
+        self.method: PrimalDualActiveSet | AugmentedLagrangian = kind(block, self.top, self._plane)
 
     def solve(self, control: Control) -> UnilateralContactState:
         """Find the contact of one load step, with an initial guess from the steps before.
@@ -149,26 +146,6 @@ class UnilateralContactProblem:
         state = _state(self.block, self.top, self._plane, self.method.solve(control))
         compat.collect_garbage(self.block.stiffness.comm)
         return state
-
-
-def _check_top(block: Block, patches: PatchGrid) -> None:
-    """Refuse a top with a margin, and patches that reach beyond it."""
-    shape = block.mesh.shape
-    if shape.margin:
-        raise InputError(
-            "the plane presses on the whole top, which has no margin",
-            value=shape.margin,
-            allowed="0 mm",
-        )
-    sides = np.array(shape.interface)
-    low, high = np.array(patches.origin), np.array(patches.origin) + patches.lengths
-    slack = 1e-9 * sides
-    if np.any(low < -slack) or np.any(high > sides + slack):
-        raise InputError(
-            "the patches reach beyond the top of the block",
-            value=(patches.origin, patches.lengths),
-            allowed=f"inside the interface {shape.interface} mm",
-        )
 
 
 def _state(

@@ -5,15 +5,20 @@ Theory: section 12 of ``demos/theory.md``.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
+from scipy.sparse import csr_array
 
 from geometry.errors import NotConverged
-from macro.linear_solvers.constrained_preconditioner import ConstrainedPreconditioner, Projection
+from macro.linear_solvers.node_matrices import coupled_nodes, dofs_of, node_submatrix
 from macro.linear_solvers.options import PREFIX, WeakContext, reason_name
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 TOLERANCE = 1e-10
 """Tolerance of contact: residual and complementarity relative to the contact forces.
@@ -25,6 +30,11 @@ tetrahedra, of 12 and 30.
 """
 
 _MOST_ITERATIONS = 1000
+
+_SWEEPS = 2
+"""Symmetric Gauss–Seidel sweeps near the constrained degrees of freedom."""
+
+_FROM_ZERO = int(PETSc.Mat.SORType.SYMMETRY_SWEEP) | int(PETSc.Mat.SORType.ZERO_INITIAL_GUESS)
 
 
 def contact_tolerance() -> float:
@@ -50,7 +60,6 @@ class ConstrainedSolver:
     """
 
     def __init__(self, matrix: PETSc.Mat, preconditioner: PETSc.PC, layers: int = 2) -> None:
-        self._projection = Projection(matrix.comm.tompi4py())
         self._matrix = matrix
         operator = PETSc.Mat().createPython(matrix.getSizes(), WeakContext(self), comm=matrix.comm)
         operator.setUp()
@@ -60,9 +69,8 @@ class ConstrainedSolver:
         self._ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
         self._ksp.setTolerances(max_it=_MOST_ITERATIONS)
         self._ksp.pc.setType("python")
-        self._preconditioner = ConstrainedPreconditioner(
-            matrix, preconditioner, self._projection, layers
-        )
+        self._preconditioner = ConstrainedPreconditioner(matrix, preconditioner, layers)
+        self._projection = self._preconditioner.projection
         self._ksp.pc.setPythonContext(WeakContext(self._preconditioner))
 
     def constrain(self, dofs: NDArray[np.intp], motions: Array | None = None) -> None:
@@ -73,8 +81,8 @@ class ConstrainedSolver:
             motions: Displacements of these by every motion that is left to them, shape (n, k);
                 orthonormal over all ranks. None: they stand still.
         """
-        self._projection.constrain(dofs, np.zeros((len(dofs), 0)) if motions is None else motions)
-        self._preconditioner.constrain(dofs)
+        still = np.zeros((len(dofs), 0))
+        self._preconditioner.constrain(dofs, still if motions is None else motions)
 
     def improve(self, solution: PETSc.Vec, residual: PETSc.Vec, tolerance: float) -> int:
         """Change the free part of a solution until its residual is small.
@@ -111,3 +119,140 @@ class ConstrainedSolver:
         """Write the operator's product y = P A x for x in the range of P; PETSc calls this."""
         self._matrix.mult(x, y)
         self._projection.project(y)
+
+
+class Projection:
+    """Orthogonal projection P: identity on free degrees of freedom, Q Qᵀ on constrained ones.
+
+    The columns of Q are the common motions that constraints leave, such as those of a rigid plane.
+
+    Args:
+        comm: MPI communicator.
+    """
+
+    def __init__(self, comm: Any) -> None:
+        self._comm = comm
+        self._dofs: Indices = np.empty(0, dtype=np.intp)
+        self._motions: Array = np.empty((0, 0))
+
+    def constrain(self, dofs: Indices, motions: Array) -> None:
+        """Constrain degrees of freedom to motions Q; see `ConstrainedSolver.constrain`."""
+        self._dofs, self._motions = dofs, motions
+
+    def project(self, vector: PETSc.Vec) -> None:
+        """Project a vector in place; collective."""
+        values, q = vector.array, self._motions
+        shares = q.T @ values[self._dofs]
+        if shares.size:
+            shares = self._comm.allreduce(shares, op=MPI.SUM)
+        values[self._dofs] = q @ shares
+
+
+class ConstrainedPreconditioner:
+    """The preconditioner M of the unconstrained matrix A, corrected near the constraints.
+
+    P M P, with P the projection on the free displacements, is least accurate beside constrained
+    degrees of freedom, because it cuts off what M wants to move there. Symmetric Gauss–Seidel
+    sweeps S ≈ A⁻¹ on the unknowns nearby, before and after it, remove that error. This is a
+    multiplicative Schwarz method (Smith, Bjørstad & Gropp 1996, ch. 1):
+
+        2 S − S A S + (1 − S A) P M P (1 − A S),
+
+    symmetric and positive definite like M. Unknowns that are coupled with other ranks are left
+    out of the sweeps, so that the products with A need no messages.
+
+    Args:
+        matrix: Symmetric positive definite matrix A.
+        preconditioner: M.
+        layers: Layers of nodes around the constrained ones that are swept.
+
+    Attributes:
+        projection: P.
+
+    Note:
+        Everything here is collective.
+    """
+
+    def __init__(self, matrix: PETSc.Mat, preconditioner: PETSc.PC, layers: int) -> None:
+        self._local = matrix.getDiagonalBlock()
+        self._preconditioner = preconditioner
+        self.projection = Projection(matrix.comm.tompi4py())
+        self._layers = layers
+        self._work = matrix.createVecRight()
+        self._shared = coupled_nodes(matrix)
+        self._dofs: Indices = np.empty(0, dtype=np.intp)
+        self._near: _Neighbourhood | None = None
+
+    def constrain(self, dofs: Indices, motions: Array) -> None:
+        """Move to other constrained degrees of freedom; see `ConstrainedSolver.constrain`."""
+        self.projection.constrain(dofs, motions)
+        if np.array_equal(dofs, self._dofs):
+            return
+        if self._near is not None:
+            self._near.square.destroy()  # else it waits for Python's garbage collector
+        self._dofs = dofs
+        near = _nearby(dofs, self._local, self._layers, self._shared)
+        self._near = _Neighbourhood(self._local, *near) if len(near[0]) else None
+
+    def apply(self, _pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write the preconditioner's y for x."""
+        near = self._near
+        x.copy(self._work)
+        if near is not None:
+            before = near.swept(x.array_r[near.dofs])
+            self._work.array[near.coupled] -= before @ near.rows
+        self.projection.project(self._work)
+        self._preconditioner.apply(self._work, y)
+        self.projection.project(y)
+        if near is not None:
+            y.array[near.dofs] += before
+            left = x.array_r[near.dofs] - near.rows @ y.array_r[near.coupled]
+            y.array[near.dofs] += near.swept(left)
+
+
+class _Neighbourhood:
+    """The rows of a rank's own matrix that belong to some unknowns.
+
+    Attributes:
+        dofs: The unknowns, shape (n,).
+        coupled: Unknowns of all nodes that have entries in these rows, shape (m,).
+        rows: The rows, shape (n, m).
+        square: Their part between the unknowns themselves.
+    """
+
+    def __init__(self, matrix: PETSc.Mat, dofs: Indices, nodes: Indices) -> None:
+        self.dofs = dofs
+        neighbours = _neighbours(matrix, nodes)
+        self.coupled = dofs_of(neighbours)
+        self.rows = node_submatrix(matrix, nodes, neighbours)[np.isin(dofs_of(nodes), dofs)]
+        square = csr_array(self.rows[:, np.searchsorted(self.coupled, dofs)])
+        square.sort_indices()
+        pattern = (part.astype(PETSc.IntType) for part in (square.indptr, square.indices))
+        csr = (*pattern, square.data)
+        self.square = PETSc.Mat().createAIJ(square.shape, csr=csr, comm=PETSc.COMM_SELF)
+        self._load, self._solution = self.square.createVecs()
+
+    def swept(self, load: Array) -> Array:
+        """Return the approximate displacements of the unknowns under their load, shape (n,)."""
+        self._load.array[:] = load
+        self.square.SOR(self._load, self._solution, sortype=_FROM_ZERO, its=_SWEEPS)
+        return self._solution.array_r.copy()
+
+
+def _nearby(
+    constrained: Indices, matrix: PETSc.Mat, layers: int, excluded: Indices
+) -> tuple[Indices, Indices]:
+    """Return the free unknowns within some layers of constrained ones, and all nodes there."""
+    nodes = np.unique(constrained // 3)
+    for _ in range(layers):
+        nodes = _neighbours(matrix, nodes)
+    dofs = dofs_of(nodes) if layers else constrained
+    return dofs[~(np.isin(dofs, constrained) | np.isin(dofs // 3, excluded))], nodes
+
+
+def _neighbours(matrix: PETSc.Mat, nodes: Indices) -> Indices:
+    """Return the nodes that have entries in the rows of some nodes, ascending."""
+    if not len(nodes):
+        return nodes
+    every = np.arange(matrix.getSize()[1] // 3)
+    return np.unique(node_submatrix(matrix, nodes, every).indices // 3).astype(np.intp)

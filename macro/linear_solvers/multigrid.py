@@ -1,4 +1,4 @@
-"""Geometric multigrid on blocks whose nodes form a rectangular lattice: the transfers.
+"""Geometric multigrid on blocks whose nodes form a rectangular lattice: grids and transfers.
 
 Grids coarsen where the planes of the lattice are close (see `coarsenings`). Displacements are
 interpolated trilinearly in the flat lattice, also on rough blocks, and the coarser matrices are
@@ -21,15 +21,86 @@ from scipy import sparse
 
 from geometry.meshes.block import BlockShape
 from macro import compat
-from macro.linear_solvers.multigrid_grids import Kept, Lines, coarsenings
 from macro.linear_solvers.multigrid_products import galerkin
+from macro.linear_solvers.node_matrices import distributed, for_displacements
 from macro.linear_solvers.options import CoarserGrid
 from macro.mesh.block import BlockMesh
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
+Kept = tuple[Indices, Indices, Indices]
+
+_SLACK = 1.5
+"""Longest merged interval relative to the target length; 1.2 and 2 took more iterations."""
+
+_LEAST = 1.2
+"""Smallest factor by which a coarser grid has fewer nodes; less would not repay its cost."""
+
+COARSEST = 1500
+"""Number of unknowns at which coarsening ends; the coarsest grid is solved by a factorisation."""
 
 _CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lines:
+    """The planes of a lattice across one axis.
+
+    Args:
+        ticks: Their coordinates, ascending, shape (n,) [mm].
+        middle: Whether a plane holds the middle nodes of elements of degree 2, shape (n,). It
+            cannot be kept without both of its neighbours.
+    """
+
+    ticks: Array
+    middle: NDArray[np.bool_]
+
+    @classmethod
+    def of_elements(cls, ticks: Array, degree: int) -> Lines:
+        """Return the planes through the nodes of elements of degree 1 or 2 between grid planes."""
+        count = degree * (len(ticks) - 1) + 1
+        finer = np.interp(np.arange(count) / degree, np.arange(len(ticks)), ticks)
+        return cls(finer, np.arange(count) % degree > 0)
+
+    def __len__(self) -> int:
+        return len(self.ticks)
+
+    def only(self, kept: Indices) -> Lines:
+        """Return some of the planes."""
+        return Lines(self.ticks[kept], self.middle[kept])
+
+    def merged(self, longest: float) -> Indices:
+        """Return the planes that are kept when pairs of intervals merge, from the last one down.
+
+        Args:
+            longest: Largest length of a merged pair [mm].
+        """
+        kept = [len(self) - 1]
+        while kept[-1] > 0:
+            end = kept[-1]
+            pair = (
+                end > 1
+                and self.ticks[end] - self.ticks[end - 2] <= longest
+                and not (self.middle[end] or self.middle[end - 2])
+            )
+            kept.append(end - (2 if pair else 1))
+        return np.array(kept[::-1])
+
+    def shares(self, kept: Indices) -> tuple[Indices, Array]:
+        """Interpolate linearly from some planes to all.
+
+        Args:
+            kept: Indices of the planes to interpolate from.
+
+        Returns:
+            For every plane the last kept plane at or before it, as an index into ``kept``, and the
+            weight of the next kept plane, exactly 0 on a kept plane; shapes (n,).
+        """
+        before = np.searchsorted(kept, np.arange(len(self)), side="right") - 1
+        after = np.minimum(before + 1, len(kept) - 1)
+        start, end = self.ticks[kept[before]], self.ticks[kept[after]]
+        length = np.where(after > before, end - start, 1.0)
+        return before, (self.ticks - start) / length
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,7 +194,7 @@ def transfers(lattice: Lattice, free: PETSc.Vec) -> Iterator[Transfer]:
     grid, nodes = lattice.grid, lattice.nodes
     for kept in coarsenings(grid):
         rows, stay = _node_weights(grid, kept, nodes, free.comm)
-        weights = _distributed(rows, len(stay), free.comm)
+        weights = distributed(rows, len(stay), free.comm)
         interpolation, coarse = for_displacements(rows, stay, free)
         yield Transfer(weights, interpolation, free, coarse)
         nodes = np.stack([np.searchsorted(of, nodes[stay, k]) for k, of in enumerate(kept)], axis=1)
@@ -153,49 +224,35 @@ def _node_weights(
     return rows, stay
 
 
-def _distributed(
-    rows: sparse.csr_matrix, columns: int, comm: PETSc.Comm, block_size: int | None = None
-) -> PETSc.Mat:
-    """Return a matrix from the rows on every rank and the number of columns that this rank owns."""
-    pattern = (part.astype(PETSc.IntType) for part in (rows.indptr, rows.indices))
-    size = ((rows.shape[0], None), (columns, None))
-    return PETSc.Mat().createAIJ(size, bsize=block_size, csr=(*pattern, rows.data), comm=comm)
+def coarsenings(grid: Sequence[Lines], coarsest: int = COARSEST) -> list[Kept]:
+    """Coarsen a lattice where its planes are close, until few unknowns are left.
 
-
-def for_displacements(
-    weights: sparse.csr_matrix, stay: Indices, free: PETSc.Vec, *, blocks: bool = False
-) -> tuple[PETSc.Mat, PETSc.Vec]:
-    """Interpolate all three components of displacements, constrained unknowns apart.
+    Unknowns are coupled most strongly along the shortest edges, and pointwise smoothing removes
+    errors along those edges only. So a target length doubles from grid to grid, and intervals merge
+    only where they are shorter than it: flat cells become thick first, and graded layers become
+    even. After that all cells grow in all directions.
 
     Args:
-        weights: Weights of all coarse nodes, numbered rank after rank, in this rank's nodes.
-        stay: This rank's nodes that are its coarse nodes.
-        free: 1 for unknowns that are free, 0 for constrained ones.
-        blocks: Whether the matrix has PETSc's block size 3, which products with it inherit.
+        grid: The planes across x, y and z.
+        coarsest: Number of unknowns, three per node, at which coarsening ends.
 
     Returns:
-        The matrix, and ``free`` of the coarse unknowns.
-
-    Note:
-        Collective.
+        The kept planes of every grid but the coarsest. There is at least one coarser grid unless
+        all nodes are corners of the block.
     """
-    count = weights.shape[0]
-    rows = weights[np.repeat(np.arange(count), 3)]
-    component = np.repeat(np.tile(np.arange(3), count), np.diff(rows.indptr))
-    rows.indices = 3 * rows.indices + component
-    matrix = _distributed(rows, 3 * len(stay), free.comm, 3 if blocks else None)
-    coarse = matrix.createVecRight()
-    same = (3 * stay[:, None] + np.arange(3)).ravel()
-    coarse.array[:] = free.array_r[same]
-    matrix.diagonalScale(free, coarse)
-    fixed = np.flatnonzero(coarse.array_r == 0.0)
-    if len(fixed):
-        first_row, first_column = matrix.getOwnershipRange()[0], coarse.getOwnershipRange()[0]
-        matrix.setValuesIJV(
-            np.arange(len(fixed) + 1, dtype=PETSc.IntType),
-            (fixed + first_column).astype(PETSc.IntType),
-            np.ones(len(fixed)),
-            rowmap=(same[fixed] + first_row).astype(PETSc.IntType),
-        )
-    matrix.assemble()
-    return matrix, coarse
+    found: list[Kept] = []
+    longest = _SLACK * (1.0 + 1e-6) * min(float(np.diff(lines.ticks).min()) for lines in grid)
+    while any(len(lines) > 2 for lines in grid) and (not found or 3 * _size(grid) > coarsest):
+        coarser, kept = list(grid), [np.arange(len(lines)) for lines in grid]
+        while _size(coarser) * _LEAST > _size(grid) and any(len(lines) > 2 for lines in coarser):
+            longest *= 2.0
+            stay = [lines.merged(longest) for lines in coarser]
+            kept = [of[which] for of, which in zip(kept, stay, strict=True)]
+            coarser = [lines.only(which) for lines, which in zip(coarser, stay, strict=True)]
+        found.append((kept[0], kept[1], kept[2]))
+        grid = coarser
+    return found
+
+
+def _size(grid: Sequence[Lines]) -> int:
+    return int(np.prod([len(lines) for lines in grid]))

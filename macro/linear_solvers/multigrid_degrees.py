@@ -21,7 +21,7 @@ from scipy import sparse
 
 from macro import compat
 from macro.elasticity import rigid_body_modes
-from macro.linear_solvers.multigrid import for_displacements
+from macro.linear_solvers.node_matrices import for_displacements
 from macro.linear_solvers.options import ALGEBRAIC_DEFAULTS, CoarserGrid
 
 Array = NDArray[np.float64]

@@ -105,8 +105,8 @@ def _diagonal_blocks(flags: NDArray[np.bool_]) -> sparse.bsr_matrix:
     some = nodes.any(axis=1)
     blocks = np.einsum("na,ab->nab", nodes[some].astype(float), np.eye(3)).reshape(-1, 9, 1)
     starts = np.concatenate([[0], np.cumsum(some)])
-    shape = (9 * len(nodes), len(nodes))
-    return sparse.bsr_matrix((blocks, np.flatnonzero(some), starts), shape=shape)
+    parts = (blocks, np.flatnonzero(some), starts)
+    return sparse.bsr_matrix(parts, shape=(9 * len(nodes), len(nodes)))
 
 
 def _products(
@@ -138,19 +138,18 @@ def _products(
 
 def _sum_of_parts(parts: list[sparse.bsr_matrix], coarse: Indices, weights: PETSc.Mat) -> PETSc.Mat:
     """Add parts of the coarser matrix, of all ranks, at the coarse nodes that they are of."""
-    comm, owners = weights.comm, weights.getOwnershipRangesColumn()
-    owner = np.searchsorted(owners, coarse, side="right")
+    owner = np.searchsorted(weights.getOwnershipRangesColumn(), coarse, side="right")
     counted = [weights.createVecRight() for _ in range(2)]
     entries = []
     for part in parts:
         counts = np.diff(part.indptr)
         filled = np.flatnonzero(counts)
-        rows, columns = coarse[filled].astype(PETSc.IntType), coarse[part.indices]
+        rows, columns = (coarse[at].astype(PETSc.IntType) for at in (filled, part.indices))
         near = owner[part.indices] == np.repeat(owner, counts)
         own = np.add.reduceat(near, part.indptr[filled], dtype=float)
         counted[0].setValues(rows, own, addv=True)
         counted[1].setValues(rows, counts[filled] - own, addv=True)
-        starts = np.concatenate([[0], np.cumsum(counts[filled])])
+        starts = np.concatenate([[0], np.cumsum(counts[filled])]).astype(PETSc.IntType)
         entries.append((starts, columns, part.data.ravel(), rows))
     local, size = counted[0].getSizes()
     room = []  # blocks per row in columns of the same rank, and of others
@@ -158,7 +157,7 @@ def _sum_of_parts(parts: list[sparse.bsr_matrix], coarse: Indices, weights: PETS
         vector.assemble()
         room.append(np.minimum(np.rint(vector.array_r).astype(PETSc.IntType), most))
         vector.destroy()
-    matrix = PETSc.Mat().create(comm)
+    matrix = PETSc.Mat().create(weights.comm)
     matrix.setSizes(((3 * local, 3 * size),) * 2)
     matrix.setType("baij")
     matrix.setBlockSize(3)
@@ -167,8 +166,7 @@ def _sum_of_parts(parts: list[sparse.bsr_matrix], coarse: Indices, weights: PETS
     matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, True)
     matrix.setOption(PETSc.Mat.Option.ROW_ORIENTED, False)
     for starts, columns, values, rows in entries:
-        pattern = (part.astype(PETSc.IntType) for part in (starts, columns))
-        matrix.setValuesBlockedIJV(*pattern, values, addv=True, rowmap=rows)
+        matrix.setValuesBlockedIJV(starts, columns, values, addv=True, rowmap=rows)
     matrix.assemble()
     return matrix
 
@@ -192,8 +190,7 @@ def block_rows(matrix: PETSc.Mat) -> Iterator[BlockRows]:
         return
     _call("MatMPIBAIJGetSeqBAIJ", own, *map(ctypes.byref, (own, ghost, ghosts)))
     with _sequential(own, count) as first, _sequential(ghost, None) as second:
-        others = second.shape[1]
-        numbers = np.ctypeslib.as_array(ghosts, (others,)) if others else none
+        numbers = np.ctypeslib.as_array(ghosts, second.shape[1:]) if second.shape[1] else none
         yield BlockRows(first, second, numbers)
 
 

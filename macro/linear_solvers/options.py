@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +11,6 @@ from typing import Any
 from petsc4py import PETSc
 
 from geometry.errors import InputError, NotConverged
-from macro.linear_solvers.direct import set_up
 
 PREFIX = "patchlaw_"
 """Prefix of every PETSc option: ``-patchlaw_ksp_rtol 1e-6`` on the command line wins."""
@@ -49,6 +48,18 @@ GEOMETRIC_DEFAULTS: Mapping[str, object] = {
 saves messages between all ranks. Two smoothing steps before and after: one step took 1.7 to 1.9
 times the iterations and three took 0.7 to 0.8 of them, in the same time; Gauss–Seidel took two to
 four times as long."""
+
+
+DIRECT_DEFAULTS = {"pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"}
+"""A factorisation by MUMPS, distributed over the ranks."""
+
+MARGINS = (50, 200, 800, 3200)
+"""Memory beyond MUMPS's estimate that is tried in turn, in percent; its own default is 20. MUMPS
+estimates the memory of a front before it knows the pivots and which rank works on what. On several
+ranks the same matrix fits in one run and fails in the next (error −9)."""
+
+_MARGIN = 14  # MUMPS's ICNTL(14): memory beyond the estimate, in percent
+_OUT_OF_MEMORY = (-8, -9, -14, -15, -17, -20)  # errors that its guide answers with ICNTL(14)
 
 
 def users_options() -> tuple[tuple[str, str], ...]:
@@ -101,37 +112,34 @@ class CoarserGrid:
 
 def linear_solver(
     matrix: PETSc.Mat,
-    prefix: str = PREFIX,
-    coarser: Callable[[], Sequence[CoarserGrid]] | None = None,
+    coarser: Sequence[CoarserGrid] | None = None,
     preconditioner: Mapping[str, object] | None = None,
+    *,
+    prefix: str = PREFIX,
 ) -> PETSc.KSP:
     """Return a solver for a symmetric positive definite matrix, its preconditioner set up.
 
     Args:
         matrix: The matrix, with its near-nullspace attached.
-        prefix: Prefix of its PETSc options.
-        coarser: Makes the coarser grids of a multigrid, finest first. It is called unless the user
-            chooses another preconditioner.
+        coarser: Coarser grids of a geometric multigrid, finest first; None for another
+            preconditioner.
         preconditioner: Options of the preconditioner, which override the defaults here.
+        prefix: Prefix of its PETSc options.
 
     Note:
         Collective.
     """
     solver = PETSc.KSP().create(matrix.comm)
     solver.setOptionsPrefix(prefix)
-    geometric = coarser is not None and PETSc.Options(prefix).getString("pc_type", "mg") == "mg"
-    if coarser is not None and geometric:
-        solver.setOperators(matrix)
-        grids = coarser()
+    solver.setOperators(matrix, _pointwise(matrix) if coarser is None else matrix)
+    if coarser is not None:
         solver.pc.setType("mg")
-        solver.pc.setMGLevels(len(grids) + 1)
-        for level, grid in enumerate(reversed(grids)):
+        solver.pc.setMGLevels(len(coarser) + 1)
+        for level, grid in enumerate(reversed(coarser)):
             solver.pc.setMGInterpolation(level + 1, grid.interpolation)
             solver.pc.getMGSmoother(level).setOperators(grid.matrix)
-    else:
-        solver.setOperators(matrix, _pointwise(matrix))
     one_rank = {"mg_coarse_pc_telescope_reduction_factor": matrix.comm.size}
-    usual = {**GEOMETRIC_DEFAULTS, **one_rank} if geometric else ALGEBRAIC_DEFAULTS
+    usual = ALGEBRAIC_DEFAULTS if coarser is None else {**GEOMETRIC_DEFAULTS, **one_rank}
     with default_options(prefix, {**KRYLOV_DEFAULTS, **usual, **(preconditioner or {})}):
         solver.setFromOptions()
         set_up(solver)  # multigrid reads the options of its levels here
@@ -183,6 +191,50 @@ def reason_name(reasons: type, code: int) -> str:
     names = [name for name, value in vars(reasons).items() if value == code and name.isupper()]
     # short aliases such as MAX_IT exist; PETSc documents the longest name
     return max(names, key=len, default=f"reason {code}")
+
+
+def set_up(solver: PETSc.KSP, margins: Sequence[int] = MARGINS) -> None:
+    """Set up a solver; a factorisation by MUMPS that runs out of memory is repeated with more.
+
+    Args:
+        solver: With its operators and options. Any other preconditioner is set up as it is.
+        margins: Memory beyond MUMPS's estimate to try in turn [%].
+
+    Raises:
+        NotConverged: When MUMPS fails otherwise, or with the largest margin.
+
+    Note:
+        Collective.
+    """
+    if not _by_mumps(solver.pc):
+        solver.setUp()
+        return
+    for margin in margins:
+        solver.pc.setFactorSetUpSolverType()  # makes the factor, which then takes its options
+        factor = solver.pc.getFactorMatrix()
+        factor.setMumpsIcntl(_MARGIN, margin)
+        solver.setUp()
+        error = factor.getMumpsInfog(1)
+        if error >= 0:
+            return
+        if error not in _OUT_OF_MEMORY:
+            break
+        operators = solver.getOperators()
+        solver.pc.reset()  # PETSc never retries a factor that failed
+        solver.setOperators(*operators)
+    raise NotConverged(
+        "the factorisation of the block",
+        reason=f"MUMPS's INFOG(1) = {error}",
+        iterations=0,
+        remedy="see MUMPS's guide for the number; more memory, or a coarser mesh",
+    )
+
+
+def _by_mumps(preconditioner: PETSc.PC) -> bool:
+    if preconditioner.getType() not in ("cholesky", "lu"):
+        return False
+    preconditioner.setFactorSetUpSolverType()  # PETSc chooses the package here
+    return str(preconditioner.getFactorSolverType()) == "mumps"
 
 
 class WeakContext:

@@ -17,8 +17,7 @@ Theory: section 11 of ``demos/theory.md``.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping
 from typing import Any
 
 from petsc4py import PETSc
@@ -26,10 +25,9 @@ from petsc4py import PETSc
 from geometry.materials import Material
 from geometry.meshes.block import BlockShape
 from geometry.meshes.refined_block import RefinedShape
-from macro.linear_solvers.direct import DIRECT_DEFAULTS
 from macro.linear_solvers.multigrid import Lattice, coarser_grids
 from macro.linear_solvers.multigrid_degrees import QUADRATIC_DEFAULTS, vertex_grid
-from macro.linear_solvers.options import PREFIX, CoarserGrid, linear_solver
+from macro.linear_solvers.options import DIRECT_DEFAULTS, PREFIX, linear_solver
 
 COMPRESSIBLE = 0.45
 """Largest Poisson's ratio at which multigrid is used without a lattice."""
@@ -83,16 +81,14 @@ def block_solver(
     limit = COMPRESSIBLE if lattice is None else STIFF
     if not requested and ratio > limit and matrix.getSize()[0] <= FACTORISED:
         return linear_solver(matrix, preconditioner=DIRECT_DEFAULTS)
-    grids: Callable[[], Sequence[CoarserGrid]] | None = None
-    smoother: Mapping[str, object] = {}
+    if requested not in ("", "mg"):
+        return linear_solver(matrix)
     if lattice is not None:
-        grids = partial(coarser_grids, lattice, matrix, free)
         smoother = smoothing(ratio, hexahedral=shape.hexahedral)
-    elif shape.degree == 2:
-        grids, smoother = partial(vertex_grid, matrix, space, free), QUADRATIC_DEFAULTS
-    return linear_solver(
-        matrix, coarser=grids, preconditioner=smoother if requested in ("", "mg") else {}
-    )
+        return linear_solver(matrix, coarser_grids(lattice, matrix, free), smoother)
+    if shape.degree == 2:
+        return linear_solver(matrix, vertex_grid(matrix, space, free), QUADRATIC_DEFAULTS)
+    return linear_solver(matrix)
 
 
 def smoothing(poisson_ratio: float, *, hexahedral: bool) -> Mapping[str, object]:

@@ -25,8 +25,8 @@ from macro import compat
 BOTTOM, TOP, SIDES = 1, 2, 3
 """Markers of the block's faces: z = −height, z = 0, and the four planes between them."""
 
-_FACES = np.array([1, 2, 4, 8, 16, 32], dtype=np.uint8).reshape(3, 2)
-"""Bits of a lattice's faces: the first and the last plane across x, y and z."""
+_FLAT = 1e-9
+"""Distance from a face, relative to the height of the block, that is rounding."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -35,7 +35,7 @@ class BlockMesh:
 
     Args:
         mesh: The dolfinx mesh; lengths in mm.
-        facet_tags: Its facets marked BOTTOM, TOP or SIDES; may include ghosts.
+        facet_tags: Its outer facets that this rank owns, marked BOTTOM, TOP or SIDES.
         shape: The shape that was meshed.
         planes: Indices of the grid planes across x, y and z that every row of ``mesh.geometry.x``
             lies on in the flat block, shape (n, 3); None for meshes without grid planes.
@@ -77,9 +77,9 @@ def block_mesh(shape: BlockShape | RefinedShape, comm: Any) -> BlockMesh:
     with ExitStack() as gmsh_session:
         models: list[Any] = []
         on_root(comm, lambda: models.append(gmsh_session.enter_context(shape.meshed())))
-        mesh, facet_tags = compat.mesh_from_gmsh(models[0] if models else None, comm)
+        mesh = compat.mesh_from_gmsh(models[0] if models else None, comm)
     mesh.geometry.x[:] *= shape.unit
-    return BlockMesh(mesh=mesh, facet_tags=facet_tags, shape=shape)
+    return BlockMesh(mesh=mesh, facet_tags=_faces(mesh, shape.height), shape=shape)
 
 
 def _from_lattice(shape: BlockShape, comm: Any) -> BlockMesh:
@@ -93,31 +93,18 @@ def _from_lattice(shape: BlockShape, comm: Any) -> BlockMesh:
     points = node_share(ticks, comm.size, comm.rank)
     mesh = compat.mesh_from_cells(cells, points, (boxes, others), comm)
     numbers = np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)  # empty lists too
-    planes = node_planes(counts, numbers)
-    facets, markers = _marked(mesh, _on_faces(planes, counts))
-    tags = dmesh.meshtags(mesh, 2, facets, markers)
-    return BlockMesh(mesh=mesh, facet_tags=tags, shape=shape, planes=planes)
+    return BlockMesh(
+        mesh=mesh,
+        facet_tags=_faces(mesh, shape.height),
+        shape=shape,
+        planes=node_planes(counts, numbers),
+    )
 
 
-def _on_faces(planes: NDArray[np.intp], counts: tuple[int, int, int]) -> NDArray[np.uint8]:
-    """Return the bits of the faces that nodes lie on, shape (n,)."""
-    first, last = _FACES.T
-    bits = np.where(planes == 0, first, 0) | np.where(planes == counts, last, 0)
-    return np.bitwise_or.reduce(bits.astype(np.uint8), axis=1)
-
-
-def _marked(mesh: Any, faces: NDArray[np.uint8]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Return this rank's facets on the block's faces, ascending, and their markers."""
-    topology = mesh.topology
-    topology.create_connectivity(3, 2)
-    topology.create_connectivity(2, 3)  # dolfinx' functions for facets need it
-    _, corners = compat.reference_facets(topology.cell_name())
-    vertices = faces[compat.cell_vertices(mesh)]
-    outer = np.flatnonzero(vertices.any(axis=1))
-    # a facet lies on the face that all its vertices lie on
-    on = np.bitwise_and.reduce(vertices[outer][:, corners], axis=2)
-    facets = topology.connectivity(3, 2).array.reshape(-1, len(corners))[outer][on > 0]
-    (bottom, top), on = _FACES[2], on[on > 0]
-    markers = np.select([on == bottom, on == top], [BOTTOM, TOP], SIDES).astype(np.int32)
-    order = np.argsort(facets)
-    return facets[order], markers[order]
+def _faces(mesh: Any, height: float) -> Any:
+    """Return the outer facets of this rank, marked by the height of their middles."""
+    mesh.topology.create_connectivity(2, 3)
+    facets = np.sort(dmesh.exterior_facet_indices(mesh.topology)).astype(np.int32)
+    level = dmesh.compute_midpoints(mesh, 2, facets)[:, 2] / height
+    markers = np.select([level < -1.0 + _FLAT, level > -_FLAT], [BOTTOM, TOP], SIDES)
+    return dmesh.meshtags(mesh, 2, facets, markers.astype(np.int32))

@@ -78,14 +78,8 @@ class ScaledAsperities:
         added = np.flatnonzero(wanted)
         # This radius stays with flat peaks, and with peaks above which no plane comes.
         some = np.full(len(added), np.sqrt(watersheds.cell))
-        values = {
-            "x": watersheds.x[added],
-            "y": watersheds.y[added],
-            "z": watersheds.z[added],
-            "radius_major": some,
-            "radius_minor": some,
-            "angle": np.zeros(len(added)),
-        }
+        values = {"radius_major": some, "radius_minor": some, "angle": np.zeros(len(added))}
+        values |= {name: getattr(watersheds, name)[added] for name in ("x", "y", "z")}
         new: dict[str, Any] = {
             name: np.append(getattr(inner, name), value) for name, value in values.items()
         }
@@ -131,15 +125,8 @@ class ScaledAsperities:
         moments = from_origin(sheds.caps(height)[:, cap], sheds.x[cap], sheds.y[cap])
         solid = moments[0] > 0.0
         which, found = which[solid], equivalent(moments[:, solid], depth[solid])
-        values = {
-            "x": found.x,
-            "y": found.y,
-            "radius_major": found.radius * np.sqrt(found.ratio),
-            "radius_minor": found.radius / np.sqrt(found.ratio),
-            "angle": found.angle,
-        }
         new: dict[str, Any] = {}
-        for name, fit in values.items():
+        for name, fit in found._asdict().items():
             new[name] = getattr(self.summits, name).copy()
             new[name][which] = fit
         return replace(self.summits, **new)

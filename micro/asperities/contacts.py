@@ -1,24 +1,29 @@
-"""Hertz contacts of all asperities of a surface at a given interference, and their stiffness.
+"""Hertz contacts of the asperities of a surface, and the plane that rests on them.
+
+A rigid plane that has approached by δ interferes with every summit by d_k = <δ(x_k) − (z_M − z_k)>.
+Without interaction each contact makes this displacement alone, w_k = d_k. With interaction the
+displacements by all contacts add up to w_k (`micro.interaction.contact_problem`).
 
 Theory: demos/theory.md, section 8.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from geometry import Asperities
+from geometry import Asperities, Control
 from geometry.errors import InputError
+from geometry.plane_equilibrium import PlaneResponse
+from geometry.rigid_plane import PlaneLevers, RigidPlane
 from micro.closed_forms.hertz import HertzContact
 from micro.compliance.body_modes import BodyModes
-from micro.interaction.body_points import BodyPoints
 from micro.interaction.contact_problem import (
     BYTES_PER_PAIR,
     ContactProblem,
@@ -28,9 +33,9 @@ from micro.interaction.contact_problem import (
     checked_pairs,
     solve,
 )
-from micro.interaction.hertz_pairs import MERGING_SLOPE, HertzPairs
+from micro.interaction.hertz_pairs import MERGING_SLOPE, BodyPoints, HertzPairs
+from micro.interaction.plane_on_peaks import Peaks, contact_stiffness
 from micro.interaction.truncated_newton import truncated_newton
-from micro.plane_on_peaks import contact_stiffness
 
 Array = NDArray[np.float64]
 
@@ -40,20 +45,28 @@ SOLVERS: Mapping[str, Method] = MappingProxyType(
 """Solvers of the models with interaction, by name."""
 
 
-class HertzCoefficients(NamedTuple):
-    """Hertz's results of n asperities at an indentation t of 1 mm.
+class ModelKind(NamedTuple):
+    """What distinguishes the four models.
 
     Attributes:
-        force: P, which grows as t^(3/2), shape (n,) [N].
-        area: π a b, which grows as t, shape (n,) [mm²].
-        semi_axes: (a, b), which grow as t^(1/2), shape (n, 2) [mm].
-        peak_pressure: p0, which grows as t^(1/2), shape (n,) [MPa].
+        elliptic: Whether contacts are ellipses; circles of radius sqrt(R' R'') otherwise.
+        interacting: Whether contacts displace each other's summits through the half-space.
     """
 
-    force: Array
-    area: Array
-    semi_axes: Array
-    peak_pressure: Array
+    elliptic: bool
+    interacting: bool
+
+
+class Equilibrium(NamedTuple):
+    """Contacts in equilibrium with a plane.
+
+    Attributes:
+        plane: The plane.
+        solution: The contacts.
+    """
+
+    plane: RigidPlane
+    solution: Solution
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -66,73 +79,48 @@ class AsperityContacts:
     Args:
         asperities: The n summits, with the highest point z_M that the approach counts from.
         contact_modulus: E* [MPa].
-        elliptic: Whether contacts are ellipses; circles of radius sqrt(R' R'') otherwise.
-        interacting: Whether contacts displace each other's summits through the half-space.
+        kind: Shape of the contacts, and whether they interact.
         solver: Solver of the models with interaction, a name in `SOLVERS`.
         body: What a finite body with its sides adds to the half-space, between all contacts, also
             those of the models without interaction; a half-space when not given. On thin blocks it
             takes away from the interaction: models without any may then have no solution.
-
-    Raises:
-        InputError: When the modulus is not positive or the solver unknown.
     """
 
     asperities: Asperities
     contact_modulus: float
-    elliptic: bool
-    interacting: bool
-    solver: str = "active-set"
-    body: BodyModes | None = None
-
-    def __post_init__(self) -> None:
-        checked_name(self.solver, SOLVERS, "solver")
-        _ = self.hertz  # checks the modulus
-
-    def contact(self, indentation: ArrayLike, index: int | slice = slice(None)) -> HertzContact:
-        """Return the Hertz contacts of some asperities.
-
-        Args:
-            indentation: Their indentations [mm].
-            index: Which asperities.
-        """
-        a = self.asperities
-        return HertzContact(
-            contact_modulus=self.contact_modulus,
-            radius_major=(a.radius_major if self.elliptic else a.radius)[index],
-            radius_minor=(a.radius_minor if self.elliptic else a.radius)[index],
-            indentation=indentation,
-        )
+    kind: ModelKind
+    solver: str
+    body: BodyModes | None
 
     @cached_property
-    def hertz(self) -> HertzCoefficients:
-        """Hertz's results at an indentation of 1 mm."""
-        unit = self.contact(1.0)
-        axes = np.stack([unit.semi_major, unit.semi_minor], axis=-1)
-        return HertzCoefficients(unit.force, unit.area, axes, unit.peak_pressure)
+    def hertz(self) -> HertzContact:
+        """The contacts at an indentation t of 1 mm.
+
+        Force, area and semi-axes grow as t^(3/2), t and t^(1/2).
+        """
+        a, elliptic = self.asperities, self.kind.elliptic
+        return HertzContact(
+            contact_modulus=self.contact_modulus,
+            radius_major=a.radius_major if elliptic else a.radius,
+            radius_minor=a.radius_minor if elliptic else a.radius,
+            indentation=1.0,
+        )
 
     @cached_property
     def pairs(self) -> HertzPairs:
         """How the contacts displace each other's summits."""
-        a, body = self.asperities, None
-        if self.body is not None:
-            body = BodyPoints.at(self.body, a.x, a.y, self.contact_modulus)
-        return HertzPairs.among(
-            a,
-            self.contact(0.0).factors,
-            circular=not self.elliptic,
-            half_space=self.interacting,
-            body=body,
+        a, body = self.asperities, self.body
+        return HertzPairs(
+            x=a.x,
+            y=a.y,
+            angle=a.angle,
+            radius=a.radius,
+            shape=self.hertz.factors,
+            circular=not self.kind.elliptic,
+            half_space=self.kind.interacting,
+            body=None if body is None else BodyPoints.at(body, a.x, a.y),
+            contact_modulus=self.contact_modulus,
         )
-
-    def displacement(self, indentation: Array) -> Array:
-        """Return the total displacements of the summits, shape (n,) [mm].
-
-        Args:
-            indentation: Indentations of the contacts, shape (n,) [mm].
-        """
-        if not self.interacting and self.body is None:
-            return indentation
-        return indentation + self.pairs.displacement(indentation)
 
     def solution(self, interference: Array, start: Array) -> Solution:
         """Solve for the summits above the plane.
@@ -149,7 +137,7 @@ class AsperityContacts:
             InputError: When the interaction of so many summits does not fit into the memory.
             NotConverged: When the contact conditions cannot be met to 1e-10.
         """
-        if not self.interacting and self.body is None:
+        if not self.kind.interacting and self.body is None:
             alone = np.maximum(interference, 0.0)
             return Solution(alone, alone, 0, 0.0, 0)
         above = np.flatnonzero(interference > 0.0)
@@ -160,14 +148,14 @@ class AsperityContacts:
         while True:
             checked_pairs(len(above), len(above), "asperities", bytes_per_pair=size)
             pairs = self.pairs.subset(above)
-            problem = ContactProblem(interaction=pairs, interference=interference[above])
+            problem = ContactProblem(interaction=pairs.evaluate, interference=interference[above])
             found = solve(problem, SOLVERS[self.solver], start[above])
             own[above], displacement[above] = found.indentation, found.displacement
             spent += found.iterations
             if self.pairs.body is None:
                 break
             # Through the half-space contacts only press summits down; a body can raise them.
-            raised = interference - self.pairs.body.displacement(self.pairs.scaled_force(own)) > 0.0
+            raised = interference - self.pairs.body.displacement(self.pairs.force(own)) > 0.0
             raised[above] = False
             if not raised.any():
                 break
@@ -187,59 +175,79 @@ class AsperityContacts:
         rate = 1.5 * self.hertz.force[active] * np.sqrt(indentation[active])
         coupling = np.zeros(2 * (len(active),))
         share = rate / (np.pi * self.contact_modulus)
-        if self.interacting:
+        if self.kind.interacting:
             x, y = self.asperities.x[active], self.asperities.y[active]
             apart = np.hypot(x[:, None] - x, y[:, None] - y)
             np.fill_diagonal(apart, np.inf)
             coupling += share / np.maximum(apart, share / MERGING_SLOPE)
-        if self.body is not None and self.pairs.body is not None:
+        if self.pairs.body is not None:
             among = self.pairs.body.among(active)
-            coupling += among.by(among) * share
+            coupling += among.by(among) * rate
         return contact_stiffness(lever[active], rate, coupling)
 
+    def equilibrium(self, control: Control, start: Equilibrium | None = None) -> Equilibrium:
+        """Solve the contacts, and the motions of the plane that are free.
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class AsperityState:
-    """Contact of all n asperities at one approach.
+        Without force the plane is that of first touch; where its slopes are free they are those
+        of the start.
 
-    Args:
-        approach: Rigid approach δ at the centre [mm].
-        interference: Depth d_k ≥ 0 of the plane below each undisplaced summit, shape (n,) [mm].
-        displacement: Displacements w_k of the summits by all contacts, shape (n,) [mm].
-        indentation: Part of w_k by the summit's own contact, shape (n,) [mm].
-        semi_axes: Semi-axes (a, b) of the contacts, shape (n, 2) [mm].
-        contact_area: Areas π a b, shape (n,) [mm²].
-        force: Forces P_k, shape (n,) [N].
-        peak_pressure: Pressures at the centres of the contacts, shape (n,) [MPa].
-        overlapping_contacts: Number of ordered pairs (k, i) in which contact i has come so close
-            to summit k that `micro.interaction.hertz_pairs` limits its kernel.
-        iterations: Linear systems solved; 0 for the models without interaction.
-        residual: Largest complementarity error relative to the largest d_k.
-    """
+        Args:
+            control: What is prescribed of the plane.
+            start: A solution nearby, of these or as many asperities.
 
-    approach: float
-    interference: Array
-    displacement: Array
-    indentation: Array
-    semi_axes: Array
-    contact_area: Array
-    force: Array
-    peak_pressure: Array
-    overlapping_contacts: int
-    iterations: int
-    residual: float
+        Raises:
+            InputError: When the start is of other asperities.
+            NotConverged: When the contact conditions cannot be met to 1e-10, or no plane is in
+                equilibrium.
+        """
+        own = np.zeros(len(self.asperities)) if start is None else start.solution.indentation
+        if own.shape != (len(self.asperities),):
+            raise InputError(
+                "the solution to start from is of other asperities",
+                value=own.shape,
+                allowed=f"({len(self.asperities)},)",
+            )
+        if control.approach is not None and control.tilt is not None:
+            plane = RigidPlane.above(self.asperities, control.approach, control.tilt)
+            return Equilibrium(plane, self.solution(self.asperities.interference(plane), own))
+        peaks, first, spent = self._peaks, self.first_plane(control, start), 0
+
+        def respond(motion: Array) -> PlaneResponse[Equilibrium]:
+            nonlocal own, spent
+            plane = RigidPlane.moved(self.asperities, motion)
+            found = self.solution(self.asperities.interference(plane), own)
+            own, spent = found.indentation, spent + found.iterations
+            known = Equilibrium(plane, found._replace(iterations=spent))
+            return PlaneResponse(
+                loads=peaks.levers.loads(self.hertz.force * own**1.5),
+                stiffness=lambda: self.stiffness(known.solution.indentation, peaks.lever),
+                state=known,
+            )
+
+        return peaks.equilibrium(respond, control, first.motion)[1]
+
+    def first_plane(self, control: Control, start: Equilibrium | None = None) -> RigidPlane:
+        """Return the plane that the search for an equilibrium starts from.
+
+        Args:
+            control: What is prescribed of the plane.
+            start: A solution nearby; without it the plane is that of contacts that do not
+                displace each other's summits.
+
+        Raises:
+            NotConverged: When no plane can be in equilibrium.
+        """
+        near = None
+        if start is not None and (start.solution.indentation.any() or control.force == 0.0):
+            near = start.plane
+        return RigidPlane.moved(self.asperities, self._peaks.first_plane(control, near))
 
     @property
-    def in_contact(self) -> NDArray[np.bool_]:
-        """Which asperities carry a force, shape (n,)."""
-        return self.indentation > 0.0
-
-
-def checked_name(name: str, table: Collection[str], what: str) -> None:
-    """Refuse a name that is not in a table.
-
-    Raises:
-        InputError: When it is not.
-    """
-    if name not in table:
-        raise InputError(f"this {what} is unknown", value=name, allowed=", ".join(table))
+    def _peaks(self) -> Peaks:
+        """The summits under the plane; not cached, because models are sent between processes."""
+        a, force = self.asperities, self.hertz.force
+        return Peaks(
+            levers=PlaneLevers.at(a.x, a.y, a.lengths),
+            depth=a.highest - a.z,
+            force=lambda interference: float(force @ np.maximum(interference, 0.0) ** 1.5),
+        )

@@ -33,9 +33,6 @@ from scipy.ndimage import label
 from geometry import Surface, roughness
 from geometry.summits import grid_maxima
 
-CONTACT_TERMS = ("floor", "crowding", "eccentricity", "wave", "eccentric_wave", "border")
-GRID_TERMS = ("radius_few", "radius", "wave")
-
 CONTACT_COEFFICIENTS = {
     "elliptic": (0.0124, 0.0, 0.0, 0.109, 1.20, 1.15),
     "circular": (0.0120, 0.0, 0.0, 0.0965, 1.37, 1.15),
@@ -76,13 +73,12 @@ class ContactMeasures:
     border_share: float
 
 
-def contact_measures(surface: Surface, approach: float, *, periodic: bool) -> ContactMeasures:
+def contact_measures(surface: Surface, approach: float) -> ContactMeasures:
     """Measure the contacts of a surface under a level plane.
 
     Args:
         surface: The surface.
         approach: Approach of the undeformed plane [mm].
-        periodic: Whether the border cuts nothing.
     """
     level = surface.highest - approach
     names, regions = label(surface.heights > level, np.ones((3, 3)))
@@ -90,7 +86,7 @@ def contact_measures(surface: Surface, approach: float, *, periodic: bool) -> Co
     cells = max(int(area.sum()), _LEAST_REGION)
     dx, dy = surface.spacing
     radius = np.sqrt(0.5 * cells * dx * dy / (np.pi * max(regions, 1)))
-    summits = grid_maxima(surface.heights, periodic=periodic)
+    summits = grid_maxima(surface.heights, periodic=False)
     above = int(np.count_nonzero(summits.height > level))
     return ContactMeasures(
         regions=regions,
@@ -99,7 +95,7 @@ def contact_measures(surface: Surface, approach: float, *, periodic: bool) -> Co
         cells_per_wave=_cells_per_wave(surface),
         crowding=float(radius * np.sqrt(max(above, 1) / surface.area)),
         eccentricity=float(np.sqrt(_mean_square_eccentricity(names, area, dx / dy))),
-        border_share=0.0 if periodic else _border_share(names, area),
+        border_share=_border_share(names, area),
     )
 
 

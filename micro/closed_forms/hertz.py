@@ -1,4 +1,4 @@
-"""Hertz contact of one asperity with a rigid plane: force, area, pressure and displacement.
+"""Hertz contact of one asperity with a rigid plane: shape, force, area, pressure, displacement.
 
 Theory: demos/theory.md, section 8.
 """
@@ -7,15 +7,128 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import elliprd, elliprf
 
 from geometry.errors import InputError
-from micro.closed_forms.ellipse import ShapeFactors, shape_factors
 from micro.closed_forms.hertz_field import elliptic_field
 
 Array = NDArray[np.float64]
+
+_NEWTON_STEPS = 30
+
+
+class ShapeFactors(NamedTuple):
+    """What the shape of the contact ellipse contributes to Hertz's formulas (no units).
+
+    Attributes:
+        axis_ratio_squared: β = b²/a² = 1 − e², in (0, 1].
+        integral: K(e), the complete elliptic integral of the first kind.
+        axis: 2 K F1/π; the major semi-axis is ``axis · sqrt(R w)``.
+        force: F1(e).
+        area: A1(e).
+    """
+
+    axis_ratio_squared: Array
+    integral: Array
+    axis: Array
+    force: Array
+    area: Array
+
+    @property
+    def axis_ratio(self) -> Array:
+        """The ratio b/a; slender contacts keep all its digits, which 1 − e² loses at e → 1."""
+        return np.sqrt(self.axis_ratio_squared)
+
+    @property
+    def eccentricity(self) -> Array:
+        """The eccentricity e."""
+        return np.sqrt(1.0 - self.axis_ratio_squared)
+
+
+def shape_factors(radius_major: ArrayLike, radius_minor: ArrayLike) -> ShapeFactors:
+    """Return the shape factors of contacts with given principal radii.
+
+    The eccentricity is the root of ((a/b)² E(e) − K(e)) / (K(e) − E(e)) = R'/R''. In Carlson's
+    integrals the left side is RD(0, 1, β)/RD(0, β, 1) with β = b²/a², free of cancellation for
+    every shape.
+
+    Args:
+        radius_major: Larger principal radius R' [mm].
+        radius_minor: Smaller principal radius R'' [mm].
+
+    Raises:
+        InputError: When a radius is not positive or R' < R''.
+
+    Source:
+        Waddad et al. 2016, eqs. 1 and 3, doi 10.1016/j.triboint.2015.12.023; Johnson, Contact
+        Mechanics (1985), eq. 4.25; Carlson's form from DLMF 19.25.1.
+    """
+    return _factors(_axis_ratio_squared(radius_major, radius_minor))
+
+
+def factors_at(eccentricity: ArrayLike) -> ShapeFactors:
+    """Return the shape factors of contacts with given eccentricities.
+
+    Args:
+        eccentricity: e in [0, 1).
+
+    Source:
+        Waddad et al. 2016, eqs. 1 and 3, doi 10.1016/j.triboint.2015.12.023.
+    """
+    e = np.asarray(eccentricity, float)
+    return _factors((1.0 - e) * (1.0 + e))
+
+
+def _factors(beta: Array) -> ShapeFactors:
+    """Return the factors; with Carlson's integrals the paper's 1/e cancels.
+
+    K − E = (e²/3) RD(0, β, 1) and E/β − K = (e²/3) RD(0, 1, β).
+    """
+    integral = elliprf(0.0, beta, 1.0)
+    product = elliprd(0.0, 1.0, beta) * elliprd(0.0, beta, 1.0)
+    force = np.pi / np.sqrt(6.0) * product**0.25 * integral**-1.5
+    axis = 2.0 / np.pi * integral * force
+    return ShapeFactors(beta, integral, axis, force, np.sqrt(beta) * axis**2)
+
+
+def _axis_ratio_squared(radius_major: ArrayLike, radius_minor: ArrayLike) -> Array:
+    """Solve ln RD(0, 1, β) − ln RD(0, β, 1) = ln R'/R'' for β by Newton's method in ln β.
+
+    The slope in ln β is −1 + (β q − 1/q) / (2 (1 − β)) with q the left side: from −3/4 at β = 1,
+    where the quotient is 0/0, to −1 at β → 0. The function is nearly straight, so the
+    paper's eq. 2 as start leads to rounding error in a few steps.
+    """
+    target = np.log(_radius_ratio(radius_major, radius_minor))
+    log_beta = -4.0 / 3.0 * target
+    for _ in range(_NEWTON_STEPS):
+        beta = np.exp(log_beta)
+        ratio = elliprd(0.0, 1.0, beta) / elliprd(0.0, beta, 1.0)
+        gap = 1.0 - beta
+        flat = gap < 1e-5  # the quotient has lost half its digits; its limit is as good
+        quotient = (beta * ratio - 1.0 / ratio) / (2.0 * np.where(flat, 1.0, gap))
+        slope = np.where(flat, -0.75, quotient - 1.0)
+        step = (target - np.log(ratio)) / slope
+        log_beta = np.minimum(log_beta + step, 0.0)
+        if np.all(np.abs(step) <= 4e-16 * (1.0 + np.abs(log_beta))):
+            break
+    return np.asarray(np.exp(log_beta))
+
+
+def _radius_ratio(radius_major: ArrayLike, radius_minor: ArrayLike) -> Array:
+    major, minor = np.asarray(radius_major, float), np.asarray(radius_minor, float)
+    good = (minor > 0.0) & (major >= minor) & np.isfinite(major)
+    if not np.all(good):
+        first = tuple(float(radius[~good].flat[0]) for radius in np.broadcast_arrays(major, minor))
+        raise InputError(
+            "these principal radii do not describe a summit",
+            value=first,
+            allowed="finite R' ≥ R'' > 0 in mm",
+        )
+    return major / minor
 
 
 def checked_modulus(contact_modulus: float) -> None:
@@ -84,7 +197,7 @@ class HertzContact:
     @property
     def semi_minor(self) -> Array:
         """Minor semi-axis b [mm]."""
-        return self.semi_major * np.sqrt(self.factors.axis_ratio_squared)
+        return self.semi_major * self.factors.axis_ratio
 
     @property
     def force(self) -> Array:
@@ -100,13 +213,8 @@ class HertzContact:
     @property
     def peak_pressure(self) -> Array:
         """Pressure at the centre, p0 = 3 P/(2 A) = E* w/(b K) [MPa], 0 without contact."""
-        width = self.factors.axis * np.sqrt(self.factors.axis_ratio_squared) * self.factors.integral
+        width = self.factors.axis * self.factors.axis_ratio * self.factors.integral
         return self.contact_modulus * np.sqrt(self._depth / self.radius) / width
-
-    @property
-    def mean_pressure(self) -> Array:
-        """Mean pressure over the contact, P/A = 2/3 p0 [MPa]."""
-        return 2.0 / 3.0 * self.peak_pressure
 
     def pressure(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Return p = p0 sqrt(1 − x²/a² − y²/b²) inside the ellipse and 0 outside [MPa].

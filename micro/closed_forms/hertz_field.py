@@ -127,16 +127,9 @@ def far_field(
     root, along, across = _coefficients(beta)
     x = 1.0 / (v + (1.0 + beta) / 3.0)
     first = np.sqrt(x)
-    slope = _polynomial(root, x)
-    slope *= first
-    moments = _polynomial(along, x)
-    moments *= x_squared
-    other = _polynomial(across, x)
-    other *= y_squared
-    moments += other
-    first *= x
-    moments *= first
-    return s * slope - moments, slope
+    slope = first * _polynomial(root, x)
+    moments = x_squared * _polynomial(along, x) + y_squared * _polynomial(across, x)
+    return s * slope - first * x * moments, slope
 
 
 def _coefficients(beta: Array) -> tuple[list[Array], list[Array], list[Array]]:

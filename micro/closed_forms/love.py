@@ -18,8 +18,7 @@ from numpy.polynomial import legendre
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import toeplitz
 
-from geometry.errors import InputError
-from geometry.patches import Partition, PatchGrid
+from geometry.patches import PatchGrid
 
 Array = NDArray[np.float64]
 
@@ -29,42 +28,14 @@ _POINTS = 6
 """Points of Gauss' rule on a side; at the distance `_FAR` their error is rounding."""
 
 
-def love_integral(x: ArrayLike, y: ArrayLike, a: ArrayLike, b: ArrayLike) -> Array:
-    """Return L(a, b, x, y), the integral of 1/distance from (x, y) over the rectangle [mm].
-
-    Finite everywhere, borders and corners included. The four corner terms cancel far away: the
-    relative error is about 1e-16 (r/a)², so 1e-10 at a thousand half-sides.
-
-    Args:
-        x: Distance of the point from the centre along x [mm]; all arguments broadcast.
-        y: Distance along y [mm].
-        a: Half-side along x [mm].
-        b: Half-side along y [mm].
-
-    Raises:
-        InputError: When a half-side is not positive.
-
-    Source:
-        Waddad et al. 2016, eq. 30, doi 10.1016/j.triboint.2015.12.023 (Love 1929).
-    """
-    x, y, a, b = np.asarray(x, float), np.asarray(y, float), *_half_sides(a, b)
-    total = np.zeros(np.broadcast_shapes(x.shape, y.shape, a.shape, b.shape))
-    for i, j in product((1, -1), repeat=2):
-        total += i * j * corner_integral(x + i * a, y + j * b)
-    return total
-
-
 def love_centre(a: ArrayLike, b: ArrayLike) -> Array:
     """Return L at the centre of the rectangle [mm]; 3.5255 s for a square of side s.
 
     Args:
         a: Half-side along x [mm].
         b: Half-side along y [mm].
-
-    Raises:
-        InputError: When a half-side is not positive.
     """
-    return 4.0 * corner_integral(*_half_sides(a, b))
+    return 4.0 * corner_integral(a, b)
 
 
 def love_mean(a: ArrayLike, b: ArrayLike) -> Array:
@@ -73,9 +44,6 @@ def love_mean(a: ArrayLike, b: ArrayLike) -> Array:
     Args:
         a: Half-side along x [mm].
         b: Half-side along y [mm].
-
-    Raises:
-        InputError: When a half-side is not positive.
     """
     return love_mutual(0.0, 0.0, a, b)
 
@@ -92,23 +60,19 @@ def love_mutual(dx: ArrayLike, dy: ArrayLike, a: ArrayLike, b: ArrayLike) -> Arr
         dy: Distance of the centres along y [mm].
         a: Half-side along x [mm].
         b: Half-side along y [mm].
-
-    Raises:
-        InputError: When a half-side is not positive.
     """
-    dx, dy, a, b = np.asarray(dx, float), np.asarray(dy, float), *_half_sides(a, b)
+    dx, dy, a, b = (np.asarray(part, float) for part in (dx, dy, a, b))
     total = np.zeros(np.broadcast_shapes(dx.shape, dy.shape, a.shape, b.shape))
     for (i, p), (j, q) in product(((-1, 1.0), (0, -2.0), (1, 1.0)), repeat=2):
         total += p * q * fourfold_integral(dx + 2 * i * a, dy + 2 * j * b)
     return total / (4.0 * a * b)
 
 
-def influence_matrix(patches: Partition) -> Array:
+def influence_matrix(patches: PatchGrid) -> Array:
     """Return the mean displacements Λ_ij of all patches by pressure on each, shape (N, N) [mm].
 
-    Pressures p displace the patches by Λ p / (π E*). For equal patches symmetric and exact to 1e-12
-    if they are squares, to 2e-11 for sides of 5 to 1 and to 1e-10 for 10 to 1. Of unequal ones
-    A_i Λ_ij is symmetric; entries lose 1e-16 (distance / shortest side)⁴ to rounding.
+    Pressures p displace the patches by Λ p / (π E*). The matrix is symmetric and exact to 1e-12 for
+    squares, to 2e-11 for sides of 5 to 1 and to 1e-10 for 10 to 1.
 
     Args:
         patches: The N patches.
@@ -116,26 +80,12 @@ def influence_matrix(patches: Partition) -> Array:
     Source:
         Love 1929, doi 10.1098/rsta.1929.0009; Waddad et al. 2016, eq. 29-30 for one point.
     """
-    if not isinstance(patches, PatchGrid):
-        return _unequal(patches)
     (nx, ny), (sx, sy), (a, b) = patches.grid, patches.size, patches.half_sizes
     table = mutual_influence(np.arange(nx)[:, None] * sx, np.arange(ny) * sy, a, b)
     steps_x = toeplitz(np.arange(nx))
     steps_y = toeplitz(np.arange(ny))
     whole = table[steps_x[:, None, :, None], steps_y[None, :, None, :]]
     return np.asarray(whole.reshape(patches.count, patches.count))
-
-
-def _unequal(patches: Partition) -> Array:
-    """Difference the fourfold antiderivative over the borders of both rectangles."""
-    x, y = patches.borders_x, patches.borders_y
-    table = fourfold_integral(
-        np.subtract.outer(x, x)[:, :, None, None], np.subtract.outer(y, y)[None, None]
-    )
-    for axis in range(4):
-        table = np.diff(table, axis=axis)
-    whole = table.transpose(0, 2, 1, 3).reshape(patches.count, patches.count)
-    return np.asarray(whole / patches.areas[:, None])
 
 
 def mutual_influence(dx: ArrayLike, dy: ArrayLike, a: float, b: float) -> Array:
@@ -146,9 +96,6 @@ def mutual_influence(dx: ArrayLike, dy: ArrayLike, a: float, b: float) -> Array:
         dy: Distance along y [mm].
         a: Half-side along x [mm].
         b: Half-side along y [mm].
-
-    Raises:
-        InputError: When a half-side is not positive.
     """
     dx, dy = np.broadcast_arrays(np.asarray(dx, float), np.asarray(dy, float))
     result = np.asarray(love_mutual(dx, dy, a, b))
@@ -197,15 +144,3 @@ def _asinh_ratio(numerator: Array, denominator: Array) -> Array:
     ratio = np.zeros(shape)
     np.divide(numerator, size, out=ratio, where=size > 1e-290 * np.abs(numerator))
     return np.arcsinh(ratio)
-
-
-def _half_sides(a: ArrayLike, b: ArrayLike) -> tuple[Array, Array]:
-    sides = np.asarray(a, float), np.asarray(b, float)
-    for side in sides:
-        if not np.all(side > 0.0):
-            raise InputError(
-                "the half-sides of a rectangle must be positive",
-                value=side.tolist(),
-                allowed="a > 0, b > 0 in mm",
-            )
-    return sides

@@ -19,8 +19,7 @@ from micro.compliance.finite_slopes import FiniteSlopes
 from micro.compliance.free_sides import FreeSides
 from micro.compliance.grid_compliance import Compliance
 from micro.half_space.plane_contact import LEVEL, HalfSpaceState, PlaneContact
-from micro.model import checked_approaches, checked_patches, whole_patch
-from micro.response import Pressed, Response
+from micro.model import Pressed, Response, checked_approaches, checked_patches, whole_patch
 
 Array = NDArray[np.float64]
 

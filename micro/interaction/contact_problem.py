@@ -28,7 +28,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,11 +72,8 @@ class InteractionDisplacement(NamedTuple):
     overlapping_contacts: int = 0
 
 
-class Interaction(Protocol):
-    """Contacts that displace each other's summits."""
-
-    def evaluate(self, indentation: Array, /) -> InteractionDisplacement:
-        """Return the displacements by given indentations, shape (n,) [mm]; negative ones are 0."""
+Interaction = Callable[[Array], InteractionDisplacement]
+"""Returns the displacements by given indentations, shape (n,) [mm]; negative ones count as 0."""
 
 
 class Solution(NamedTuple):
@@ -150,7 +147,6 @@ def checked_pairs(
     what: str,
     *,
     bytes_per_pair: float = BYTES_PER_PAIR,
-    available: float | None = None,
 ) -> None:
     """Refuse a number of pairs whose dense matrices do not fit into the memory.
 
@@ -159,13 +155,11 @@ def checked_pairs(
         columns: Number of contacts that displace them.
         what: Name of the contacts in the message, such as ``asperities``.
         bytes_per_pair: Memory that a pair takes [B].
-        available: Memory that may be filled [B]; that of this process when not given.
 
     Raises:
-        InputError: When the matrices need more than the memory available.
+        InputError: When the matrices need more than the memory of this process.
     """
-    available = process_memory() if available is None else available
-    needed = bytes_per_pair * rows * columns
+    needed, available = bytes_per_pair * rows * columns, process_memory()
     if needed > available:
         raise InputError(
             f"the interaction of {columns} {what} needs {needed / 1e9:.3g} GB of memory"
@@ -232,7 +226,7 @@ def active_set(
     """
 
     def evaluate(z: Array) -> tuple[InteractionDisplacement, Array]:
-        caused = problem.interaction.evaluate(z)
+        caused = problem.interaction(z)
         return caused, z + caused.displacement - problem.interference
 
     z = start

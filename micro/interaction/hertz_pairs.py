@@ -1,4 +1,4 @@
-"""How far Hertz contacts press each other's summits down, pair by pair.
+"""How far Hertz contacts press each other's summits down, through the half-space and a finite body.
 
 The unknowns are the indentations t_i = κ_i K_i s_i, the part of a summit's displacement that its
 own contact causes; they are linear in s_i = a_i². Contact i displaces summit k by U_ki(t_i), a
@@ -13,22 +13,28 @@ one, as they should: t (1 + c*) = d and 2 t^(3/2) = d^(3/2). More than two at on
 little: n equal ones n (1 + (n − 1) c*)^(−3/2) of one, 0.94 for 3 and 0.82 for 5. Pairs beyond c*
 count as overlapping contacts, so that a result can be judged.
 
-Theory: demos/theory.md, section 8.
+A finite body adds smooth displacements, in modes. Contacts are small against the waves of these.
+So forces act and displacements are taken at the centres of the contacts, and a contact's own force
+counts as well.
+
+Theory: demos/theory.md, section 8, eq. 6.1.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import elliprf
 
-from geometry import Asperities
-from micro.closed_forms.ellipse import ShapeFactors
+from geometry import Partition
+from geometry.legendre_modes import mode_values
+from micro.closed_forms.hertz import ShapeFactors
 from micro.closed_forms.hertz_field import circular_field, elliptic_field
-from micro.interaction.body_points import BodyPoints
+from micro.compliance.body_modes import BodyModes
 from micro.interaction.contact_problem import InteractionDisplacement
 
 Array = NDArray[np.float64]
@@ -40,7 +46,6 @@ MERGING_SLOPE = 2.0 ** (2.0 / 3.0) - 1.0
 SINE_MERGED = float(np.sin(0.5 * np.pi * MERGING_SLOPE))
 """a/r of a circular contact whose slope at distance r is c*."""
 
-_ARRAYS = ("x", "y", "angle", "beta", "integral", "size", "v_merged")
 _NEWTON_STEPS = 30
 
 _PAIRS_AT_ONCE = 2**16
@@ -48,80 +53,120 @@ _PAIRS_AT_ONCE = 2**16
 blocks and 283 ms in one piece, whose arrays leave the cache."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class HertzPairs:
-    """Asperities that displace each other's summits; all arrays have the shape (n,).
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BodyPoints:
+    """Compliance of a body between n points of its contact face.
 
     Args:
-        x: Abscissae of the summits [mm].
-        y: Ordinates [mm].
-        angle: Directions of the major semi-axes from the x axis [rad]; unused for circles.
-        beta: b²/a².
-        integral: K(e).
-        size: s_i/t_i = R (2 K F1/π)² [mm].
-        v_merged: Confocal parameter v* at which the slope is c*.
-        circular: Whether all contacts are circles, which have a kernel in closed form.
+        body: The compliance in modes.
+        values: Modes at the points, shape (K², n).
+    """
+
+    body: BodyModes
+    values: Array
+
+    @classmethod
+    def at(cls, body: BodyModes, x: Array, y: Array) -> Self:
+        """Evaluate the modes at points.
+
+        Args:
+            body: The compliance in modes.
+            x: Abscissae, shape (n,) [mm].
+            y: Ordinates, shape (n,) [mm].
+        """
+        along_x, along_y = (
+            mode_values(place - corner, length, body.count)
+            for place, corner, length in zip((x, y), body.origin, body.lengths, strict=True)
+        )
+        return cls(body=body, values=(along_x[:, None] * along_y).reshape(len(body.matrix), -1))
+
+    def among(self, index: Indices) -> Self:
+        """Return the compliance between some of the points."""
+        return replace(self, values=self.values[:, index])
+
+    def displacement(self, force: Array) -> Array:
+        """Return the displacements of the points by forces on them, shape (n,) [mm].
+
+        Args:
+            force: Forces, shape (n,) [N].
+        """
+        return np.asarray(self.values.T @ (self.body.matrix @ (self.values @ force)))
+
+    def by(self, loaded: BodyPoints) -> Array:
+        """Return the displacements of the points by unit forces on m others, (n, m) [mm/N].
+
+        Args:
+            loaded: The points that the forces act on, on the same body.
+        """
+        return np.asarray(self.values.T @ (self.body.matrix @ loaded.values))
+
+    def patch_means(self, patches: Partition, force: Array) -> Array:
+        """Return the mean displacements of patches, shape (N,) [mm].
+
+        Args:
+            patches: N patches within the face.
+            force: Forces on the points, shape (n,) [N].
+        """
+        cells = self.body.on(patches.borders_x, patches.borders_y)
+        amplitudes = (self.body.matrix @ (self.values @ force)).reshape(self.body.count, -1)
+        return np.asarray((cells.means_x.T @ amplitudes @ cells.means_y).ravel())
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HertzPairs:
+    """Asperities that displace each other's summits.
+
+    Args:
+        x: Abscissae of the n summits, shape (n,) [mm].
+        y: Ordinates, shape (n,) [mm].
+        angle: Directions of the major semi-axes from the x axis, shape (n,) [rad].
+        radius: Equivalent radii R, shape (n,) [mm].
+        shape: Shape factors of the contacts, arrays of shape (n,).
+        circular: Whether the shape factors are those of circles, which have a kernel in closed
+            form.
         half_space: Whether contacts displace each other's summits through the half-space.
         body: What a finite body adds to the displacements of all summits, the loaded one
             included; None leaves the half-space alone.
+        contact_modulus: E* [MPa], by which the forces on a body grow.
     """
 
     x: Array
     y: Array
     angle: Array
-    beta: Array
-    integral: Array
-    size: Array
-    v_merged: Array
+    radius: Array
+    shape: ShapeFactors
     circular: bool
     half_space: bool = True
     body: BodyPoints | None = None
+    contact_modulus: float = 1.0
 
-    @classmethod
-    def among(
-        cls,
-        asperities: Asperities,
-        shape: ShapeFactors,
-        *,
-        circular: bool,
-        half_space: bool = True,
-        body: BodyPoints | None = None,
-    ) -> Self:
-        """Collect what the interaction needs of asperities.
+    @cached_property
+    def size(self) -> Array:
+        """The ratios s_i/t_i = R (2 K F1/π)², shape (n,) [mm]."""
+        return self.radius * self.shape.axis**2
 
-        Args:
-            asperities: The n asperities.
-            shape: Their shape factors, arrays of shape (n,).
-            circular: Whether the shape factors are those of circles.
-            half_space: Whether contacts displace each other's summits through the half-space.
-            body: What a finite body adds, at the summits.
-        """
-        return cls(
-            x=asperities.x,
-            y=asperities.y,
-            angle=asperities.angle,
-            beta=shape.axis_ratio_squared,
-            integral=shape.integral,
-            size=asperities.radius * shape.axis**2,
-            v_merged=merging_parameter(shape.axis_ratio_squared, shape.integral),
-            circular=circular,
-            half_space=half_space,
-            body=body,
-        )
+    @cached_property
+    def v_merged(self) -> Array:
+        """Confocal parameters v* at which the slope is c*, shape (n,)."""
+        return merging_parameter(self.shape.axis_ratio_squared, self.shape.integral)
 
     def subset(self, index: Indices) -> Self:
         """Return the interaction among some of the asperities."""
-        body = None if self.body is None else self.body.among(index)
-        arrays = {name: getattr(self, name)[index] for name in _ARRAYS}
-        return replace(self, **arrays, body=body)
+        return replace(
+            self,
+            x=self.x[index],
+            y=self.y[index],
+            angle=self.angle[index],
+            radius=self.radius[index],
+            shape=ShapeFactors(*(factor[index] for factor in self.shape)),
+            body=None if self.body is None else self.body.among(index),
+        )
 
-    def scaled_force(self, indentation: Array) -> Array:
-        """Return P/(π E*) of indentations t ≥ 0 of all contacts, shape (n,) [mm²].
-
-        P/(π E*) = 2/3 s^(3/2)/(s/t · K).
-        """
+    def force(self, indentation: Array) -> Array:
+        """Return the forces of indentations t ≥ 0, P = 2/3 π E* s^(3/2)/(s/t · K), (n,) [N]."""
         s = self.size * indentation
-        return np.asarray(2.0 / 3.0 * s**1.5 / (self.size * self.integral))
+        unit = 2.0 / 3.0 * np.pi * self.contact_modulus
+        return np.asarray(unit * s**1.5 / (self.size * self.shape.integral))
 
     def evaluate(self, indentation: Array) -> InteractionDisplacement:
         """Return the displacement of every summit by the other contacts, with its slopes.
@@ -140,26 +185,12 @@ class HertzPairs:
                 merged = slope[rows] >= MERGING_SLOPE * (1.0 - 1e-12)
                 overlapping += int(np.count_nonzero(merged))
         if self.body is not None:
-            force = self.scaled_force(np.maximum(indentation, 0.0))[active]
+            force = self.force(np.maximum(indentation, 0.0))[active]
             between = self.body.by(self.body.among(active))
             displacement += between @ force
             between *= 1.5 * force / indentation[active]
             slope += between
         return InteractionDisplacement(active, displacement, slope, overlapping)
-
-    def displacement(self, indentation: Array) -> Array:
-        """Return the displacements that `evaluate` returns, without the memory for their slopes.
-
-        Args:
-            indentation: Indentations t ≥ 0, shape (n,) [mm].
-        """
-        active, found = np.flatnonzero(indentation > 0.0), np.zeros(len(indentation))
-        if self.half_space:
-            for rows in self._blocks(len(active)):
-                found[rows] = self._by_contacts(rows, active, indentation)[0]
-        if self.body is not None:
-            found += self.body.displacement(self.scaled_force(indentation))
-        return found
 
     def _blocks(self, columns: int) -> list[slice]:
         """Return slices of the displaced summits, so that the fields of a block fit the cache."""
@@ -169,16 +200,15 @@ class HertzPairs:
     def _by_contacts(self, rows: slice, active: Indices, own: Array) -> tuple[Array, Array]:
         """Return displacements of some summits by the others' contacts, and slopes c_ki."""
         x, y = self.x[rows, None] - self.x[active], self.y[rows, None] - self.y[active]
-        size, integral = self.size[active], self.integral[active]
+        size, integral = self.size[active], self.shape.integral[active]
         s = size * own[active]
         if self.circular:
             field, slope = circular_field(x**2 + y**2, s, SINE_MERGED)
         else:
             cos, sin = np.cos(self.angle[active]), np.sin(self.angle[active])
             along, across = cos * x + sin * y, cos * y - sin * x
-            field, slope = elliptic_field(
-                along**2, across**2, s, self.beta[active], self.v_merged[active]
-            )
+            beta, merged = self.shape.axis_ratio_squared[active], self.v_merged[active]
+            field, slope = elliptic_field(along**2, across**2, s, beta, merged)
         slope /= integral
         itself = np.arange(len(self.x))[rows, None] == active
         field[itself] = slope[itself] = 0.0

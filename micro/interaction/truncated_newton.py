@@ -85,7 +85,7 @@ def _minimise(
     rows, goal = np.flatnonzero(contacting), 0.1 * TOLERANCE * problem.scale
 
     def evaluate(t: Array) -> tuple[InteractionDisplacement, Array]:
-        caused = problem.interaction.evaluate(t)
+        caused = problem.interaction(t)
         return caused, (t + caused.displacement - problem.interference)[rows]
 
     t = start

@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from geometry import Control
 from geometry.errors import NotConverged
 from geometry.plane_equilibrium import PlaneResponse
-from micro.interaction.body_points import BodyPoints
 from micro.interaction.contact_problem import (
     ContactProblem,
     InteractionDisplacement,
@@ -30,9 +29,10 @@ from micro.interaction.contact_problem import (
     checked_pairs,
     solve,
 )
+from micro.interaction.hertz_pairs import BodyPoints
+from micro.interaction.plane_on_peaks import Peaks, contact_stiffness
 from micro.islands.shapes import Islands, islands
 from micro.islands.watersheds import Watersheds
-from micro.plane_on_peaks import Peaks, contact_stiffness
 
 Array = NDArray[np.float64]
 
@@ -115,7 +115,7 @@ class PointForces:
         """
         if interference.max(initial=0.0) <= 0.0:
             return np.zeros(len(interference))
-        problem = ContactProblem(interaction=self, interference=interference)
+        problem = ContactProblem(interaction=self.evaluate, interference=interference)
         return solve(problem, active_set, start).indentation
 
     def stiffness(self, indentation: Array, lever: Array) -> Array:
@@ -228,8 +228,8 @@ class IslandContact:
         if without_force or (prescribed and self.body is None):
             return kernel @ found.force, self.motion, found
         if self.body is not None:
-            centres = BodyPoints.at(self.body.body, found.x, found.y, self.contact_modulus)
-            kernel = kernel + self.body.by(centres) / np.pi
+            centres = BodyPoints.at(self.body.body, found.x, found.y)
+            kernel = kernel + self.contact_modulus * self.body.by(centres)
         top, depth, lever = found.top, found.depth, peaks.lever
         forces = PointForces(law=found.force / depth**1.5, matrix=kernel[top])
         over, moved = sheds.z[top] - self.level[top], lever[top]

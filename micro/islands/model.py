@@ -11,7 +11,7 @@ Volume and moments describe the surface on the scale of the contact. Against hal
 20 surfaces of the paper's Sets 1 and 2 with 256 × 256 cells the force is within 3 % (root mean
 square; 9 % at most) and the area within 5 % (14 %) from 0.1 to 5 % of contact area. Beyond 8 %
 regions grow together across the surface and stand for no ellipse. Every result says whether it
-lies within this range (`IslandState.warning`, `Response.warnings`).
+lies within this range (`Response.warnings`).
 
 Theory: demos/theory.md, section 9.
 """
@@ -20,76 +20,77 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from geometry import Control, Partition, PatchGrid, Surface
 from geometry.rigid_plane import PlaneLevers, RigidPlane
-from micro.closed_forms.hertz import checked_modulus
-from micro.compliance.body_modes import BodyModes
-from micro.interaction.body_points import BodyPoints
+from micro.interaction.contact_model import LEVEL, ContactModel, ContactState, first_guess
+from micro.interaction.hertz_pairs import BodyPoints
+from micro.interaction.plane_on_peaks import Peaks
 from micro.islands.equilibrium import IslandContact, IslandEquilibrium
-from micro.islands.patch_shares import island_shares
-from micro.islands.shapes import IslandState, total_force
-from micro.islands.watersheds import Watersheds
-from micro.model import checked_approaches, checked_patches, whole_patch
-from micro.patch_sums import EllipticContacts, PatchSums
-from micro.plane_on_peaks import Peaks
-from micro.response import Pressed, Response
+from micro.islands.shapes import Islands, island_shares, total_force
+from micro.islands.watersheds import MOST_WHOLE, Watersheds, needed_depth
+from micro.model import whole_patch
 
 Array = NDArray[np.float64]
 
-_LEVEL = (0.0, 0.0)
+LARGEST_AREA_FRACTION = 0.08
+"""Contact area fraction up to which the model is within its stated error."""
+
+GROWN_AREA_FRACTION = 0.04
+"""The same where one island holds more than `LARGEST_SHARE` of the contact area."""
+
+LARGEST_SHARE = 0.5
+
 _FIRST = 0.1  # of the range of heights: the approach to start from where none is known
 _TURN = 1e-4  # largest turn of the plane, of the deepest contact
 _MOST_CUTS = 8
-_MARGIN = 1.2  # depth of the watersheds that are found, in units of the approach
 
 
-class _Found(NamedTuple):
-    """Islands in equilibrium with a plane, and the watersheds that they are regions of."""
+class IslandCaps(NamedTuple):
+    """The regions that islands stand for.
+
+    Attributes:
+        watersheds: The watersheds of n peaks.
+        islands: The m islands.
+        height: Heights of the peaks above their own levels, negative below, shape (n,) [mm].
+    """
 
     watersheds: Watersheds
-    plane: RigidPlane
-    equilibrium: IslandEquilibrium
+    islands: Islands
+    height: Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class IslandModel:
-    """Contact of a surface by its regions above the plane.
+class IslandModel(ContactModel):
+    """Contact of a surface by its regions above the plane; see `ContactModel` for further fields.
 
     The border ends the surface, also a periodic one. A first approach divides the surface into
     watersheds (0.1 s for 256 × 256 cells); with these every further one takes milliseconds.
 
     Args:
         surface: The surface.
-        contact_modulus: E* [MPa].
         highest: Height z_M that the approach counts from [mm]; the surface's own when not given.
-        body: What a finite body with its sides adds to the half-space, between the centres of the
-            islands and the peaks; a half-space when not given.
-        most_cached: Largest number of cells of a surface whose watersheds are found once and
-            cached. Those of a larger surface are found again for every plane, only as deep as
-            needed.
-
-    Raises:
-        InputError: When the modulus is not positive.
+        most_whole: Largest number of cells of a surface whose watersheds are found as a whole;
+            see `needed_depth`.
     """
 
     surface: Surface
-    contact_modulus: float
     highest: float | None = None
-    body: BodyModes | None = None
-    most_cached: int = 2**20
-
-    def __post_init__(self) -> None:
-        checked_modulus(self.contact_modulus)
+    most_whole: int = MOST_WHOLE
 
     @property
     def name(self) -> str:
         """Name of the model."""
         return "islands"
+
+    @property
+    def rough(self) -> Surface:
+        """The surface."""
+        return self.surface
 
     @property
     def reference_height(self) -> float:
@@ -107,191 +108,121 @@ class IslandModel:
         alone = replace(self, surface=piece, highest=self.reference_height, body=None)
         return alone, whole_patch(piece)
 
-    def solve(self, approach: float, *, tilt: tuple[float, float] = _LEVEL) -> IslandState:
-        """Solve the contact at one approach of the plane.
-
-        Args:
-            approach: Rigid approach δ at the centre of the rectangle [mm].
-            tilt: Slopes (tx, ty) of the approach: δ(x, y) = δ + tx (x − xc) + ty (y − yc).
-
-        Raises:
-            InputError: When the approach or the tilt is not finite, or the interaction of the
-                islands does not fit into the memory.
-            NotConverged: When islands and displacements do not agree to 1e-6.
-        """
-        plane = RigidPlane.above(self.surface, approach, tilt)
-        given = Control(approach=approach, tilt=tilt)
-        return self._state(self._found(self._watersheds(plane), plane, given))
-
-    def respond(
-        self,
-        approaches: ArrayLike,
-        *,
-        patches: Partition | None = None,
-        mean_heights: ArrayLike | None = None,
-        tilt: tuple[float, float] = _LEVEL,
-    ) -> Response:
-        """Solve at approaches, none of which depends on another; see `MicroModel.respond`.
-
-        A patch gets the share of an island that lies in it (`micro.islands.patch_shares`); as a
-        contact an island counts where its highest peak lies. Against half-space pressures on 4 × 4
-        patches this misplaces a tenth of the mean patch force.
-        """
-        planes = [
-            RigidPlane.above(self.surface, approach, tilt)
-            for approach in checked_approaches(approaches)
-        ]
-        sums = PatchSums(self, *checked_patches(self.surface, patches, mean_heights))
-        watersheds = self._watersheds(max(planes, key=lambda plane: plane.approach))
-        rows = []
-        for plane in planes:
-            given = Control(approach=plane.approach, tilt=tilt)
-            rows.append(self._row(self._found(watersheds, plane, given), sums))
-        return sums.response(rows)
-
-    def press(
-        self,
-        control: Control,
-        *,
-        patches: Partition | None = None,
-        mean_heights: ArrayLike | None = None,
-        start: Any = None,
-    ) -> Pressed:
-        """Solve one load step; see `MicroModel.press`.
+    def equilibrium(self, control: Control, start: RigidPlane | None = None) -> ContactState:
+        """Solve for islands and plane; see `ContactModel.equilibrium`.
 
         Islands are found again at every load step, so the start is a plane only. A plane that turns
         is solved for on the watersheds of its slopes before, until a turn moves no point by more
         than 1e-4 of the deepest contact.
         """
-        sums = PatchSums(self, *checked_patches(self.surface, patches, mean_heights))
-        found = self._pressed(control, start)
-        response = sums.response([self._row(found, sums)])
-        return Pressed(response, found.plane, found.plane)
-
-    def _pressed(self, control: Control, near: RigidPlane | None) -> _Found:
-        """Find the islands, the plane, and the watersheds under its slopes."""
-        approach = _FIRST * float(np.ptp(self.surface.heights))
-        if near is not None:
-            approach = near.approach
-        if control.approach is not None:
-            approach = control.approach
-        turned = control.tilt or (_LEVEL if near is None else near.tilt)
-        plane = RigidPlane.above(self.surface, approach, turned)
-        if not self._is_cached and (control.force or control.tilt is None):
-            # Watersheds above a floor have all peaks, which suffice to estimate the plane.
+        near = start
+        unknown = _FIRST * float(np.ptp(self.surface.heights))
+        plane = first_guess(self.surface, control, near, approach=unknown)
+        if np.isfinite(self._depth(plane)) and control.free.any():
+            # Watersheds of any depth have all peaks, which suffice to estimate the plane.
             peaks = self._peaks(self._watersheds(plane), plane)
-            plane = self._deeper(RigidPlane.moved(self.surface, peaks.first_plane(control, near)))
+            plane = RigidPlane.moved(self.surface, peaks.first_plane(control, near))
         for _ in range(_MOST_CUTS):
-            found = self._found(self._watersheds(plane), plane, control, near)
-            turn = np.hypot(*np.subtract(found.plane.tilt, plane.tilt)) * 0.5
-            deepest = float(found.equilibrium.islands.depth.max(initial=0.0))
-            deep_enough = self._is_cached or found.plane.approach <= plane.approach
+            before, watersheds = plane, self._watersheds(plane)
+            found = self._found(watersheds, before, control, near)
+            near = plane = RigidPlane.moved(self.surface, found.motion)
+            turn = 0.5 * np.hypot(*np.subtract(plane.tilt, before.tilt))
+            deepest = float(found.islands.depth.max(initial=0.0))
+            deep_enough = self._depth(plane) <= self._depth(before)
             if turn * np.hypot(*self.surface.lengths) <= _TURN * deepest and deep_enough:
                 break
-            near = found.plane
-            plane = self._deeper(near)
-        return found
+        islands = found.islands
+        return ContactState(
+            plane=plane,
+            contacts=replace(islands, force=self.contact_modulus * islands.force),
+            summits=np.stack([watersheds.x[islands.top], watersheds.y[islands.top]], axis=1),
+            iterations=found.iterations,
+            residual=found.residual,
+            overlapping_contacts=int(np.count_nonzero(islands.member >= 0)) - len(islands),
+            start=plane,
+            shape=IslandCaps(watersheds, islands, found.height),
+        )
 
-    def _deeper(self, plane: RigidPlane) -> RigidPlane:
-        return replace(plane, approach=plane.approach + (_MARGIN - 1.0) * abs(plane.approach))
+    def patch_loads(self, state: ContactState, patches: Partition) -> tuple[Array, Array]:
+        """Return the forces and contact areas of patches; see `ContactModel.patch_loads`.
 
-    def _peaks(self, watersheds: Watersheds, tilted: RigidPlane) -> Peaks:
-        """Return the peaks of watersheds that were found under the slopes of a plane."""
-        levers = PlaneLevers.at(watersheds.x, watersheds.y, self.surface.lengths)
-        return Peaks(
-            levers=levers,
-            depth=self.reference_height - watersheds.z + levers.matrix[:, 1:] @ tilted.tilt,
-            force=lambda over: self.contact_modulus * total_force(watersheds, over),
+        A patch gets the share of an island that lies in it (`island_shares`). Against half-space
+        pressures on 4 × 4 patches this misplaces a tenth of the mean patch force.
+        """
+        watersheds, islands, height = state.shape
+        force, area = island_shares(patches, watersheds, islands, height, self.surface.lengths)
+        return self.contact_modulus * islands.force @ force, islands.area @ area
+
+    def warning(self, state: ContactState, area_fraction: float) -> str:
+        """Return why islands have grown too large; see `ContactModel.warning`.
+
+        Outside of the range is a contact area above 8 % of the nominal one, or above 4 % with more
+        than half of it in one island. The regions then grow together across the surface, and the
+        force may be tens of per cent low and the area as much too large.
+        """
+        area = state.contacts.area
+        share = float(area.max(initial=0.0) / (area.sum() or 1.0))
+        grown = area_fraction > GROWN_AREA_FRACTION and share > LARGEST_SHARE
+        if area_fraction <= LARGEST_AREA_FRACTION and not grown:
+            return ""
+        return (
+            f"at an approach of {state.plane.approach:.4g} mm the islands cover"
+            f" {area_fraction:.1%} of the surface, the largest {share:.0%} of it: they grow"
+            f" together, and the model islands stands for up to {LARGEST_AREA_FRACTION:.0%}"
+            f" ({GROWN_AREA_FRACTION:.0%} when one holds more than half)"
         )
 
     def _found(
-        self,
-        watersheds: Watersheds,
-        tilted: RigidPlane,
-        control: Control,
-        near: RigidPlane | None = None,
-    ) -> _Found:
+        self, watersheds: Watersheds, cut: RigidPlane, control: Control, near: RigidPlane | None
+    ) -> IslandEquilibrium:
         """Solve on watersheds that were found under the slopes of one plane, for another."""
-        peaks = self._peaks(watersheds, tilted)
+        peaks = self._peaks(watersheds, cut)
         motion = peaks.first_plane(control, near)
-        slopes = peaks.lever[:, 1:] @ (motion[1:] - tilted.tilt)
         body = None
         if self.body is not None:
-            body = BodyPoints.at(self.body, watersheds.x, watersheds.y, self.contact_modulus)
+            body = BodyPoints.at(self.body, watersheds.x, watersheds.y)
         contact = IslandContact(
             watersheds=watersheds,
             peaks=peaks,
             control=control,
-            level=self.reference_height - motion[0] - slopes,
+            level=self.reference_height - motion[0] - peaks.lever[:, 1:] @ (motion[1:] - cut.tilt),
             motion=motion,
             contact_modulus=self.contact_modulus,
             body=body,
         )
-        found = contact.equilibrium()
-        return _Found(watersheds, RigidPlane.moved(self.surface, found.motion), found)
+        return contact.equilibrium()
+
+    def _peaks(self, watersheds: Watersheds, cut: RigidPlane) -> Peaks:
+        """Return the peaks of watersheds that were found under the slopes of a plane."""
+        levers = PlaneLevers.at(watersheds.x, watersheds.y, self.surface.lengths)
+        return Peaks(
+            levers=levers,
+            depth=self.reference_height - watersheds.z + levers.matrix[:, 1:] @ cut.tilt,
+            force=lambda over: self.contact_modulus * total_force(watersheds, over),
+        )
+
+    def _depth(self, plane: RigidPlane) -> float:
+        return needed_depth(self.surface, plane.approach, self.most_whole)
 
     def _watersheds(self, plane: RigidPlane) -> Watersheds:
-        """Return the watersheds that a plane and all above it need."""
-        surface, level = self.surface, plane.tilt == _LEVEL
-        if level and self._is_cached:
-            return self._whole
-        offset = None
-        if not level:
-            # The heights may be periodic; what a tilt adds to them is not.
-            heights = plane.at(surface.x[:, None], surface.y) - plane.approach
-            offset = replace(surface, heights=heights, periodic=False)
-        floor = self.reference_height - _MARGIN * max(plane.approach, 0.0)
-        return Watersheds.of(
-            surface, tilt_offset=offset, floor=-np.inf if self._is_cached else floor
-        )
-
-    @property
-    def _is_cached(self) -> bool:
-        return self.surface.heights.size <= self.most_cached
+        """Return the watersheds that a plane and all above it need; the last are cached."""
+        surface, level = self.surface, plane.tilt == LEVEL
+        key = (*plane.tilt, self._depth(plane))
+        if key not in self._cache:
+            offset = None
+            if not level:
+                # The heights may be periodic; what a tilt adds to them is not.
+                heights = plane.at(surface.x[:, None], surface.y) - plane.approach
+                offset = replace(surface, heights=heights, periodic=False)
+            self._cache.clear()
+            self._cache[key] = Watersheds.of(
+                surface,
+                tilt_offset=offset,
+                floor=self.reference_height - self._depth(plane),
+                ceiling=surface.highest if level else np.inf,
+            )
+        return self._cache[key]
 
     @cached_property
-    def _whole(self) -> Watersheds:
-        return Watersheds.of(self.surface, ceiling=self.surface.highest)
-
-    def _state(self, found: _Found) -> IslandState:
-        equilibrium = found.equilibrium
-        islands = equilibrium.islands
-        return IslandState(
-            approach=found.plane.approach,
-            x=islands.x,
-            y=islands.y,
-            angle=islands.angle,
-            indentation=islands.depth,
-            semi_axes=islands.semi_axes,
-            contact_area=np.pi * islands.semi_axes.prod(axis=1),
-            force=self.contact_modulus * islands.force,
-            merged=int(np.count_nonzero(islands.member >= 0)) - len(islands),
-            nominal_area=self.surface.area,
-            iterations=equilibrium.iterations,
-            residual=equilibrium.residual,
-        )
-
-    def _row(self, found: _Found, sums: PatchSums) -> dict[str, Any]:
-        """Return the fields of a response for one plane."""
-        state, sheds, patches = self._state(found), found.watersheds, sums.patches
-        top = found.equilibrium.islands.top
-        owner = patches.index_of(sheds.x[top], sheds.y[top])
-        force, area = island_shares(patches, sheds, found.equilibrium, self.surface.lengths)
-        contacts = EllipticContacts(
-            position=np.stack([state.x, state.y], axis=1),
-            angle=state.angle,
-            semi_axes=state.semi_axes,
-            area=state.contact_area,
-            force=state.force,
-        )
-        return sums.row(
-            found.plane,
-            contacts,
-            owner,
-            patch_force=state.force @ force,
-            patch_contact_area=state.contact_area @ area,
-            iterations=state.iterations,
-            residual=state.residual,
-            overlapping_contacts=state.merged,
-            warning=state.warning,
-        )
+    def _cache(self) -> dict[tuple[float, ...], Watersheds]:
+        return {}

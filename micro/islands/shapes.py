@@ -1,4 +1,4 @@
-"""The Hertz contact that stands for a region above the plane, from its volume and moments.
+"""The Hertz contact that stands for a region above the plane, and the patches' shares in it.
 
 A paraboloid cap of height w with principal radii R', R'' has the elliptic base of semi-axes
 sqrt(2 R' w), sqrt(2 R'' w). Integrated over the cap,
@@ -14,26 +14,22 @@ Theory: demos/theory.md, section 9.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from micro.closed_forms.ellipse import shape_factors
+from geometry import Partition, overlaps
+from micro.closed_forms.hertz import shape_factors
+from micro.interaction.patch_sums import EllipticContacts
 from micro.islands.watersheds import Watersheds
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-LARGEST_AREA_FRACTION = 0.08
-"""Contact area fraction up to which the model is within its stated error."""
-
-GROWN_AREA_FRACTION = 0.04
-"""The same where one island holds more than `LARGEST_SHARE` of the contact area."""
-
-LARGEST_SHARE = 0.5
-
 _MOST_SLENDER = 1e4
+_TIE = 1e-9  # of the shorter side: a point that is no further from a border lies on it
 
 
 class Paraboloids(NamedTuple):
@@ -43,40 +39,30 @@ class Paraboloids(NamedTuple):
         x: Abscissae of the centroids of volume, shape (m,) [mm].
         y: Ordinates, shape (m,) [mm].
         angle: Directions of the larger principal radii from the x axis, shape (m,) [rad].
-        radius: R = sqrt(R' R''), shape (m,) [mm].
-        ratio: R'/R'' ≥ 1, shape (m,).
+        radius_major: Larger principal radii R', shape (m,) [mm].
+        radius_minor: Smaller ones R'', shape (m,) [mm].
     """
 
     x: Array
     y: Array
     angle: Array
-    radius: Array
-    ratio: Array
+    radius_major: Array
+    radius_minor: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Islands:
-    """Connected regions above the plane as Hertz contacts, for E* = 1 MPa.
+class Islands(EllipticContacts):
+    """Connected regions above the plane as Hertz contacts at their centroids, for E* = 1 MPa.
 
     Args:
         member: Island of each of the n peaks, −1 below the plane, shape (n,).
         top: The highest peak of each island, shape (m,).
         depth: Heights w of the highest peaks above their level, shape (m,) [mm].
-        x: Abscissae of the centroids of volume, shape (m,) [mm].
-        y: Ordinates, shape (m,) [mm].
-        angle: Directions of the major axes from the x axis, shape (m,) [rad].
-        semi_axes: Semi-axes of contact (a, b), shape (m, 2) [mm].
-        force: Forces over E*, shape (m,) [mm²].
     """
 
     member: Indices
     top: Indices
     depth: Array
-    x: Array
-    y: Array
-    angle: Array
-    semi_axes: Array
-    force: Array
 
     def __len__(self) -> int:
         return len(self.depth)
@@ -128,8 +114,9 @@ def islands(watersheds: Watersheds, height: Array, region: Indices) -> Islands:
     moments = from_origin(caps[:, on], watersheds.x[on], watersheds.y[on])
     total: Array = np.stack([np.bincount(island, part, count) for part in moments])
     found = equivalent(total, depth)
-    shape = shape_factors(found.ratio, np.ones(count))
-    major = shape.axis * np.sqrt(found.radius * depth)
+    shape = shape_factors(found.radius_major, found.radius_minor)
+    radius = np.sqrt(found.radius_major * found.radius_minor)
+    major = shape.axis * np.sqrt(radius * depth)
     return Islands(
         member=member,
         top=top,
@@ -137,8 +124,8 @@ def islands(watersheds: Watersheds, height: Array, region: Indices) -> Islands:
         x=found.x,
         y=found.y,
         angle=found.angle,
-        semi_axes=np.stack([major, major * np.sqrt(shape.axis_ratio_squared)], axis=1),
-        force=4.0 / 3.0 * np.sqrt(found.radius) * shape.force * depth**1.5,
+        semi_axes=np.stack([major, major * shape.axis_ratio], axis=1),
+        force=4.0 / 3.0 * np.sqrt(radius) * shape.force * depth**1.5,
     )
 
 
@@ -164,14 +151,16 @@ def equivalent(moments: Array, depth: Array) -> Paraboloids:
     x, y, xx, xy, yy = list(moments[1:] / volume)
     mean, half = 0.5 * (xx - x**2 + yy - y**2), 0.5 * (xx - x**2 - yy + y**2)
     cross = xy - x * y
-    radius = np.hypot(half, cross)
-    largest = np.maximum(mean + radius, np.finfo(float).tiny)  # 0 for a single sample
+    spread = np.hypot(half, cross)
+    largest = np.maximum(mean + spread, np.finfo(float).tiny)  # 0 for a single sample
+    ratio = largest / np.clip(mean - spread, largest / _MOST_SLENDER, largest)
+    radius = volume / (np.pi * depth**2)
     return Paraboloids(
         x=x,
         y=y,
         angle=np.mod(0.5 * np.arctan2(cross, half), np.pi),
-        radius=volume / (np.pi * depth**2),
-        ratio=largest / np.clip(mean - radius, largest / _MOST_SLENDER, largest),
+        radius_major=radius * np.sqrt(ratio),
+        radius_minor=radius / np.sqrt(ratio),
     )
 
 
@@ -196,55 +185,65 @@ def from_origin(moments: Array, x: Array, y: Array) -> Array:
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class IslandState:
-    """Contacts of m islands at one approach.
+def island_shares(
+    patches: Partition,
+    watersheds: Watersheds,
+    islands: Islands,
+    height: Array,
+    lengths: tuple[float, float],
+) -> tuple[Array, Array]:
+    """Return the shares of N patches in the force and in the area of each island, (m, N).
+
+    A sample at a height e above its level weighs as Hertz's pressure does in a paraboloid cap of
+    height w, (2 e/w − 1)^½, in force, and as 1 in area where e > w/2. Samples that straddle a
+    border are shared by area.
 
     Args:
-        approach: Rigid approach δ at the centre [mm].
-        x: Abscissae of the contacts, shape (m,) [mm].
-        y: Ordinates, shape (m,) [mm].
-        angle: Directions of the major semi-axes from the x axis, shape (m,) [rad].
-        indentation: Heights w of the displaced islands above the plane, shape (m,) [mm].
-        semi_axes: Semi-axes (a, b) of the contacts, shape (m, 2) [mm].
-        contact_area: Areas π a b, shape (m,) [mm²].
-        force: Forces, shape (m,) [N].
-        merged: Number of peaks that belong to an island with a higher peak.
-        nominal_area: Area of the surface [mm²].
-        iterations: Iterations made.
-        residual: Last change of a displacement relative to the largest interference.
+        patches: The patches; every peak above the plane lies in one.
+        watersheds: Watersheds of the surface.
+        islands: The m islands.
+        height: Heights of the n peaks above their own levels, negative below, shape (n,) [mm].
+        lengths: Sides (Lx, Ly) of the surface [mm].
     """
+    sheds = watersheds
+    owner, sample, height = sheds.above(height)
+    island = islands.member[owner]
+    inside = island >= 0
+    island, sample, height = island[inside], sample[inside], height[inside]
+    pressed = 2.0 * height / islands.depth[island] - 1.0
+    row, column = np.divmod(sample, sheds.grid[1])
+    rows = _intervals(patches.borders_x, lengths[0], sheds.grid[0])
+    columns = _intervals(patches.borders_y, lengths[1], sheds.grid[1])
+    tops = np.stack([sheds.x[islands.top], sheds.y[islands.top]], axis=1)
+    shares = []
+    for weight in (np.sqrt(np.maximum(pressed, 0.0)), (pressed > 0.0).astype(float)):
+        total = np.zeros(len(tops) * patches.count)
+        for (ix, along), (iy, across) in product(rows, columns):
+            place = island * patches.count + ix[row] * patches.shape[1] + iy[column]
+            parts = weight * along[row] * across[column]
+            total += np.bincount(place, parts, minlength=len(total))
+        share = total.reshape(len(tops), patches.count)
+        empty = np.flatnonzero(share.sum(axis=1) == 0.0)
+        share[empty] = _point_shares(patches, tops[empty], _TIE * min(lengths))
+        shares.append(share / share.sum(axis=1, keepdims=True))
+    return shares[0], shares[1]
 
-    approach: float
-    x: Array
-    y: Array
-    angle: Array
-    indentation: Array
-    semi_axes: Array
-    contact_area: Array
-    force: Array
-    merged: int
-    nominal_area: float
-    iterations: int
-    residual: float
 
-    @property
-    def warning(self) -> str:
-        """Why the result lies outside the model's range of validity; empty within it.
+def _point_shares(patches: Partition, point: Array, slack: float) -> Array:
+    """Return the shares of the patches in points; a border halves a point on it, (m, N)."""
+    x, y = patches.borders_x, patches.borders_y
+    share = np.zeros((len(point), patches.count))
+    for offset in product((-slack, slack), repeat=2):
+        inside = np.clip(point + offset, (x[0], y[0]), (x[-1], y[-1]))
+        np.add.at(share, (np.arange(len(point)), patches.index_of(*inside.T)), 0.25)
+    return share
 
-        Outside means a contact area above 8 % of the nominal one, or above 4 % with more than
-        half of it in one island. The regions then grow together across the surface, and the force
-        may be tens of per cent low and the area as much too large.
-        """
-        total = float(self.contact_area.sum())
-        fraction = total / self.nominal_area
-        share = float(self.contact_area.max(initial=0.0)) / (total or 1.0)
-        grown = fraction > GROWN_AREA_FRACTION and share > LARGEST_SHARE
-        if fraction <= LARGEST_AREA_FRACTION and not grown:
-            return ""
-        return (
-            f"at an approach of {self.approach:.4g} mm the islands cover {fraction:.1%} of the"
-            f" surface, the largest {share:.0%} of it: they grow together, and the model islands"
-            f" stands for up to {LARGEST_AREA_FRACTION:.0%}"
-            f" ({GROWN_AREA_FRACTION:.0%} when one holds more than half)"
-        )
+
+def _intervals(borders: Array, length: float, cells: int) -> list[tuple[Indices, Array]]:
+    """Return the first, second, … interval that every cell reaches into, and its share there."""
+    share = overlaps(borders, length, cells) * (cells / length)
+    first, most = np.argmax(share > 0.0, axis=0), int((share > 0.0).sum(axis=0).max())
+    place = first + np.arange(most)[:, None]
+    inside = np.minimum(place, len(share) - 1)
+    parts = np.where(place == inside, np.take_along_axis(share, inside, axis=0), 0.0)
+    return list(zip(inside, parts, strict=True))

@@ -25,6 +25,11 @@ from micro.islands.division import Saddles, divided, saddles_between, sampled
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
+MOST_WHOLE = 2**20
+"""Cells of the largest surface whose watersheds are found as a whole, once for all planes."""
+
+_MARGIN = 1.2
+"""Depth of watersheds that are not found as a whole, in units of the approach."""
 _FEW = 32  # samples of the smallest cap that has a shape of its own
 _POWERS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
 _ORDER = np.array([2.0, 2.5, 2.5, 3.0, 3.0, 3.0])[:, None]
@@ -42,7 +47,8 @@ class Watersheds:
         owner: Peak of every sample, by watershed and there by depth, shape (s,).
         sample: Flat indices of the samples, shape (s,).
         depth: Depths of the samples below their peak, shape (s,) [mm].
-        moments: X^p Y^q of the samples from their peak for the six powers up to 2, (6, s).
+        sums: Sums over the samples before each, in their order, of X^p Y^q from their peak for the
+            six powers up to 2, and of the same times the depths, shape (2, 6, s + 1).
         grid: Numbers of samples over the surface.
         cell: Area of a sample [mm²].
     """
@@ -54,7 +60,7 @@ class Watersheds:
     owner: Indices
     sample: Indices
     depth: Array
-    moments: Array
+    sums: Array
     grid: tuple[int, int]
     cell: float
 
@@ -102,6 +108,10 @@ class Watersheds:
         sample, depth, owner = sample[order], depth[order], owner[sample][order]
         place = (np.stack(np.unravel_index(sample, heights.shape), axis=1) + 0.5) * side
         along, across = (place - summit[owner]).T
+        moments = np.stack([along**p * across**q for p, q in _POWERS])
+        sums: Array = np.zeros((2, len(_POWERS), len(depth) + 1))
+        np.cumsum(moments, axis=1, out=sums[0, :, 1:])
+        np.cumsum(moments * depth, axis=1, out=sums[1, :, 1:])
         return cls(
             x=summit[:, 0],
             y=summit[:, 1],
@@ -110,7 +120,7 @@ class Watersheds:
             owner=owner,
             sample=sample,
             depth=depth,
-            moments=np.stack([along**p * across**q for p, q in _POWERS]),
+            sums=sums,
             grid=(heights.shape[0], heights.shape[1]),
             cell=float(side.prod()),
         )
@@ -132,7 +142,7 @@ class Watersheds:
         taken = np.maximum(height, least)
         ends = np.searchsorted(self._key, np.arange(len(self)) + taken / self._deepest)
         ends = np.clip(ends, self._start[:-1], self._start[1:])
-        sums, deep = (table[:, ends] - table[:, self._start[:-1]] for table in self._cumulated)
+        sums, deep = self.sums[:, :, ends] - self.sums[:, :, self._start[:-1]]
         shrunk = np.divide(height, taken, out=np.zeros_like(height), where=taken > 0.0)
         return self.cell * (taken * sums - deep) * shrunk**_ORDER
 
@@ -204,14 +214,22 @@ class Watersheds:
         least[many] = self.depth[last[many]]
         return least
 
-    @cached_property
-    def _cumulated(self) -> tuple[Array, Array]:
-        nothing = np.zeros((len(_POWERS), 1))
-        moments, deep = (
-            np.concatenate([nothing, np.cumsum(part, axis=1)], axis=1)
-            for part in (self.moments, self.moments * self.depth)
-        )
-        return moments, deep
+
+def needed_depth(surface: Surface, approach: float, most_whole: int = MOST_WHOLE) -> float:
+    """Return how far below the reference height watersheds must reach for an approach [mm].
+
+    Small surfaces need one depth, the infinite one. Those of a large one are found as deep as
+    needed, to a power of two, so that load steps that follow each other need the same.
+
+    Args:
+        surface: The surface.
+        approach: The approach [mm].
+        most_whole: Cells of the largest small surface.
+    """
+    if surface.heights.size <= most_whole:
+        return np.inf
+    least = 1e-9 * min(surface.spacing)
+    return float(np.exp2(np.ceil(np.log2(max(_MARGIN * approach, least)))))
 
 
 def _needed(heights: Array, owner: Indices, z: Array, floor: float) -> NDArray[np.bool_]:

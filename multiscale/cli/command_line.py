@@ -10,20 +10,17 @@ import argparse
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn
 
+from multiscale.comparison import AGAINST
 from multiscale.output.streams import sturdy_streams
-
-AGAINST = ("reference", "concurrent", "half-space")
-"""What a comparison can be against; the keys of `multiscale.comparison.compare.AGAINST`."""
 
 COMPARE_ENDING = "-compare"
 """What the results folder of a comparison is called after the scene's name."""
-
 
 _INTERRUPTED = 130  # exit code after SIGINT, as shells have it
 _WRONG_INPUT = 2  # and of what is installed; errors with exit codes need numpy
@@ -88,7 +85,7 @@ def _run(words: list[str]) -> int:
     cut = words.index("--") if "--" in words else len(words)
     choice: argparse.Namespace | str
     try:
-        choice = parser().parse_args(words[:cut])
+        choice = _parser().parse_args(words[:cut])
     except UsageError as error:  # for rank 0 to say, which is known once MPI has started
         choice = str(error)
     from multiscale.installation import works_together
@@ -139,75 +136,6 @@ def _raise(number: int, frame: FrameType | None) -> None:
     raise Ended(number)
 
 
-def parser() -> argparse.ArgumentParser:
-    """Return the parser of the command line; ``command`` is the name of the command."""
-    top = _Parser(
-        prog="patchlaw",
-        description="Multiscale contact of rough surfaces.",
-        epilog="PETSc options follow after --, such as: patchlaw run scene.toml -- -ksp_monitor",
-    )
-    top.add_argument("--version", action=_ShowVersions, nargs=0, help="show versions and exit")
-    commands = top.add_subparsers(
-        required=True, metavar="COMMAND", dest="command", parser_class=_Parser
-    )
-
-    def command(name: str, summary: str) -> argparse.ArgumentParser:
-        return commands.add_parser(name, help=summary, description=summary)
-
-    run = command("run", "Run a scene; write history, laws, figures and report.")
-    run.add_argument(
-        "--resume", action="store_true", help="go on after the last load step of an interrupted run"
-    )
-    run.add_argument(
-        "--max-time",
-        metavar="TIME",
-        type=wall_time,
-        help="stop cleanly before so much wall time is over, as 55m",
-    )
-    _add_scene(run)
-    _add_scene(
-        command("plan", "Say what a run would do, and why; run nothing expensive."),
-        folder="accepted so that the words of a run can be reused: a plan writes nothing",
-    )
-    compare = command(
-        "compare", "Run a scene in every sensible configuration; draw error against time."
-    )
-    _add_scene(compare, ending=COMPARE_ENDING)
-    compare.add_argument(
-        "--against",
-        metavar="KIND",
-        choices=AGAINST,
-        help=f"compare with {', '.join(AGAINST)}; by default the best that is reached",
-    )
-    compare.add_argument(
-        "--budget",
-        metavar="TIME",
-        type=wall_time,
-        help="wall time for all configurations, such as 5min; by default any",
-    )
-    compare.add_argument(
-        "--ranks",
-        type=int,
-        default=1,
-        metavar="N",
-        help="processes of each configuration, under mpirun",
-    )
-    _add_scene(command("laws", "Tabulate the patch laws of a scene; write and draw them."))
-    _add_scene(command("surface", "Describe and draw the surface of a scene."))
-    command("schema", "Print the JSON Schema of scene files.")
-    doctor = command(
-        "doctor", "Check versions, MPI, threads, form compiler and memory; solve a small block."
-    )
-    doctor.add_argument("--json", action="store_true", help="results as JSON, for scripts")
-    warm = command(
-        "warm", "Compile all finite element forms now, so that later runs need no compiler."
-    )
-    warm.add_argument(
-        "--element", nargs="+", default=[], metavar="NAME", help="Q1, Q2, P1, P2; all by default"
-    )
-    return top
-
-
 def wall_time(text: str) -> float:
     """Return a wall time in seconds.
 
@@ -225,16 +153,73 @@ def wall_time(text: str) -> float:
         raise argparse.ArgumentTypeError(f"{text!r}: {error}") from None
 
 
+_TIME: dict[str, Any] = {"type": wall_time, "metavar": "TIME"}
+
+
+def _parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line; `function` says where the code of a command is."""
+    top = _Parser(
+        prog="patchlaw",
+        description="Multiscale contact of rough surfaces.",
+        epilog="PETSc options follow after --, such as: patchlaw run scene.toml -- -ksp_monitor",
+    )
+    top.add_argument("--version", action=_ShowVersions, nargs=0, help="show versions and exit")
+    commands = top.add_subparsers(required=True, metavar="COMMAND", parser_class=_Parser)
+
+    def command(name: str, function: str, summary: str) -> argparse.ArgumentParser:
+        made = commands.add_parser(name, help=summary, description=summary)
+        made.set_defaults(function=function)
+        return made
+
+    _add_runs(command)
+    _add_descriptions(command)
+    return top
+
+
+def _add_runs(command: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
+    """Add the commands that run scenes."""
+    run = command("run", "run.run_scene", "Run a scene; write history, laws, figures and report.")
+    run.add_argument("--resume", action="store_true", help="go on with an interrupted run")
+    run.add_argument("--max-time", help="stop cleanly before this wall time is over", **_TIME)
+    _add_scene(run)
+    compare = command(
+        "compare",
+        "compare.compare_scene",
+        "Run a scene in every sensible configuration; draw error against time.",
+    )
+    _add_scene(compare, ending=COMPARE_ENDING)
+    against = f"compare with {', '.join(AGAINST)}; by default the best that is reached"
+    compare.add_argument("--against", metavar="KIND", choices=AGAINST, help=against)
+    budget = "wall time for all configurations, such as 5min; by default any"
+    compare.add_argument("--budget", help=budget, **_TIME)
+    ranks = "processes of each configuration, under mpirun"
+    compare.add_argument("--ranks", type=int, default=1, metavar="N", help=ranks)
+
+
+def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
+    """Add the commands that run no scene."""
+    plan = "Say what a run would do, and why; run nothing expensive."
+    unused = "accepted so that the words of a run can be reused: a plan writes nothing"
+    _add_scene(command("plan", "describe.plan_scene", plan), folder=unused)
+    laws = "Tabulate the patch laws of a scene; write and draw them."
+    _add_scene(command("laws", "describe.tabulate_laws", laws))
+    surface = "Describe and draw the surface of a scene."
+    _add_scene(command("surface", "describe.describe_surface", surface))
+    command("schema", "describe.print_schema", "Print the JSON Schema of scene files.")
+    checks = "Check versions, MPI, threads, form compiler and memory; solve a small block."
+    doctor = command("doctor", "doctor.examine_machine", checks)
+    doctor.add_argument("--json", action="store_true", help="results as JSON, for scripts")
+    forms = "Compile all finite element forms now, so that later runs need no compiler."
+    names: dict[str, Any] = {"nargs": "+", "default": [], "metavar": "NAME"}
+    warm = command("warm", "doctor.compile_ahead", forms)
+    warm.add_argument("--element", help="Q1, Q2, P1, P2; all by default", **names)
+
+
 def _add_scene(command: argparse.ArgumentParser, *, folder: str = "", ending: str = "") -> None:
     """Add what every command on a scene takes: the file, the results folder, changes of keys."""
     command.add_argument("scene", type=Path, help="scene file (TOML)")
     where = f"folder of the results (default: results/SCENE{ending}, by the file's name)"
     command.add_argument("--out", type=Path, metavar="DIR", help=folder or where)
-    command.add_argument(
-        "--set",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="KEY=VALUE",
-        help="change keys of the scene, such as load.approach='4 um'",
-    )
+    keys: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
+    changes = "change keys of the scene, such as load.approach='4 um'"
+    command.add_argument("--set", metavar="KEY=VALUE", help=changes, **keys)

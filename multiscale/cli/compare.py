@@ -1,22 +1,28 @@
-"""The command ``patchlaw compare``."""
+"""The command ``patchlaw compare``: its lines in the terminal, its files."""
 
 from __future__ import annotations
 
 import argparse
+import os
+import platform
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from geometry.errors import InputError, NotConverged
 from multiscale.cli.command_line import COMPARE_ENDING
-from multiscale.cli.inputs import scene_and_folder
-from multiscale.comparison.compare import compare
+from multiscale.cli.execution import scene_and_folder
+from multiscale.comparison import errors
+from multiscale.comparison.compare import Launch, compare
 from multiscale.comparison.comparison import Comparison
-from multiscale.comparison.launching import Launch, check_launchable
-from multiscale.comparison.report import frontier_lines, headline, write_comparison
-from multiscale.comparison.run_result import RunResult
+from multiscale.comparison.configuration import RunResult
+from multiscale.comparison.process import check_launchable
 from multiscale.output import terminal
+from multiscale.output.results import png
 from multiscale.restart.results_folder import locked
+from multiscale.results.html_page import filled
 from multiscale.scene.scene import Scene
+from multiscale.storage import write_bytes, write_csv, write_text
 
 RESULTS = "configurations"
 """Folder of the results of all configurations, within the folder of the comparison."""
@@ -58,10 +64,10 @@ def _followed(
     with terminal.following(comm) as (begun, ended):
 
         def observe(result: RunResult, stored: bool) -> None:
-            spent = f"{sum(result.seconds.values()):8.2f} s" if result.seconds else " " * 10
+            spent = f"{result.seconds:8.2f} s" if result.phases else " " * 10
             status = result.status + ", from an earlier call" * stored
             why = f": {result.message}" if result.message else ""
-            ended(f"{spent}  {result.configuration.name}: {status}{why}")
+            ended(f"{spent}  {result.name}: {status}{why}")
 
         try:
             return compare(
@@ -78,3 +84,90 @@ def _followed(
         except KeyboardInterrupt:
             ended(f"interrupted: finished configurations are in {folder}; the same call goes on")
             raise
+
+
+def write_comparison(folder: Path, comparison: Comparison) -> list[Path]:
+    """Write ``compare.csv``, the figures and ``report.html``.
+
+    Args:
+        folder: Folder of the results; made when missing.
+        comparison: The comparison.
+
+    Returns:
+        The files written.
+    """
+    columns, pictures = comparison.to_dict(), _pictures(comparison)
+    files = [write_csv(folder / "compare.csv", list(columns), zip(*columns.values(), strict=True))]
+    files += [write_bytes(folder / f"{name}.png", picture) for name, picture in pictures.items()]
+    return [*files, write_text(folder / "report.html", comparison_html(comparison, pictures))]
+
+
+def _pictures(comparison: Comparison) -> dict[str, bytes]:
+    """Return the figures as PNG images by name; matplotlib is loaded only here."""
+    from multiscale.comparison import figures
+
+    drawn = {}
+    if comparison.measure is not None:
+        drawn["pareto"] = figures.pareto_figure(comparison)
+    if any(row.steps for row in comparison.rows):
+        drawn["curves"] = figures.curves_figure(comparison)
+        drawn["pressures"] = figures.maps_figure(comparison)
+    return {name: png(figure) for name, figure in drawn.items()}
+
+
+def comparison_html(comparison: Comparison, pictures: Mapping[str, bytes]) -> str:
+    """Return the report: a complete HTML document that needs no network.
+
+    Args:
+        comparison: The comparison.
+        pictures: PNG images by name, ``pareto``, ``curves`` and ``pressures``.
+    """
+    threads = os.environ.get("OMP_NUM_THREADS", "all")
+    return filled(
+        "comparison/report.jinja",
+        title=f"patchlaw compare: {comparison.scene}",
+        comparison=comparison,
+        records=comparison.records(),
+        frontier_names=[row.name for row in comparison.frontier()],
+        headline=headline(comparison),
+        frontier_lines=list(frontier_lines(comparison)),
+        pictures=pictures,
+        definitions=(errors.__doc__ or "").strip(),
+        machine=f"{platform.platform()}, {os.cpu_count()} cores, threads: {threads}",
+    )
+
+
+def headline(comparison: Comparison) -> Iterator[str]:
+    """Yield sentences on the number of configurations that were run, and on the measure.
+
+    Args:
+        comparison: The comparison.
+    """
+    done = sum(row.status == "done" for row in comparison.rows)
+    yield f"{done} of {len(comparison)} configurations were run to the end of the load."
+    if comparison.measure is None:
+        return
+    own, response = comparison.uncertainty, comparison.response
+    bars = {
+        f"of the {response}": getattr(own, f"{response}_max"),
+        "of the contact area": own.area_max,
+        "of the mean pressure in the distribution of pressures": own.distribution,
+    }
+    known = ", ".join(f"{100 * bar:.3g} % {part}" for part, bar in bars.items() if bar > 0)
+    yield (
+        f"They are compared with “{comparison.measure}”, whose own uncertainty is "
+        f"{known or 'not known'}."
+    )
+
+
+def frontier_lines(comparison: Comparison) -> Iterator[str]:
+    """Yield a line on each configuration of the frontier: its time and its error.
+
+    Args:
+        comparison: The comparison.
+    """
+    bar = getattr(comparison.uncertainty, f"{comparison.response}_max")
+    for row in comparison.frontier():
+        size = comparison.error(row)
+        less = "no more than the uncertainty of the measure, " if size <= bar else ""
+        yield f"{row.seconds:.3g} s: error {less}{100 * size:.3g} %: {row.name}"

@@ -10,15 +10,15 @@ from typing import Any
 
 from geometry.collective import on_root
 from geometry.statistics import roughness
-from multiscale.cli.inputs import scene_and_folder
-from multiscale.couplings.blocks import load_finite_elements
-from multiscale.laws.files import write_laws
+from multiscale.cli.execution import scene_and_folder
+from multiscale.couplings.assembly import load_finite_elements
+from multiscale.laws.law_table import write_laws
 from multiscale.machine import cluster_nodes, large_object_comm
 from multiscale.output import terminal
 from multiscale.output.results import write_figure
 from multiscale.planning import plan
 from multiscale.planning.block_plan import memory_warnings
-from multiscale.planning.costs import Cost, predicted_cost
+from multiscale.planning.costs import predicted_cost
 from multiscale.planning.problem_setup import make_setup
 from multiscale.restart.results_folder import locked
 from multiscale.run import Run
@@ -37,16 +37,16 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
     """
     scene, _ = scene_and_folder(choice, comm)
     load_finite_elements(scene, comm)
-    nodes = cluster_nodes(comm)
+    setup = _setup(scene, comm)
+    cost = on_root(comm, lambda: predicted_cost(setup))
+    shortages = list(memory_warnings(setup, cluster_nodes(comm)))
+    terminal.show_plan(comm, setup, cost, shortages)
 
-    def planned() -> tuple[ProblemSetup, Cost]:
-        setup = make_setup(
-            scene, nodes=replace(nodes, extensible=True)
-        )  # of any number, if it takes them
-        return setup, predicted_cost(setup)
 
-    setup, cost = on_root(large_object_comm(comm), planned)
-    terminal.show_plan(comm, setup, cost, list(memory_warnings(setup, nodes)))
+def _setup(scene: Scene, comm: Any) -> ProblemSetup:
+    """Set the problem up, as if these nodes had any memory that it may take."""
+    nodes = replace(cluster_nodes(comm), extensible=True)
+    return on_root(large_object_comm(comm), lambda: make_setup(scene, nodes=nodes))
 
 
 def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -84,10 +84,7 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
     """
     scene, folder = scene_and_folder(choice, comm)
     with locked(folder, comm):
-        nodes = replace(
-            cluster_nodes(comm), extensible=True
-        )  # a surface needs no memory for its block
-        setup = on_root(large_object_comm(comm), lambda: make_setup(scene, nodes=nodes))
+        setup = _setup(scene, comm)
         terminal.show_pairs(comm, _surface_facts(setup), setup.surface.notes)
 
         def write() -> list[Path]:
@@ -101,7 +98,7 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
 
 def _surface_facts(setup: ProblemSetup) -> list[tuple[str, str]]:
     """Return statistics of a surface, each with its topic."""
-    rough = roughness(setup.surface)
+    rough, summits = roughness(setup.surface), setup.asperities
     return [
         ("surface", plan.surface_statement(setup)),
         ("Sa, Sq, Sz", f"{1e3 * rough.sa:.4g}, {1e3 * rough.sq:.4g}, {1e3 * rough.sz:.4g} µm"),
@@ -109,10 +106,7 @@ def _surface_facts(setup: ProblemSetup) -> list[tuple[str, str]]:
         ("m0, m2, m4", f"{rough.m0:.4g} mm², {rough.m2:.4g}, {rough.m4:.4g} 1/mm² (profile)"),
         ("Nayak α", f"{rough.nayak:.3g} (profile), {rough.nayak_radial:.3g} (radial moments)"),
         ("highest point", f"{1e3 * setup.surface.highest:.6g} µm"),
-        (
-            "summits",
-            f"{setup.asperities.count}, border maxima {setup.asperities.border_x.size}",
-        ),
+        ("summits", f"{summits.count}, border maxima {summits.border_x.size}"),
     ]
 
 

@@ -1,4 +1,4 @@
-"""Runs one parsed command on all ranks of an MPI job and turns errors into exit codes."""
+"""Runs one parsed command on all ranks of an MPI job: its scene, its options, its exit code."""
 
 from __future__ import annotations
 
@@ -9,23 +9,19 @@ import sys
 import time
 import traceback
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
+from geometry.collective import on_root
 from geometry.errors import InputError, NotWritten, OutOfMemory, PatchlawError
-from multiscale.machine import check_address_space, keep_petsc_from_signals, world
+from multiscale.machine import (
+    check_address_space,
+    keep_petsc_from_signals,
+    refuse_detached_processes,
+    world,
+)
 from multiscale.output import terminal
-
-_COMMANDS = {
-    "run": "run.run_scene",
-    "plan": "describe.plan_scene",
-    "laws": "describe.tabulate_laws",
-    "surface": "describe.describe_surface",
-    "schema": "describe.print_schema",
-    "compare": "compare.compare_scene",
-    "doctor": "doctor.examine_machine",
-    "warm": "doctor.compile_ahead",
-}
-"""Module and function of every command; the module is imported when its command runs."""
+from multiscale.scene.scene import Scene
 
 _LONGEST_WAIT = 5.0  # for other ranks at the end of a command [s]
 _OPTION_FILES = ("-options_file", "-options_file_yaml")
@@ -53,7 +49,7 @@ def execute(choice: argparse.Namespace | str, options: list[str]) -> int:
     try:
         if isinstance(choice, str):
             raise InputError(choice, key="command line")
-        module, _, function = _COMMANDS[choice.command].partition(".")
+        module, _, function = choice.function.partition(".")
         command = getattr(import_module(f"multiscale.cli.{module}"), function)
         command(choice, _start_petsc(options), comm)
     except PatchlawError as error:
@@ -77,6 +73,35 @@ def execute(choice: argparse.Namespace | str, options: list[str]) -> int:
         return _end_all(comm, 1)
     _all_arrive(meeting)
     return 0
+
+
+def scene_and_folder(
+    choice: argparse.Namespace, comm: Any, *, ending: str = ""
+) -> tuple[Scene, Path]:
+    """Read the scene on rank 0 and find the folder of its results.
+
+    Args:
+        choice: Parsed words of the command line.
+        comm: MPI communicator; None for a process on its own.
+        ending: What the folder is called after the scene's name, unless the user names a folder.
+
+    Returns:
+        The scene and the folder, the same on every rank.
+
+    Raises:
+        InputError: When the scene cannot be used, or this process is one of several that should be
+            one MPI job and are not.
+
+    Note:
+        Collective.
+    """
+    refuse_detached_processes()
+
+    def read() -> tuple[Scene, Path]:
+        scene = Scene.load(choice.scene, choice.set)
+        return scene, choice.out or Path("results") / f"{scene.name}{ending}"
+
+    return on_root(comm, read)
 
 
 def complain_of_stream(name: str, failure: OSError) -> int:

@@ -7,7 +7,7 @@ from typing import Any
 
 from geometry.collective import on_root
 from geometry.errors import InputError, NotConverged, PatchlawError
-from multiscale.cli.inputs import scene_and_folder
+from multiscale.cli.execution import scene_and_folder
 from multiscale.output import terminal
 from multiscale.output.field_files import write_fields
 from multiscale.output.results import write_results
@@ -28,9 +28,7 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
     with Interruption(comm, choice.max_time) as interruption:
         scene, folder = scene_and_folder(choice, comm)
         with locked(folder, comm) as lock:
-            found = None
-            if choice.resume:
-                found = on_root(comm, lambda: find_checkpoint(folder, scene))
+            found = on_root(comm, lambda: find_checkpoint(folder, scene)) if choice.resume else None
             run = Run(scene, comm, None if found is None else found.resolved)
             with CheckpointWriter(folder, run, lock.hold) as checkpoints:
                 if _announce(choice.resume, found, run, checkpoints):

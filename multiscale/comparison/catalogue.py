@@ -8,8 +8,10 @@ their results over the patches that pressures are compared on (`pressure_grid`).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
 
 from geometry.errors import InputError, NotConverged
 from geometry.meshes.families import suggested_fine
@@ -28,8 +30,7 @@ from multiscale.comparison.configuration import (
 from multiscale.planning.costs import Machine, predicted_cost
 from multiscale.planning.problem_setup import make_setup
 from multiscale.scene.scene import Scene
-from multiscale.setup.checks import LAW_BLOCK_CELLS, patch_grid
-from multiscale.setup.surface import make_surface
+from multiscale.setup.surface_and_block import LAW_BLOCK_CELLS, make_surface, patch_grid
 
 SMALL_SLOPES = ", small slopes"
 """End of the name of a configuration that differs from another by neglecting finite slopes."""
@@ -53,22 +54,6 @@ _HALF_SPACE: Content = {"model": "half-space"}
 _FITTED: Content = {"model": "elliptic", "curvature": "contact", "border": "include"}
 
 
-class Proposal(NamedTuple):
-    """A configuration that the scene need not allow.
-
-    Attributes:
-        name: Its name.
-        changes: The sections of the scene that it changes.
-        heights: Grid of its surface.
-        repeat_low: Whether to repeat it with low heights under a low load.
-    """
-
-    name: str
-    changes: Content
-    heights: Grid
-    repeat_low: bool = False
-
-
 def configurations(scene: Scene, ranks: int = 1) -> tuple[Configuration, ...]:
     """Return the configurations of a scene, those of the least predicted cost first.
 
@@ -79,171 +64,157 @@ def configurations(scene: Scene, ranks: int = 1) -> tuple[Configuration, ...]:
     Raises:
         InputError: When the surface cannot be read.
     """
-    catalogue, machine = _Catalogue(scene), Machine()
+    machine = Machine()
     found: dict[str, Configuration] = {}
-
-    def add(name: str, content: Content, heights: Grid, scale: float = 1.0) -> Content | None:
-        """Add a configuration unless the scene does not allow it; return its complete content.
-
-        A reference that does not fit into the memory is added with the reason.
-        """
-        if heights != catalogue.heights:
-            content = content | {"surface": content["surface"] | {"grid": list(heights)}}
-        cost, refusal, kind = float("inf"), "", content["coupling"]["kind"]
-        try:
-            one = Scene.from_dict(content)
-            cost = predicted_cost(make_setup(one), machine).total
-        except (InputError, NotConverged) as error:
-            if kind != "reference" or "GB of memory" not in str(error):
-                return None
-            refusal = str(error)
-        made = Configuration(
-            name=name,
-            content=content_of(one),
-            heights=heights,
-            cost=cost,
-            ranks=1 if kind == "analytic" else ranks,
-            scale=scale,
-            refusal=refusal,
-        )
-        found.setdefault(made.key, made)
-        return made.content
-
     # The scene itself comes first: an equal configuration does not replace its name.
-    for one in catalogue.proposals():
-        content = add(one.name, catalogue.base | one.changes, one.heights)
-        if one.repeat_low and content is not None:
-            low = scaled(content)
-            if low is not None:
-                add(one.name + LOW_HEIGHTS, low, one.heights, LOW_HEIGHTS_SCALE)
+    for proposal in _Catalogue(scene).proposals():
+        one = _allowed(proposal, machine)
+        if one is not None:
+            one = replace(one, ranks=1 if one.kind == "analytic" else ranks)
+            found.setdefault(one.key, one)
     return tuple(sorted(found.values(), key=lambda one: one.cost))
 
 
-class _Catalogue:
-    """Proposes the configurations of one scene.
+def _allowed(proposal: Configuration, machine: Machine) -> Configuration | None:
+    """Return a configuration with all its keys and its cost; None when its scene is refused.
 
-    Attributes:
-        base: What all configurations have in common.
-        heights: Grid of the surface.
+    A reference that does not fit into the memory stays, with the reason.
+    """
+    cost, refusal = float("inf"), ""
+    try:
+        cost = predicted_cost(make_setup(proposal.scene), machine).total
+    except (InputError, NotConverged) as error:
+        if proposal.kind != "reference" or "GB of memory" not in str(error):
+            return None
+        refusal = str(error)
+    return replace(proposal, content=content_of(proposal.scene), cost=cost, refusal=refusal)
+
+
+class _Catalogue:
+    """Proposes the configurations of one scene, whose costs are not known yet.
+
+    All of them have the content `_base`, apart from what a proposal changes.
     """
 
     def __init__(self, scene: Scene) -> None:
-        content = content_of(scene)
+        content, self._scene, self._patches = content_of(scene), scene, patch_grid(scene)
         # Every key of a configuration is stated, so that no accuracy chooses one.
-        self._given = {"accuracy": content.pop("accuracy", None), "block": content["block"]}
-        self._scene, self._patches, stated = scene, patch_grid(scene), scene.surface.grid
-        self.heights: Grid = stated if isinstance(stated, tuple) else make_surface(scene).grid
-        self._grids = coarser_grids(self.heights, scene)
+        self._accuracy = content.pop("accuracy", None)
+        # Only laws need a mesh of the block.
+        content["block"].pop("cells", None)
+        stated = scene.block.cells if isinstance(scene.block.cells, tuple) else None
+        self._own_cells = stated if scene.coupling.on_mesh else None
+        self._cells = stated or LAW_BLOCK_CELLS
+        self._base = content | {"patches": {"grid": list(pressure_grid(scene))}}
+        nx, ny = content["surface"].get("grid") or make_surface(scene).grid
+        self._grids = coarser_grids((nx, ny), scene)
         fitting = [grid for grid in self._grids if max(grid) <= LAW_HEIGHTS]
         self._law_grid = fitting[-1] if fitting else self._grids[0]
-        block = {key: value for key, value in content["block"].items() if key != "cells"}
-        patches = {"grid": list(pressure_grid(scene))}
-        self.base: Content = content | {"patches": patches, "block": block}
 
-    def proposals(self) -> Iterator[Proposal]:
+    def proposals(self) -> Iterator[Configuration]:
         """Yield all proposals, the scene itself first."""
-        yield self._own()
-        micros: dict[str, Content] = {name: {"model": name} for name in MODEL_NAMES}
-        del micros["half-space"]
-        for name, micro in (micros | {"elliptic, fitted": _FITTED}).items():
-            changes = {"coupling": {"kind": "analytic"}, "micro": micro}
-            yield Proposal(f"analytic, {name}", changes, self.heights)
+        own: dict[str, Any] = {"patches": self._patches, "cells": self._own_cells}
+        made = self._proposal(self._base["coupling"], accuracy=self._accuracy, **own)
+        yield replace(made, name=f"{OWN}: {made.name}")
+        for micro in (*({"model": name} for name in MODEL_NAMES), _FITTED):
+            if micro != _HALF_SPACE:
+                yield self._proposal({"kind": "analytic"}, micro)
         for kind in ("analytic", "concurrent"):
-            yield from self._half_spaces(kind, {"coupling": {"kind": kind}})
-        yield from self._isolated()
-        yield from self._consistent()
+            yield from self._half_spaces({"kind": kind})
+        yield from self._laws()
         yield from self._references()
 
-    def _own(self) -> Proposal:
-        kind: str = self._scene.coupling.kind
-        parts = [kind]
-        if kind not in ("analytic", "reference"):
-            parts.append(f"{_times(self._patches)} patches")
-        if kind != "reference":
-            parts.append(self._scene.micro.model)
-        changes = {name: value for name, value in self._given.items() if value is not None}
-        changes["patches"] = {"grid": list(self._patches)}
-        return Proposal(f"{OWN}: {', '.join(parts)}", changes, self.heights)
+    def _proposal(
+        self,
+        coupling: Content,
+        micro: Content | None = None,
+        *,
+        heights: Grid | None = None,
+        patches: Grid | None = None,
+        cells: Sequence[int] | None = None,
+        **sections: Any,
+    ) -> Configuration:
+        """Return a proposal that changes grids and whole sections."""
+        content = self._base | {"coupling": coupling} | sections
+        content["surface"] = content["surface"] | {"grid": list(heights or self._grids[-1])}
+        if micro is not None:
+            content["micro"] = micro
+        if patches is not None:
+            content["patches"] = {"grid": list(patches)}
+        if cells is not None:
+            content["block"] = content["block"] | {"cells": list(cells)}
+        return Configuration(name=_name_of(content), content=content)
 
-    def _half_spaces(self, name: str, changes: Content) -> Iterator[Proposal]:
+    def _half_spaces(self, coupling: Content, **grids: Grid) -> Iterator[Configuration]:
         """Yield half-spaces on every grid, and one of them without finite slopes."""
-        for grid in self._grids:
-            full = f"{name}, half-space {_times(grid)}"
-            yield Proposal(full, changes | {"micro": _HALF_SPACE}, grid)
-            if grid == self._law_grid:
-                small = changes | {"micro": _HALF_SPACE | {"finite_slopes": False}}
-                yield Proposal(full + SMALL_SLOPES, small, grid)
+        for heights in self._grids:
+            yield self._proposal(coupling, _HALF_SPACE, heights=heights, **grids)
+        small = _HALF_SPACE | {"finite_slopes": False}
+        yield self._proposal(coupling, small, heights=self._law_grid, **grids)
 
-    def _isolated(self) -> Iterator[Proposal]:
-        micro = self.base["micro"]
-        if micro["model"] in ("half-space", "auto"):
-            micro = {"model": "elliptic"}
-        coupling = {"kind": "isolated", "love": self._scene.coupling.love}
-        half = tuple(max(1, count // 2) for count in self._cells)
-        for grid, cells in (
-            *((grid, self._cells) for grid in self._patch_grids),
-            (self._patches, half),
-        ):
-            if _carries(cells, grid):
-                yield self._by_laws(coupling, micro, grid, cells)
-        yield self._by_laws(coupling, _HALF_SPACE, self._patches, self._cells)
-
-    def _consistent(self) -> Iterator[Proposal]:
-        own, micro = self._patches, self.base["micro"]
-        coupling = {"kind": "consistent", "compliance": "decomposed"}
-        for grid in self._patch_grids:
-            yield self._by_laws(coupling, _HALF_SPACE, grid)
-        changes = {"coupling": coupling, "patches": {"grid": list(own)}}
-        yield from self._half_spaces(f"consistent, {_times(own)} patches", changes)
+    def _laws(self) -> Iterator[Configuration]:
+        """Yield couplings by laws, from asperities or islands and from half-spaces."""
+        own, cells, micro = self._patches, self._cells, self._base["micro"]
+        isolated = {"kind": "isolated", "love": self._scene.coupling.love}
+        consistent = {"kind": "consistent", "compliance": "decomposed"}
         if micro["model"] not in ("half-space", "auto"):
-            yield self._by_laws(coupling, micro, own)
-        if _carries(self._cells, own):
-            meshed = {"kind": "consistent", "compliance": "finite-element"}
-            yield self._by_laws(meshed, _HALF_SPACE, own, self._cells)
+            yield self._proposal(consistent, micro, patches=own)
+        else:
+            micro = {"model": "elliptic"}
+        half = tuple(max(1, count // 2) for count in cells)
+        grids = {(count, count) for count in PATCHES if count <= min(self._grids[-1])} | {own}
+        for patches, mesh in (*((patches, cells) for patches in grids), (own, half)):
+            if _carries(mesh, patches):
+                yield self._proposal(isolated, micro, patches=patches, cells=mesh)
+        half_space = partial(self._proposal, micro=_HALF_SPACE, heights=self._law_grid)
+        for patches in grids:
+            yield half_space(consistent, patches=patches)
+        yield from self._half_spaces(consistent, patches=own)
+        yield half_space(isolated, patches=own, cells=cells)
+        if _carries(cells, own):
+            meshed = consistent | {"compliance": "finite-element"}
+            yield half_space(meshed, patches=own, cells=cells)
 
-    def _by_laws(
-        self, coupling: Content, micro: Content, patches: Grid, cells: tuple[int, ...] = ()
-    ) -> Proposal:
-        """Return a coupling by laws; with cells, on a mesh that carries them."""
-        heights, model = self.heights, micro["model"]
-        if model == "half-space":
-            heights = self._law_grid
-            model += f" {_times(heights)}"
-        name = f"{coupling['kind']}, {_times(patches)} patches, {model}"
-        changes = {"coupling": coupling, "micro": micro, "patches": {"grid": list(patches)}}
-        if cells:
-            name += f", {_times(cells)} elements"
-            changes["block"] = self.base["block"] | {"cells": list(cells)}
-        return Proposal(name, changes, heights)
-
-    def _references(self) -> Iterator[Proposal]:
-        """Yield references; edges are those that fit the contacts, where these are known."""
-        section, scene, fine = self.base["reference"], self._scene, None
-        if not scene.reference.hexahedral:
-            fine, load_history = section.get("fine"), scene.loading.load_history
-            if not fine and load_history.quantity == "approach" and load_history.tilt is not None:
-                surface = make_surface(scene)
-                fine = suggested_fine(surface, load_history.largest, tilt=load_history.tilt)
+    def _references(self) -> Iterator[Configuration]:
+        """Yield references, the one with edges that fit the contacts also with low heights."""
+        fine, section = self._fine, self._base["reference"]
         for meshes, factor in REFERENCE_MESHES if fine else ((1, 1.0), (2, 1.0), (3, 1.0)):
             section = section | {"meshes": meshes}
-            name = f"reference, {meshes} mesh{'es' * (meshes > 1)}"
             if fine:
                 section["fine"] = float(f"{factor * fine:.4g}")
-                name += f", {1e3 * section['fine']:.3g} µm"
-            changes = {"coupling": {"kind": "reference"}, "reference": section}
-            repeat_low = bool(fine) and (meshes, factor) == (1, 1.0)
-            yield Proposal(name, changes, self.heights, repeat_low)
+            made = self._proposal({"kind": "reference"}, reference=section)
+            yield made
+            if fine and (meshes, factor) == (1, 1.0) and self._scene.surface.spectrum:
+                low, name = scaled(made.content), made.name + LOW_HEIGHTS
+                yield replace(made, name=name, content=low, scale=LOW_HEIGHTS_SCALE)
 
     @property
-    def _cells(self) -> tuple[int, int, int]:
-        """Elements of a block whose mesh carries the laws."""
-        stated = self._scene.block.cells
-        return stated if isinstance(stated, tuple) else LAW_BLOCK_CELLS
+    def _fine(self) -> float | None:
+        """Edges of tetrahedra that fit the contacts; None where they are not known."""
+        section, loads = self._scene.reference, self._scene.loading.load_history
+        if section.hexahedral or section.fine:
+            return section.fine
+        if loads.quantity == "force" or loads.tilt is None:
+            return None
+        return suggested_fine(make_surface(self._scene), loads.largest, tilt=loads.tilt)
 
-    @property
-    def _patch_grids(self) -> list[Grid]:
-        fitting = {(count, count) for count in PATCHES if count <= min(self.heights)}
-        return sorted(fitting | {self._patches})
+
+def _name_of(content: Content) -> str:
+    """Return the name of a scene among its configurations."""
+    micro, reference, surface = (content[name] for name in ("micro", "reference", "surface"))
+    kind, model, cells = content["coupling"]["kind"], micro["model"], content["block"].get("cells")
+    if kind == "reference":
+        meshes, fine = reference["meshes"], reference.get("fine")
+        name = f"reference, {meshes} mesh{'es' * (meshes > 1)}"
+        return f"{name}, {1e3 * fine:.3g} µm" if fine else name
+    name = kind
+    if kind in ("isolated", "consistent"):
+        name += f", {_times(content['patches']['grid'])} patches"
+    name += f", {model}" + ", fitted" * (micro == _FITTED)
+    if model == "half-space":
+        name += f" {_times(surface['grid'])}"
+    name += f", {_times(cells)} elements" if cells else ""
+    return name + SMALL_SLOPES * (micro.get("finite_slopes") is False)
 
 
 def _carries(cells: tuple[int, ...], patches: Grid) -> bool:
@@ -251,5 +222,5 @@ def _carries(cells: tuple[int, ...], patches: Grid) -> bool:
     return all(c >= CELLS_PER_PATCH * n for c, n in zip(cells[:2], patches, strict=True))
 
 
-def _times(counts: tuple[int, ...]) -> str:
+def _times(counts: Sequence[int]) -> str:
     return " × ".join(map(str, counts))

@@ -1,36 +1,46 @@
-"""Compares all sensible ways to compute a scene: error against wall time."""
+"""Compares all sensible ways to compute a scene, each in a process of its own."""
 
 from __future__ import annotations
 
 import json
-import math
+import os
+import signal
+import subprocess
+import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO, TypeAlias
 
 from geometry.errors import InputError
-from geometry.patches import PatchGrid
+from multiscale.comparison import AGAINST
 from multiscale.comparison.catalogue import configurations
-from multiscale.comparison.comparison import Comparison, Row
-from multiscale.comparison.configuration import Configuration, pressure_grid
-from multiscale.comparison.error_breakdown import error_breakdowns
-from multiscale.comparison.error_measures import ErrorMeasures, error_measures, uncertainty
-from multiscale.comparison.launching import Launch, check_launchable, run_all
-from multiscale.comparison.run_result import RunResult
+from multiscale.comparison.comparison import Comparison, compared
+from multiscale.comparison.configuration import Configuration, RunResult, read_result, write_result
+from multiscale.comparison.process import check_launchable
 from multiscale.planning.auto_keys import auto_keys, provisional, resolved_sections, with_resolved
 from multiscale.planning.problem_setup import make_setup
+from multiscale.restart.interruption import ENDING
 from multiscale.scene.scene import Scene
 from multiscale.storage import write_json
 
-AGAINST = {"reference": "reference", "concurrent": "concurrent", "half-space": "analytic"}
-"""Coupling of each kind of measure; the best kind is the first."""
+Launch: TypeAlias = Callable[[Configuration, float | None], RunResult]
+"""Runs a configuration, and stops it after so many seconds if they are not None."""
 
 AUTO_VALUES = "auto_values.json"
 """File of the values that were chosen for the scene's keys that are ``auto``."""
 
-BUSY = 0.7
-"""A machine is called busy when the processes worked less than this share of their wall time."""
+TIME_TO_END = 5.0
+"""Time that a process has between SIGTERM and SIGKILL [s]."""
+
+REPEATABLE = ("done", "refused", "not converged")
+"""How runs end that would end in the same way again."""
+
+PROGRAM = (sys.executable, "-m", "multiscale.comparison.process")
+"""Words that start the program of a process."""
 
 
 def compare(
@@ -59,7 +69,7 @@ def compare(
         folder: Folder where results are stored, so that the next call goes on from them; None
             stores nothing.
         ranks: Number of processes of configurations that can use more than one, under ``mpirun``.
-        launch: Runs one configuration; by default `launching.launch_process`.
+        launch: Runs one configuration; by default `launch_process`.
         begin: Called with every configuration that is about to be run.
         observe: Called with every result, and whether it is from an earlier call.
 
@@ -80,12 +90,12 @@ def compare(
     with tempfile.TemporaryDirectory(prefix="patchlaw-compare-") as temporary:
         place = Path(temporary) if folder is None else folder
         scene = resolved_scene(scene, place)
-        found = run_all(
-            configurations(scene, ranks), place, budget_s=budget_s, launch=launch, begin=begin
-        )
-        for result, stored in found:
+        ways = configurations(scene, ranks)
+        for result, is_stored in run_all(
+            ways, place, budget_s=budget_s, launch=launch or launch_process, begin=begin
+        ):
             if observe is not None:
-                observe(result, stored)
+                observe(result, is_stored)
             results.append(result)
     return compared(scene, results, against)
 
@@ -104,176 +114,122 @@ def resolved_scene(scene: Scene, folder: Path) -> Scene:
     if auto <= {"micro.model"}:
         return scene
     path, given = folder / AUTO_VALUES, scene.model_dump(by_alias=True, mode="json")
-    try:
+    values = None
+    with suppress(OSError, ValueError, KeyError, TypeError):
         stored = json.loads(path.read_text(encoding="utf-8"))
         values = stored["sections"] if stored["scene"] == given else None
-    except (OSError, ValueError, KeyError, TypeError):
-        values = None
     if values is None:
         values = resolved_sections(make_setup(scene), scene)
         write_json(path, {"scene": given, "sections": values})
     return provisional(with_resolved(scene, values), auto & {"micro.model"})
 
 
-def compared(scene: Scene, results: Sequence[RunResult], against: str | None = None) -> Comparison:
-    """Compare results with the best of them.
+def run_all(
+    configurations: Sequence[Configuration],
+    folder: Path,
+    *,
+    launch: Launch,
+    budget_s: float | None = None,
+    begin: Callable[[Configuration], None] | None = None,
+    clock: Callable[[], float] = time.monotonic,
+) -> Iterator[tuple[RunResult, bool]]:
+    """Run configurations in their order, and yield the result of each when it ends.
+
+    Results are stored, one file each, and a configuration that has a result is not run again.
+    Configurations that are predicted to take more time than the budget leaves, or more memory than
+    there is, are left out.
 
     Args:
-        scene: The scene.
-        results: The results of its configurations.
-        against: Kind of the measure; the best kind where it was not reached, or by default.
-    """
-    best = {kind: ranked(results, kind) for kind in AGAINST}
-    reached = [kind for kind in AGAINST if best[kind]]
-    chosen = against if against in reached else next(iter(reached), None)
-    load_history = scene.loading.load_history
-    curves = {one.configuration.name: one.curves for one in results if one.curves is not None}
-    lengths = next((one.patches.lengths for one in curves.values()), (1.0, 1.0))
-    grid = PatchGrid(grid=pressure_grid(scene), lengths=lengths)
-    warnings = list(_warnings(results, against, chosen))
-    common: dict[str, Any] = {
-        "scene": scene.name,
-        "quantity": load_history.quantity,
-        "steps": load_history.count,
-        "grid": grid,
-        "curves": curves,
-    }
-    if chosen is None:
-        return Comparison(rows=tuple(map(_row, results)), warnings=tuple(warnings), **common)
-    measure = best[chosen][0]
-    name, right = measure.configuration.name, curves[measure.configuration.name]
-    pairs = [(curves[coarse], curves[fine]) for coarse, fine in refinements(best[chosen])]
-    own = uncertainty(right, pairs, grid)
-    response = "force" if load_history.quantity == "approach" else "approach"
-    tops = {AGAINST[kind]: best[kind][0] for kind in reached}
-    shares = error_breakdowns(results, tops, measure, response)
-    if not math.isfinite(getattr(own, f"{response}_max")):
-        warnings.append(f"{name} has no error bar of its own: it is taken as exact")
-    rows = []
-    for one in results:
-        errors = own if one is measure else ErrorMeasures()
-        if one is not measure and one.curves is not None:
-            errors = error_measures(one.curves, right, grid)
-        rows.append(_row(one, is_measure=one is measure, errors=errors, shares=shares(one)))
-    return Comparison(
-        rows=tuple(rows),
-        measure=name,
-        against=chosen,
-        uncertainty=own,
-        warnings=tuple(warnings),
-        **common,
-    )
-
-
-def ranked(results: Sequence[RunResult], against: str) -> list[RunResult]:
-    """Return the finished results that could be the measure, the best first.
-
-    One mesh alone has no error bar, and is no measure.
-
-    Args:
-        results: All results.
-        against: Kind of the measure.
-    """
-
-    def fits(one: Configuration) -> bool:
-        models = ("", "half-space")
-        return one.kind == AGAINST[against] and one.model in models and one.scale == 1.0
-
-    fitting = [one for one in results if one.done and fits(one.configuration)]
-    found = sorted(fitting, key=_fineness, reverse=True)
-    return [] if against == "reference" and found and _fineness(found[0])[0] < 2 else found
-
-
-def _fineness(result: RunResult) -> tuple[float, ...]:
-    """Return what makes a result better than another of its kind: the first that differs.
-
-    These are the number of meshes, the edges of the finest in a contact, finite slopes, heights.
-    """
-    one = result.configuration
-    reference = one.content["reference"] if one.kind == "reference" else {}
-    return (
-        reference.get("meshes", 0),
-        -reference.get("fine", 0.0),
-        result.finite_slopes,
-        math.prod(one.heights),
-    )
-
-
-def refinements(best_first: Sequence[RunResult]) -> Iterator[tuple[str, str]]:
-    """Yield, for edges and for heights, the finest pair of results that differ by nothing else.
-
-    Numbers of meshes are no refinement: the finest of the meshes is the same.
-
-    Args:
-        best_first: Finished results of one kind, the best first.
+        configurations: The configurations.
+        folder: Folder of the results.
+        budget_s: Wall time for all that is run now [s]; None for any.
+        launch: Runs one configuration.
+        begin: Called with every configuration that is about to be run.
+        clock: Returns the time [s].
 
     Yields:
-        Names of the coarser and the finer configuration.
+        The result, and whether it is from an earlier call.
     """
-    for refined in (1, 3):
-        groups: dict[tuple[float, ...], list[str]] = {}
-        for one in best_first:
-            others = tuple(value for k, value in enumerate(_fineness(one)) if k != refined)
-            groups.setdefault(others, []).append(one.configuration.name)
-        pairs = [group for group in groups.values() if len(group) > 1]
-        if pairs:
-            yield pairs[0][1], pairs[0][0]
+    end = None if budget_s is None else clock() + budget_s
+    for one in configurations:
+        path = folder / f"{one.key}.json"
+        stored = read_result(path)
+        left = None if end is None else end - clock()
+        if stored is not None and stored.status in REPEATABLE:
+            yield replace(stored, configuration=one), True
+        elif one.refusal:
+            yield RunResult(configuration=one, status="refused", message=one.refusal), False
+        elif left is not None and one.cost > left:
+            rest = f"{left:.2g} s" if left > 0.0 else "nothing"
+            why = f"it is predicted to take {one.cost:.2g} s, and the budget leaves {rest}"
+            yield RunResult(configuration=one, status="not started", message=why), False
+        else:
+            if begin is not None:
+                begin(one)
+            result = launch(one, left)
+            write_result(path, result)
+            yield result, False
 
 
-def _warnings(
-    results: Sequence[RunResult], against: str | None, chosen: str | None
-) -> Iterator[str]:
-    if against is not None and chosen != against:
-        instead = f"compared against the {chosen} instead" if chosen else "nothing to compare with"
-        yield f"no configuration of kind {against} was reached: {instead}"
-    timed = [one for one in results if one.seconds]
-    wall = sum(one.configuration.ranks * sum(one.seconds.values()) for one in timed)
-    cpu = sum(one.cpu_s for one in timed)
-    if cpu < BUSY * wall:
-        yield (
-            f"the processes worked {cpu:.3g} s in {wall:.3g} s of their wall time: the machine was "
-            "busy with something else, and times are too long"
+def launch_process(
+    configuration: Configuration, seconds: float | None, program: Sequence[str] = PROGRAM
+) -> RunResult:
+    """Run a configuration in a new process, or under ``mpirun``.
+
+    Args:
+        configuration: The configuration.
+        seconds: Wall time after which the process is ended [s]; None for any.
+        program: Words that start the program; it is given the name of a file with the
+            configuration, which it replaces by the result.
+    """
+    start, ranks = time.monotonic(), configuration.ranks
+    mpirun = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
+    with tempfile.TemporaryDirectory(prefix="patchlaw-compare-") as name:
+        file, errors = Path(name) / "result", Path(name) / "errors"
+        write_result(file, RunResult(configuration=configuration, status="not started"))
+        with errors.open("wb") as stream:
+            code = _exit_code([*mpirun, *program, str(file)], stream, seconds)
+        spent = time.monotonic() - start
+        result = read_result(file)
+        text = errors.read_text(encoding="utf-8", errors="replace")
+    if code is not None and result is not None and result.status != "not started":
+        return replace(result, start_s=result.start_s + spent)
+    result = RunResult(configuration=configuration, status="failed", exit_code=code)
+    if code is None:
+        why = f"ended after {spent:.1f} s, which was what the budget left"
+        return replace(result, status="over budget", message=why, start_s=spent)
+    lines = [line for line in text.splitlines() if line.strip(" -")]  # mpirun ends by a rule
+    why = lines[-1] if lines else f"its process ended with exit code {code}"
+    return replace(result, message=why)
+
+
+def _exit_code(command: list[str], errors: BinaryIO, seconds: float | None) -> int | None:
+    """Run a command in a group of processes of its own; None when its time is over.
+
+    The group ends with this function, however it ends. Signals that end this process are blocked
+    until the new one is known, so that it cannot be left behind.
+    """
+    # os.environ is without variables that MPI has set for this process
+    environment, process = os.environ | {"PATCHLAW_CACHE": "off"}, None
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
+    try:
+        process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=errors,
+            env=environment,
+            start_new_session=True,
+            preexec_fn=lambda: signal.pthread_sigmask(signal.SIG_SETMASK, mask),
         )
-
-
-def _row(result: RunResult, **columns: Any) -> Row:
-    """Return the row of a result; the columns are those that the comparison adds."""
-    one, curves = result.configuration, result.curves
-    if curves is not None:
-        columns |= {
-            "steps": len(curves),
-            "approach_mm": float(curves.approach[-1]),
-            "force_N": float(curves.force[-1]),
-            "contact_area_fraction": float(curves.area[-1]),
-            "mean_separation_mm": float(curves.separation[-1]),
-        }
-    if seconds := dict(result.seconds):
-        columns["seconds"] = sum(seconds.values())
-        columns["seconds_laws"] = seconds.pop("laws", math.nan)
-        columns["seconds_steps"] = seconds.pop("load steps", math.nan)
-        columns["seconds_setup"] = sum(seconds.values())
-    meshed = "reference" if one.kind == "reference" else "block"
-    has_cells = one.kind == "reference" or one.scene.coupling.on_mesh
-    cells = one.content[meshed].get("cells", ()) if has_cells else ()
-    return Row(
-        name=one.name,
-        kind=one.kind,
-        model=one.model,
-        heights=_text(one.heights),
-        patches=_text(one.content["patches"]["grid"]),
-        cells=_text(cells),
-        finite_slopes=one.kind == "reference" or result.finite_slopes,
-        status=result.status,
-        unknowns=result.unknowns,
-        ranks=one.ranks,
-        seconds_start=result.start_s,
-        seconds_cpu=result.cpu_s,
-        peak_MB=result.peak_MB,
-        exit_code=result.exit_code,
-        message=result.message,
-        **columns,
-    )
-
-
-def _text(counts: Sequence[int]) -> str:
-    return "x".join(map(str, counts))
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        return process.wait(seconds)
+    except subprocess.TimeoutExpired:
+        return None
+    finally:
+        for sign in (signal.SIGTERM, signal.SIGKILL):
+            if process is not None and process.poll() is None:
+                with suppress(ProcessLookupError, subprocess.TimeoutExpired):
+                    os.killpg(process.pid, sign)
+                    process.wait(TIME_TO_END)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)

@@ -1,91 +1,84 @@
-"""The comparison of a scene's configurations as records: error against wall time."""
+"""The configurations of a scene against the best of them: error against wall time."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
-from multiscale.comparison.error_breakdown import ErrorBreakdown
-from multiscale.comparison.error_measures import Curves, ErrorMeasures
+from multiscale.comparison import AGAINST
+from multiscale.comparison.configuration import RunResult, pressure_grid
+from multiscale.comparison.errors import (
+    ErrorBreakdown,
+    ErrorCauses,
+    ErrorMeasures,
+    error_measures,
+    uncertainty,
+)
+from multiscale.scene.scene import Scene
 
-_UNKNOWN = float("nan")
+BUSY = 0.7
+"""A machine is called busy when the processes worked less than this share of their wall time."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Row:
-    """One configuration: a row of ``compare.csv``.
-
-    The attributes are its columns; `errors` and `shares` have a column for each of their parts.
+@dataclass(frozen=True, kw_only=True)
+class Row(RunResult):
+    """The result of a configuration with its errors: a row of ``compare.csv``.
 
     Attributes:
-        name: Unique name of the configuration.
-        kind: Its coupling.
-        model: Its micro model; empty for an explicit reference.
-        heights: Grid of its surface.
-        patches: Its patches.
-        cells: Elements of its block; empty where it has none, or as many as it needs.
-        status: How its run ended.
-        finite_slopes: Whether it accounts for finite slopes.
         is_measure: Whether the others are compared against it.
-        unknowns: Degrees of freedom of a block that was pressed on its mesh.
-        ranks: Number of processes.
-        seconds: Wall time [s], without `seconds_start`.
-        seconds_setup: Part of it for surface, micro model and block.
-        seconds_laws: Part of it for patch laws.
-        seconds_steps: Part of it for load steps.
-        seconds_start: Wall time of interpreter, imports and compiled forms [s].
-        seconds_cpu: Processor time of all ranks together, without that of `seconds_start` [s].
-        peak_MB: Largest memory, of all ranks together [MB].
-        steps: Number of accepted load steps.
-        approach_mm: Approach at the last of them [mm].
-        force_N: Force at the last of them [N].
-        contact_area_fraction: Contact area fraction at the last of them.
-        mean_separation_mm: Mean separation at the last of them [mm].
         errors: Errors against the measure; for the measure itself, its uncertainty.
         shares: Causes of the error at the last load step.
-        exit_code: Exit code of its process.
-        message: Text of the error.
     """
 
-    name: str
-    kind: str
-    model: str
-    heights: str
-    patches: str
-    cells: str
-    status: str
-    finite_slopes: bool = False
     is_measure: bool = False
-    unknowns: int | None = None
-    ranks: int = 1
-    seconds: float = _UNKNOWN
-    seconds_setup: float = _UNKNOWN
-    seconds_laws: float = _UNKNOWN
-    seconds_steps: float = _UNKNOWN
-    seconds_start: float = _UNKNOWN
-    seconds_cpu: float = _UNKNOWN
-    peak_MB: float = _UNKNOWN
-    steps: int = 0
-    approach_mm: float = _UNKNOWN
-    force_N: float = _UNKNOWN
-    contact_area_fraction: float = _UNKNOWN
-    mean_separation_mm: float = _UNKNOWN
     errors: ErrorMeasures = field(default_factory=ErrorMeasures)
     shares: ErrorBreakdown = field(default_factory=ErrorBreakdown)
-    exit_code: int | None = None
-    message: str = ""
 
     def record(self) -> dict[str, Any]:
-        """Return the row by column: plain values, None where unknown."""
-        record: dict[str, Any] = {}
-        for name, value in asdict(self).items():
-            parts = {"errors": "error_{}", "shares": "share_{}"}.get(name)
-            record |= {parts.format(key): v for key, v in value.items()} if parts else {name: value}
+        """Return the row by column: plain values, None where unknown.
+
+        Times are those of `RunResult`, ``seconds`` without ``seconds_start``; values such as
+        ``force_N`` are those of the last accepted load step.
+        """
+        one, phases = self.configuration, dict(self.phases)
+        laws, steps = phases.pop("laws", None), phases.pop("load steps", None)
+        cells = one.content["reference" if self.kind == "reference" else "block"].get("cells", ())
+        record = {
+            "name": self.name,
+            "kind": self.kind,
+            "model": self.model,
+            "heights": _text(one.heights),
+            "patches": _text(one.content["patches"]["grid"]),
+            "cells": _text(cells),
+            "status": self.status,
+            "finite_slopes": self.finite_slopes,
+            "is_measure": self.is_measure,
+            "unknowns": self.unknowns,
+            "ranks": one.ranks,
+            "seconds": self.seconds,
+            "seconds_setup": sum(phases.values()) if self.phases else None,
+            "seconds_laws": laws,
+            "seconds_steps": steps,
+            "seconds_start": self.start_s,
+            "seconds_cpu": self.cpu_s,
+            "peak_MB": self.peak_MB,
+            "steps": self.steps,
+            "approach_mm": self.last("approach"),
+            "force_N": self.last("force"),
+            "contact_area_fraction": self.last("area"),
+            "mean_separation_mm": self.last("separation"),
+            **{f"error_{name}": value for name, value in asdict(self.errors).items()},
+            **{f"share_{name}": value for name, value in asdict(self.shares).items()},
+            "exit_code": self.exit_code,
+            "message": self.message,
+        }
         return {name: None if value != value else value for name, value in record.items()}
 
 
@@ -104,7 +97,6 @@ class Comparison:
         measure: Name of the measure; None when no configuration can be one.
         against: Kind of the measure, as ``--against`` names it.
         uncertainty: Uncertainty of the measure; NaN where unknown.
-        curves: Results by name of the configuration.
         warnings: What a reader should know.
     """
 
@@ -116,7 +108,6 @@ class Comparison:
     measure: str | None = None
     against: str | None = None
     uncertainty: ErrorMeasures = field(default_factory=ErrorMeasures)
-    curves: Mapping[str, Curves] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
     def __len__(self) -> int:
@@ -124,10 +115,7 @@ class Comparison:
 
     def __getitem__(self, name: str) -> Row:
         """Return the row of a configuration."""
-        for row in self.rows:
-            if row.name == name:
-                return row
-        raise KeyError(name)
+        return {row.name: row for row in self.rows}[name]
 
     @property
     def response(self) -> str:
@@ -157,12 +145,11 @@ class Comparison:
         Raises:
             InputError: When there is no such error measure.
         """
-        name = error or f"{self.response}_max"
-        if name not in ErrorMeasures.__slots__:
-            allowed = ", ".join(ErrorMeasures.__slots__)
-            raise InputError("is no error measure", value=name, allowed=allowed)
+        name, allowed = error or f"{self.response}_max", [one.name for one in fields(row.errors)]
+        if name not in allowed:
+            raise InputError("is no error measure", value=name, allowed=", ".join(allowed))
         size, bar = abs(getattr(row.errors, name)), getattr(self.uncertainty, name)
-        return float(max(size, bar)) if np.isfinite((size, bar)).all() else float(size)
+        return float(np.maximum(size, np.nan_to_num(bar)))
 
     def frontier(self, error: str | None = None) -> tuple[Row, ...]:
         """Return the rows that no other beats in both time and error, the fastest first.
@@ -174,14 +161,117 @@ class Comparison:
             error: Name of a field of `ErrorMeasures`; by default the largest of the response over
                 the curve.
         """
-        known = [
-            (row.seconds, self.error(row, error), row) for row in self.rows if row.status == "done"
-        ]
-        finite = [one for one in known if np.isfinite(one[:2]).all()]
-        best: list[Row] = []
-        least = np.inf
-        for seconds, size, row in sorted(finite, key=lambda one: one[:2]):
-            if size < least or (best and (seconds, size) == (best[-1].seconds, least)):
-                best.append(row)
-                least = size
-        return tuple(best)
+        ended = [row for row in self.rows if row.status == "done"]
+        costs = np.array([(row.seconds, self.error(row, error)) for row in ended]).reshape(-1, 2)
+        others = costs[:, None]
+        is_beaten = ((others >= costs).all(axis=2) & (others > costs).any(axis=2)).any(axis=1)
+        best = np.flatnonzero(np.isfinite(costs).all(axis=1) & ~is_beaten)
+        return tuple(sorted((ended[index] for index in best), key=lambda row: row.seconds))
+
+
+def compared(scene: Scene, results: Sequence[RunResult], against: str | None = None) -> Comparison:
+    """Compare results with the best of them.
+
+    Args:
+        scene: The scene.
+        results: The results of its configurations.
+        against: Kind of the measure; the best kind where it was not reached, or by default.
+    """
+    rows = [Row(**vars(one)) for one in results]
+    best = {kind: ranked(rows, kind) for kind in AGAINST}
+    reached = [kind for kind in AGAINST if best[kind]]
+    chosen = against if against in reached else next(iter(reached), None)
+    loads = scene.loading.load_history
+    lengths = next((one.curves.patches.lengths for one in rows if one.steps), (1.0, 1.0))
+    found = Comparison(
+        scene=scene.name,
+        rows=tuple(rows),
+        quantity=loads.quantity,
+        steps=loads.count,
+        grid=PatchGrid(grid=pressure_grid(scene), lengths=lengths),
+        against=chosen,
+        warnings=tuple(_warnings(rows, against, chosen)),
+    )
+    if chosen is None:
+        return found
+    measure, tops = best[chosen][0], {AGAINST[kind]: best[kind][0] for kind in reached}
+    pairs = [(coarse.curves, fine.curves) for coarse, fine in refinements(best[chosen])]
+    own = uncertainty(measure.curves, pairs, found.grid)
+    causes = ErrorCauses(rows, tops, measure, found.response)
+    for index, row in enumerate(rows):
+        errors = error_measures(row.curves, measure.curves, found.grid)
+        rows[index] = replace(row, errors=errors, shares=causes.breakdown(row))
+        if row is measure:
+            rows[index] = replace(rows[index], errors=own, is_measure=True)
+    found = replace(found, rows=tuple(rows), measure=measure.name, uncertainty=own)
+    if math.isfinite(getattr(own, f"{found.response}_max")):
+        return found
+    exact = f"{measure.name} has no error bar of its own: it is taken as exact"
+    return replace(found, warnings=(*found.warnings, exact))
+
+
+def ranked(results: Sequence[RunResult], against: str) -> list[RunResult]:
+    """Return the finished results that could be the measure, the best first.
+
+    One mesh alone has no error bar, and is no measure.
+
+    Args:
+        results: All results.
+        against: Kind of the measure.
+    """
+    ended = [one for one in results if one.kind == AGAINST[against] and one.status == "done"]
+    fitting = [
+        one
+        for one in ended
+        if one.steps and one.configuration.scale == 1.0 and one.model in ("", "half-space")
+    ]
+    found = sorted(fitting, key=_fineness, reverse=True)
+    return [] if against == "reference" and found and _fineness(found[0])[0] < 2 else found
+
+
+def _fineness(result: RunResult) -> tuple[float, ...]:
+    """Return what makes a result better than another of its kind: the first that differs.
+
+    These are the number of meshes, the edges of the finest in a contact, finite slopes, heights.
+    """
+    one = result.configuration
+    reference = one.content["reference"] if one.kind == "reference" else {}
+    meshes, edges = reference.get("meshes", 0), reference.get("fine", 0.0)
+    return meshes, -edges, result.finite_slopes, math.prod(one.heights)
+
+
+def refinements(best_first: Sequence[RunResult]) -> Iterator[tuple[RunResult, RunResult]]:
+    """Yield, for edges and for heights, the finest pair of results that differ by nothing else.
+
+    Numbers of meshes are no refinement: the finest of the meshes is the same.
+
+    Args:
+        best_first: Finished results of one kind, the best first.
+
+    Yields:
+        The coarser and the finer result.
+    """
+    for refined in (1, 3):  # places of edges and heights in `_fineness`
+        for fine, coarse in combinations(best_first, 2):
+            pairs = enumerate(zip(_fineness(fine), _fineness(coarse), strict=True))
+            if [place for place, (one, other) in pairs if one != other] == [refined]:
+                yield coarse, fine
+                break
+
+
+def _warnings(rows: Sequence[Row], against: str | None, chosen: str | None) -> Iterator[str]:
+    if against not in (None, chosen):
+        instead = f"compared against the {chosen} instead" if chosen else "nothing to compare with"
+        yield f"no configuration of kind {against} was reached: {instead}"
+    timed = [row for row in rows if row.phases]
+    wall = sum(row.configuration.ranks * row.seconds for row in timed)
+    cpu = sum(row.cpu_s for row in timed)
+    if cpu < BUSY * wall:
+        yield (
+            f"the processes worked {cpu:.3g} s in {wall:.3g} s of their wall time: the machine was "
+            "busy with something else, and times are too long"
+        )
+
+
+def _text(counts: Sequence[int]) -> str:
+    return "x".join(map(str, counts))

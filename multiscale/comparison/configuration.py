@@ -1,20 +1,35 @@
-"""One way to compute a scene, and what all ways to compute it share."""
+"""One way to compute a scene, and the result of its run with the file that keeps it."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property, partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import PlainSerializer, PlainValidator, TypeAdapter
+
+from geometry.errors import PatchlawError
+from geometry.patches import PatchGrid
 from multiscale.scene.scene import Scene
-from multiscale.setup.checks import patch_grid
+from multiscale.setup.surface_and_block import patch_grid
+from multiscale.storage import write_bytes
 
+Array = Annotated[
+    NDArray[np.float64],
+    PlainValidator(partial(np.array, dtype=float)),
+    PlainSerializer(np.ndarray.tolist),
+]
+"""An array of numbers, which JSON holds as lists."""
 Content: TypeAlias = dict[str, Any]
 Grid: TypeAlias = tuple[int, int]
+"""Heights or patches along x and y."""
+Status = Literal["done", "not converged", "refused", "failed", "over budget", "not started"]
 
 OWN = "the scene as it is"
 """Beginning of the name of the configuration that runs the scene as its file states it."""
@@ -38,7 +53,6 @@ class Configuration:
     Attributes:
         name: A unique name, for tables and legends.
         content: The complete scene, as `Scene.from_dict` takes it.
-        heights: Grid of the surface.
         cost: Predicted wall time [s].
         ranks: Number of processes.
         scale: Heights and load relative to those of the compared scene; results are divided by it.
@@ -47,8 +61,7 @@ class Configuration:
 
     name: str
     content: Content
-    heights: Grid
-    cost: float
+    cost: float = float("inf")
     ranks: int = 1
     scale: float = 1.0
     refusal: str = ""
@@ -73,15 +86,156 @@ class Configuration:
         """The micro model; empty for an explicit reference."""
         return "" if self.kind == "reference" else str(self.content["micro"]["model"])
 
+    @property
+    def heights(self) -> Grid:
+        """Grid of the surface."""
+        nx, ny = self.content["surface"]["grid"]
+        return nx, ny
+
     @cached_property
     def key(self) -> str:
         """Hash of everything that the results depend on."""
         parts = {"scene": self.content, "version": version("patchlaw"), "ranks": self.ranks}
         file = self.content["surface"].get("file")
         if file is not None:
-            parts["heights"] = hashlib.sha256(Path(file).read_bytes()).hexdigest()
-        text = json.dumps(parts, sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()[:20]
+            parts["heights"] = _checksum(Path(file).read_bytes())
+        return _checksum(json.dumps(parts, sort_keys=True).encode())[:20]
+
+
+_none, _ONE_PATCH = partial(np.empty, 0), PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Curves:
+    """The results of a run that are compared: m load steps, by default none, and N patches.
+
+    Attributes:
+        patches: The partition of the interface.
+        approach: Approach of the plane at the middle, shape (m,) [mm].
+        force: Force, shape (m,) [N].
+        area: Contact area fraction, shape (m,).
+        separation: Mean separation, shape (m,) [mm].
+        patch_pressure: Mean pressure of each patch, shape (m, N) [MPa].
+        approach_error: The run's own error bar of the approach, shape (m,) [mm]; NaN where unknown.
+        force_error: Error bar of the force, shape (m,) [N].
+        area_error: Error bar of the area fraction, shape (m,).
+    """
+
+    patches: PatchGrid = _ONE_PATCH
+    approach: Array = field(default_factory=_none)
+    force: Array = field(default_factory=_none)
+    area: Array = field(default_factory=_none)
+    separation: Array = field(default_factory=_none)
+    patch_pressure: Array = field(default_factory=_none)
+    approach_error: Array = field(default_factory=_none)
+    force_error: Array = field(default_factory=_none)
+    area_error: Array = field(default_factory=_none)
+
+    def divided(self, scale: float) -> Curves:
+        """Return the curves for heights and a load that are larger by 1 / scale, at small slopes.
+
+        Areas stay as they are; forces, pressures and lengths normal to the surface are divided.
+        """
+        names = {field.name for field in fields(self)} - {"patches", "area", "area_error"}
+        return replace(self, **{name: getattr(self, name) / scale for name in names})
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunResult:
+    """The result of one configuration, finished or not.
+
+    Attributes:
+        configuration: The configuration.
+        status: How the run ended.
+        exit_code: Exit code of its process; None when it was killed or never started.
+        message: The text of the error; empty without one.
+        phases: Wall time of each phase [s].
+        start_s: Wall time of everything else in the process: interpreter, imports, compiled
+            forms [s].
+        cpu_s: Processor time of the phases, of all ranks together [s].
+        peak_MB: Largest memory in use, of all ranks together [MB]; NaN when unknown.
+        unknowns: Degrees of freedom of the block that was pressed, where there is one.
+        curves: The accepted load steps.
+        finite_slopes: Whether it accounts for finite slopes.
+    """
+
+    configuration: Configuration
+    status: Status
+    exit_code: int | None = None
+    message: str = ""
+    phases: dict[str, float] = field(default_factory=dict)
+    start_s: float = float("nan")
+    cpu_s: float = float("nan")
+    peak_MB: float = float("nan")
+    unknowns: int | None = None
+    curves: Curves = field(default_factory=Curves)
+    finite_slopes: bool = False
+
+    @property
+    def name(self) -> str:
+        """Name of the configuration."""
+        return self.configuration.name
+
+    @property
+    def kind(self) -> str:
+        """Coupling of the configuration."""
+        return self.configuration.kind
+
+    @property
+    def model(self) -> str:
+        """Micro model of the configuration; empty for an explicit reference."""
+        return self.configuration.model
+
+    @property
+    def seconds(self) -> float:
+        """Wall time of all phases [s]; NaN where none was begun."""
+        return sum(self.phases.values()) if self.phases else float("nan")
+
+    @property
+    def steps(self) -> int:
+        """Number of accepted load steps."""
+        return self.curves.force.size
+
+    def last(self, name: str) -> float:
+        """Return a value at the last accepted load step; NaN without any.
+
+        Args:
+            name: Name of one of the curves.
+        """
+        return float(getattr(self.curves, name)[-1]) if self.steps else float("nan")
+
+
+_RESULTS = TypeAdapter(RunResult)
+
+
+def write_result(path: Path, result: RunResult) -> Path:
+    """Write a result, whole or not at all: a line with the checksum, then JSON.
+
+    Args:
+        path: The file.
+        result: The result.
+    """
+    content = json.dumps(_RESULTS.dump_python(result, mode="json")).encode()
+    return write_bytes(path, _checksum(content).encode() + b"\n" + content)
+
+
+def read_result(path: Path) -> RunResult | None:
+    """Read the result of a configuration; None when the file is missing or damaged.
+
+    Args:
+        path: The file.
+    """
+    try:
+        checksum, _, content = path.read_bytes().partition(b"\n")
+        if checksum.decode() != _checksum(content):
+            return None
+        return _RESULTS.validate_json(content)
+    except (OSError, ValueError, PatchlawError):
+        return None
+
+
+def _checksum(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
 
 
 def pressure_grid(scene: Scene) -> Grid:
@@ -99,26 +253,23 @@ def content_of(scene: Scene) -> Content:
     return content | {"output": _NO_OUTPUT}
 
 
-def scaled(content: Content) -> Content | None:
-    """Return a scene with heights and load scaled together; None where heights are from a file.
+def scaled(content: Content) -> Content:
+    """Return a scene with heights, made from a spectrum, and load scaled together.
 
     As slopes become small, the force and all lengths normal to the surface scale alike (Hertz).
     What remains between the scaled scene and the scene itself is the effect of finite slopes.
     """
     surface, load, scale = content["surface"], content["load"], LOW_HEIGHTS_SCALE
-    if "spectrum" not in surface:
-        return None
     powers = {"rms_slope": 1, "rms_height": 1, "s0": 2}
     spectrum = {
         key: value * scale ** powers[key] if key in powers else value
         for key, value in surface["spectrum"].items()
     }
-    scaled = {
-        key: [scale * number for number in value]
+    motion = {  # approach, force and a prescribed tilt are the lists
+        key: [scale * number for number in value] if isinstance(value, list) else value
         for key, value in load.items()
-        if key in ("approach", "force") or (key == "tilt" and value != "free")
     }
-    return content | {"surface": surface | {"spectrum": spectrum}, "load": load | scaled}
+    return content | {"surface": surface | {"spectrum": spectrum}, "load": motion}
 
 
 def coarser_grids(heights: Grid, scene: Scene) -> list[Grid]:
@@ -127,14 +278,10 @@ def coarser_grids(heights: Grid, scene: Scene) -> list[Grid]:
     Heights from a file have their own grid only.
     """
     grids, spectrum = [heights], scene.surface.spectrum
-    while spectrum is not None and all(count % 2 == 0 for count in grids[0]):
-        coarser = (grids[0][0] // 2, grids[0][1] // 2)
-        bands = (spectrum.waves_x or spectrum.waves, spectrum.waves_y or spectrum.waves)
-        shortest = [0.0 if band is None else band[1] for band in bands]
-        if any(
-            count < max(FEWEST_HEIGHTS, HEIGHTS_PER_WAVE * waves)
-            for count, waves in zip(coarser, shortest, strict=True)
-        ):
-            break
-        grids.insert(0, coarser)
+    if spectrum is None:
+        return grids
+    bands = (spectrum.waves_x or spectrum.waves, spectrum.waves_y or spectrum.waves)
+    least = [max(FEWEST_HEIGHTS, HEIGHTS_PER_WAVE * band[1]) for band in bands if band]
+    while all(n % 2 == 0 and n // 2 >= few for n, few in zip(grids[0], least, strict=True)):
+        grids.insert(0, (grids[0][0] // 2, grids[0][1] // 2))
     return grids

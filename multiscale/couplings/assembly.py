@@ -1,25 +1,103 @@
-"""Makes the laws and the coupling that a scene asks for."""
+"""Makes the laws and the coupling that a scene asks for, and chooses their Newton's method."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+import gc
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from geometry.errors import InputError
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry import InputError
 from micro import MicroModel
-from multiscale.couplings.blocks import embedding, patch_compliance, patch_displacements
-from multiscale.couplings.condensed import CondensedCoupling, FreePlaneCoupling
-from multiscale.couplings.load_steps import ContactCoupling, EmbeddedCoupling
-from multiscale.couplings.newton_choice import newton_choice
+from multiscale.couplings.body import embedding, patch_compliance, patch_displacements
+from multiscale.couplings.condensed import CondensedCoupling
+from multiscale.couplings.contact import ContactCoupling
+from multiscale.couplings.law_couplings import EmbeddedCoupling, FreePlaneCoupling
 from multiscale.couplings.reference import ReferenceCoupling, make_reference
 from multiscale.laws.consistent import consistent_laws
 from multiscale.laws.isolated import isolated_laws
 from multiscale.laws.law_table import LawTable
+from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling
+from multiscale.results.history import range_notes
+from multiscale.results.reference_record import ReferenceRecord
+from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import Block
+    from macro import Block, Interface
+
+Array = NDArray[np.float64]
+
+MOST_CYCLES_PER_STEP = 12
+"""Multigrid cycles that a load step of the full Newton takes at most, when it starts from earlier
+steps. With fewer patches that can touch it takes about one for each (the paper's cube with 4 × 4
+patches, 4 of them loaded: 39 in 8 steps; with 2 of 64 that can touch: 36 in 40)."""
+
+CYCLES_PER_PATCH = 11
+"""Multigrid cycles that the compliance of one patch takes, measured on the paper's cube with 4 × 4
+and 8 × 8 patches."""
+
+_UNLESS_FLAT = "; should a patch turn out to be flat, condensed all the same"
+
+
+class NewtonChoice(NamedTuple):
+    """Which Newton solves the load steps, and why.
+
+    Attributes:
+        condensed: Whether it is the dense one of the patches.
+        why: The reason, as a sentence.
+    """
+
+    condensed: bool
+    why: str
+
+
+def full_cycles(setup: ProblemSetup, steps: int) -> int:
+    """Return the multigrid cycles that load steps on the mesh are predicted to take.
+
+    Args:
+        setup: The problem set up from the scene.
+        steps: Load steps.
+    """
+    return steps * min(max(setup.interfering_patches, 1), MOST_CYCLES_PER_STEP)
+
+
+def newton_choice(setup: ProblemSetup, table: LawTable | None = None) -> NewtonChoice:
+    """Choose the Newton of the scene, or the one that is predicted to take fewer multigrid cycles.
+
+    The full Newton spends cycles on load steps until its basis of earlier solutions spans all
+    states of the patches. The condensed one spends them on the compliance, before the first step.
+
+    Args:
+        setup: The problem set up from the scene, of a coupling with laws.
+        table: The laws, once made; flat patches rule out the full Newton.
+    """
+    coupling = setup.scene.coupling
+    if coupling.decomposed:
+        return NewtonChoice(True, "the decomposed block is its compliance")
+    flat = 0 if table is None else sum(law.is_flat for law in table.laws)
+    if flat and coupling.newton == "auto" and coupling.interface == "patchwise":
+        why = (
+            f"{flat} of {setup.patches.count} patches are flat, and their pressure is a function "
+            "of closure nowhere"
+        )
+        return NewtonChoice(True, why)
+    if coupling.interface == "pointwise":
+        return NewtonChoice(False, "laws at points need the whole mesh")
+    if coupling.newton != "auto":
+        return NewtonChoice(coupling.newton == "condensed", "as the scene asks")
+    patches, steps = setup.patches.count, setup.scene.loading.load_history.count
+    compliance, full = CYCLES_PER_PATCH * patches, full_cycles(setup, steps)
+    fewer = "fewer" if compliance < full else "more"
+    unless = "" if compliance < full or table or setup.uses_summits else _UNLESS_FLAT
+    return NewtonChoice(
+        compliance < full,
+        f"the compliance of {patches} patches takes about {compliance} multigrid cycles, "
+        f"{fewer} than {steps} load steps on the mesh with about {full}{unless}",
+    )
 
 
 def make_table(setup: ProblemSetup, model: MicroModel, comm: Any) -> LawTable:
@@ -46,46 +124,40 @@ def make_table(setup: ProblemSetup, model: MicroModel, comm: Any) -> LawTable:
             allowed="isolated, consistent",
             file=setup.scene.file,
         )
-    if kind == "consistent":
-        load_history = setup.scene.loading.load_history
-        return consistent_laws(
-            model,
-            setup.patches,
-            mean_heights=setup.mean_heights,
-            largest=load_history.control(load_history.largest),
-            displacements=patch_displacements(setup, comm, dense=newton_choice(setup).condensed),
-            pointwise=setup.scene.coupling.interface == "pointwise",
-            tolerance=setup.table_tolerance,
-            most_rows=setup.table_rows,
-            comm=comm,
-        )
-    return isolated_laws(
+    common: dict[str, Any] = {
+        "mean_heights": setup.mean_heights,
+        "tolerance": setup.table_tolerance,
+        "most_rows": setup.table_rows,
+        "comm": comm,
+    }
+    if kind == "isolated":
+        ends, love = setup.largest_closures, setup.scene.coupling.love
+        return isolated_laws(model, setup.patches, closure_ends=ends, love=love, **common)
+    load_history = setup.scene.loading.load_history
+    return consistent_laws(
         model,
         setup.patches,
-        mean_heights=setup.mean_heights,
-        closure_ends=setup.largest_closures,
-        love=setup.scene.coupling.love,
-        tolerance=setup.table_tolerance,
-        most_rows=setup.table_rows,
-        comm=comm,
+        largest=load_history.control(load_history.largest),
+        displacements=patch_displacements(setup, comm, dense=newton_choice(setup).condensed),
+        pointwise=setup.scene.coupling.interface == "pointwise",
+        **common,
     )
 
 
-def assemble(setup: ProblemSetup, make: Callable[[], LawTable | MicroModel], comm: Any) -> Coupling:
+def assemble(setup: ProblemSetup, made: LawTable | MicroModel | None, comm: Any) -> Coupling:
     """Put micro and macro model together as the scene asks.
 
     Args:
         setup: The problem set up from the scene.
-        make: Makes the patch laws, of couplings that use them, or else the micro model on the body;
-            not called for a reference.
+        made: The patch laws, of couplings that use them, or else the micro model on the body; None
+            for a reference.
         comm: MPI communicator; None for this process alone.
 
     Note:
         Collective.
     """
-    if setup.micro is None:
+    if made is None:
         return make_reference(setup, comm)
-    made = make()
     if not isinstance(made, LawTable):
         return ContactCoupling(made, setup.patches, setup.mean_heights, comm)
     condensed = newton_choice(setup, made).condensed
@@ -110,3 +182,98 @@ def meshed_blocks(coupling: Coupling | None) -> list[Block]:
     if isinstance(coupling, ReferenceCoupling | EmbeddedCoupling):
         return coupling.blocks
     return []
+
+
+def field_under(setup: ProblemSetup, pressure: Array, comm: Any) -> tuple[Interface, Array]:
+    """Return the meshed block and its displacements under pressures that are uniform on patches.
+
+    Args:
+        setup: The problem set up from the scene.
+        pressure: Pressures of the patches, shape (N,) [MPa].
+        comm: MPI communicator; None for this process alone.
+
+    Note:
+        Collective.
+    """
+    interface = embedding(setup, comm)
+    function = interface.block.solve(interface.load(pressure))
+    return interface, function.x.array[: interface.block.owned_dofs].copy()
+
+
+def free_blocks(blocks: list[Block]) -> None:
+    """Free blocks that nothing else refers to any more.
+
+    PETSc keeps objects that Python drops until it is asked on their own communicator. Without this
+    a program that makes many runs would grow by a block with each.
+
+    Args:
+        blocks: The blocks; the list is emptied.
+
+    Note:
+        Collective.
+    """
+    if not blocks:
+        return
+    from macro.compat import collect_garbage
+
+    comms = [block.stiffness.comm.duplicate() for block in blocks]  # these outlive their blocks
+    blocks.clear()
+    gc.collect()  # a block and its contact problem refer to each other
+    for comm in comms:
+        collect_garbage(comm)
+        comm.destroy()
+
+
+def load_finite_elements(scene: Scene, comm: Any) -> None:
+    """Import the finite elements on all ranks where a scene may need them.
+
+    PETSc starts with collective calls on all processes of the job, so that one rank alone must not
+    import it.
+
+    Args:
+        scene: The scene.
+        comm: MPI communicator; None for this process alone, which imports them when it needs them.
+
+    Note:
+        Collective.
+    """
+    if comm is not None and scene.coupling.kind != "analytic":
+        import macro  # noqa: F401
+
+
+def approximation_notes(
+    setup: ProblemSetup, table: LawTable | None, steps: Sequence[LoadStep]
+) -> Iterator[str]:
+    """Yield what a report says of the approximations behind load steps.
+
+    Args:
+        setup: The problem set up from a scene.
+        table: The laws, where the steps use laws.
+        steps: The load steps.
+    """
+    if setup.choice is not None:
+        yield f"micro model chosen: {setup.choice.sentence}"
+    if table is not None:
+        yield from table.notes(setup.table_tolerance)
+        planned, taken = newton_choice(setup), newton_choice(setup, table)
+        if taken.condensed != planned.condensed:
+            yield f"Newton condensed to the patches, not full: {taken.why}"
+    imbalances = [abs(step.imbalance) for step in steps if step.imbalance is not None]
+    if imbalances:
+        yield f"force against the support's reaction: equal to {max(imbalances):.1e}"
+    yield from range_notes(steps, table)
+
+
+def with_mesh_errors(
+    coupling: Coupling | None, steps: Sequence[LoadStep]
+) -> tuple[tuple[LoadStep, ...], ReferenceRecord | None, list[str]]:
+    """Return load steps with the errors of a reference's meshes, its record, and notes on it.
+
+    Args:
+        coupling: The coupling; others than a reference leave the steps as they are.
+        steps: The load steps.
+    """
+    if not isinstance(coupling, ReferenceCoupling):
+        return tuple(steps), None, []
+    record = coupling.record(steps)
+    return record.with_errors(steps), record, list(coupling.notes(record, steps))

@@ -1,4 +1,7 @@
-"""The equations of patch laws on the compliance of a block, under one load of the plane."""
+"""The equations of patch laws on the compliance of a block, under one load of the plane.
+
+Theory: demos/theory.md, section 11.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from geometry.errors import NotConverged
-from geometry.patches import PatchGrid
-from geometry.rigid_plane import Control, PlaneLevers
+from geometry import Control, InputError, NotConverged, PatchGrid
+from geometry.rigid_plane import PlaneLevers
 from multiscale.laws.interpolation import LawPoint, Tangent
-from multiscale.laws.law_table import PatchLaws
+from multiscale.laws.patch_law import PatchLaws
 
 Array = NDArray[np.float64]
 
@@ -38,7 +40,7 @@ class DenseState:
         point: The laws at s.
         residual: Closures by plane and displacements less those of the laws, shape (N,) [mm].
         load: Force [N] and its first moments about the middle [N mm], shape (3,).
-        residuals: Relative residual before every Newton step and at the end, see `TOLERANCE`.
+        iterations: Newton steps that led to it.
     """
 
     local: Array
@@ -46,22 +48,7 @@ class DenseState:
     point: LawPoint
     residual: Array
     load: Array
-    residuals: tuple[float, ...] = ()
-
-    @property
-    def closure(self) -> Array:
-        """Closures, shape (N,) [mm]."""
-        return self.point.closure
-
-    @property
-    def pressure(self) -> Array:
-        """Pressures, shape (N,) [MPa]."""
-        return self.point.pressure
-
-    @property
-    def iterations(self) -> int:
-        """Newton steps."""
-        return len(self.residuals) - 1
+    iterations: int = 0
 
 
 class LoadedPatches:
@@ -74,6 +61,9 @@ class LoadedPatches:
         patches: The partition.
         control: What is prescribed of the plane.
 
+    Raises:
+        InputError: When the compliance is not a finite matrix of the size of the partition.
+
     Attributes:
         levers: How the plane's motions move the patches.
         area: Area of a patch [mm²].
@@ -83,6 +73,13 @@ class LoadedPatches:
     def __init__(
         self, laws: PatchLaws, compliance: Array, patches: PatchGrid, control: Control
     ) -> None:
+        shape = patches.count, patches.count
+        if compliance.shape != shape or not np.all(np.isfinite(compliance)):
+            raise InputError(
+                "the compliance does not fit the patches",
+                value=compliance.shape,
+                allowed=f"a finite matrix of shape {shape}",
+            )
         self.laws, self.compliance, self.control = laws, compliance, control
         self.area = patches.area
         x, y = patches.centres.T
@@ -154,14 +151,18 @@ class LoadedPatches:
             loads / max(force, of_force / TOLERANCE),
         )
 
-    def at_first_touch(self, plane: Array) -> Control:
-        """Return what stands for a force of zero: the plane where its first patch is touched."""
+    def first_touch(self, plane: Array) -> Control:
+        """Return what stands for a force of zero: the plane where its first patch is touched.
+
+        Args:
+            plane: A plane, whose slopes hold where the load prescribes none.
+        """
         plane = self.control.prescribed(plane)
-        tilted = self.levers.matrix[:, 1:] @ plane[1:]
-        approach = float(np.min(self.laws.first_touch - tilted))
+        approach = self.levers.first_touch(self.laws.first_touch, plane[1:])
         if not np.isfinite(approach):
             raise self.failure("NO_CONTACT", 0)
-        largest = max(self._largest_touch(), float(np.abs(approach + tilted).max()))
+        closures = approach + self.levers.matrix[:, 1:] @ plane[1:]
+        largest = max(self._largest_touch(), float(np.abs(closures).max()))
         approach -= 2.0 * TOLERANCE * largest  # so that a residual is not a contact
         return Control(approach=approach, tilt=(float(plane[1]), float(plane[2])))
 

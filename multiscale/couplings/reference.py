@@ -1,4 +1,7 @@
-"""The reference among the couplings: the rough surface itself is meshed and pressed."""
+"""The reference among the couplings: the rough surface itself is meshed and pressed.
+
+Theory: demos/theory.md, section 12.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
-from geometry.rigid_plane import Control
-from multiscale.couplings.blocks import block_material
+from geometry import Control
 from multiscale.loading.load_step import LoadStep
 from multiscale.results.reference_record import ReferenceRecord, reference_record
 from multiscale.setup.problem import ProblemSetup
+from multiscale.setup.surface_and_block import block_material, located
 from multiscale.storage import Arrays, packed, unpacked
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
@@ -43,7 +45,8 @@ class ReferenceCoupling:
         problems: Sequence[UnilateralContactProblem],
         qualities: Sequence[MeshQuality],
     ) -> None:
-        self._setup, self._patches = setup, setup.patches
+        assert setup.meshes is not None
+        self._surface, self._patches, self._meshes = setup.surface, setup.patches, setup.meshes
         self._problems, self.qualities = tuple(problems), tuple(qualities)
         self._last: tuple[UnilateralContactState, ...] = ()
 
@@ -56,11 +59,6 @@ class ReferenceCoupling:
     def blocks(self) -> list[Block]:
         """The rough blocks, the finest last."""
         return [problem.block for problem in self._problems]
-
-    @property
-    def unknowns(self) -> tuple[int, ...]:
-        """Degrees of freedom of every block."""
-        return tuple(block.dofs for block in self.blocks)
 
     @property
     def latest(self) -> UnilateralContactState:
@@ -117,12 +115,11 @@ class ReferenceCoupling:
         Args:
             steps: Load steps of this coupling.
         """
-        meshes = self._setup.meshes
-        assert meshes is not None
+        meshes = self._meshes
         record = reference_record(
             steps,
             meshes.sizes,
-            self.unknowns,
+            [block.dofs for block in self.blocks],
             force_order=meshes.force_order,
             area_order=meshes.area_order,
         )
@@ -142,7 +139,7 @@ class ReferenceCoupling:
                 f"no node of the finest mesh touches in {len(missed)} of {len(steps)} load steps, "
                 f"first in step {missed[0]}, though the plane lies below the surface's highest "
                 "point: the mesh is too coarse for contact there, and the force zero; refine "
-                f"{self._setup.meshes.key if self._setup.meshes else 'it'}"
+                f"{self._meshes.key}"
             )
         thinnest = min(quality.thinnest for quality in self.qualities)
         steepest = max(quality.steepest for quality in self.qualities)
@@ -153,8 +150,7 @@ class ReferenceCoupling:
 
     def _misses(self, step: LoadStep) -> bool:
         """Whether no node touches though the plane lies below the surface's highest point."""
-        surface = self._setup.surface
-        arm = np.asarray(surface.highest_point) - 0.5 * np.asarray(surface.lengths)
+        arm = np.subtract(self._surface.highest_point, np.multiply(0.5, self._surface.lengths))
         return not step.contacts and step.approach_mm + float(arm @ np.asarray(step.tilt)) > 0.0
 
 
@@ -179,12 +175,10 @@ def make_reference(setup: ProblemSetup, comm: Any) -> ReferenceCoupling:
     scene, surface, problems, qualities = setup.scene, setup.surface, [], []
     for shape in setup.meshes.shapes:
         finest = shape is setup.meshes.shapes[-1]
-        try:
+        with located(scene, "surface"):
             mesh, quality = rough_block_mesh(shape, surface, comm or MPI.COMM_SELF)
-        except InputError as error:
-            raise error.located(key="surface", file=scene.file) from None
         problem = UnilateralContactProblem(
-            Block(mesh, block_material(setup), sides=scene.block.sides),
+            Block(mesh, block_material(scene), sides=scene.block.sides),
             surface.highest - surface.mean_height,
             method=scene.reference.method,
             patches=setup.patches if finest else None,

@@ -1,8 +1,9 @@
 """Patch laws: pressure of a patch over its local approach, tabulated, refined, stored.
 
-    LawRows       columns of rows, first touch, repair         `rows`
-    PatchLaw      rows of one patch and their interpolants     `patch_law`, `interpolation`
-    LawTable      the laws of all patches                      `law_table`, `files`
+    LawRows, PlanePath    columns of rows, first touch, repair; the plane's path    `rows`
+    LawCurves, LawPoint   interpolants over the approach, what they give            `interpolation`
+    PatchLaw, PatchLaws   the law of one patch, and of many at once                 `patch_law`
+    LawTable              the laws of all patches, and their file                   `law_table`
 
 `consistent` makes rows from contact problems of the whole surface, `isolated` from each patch
 alone; `refinement` asks them for more rows where the error between rows is largest.

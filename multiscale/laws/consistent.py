@@ -1,4 +1,7 @@
-"""Makes the consistent patch laws: all of them from one solution of the whole surface."""
+"""Makes the consistent patch laws: all of them from one solution of the whole surface.
+
+Theory: demos/theory.md, section 10.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry import Control, PatchGrid
 from geometry.collective import on_root, shared
-from geometry.patches import PatchGrid
-from geometry.rigid_plane import Control
 from micro import MicroModel, Response, RigidPlane, influence_matrix
-from multiscale.laws.law_table import LawTable, PlanePath
+from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.refinement import MOST_ROWS, refined
-from multiscale.laws.rows import SolvedRows
+from multiscale.laws.rows import PlanePath, SolvedRows
 
 Array = NDArray[np.float64]
 Displacements = Callable[[Array], Array]
@@ -83,31 +85,26 @@ def consistent_laws(
     Note:
         Collective.
     """
-    heights = np.asarray(mean_heights, dtype=float)
     compliance = np.divide(influence_matrix(patches), np.pi * model.contact_modulus)
     whole = WholeSurface(
         model=model,
         patches=patches,
-        mean_heights=heights,
+        mean_heights=np.asarray(mean_heights, dtype=float),
         displacements=displacements or (lambda pressures: pressures @ compliance.T),
         tilt=largest.tilt,
         comm=comm,
     )
     first, end, tilt = on_root(comm, lambda: whole.range_up_to(largest))
-    reserve = _POINTWISE_RESERVE if pointwise else _RESERVE
-    end += reserve * max(end - first, 0.0)
-    if end <= first:
-        laws, error = whole.laws(whole.rows(np.array([end]))), 0.0
-    else:
-        laws, error = refined(
-            whole.rows,
-            whole.laws,
-            first,
-            end,
-            compliance=compliance,
-            tolerance=tolerance,
-            most_rows=most_rows,
-        )
+    end += (_POINTWISE_RESERVE if pointwise else _RESERVE) * max(end - first, 0.0)
+    laws, error = refined(
+        whole.rows,
+        whole.laws,
+        first,
+        end,
+        compliance=compliance,
+        tolerance=tolerance,
+        most_rows=most_rows,
+    )
     return LawTable(
         patches=patches,
         laws=tuple(laws),
@@ -182,29 +179,34 @@ class WholeSurface:
         solved = self._solve(approaches)
         self._solved.update(zip(map(float, approaches), solved, strict=True))
         responses, planes = zip(*solved, strict=True)
-        pressure = np.array([response.patch_pressure[0] for response in responses])
-        macro_displacement = self.displacements(pressure)
-        local = np.array([plane.means(self.patches) for plane in planes])
-        area, contacts, displacement = (
-            np.array([getattr(response, name)[0] for response in responses])
-            for name in ("patch_contact_area", "patch_contacts", "patch_displacement")
-        )
-        loaded = pressure > 0.0
-        outside = np.array([response.warning[0] != "" for response in responses])
+
+        def found(name: str) -> NDArray[Any]:
+            return np.array([getattr(response, name)[0] for response in responses])
+
+        def in_all_patches(values: NDArray[Any]) -> NDArray[Any]:
+            return np.broadcast_to(values[:, None], pressure.shape)
+
+        pressure, local = found("patch_pressure"), np.array([p.means(self.patches) for p in planes])
+        loaded, macro_displacement = pressure > 0.0, self.displacements(pressure)
+        area_fraction = found("patch_contact_area") / self.patches.area
         return SolvedRows(
-            approach=local if self.tilt is not None else _column(approaches, local),
+            approach=local if self.tilt is not None else in_all_patches(approaches),
             closure=local - macro_displacement,
             pressure=pressure,
-            contact_area_fraction=np.where(loaded, area / self.patches.area, 0.0),
-            contacts=np.where(loaded, contacts, 0),
-            unresolved_displacement=displacement - macro_displacement,
-            outside_range=_column(outside, local),
+            contact_area_fraction=np.where(loaded, area_fraction, 0.0),
+            contacts=np.where(loaded, found("patch_contacts"), 0),
+            unresolved_displacement=found("patch_displacement") - macro_displacement,
+            outside_range=in_all_patches(found("warning") != ""),
         )
 
     def laws(self, rows: SolvedRows) -> list[PatchLaw]:
         """Return the laws of all patches through rows of increasing approaches, columns (m, N)."""
-        separations = self.model.reference_height - self.mean_heights
-        return [_law(rows[:, index], float(height)) for index, height in enumerate(separations)]
+        laws = []
+        for index, height in enumerate(self.mean_heights):
+            touching = rows[:, index].from_first_touch()
+            touch = touching.closure[0] if len(touching) else rows.closure[:, index].max()
+            laws.append(PatchLaw.of(touching, touch, self.model.reference_height - height))
+        return laws
 
     @property
     def path(self) -> PlanePath:
@@ -237,19 +239,3 @@ class WholeSurface:
         return self.model.press(
             control, patches=self.patches, mean_heights=self.mean_heights, start=start
         )
-
-
-def _column(values: NDArray[Any], like: Array) -> NDArray[Any]:
-    """Return values of load steps, shape (m,), as a column of all patches, shape (m, N)."""
-    return np.broadcast_to(values[:, None], like.shape)
-
-
-def _law(rows: SolvedRows, initial_separation: float) -> PatchLaw:
-    """Return the law of one patch out of all its rows, those before first touch included."""
-    touching = rows.from_first_touch()
-    return PatchLaw(
-        rows=touching,
-        first_touch=float(touching.closure[0] if len(touching) else rows.closure.max()),
-        initial_separation=initial_separation,
-        warning_pressure=touching.warning_pressure,
-    )

@@ -1,4 +1,7 @@
-"""Makes the isolated patch laws: each patch's asperities alone, as Waddad et al. 2016 do."""
+"""Makes the isolated patch laws: each patch's asperities alone, as Waddad et al. 2016 do.
+
+Theory: demos/theory.md, section 10.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry import PatchGrid
 from geometry.collective import shared
-from geometry.patches import PatchGrid
 from micro import MicroModel
 from micro.closed_forms.love import love_centre, love_mean
 from multiscale.laws.law_table import LawTable
@@ -61,16 +64,18 @@ class IsolatedPatch:
         response = self.model.respond(
             approaches, patches=self.patch, mean_heights=np.array([self.mean_height])
         )
-        pressure = response.mean_pressure
+        # exactly nothing before and at first touch, without the rounding of a solution
+        loaded = approaches > self.first_touch
+        pressure = np.where(loaded, response.mean_pressure, 0.0)
         # the block's closure is a mean over the patch, whichever displacement made the law's
-        mean = self._displacement("mean") * pressure
+        unresolved = response.patch_displacement[:, 0] - self._displacement("mean") * pressure
         return SolvedRows(
             approach=approaches,
             closure=approaches - self.compliance * pressure,  # eq. 31
             pressure=pressure,
-            contact_area_fraction=response.contact_area_fraction,
-            contacts=response.contacts,
-            unresolved_displacement=response.patch_displacement[:, 0] - mean,
+            contact_area_fraction=np.where(loaded, response.contact_area_fraction, 0.0),
+            contacts=np.where(loaded, response.contacts, 0),
+            unresolved_displacement=np.where(loaded, unresolved, 0.0),
             outside_range=response.warning != "",
         )
 
@@ -88,26 +93,16 @@ class IsolatedPatch:
         Returns:
             The law; open when first touch lies beyond `closure_end`.
         """
-        touch = self.first_touch
+        touch, separation = self.first_touch, self.model.reference_height - self.mean_height
         if touch >= closure_end:
-            return self._law(SolvedRows.none())
-
-        def solve(approaches: Array) -> SolvedRows:
-            rows, loaded = self.rows(approaches), approaches > touch
-            # exactly, without the rounding of a solution at first touch
-            zeros = rows.mapped(lambda column: np.where(loaded, column, 0))
-            closure = np.where(loaded, rows.closure, touch)
-            outside = rows.outside_range
-            return replace(zeros, approach=approaches, closure=closure, outside_range=outside)[
-                :, None
-            ]
+            return PatchLaw.of(SolvedRows.none(), touch, separation)
 
         def make(rows: SolvedRows) -> list[PatchLaw]:
-            kept, change = rows[:, 0].rising()
-            return [replace(self._law(kept), repaired=change)]
+            rising, change = rows[:, 0].rising()
+            return [replace(PatchLaw.of(rising, touch, separation), repaired=change)]
 
-        laws, _ = refined(
-            solve,
+        (law,), _ = refined(
+            lambda approaches: self.rows(approaches)[:, None],
             make,
             touch,
             self._approach_at(closure_end),
@@ -115,15 +110,7 @@ class IsolatedPatch:
             tolerance=tolerance,
             most_rows=most_rows,
         )
-        return laws[0]
-
-    def _law(self, rows: SolvedRows) -> PatchLaw:
-        return PatchLaw(
-            rows=rows,
-            first_touch=self.first_touch,
-            initial_separation=float(self.model.reference_height - self.mean_height),
-            warning_pressure=rows.warning_pressure,
-        )
+        return law
 
     def _displacement(self, love: str) -> float:
         return float(_LOVE[love](*self.patch.half_sizes) / (np.pi * self.model.contact_modulus))
@@ -164,8 +151,8 @@ def isolated_laws(
         love: Displacement in the closure, ``mean`` or ``centre``.
         tolerance: Interpolation error of the pressure, see `refinement.refined`.
         most_rows: Rows that are solved at most for one law.
-        comm: MPI communicator; its ranks share the patches by predicted work. A patch is solved
-            alone, so that its law does not depend on the number of ranks.
+        comm: MPI communicator; its ranks share the patches. A patch is solved alone, so that its
+            law does not depend on the number of ranks.
 
     Returns:
         All laws, on every rank.
@@ -176,8 +163,8 @@ def isolated_laws(
     Source:
         Waddad et al. 2016, section 3.2, eq. 29-31, doi 10.1016/j.triboint.2015.12.023.
     """
-    # the largest first, so that the ranks end together
-    order = np.argsort(-_predicted_work(model, patches, closure_ends), kind="stable")
+    # those that the plane comes nearest to first: they take longest, and the ranks end together
+    order = np.argsort(-(mean_heights + closure_ends), kind="stable")
 
     def make(task: int) -> PatchLaw:
         index = int(order[task])
@@ -200,18 +187,3 @@ def isolated_laws(
         },
         force_error=max(law.interpolation_error for law in laws),
     )
-
-
-def _predicted_work(model: MicroModel, patches: PatchGrid, closure_ends: Array) -> Array:
-    """Return the number of cells or summits that can touch in each patch, shape (N,)."""
-    surface, summits = getattr(model, "surface", None), getattr(model, "asperities", None)
-    if surface is not None:
-        x, y = (part.ravel() for part in np.meshgrid(surface.x, surface.y, indexing="ij"))
-        z = surface.heights.ravel()
-    elif summits is not None:
-        x, y, z = summits.x, summits.y, summits.z
-    else:
-        return np.ones(patches.count)
-    owner = patches.index_of(x, y)
-    touchable = model.reference_height - z < closure_ends[owner]
-    return np.bincount(owner[touchable], minlength=patches.count).astype(float)

@@ -1,157 +1,45 @@
-"""The laws of all patches of an interface, and what they say of themselves."""
+"""The laws of all patches of an interface, what they say of themselves, and their file.
+
+Theory: demos/theory.md, section 10.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields
-from typing import NamedTuple
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, BinaryIO
 
+import h5py
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
-from scipy.optimize import brentq
 
-from geometry.errors import InputError
-from geometry.patches import PatchGrid
-from multiscale.laws.interpolation import LawCurves, LawPoint
+from geometry import InputError, PatchGrid
 from multiscale.laws.patch_law import PatchLaw
+from multiscale.laws.rows import LawRows, PlanePath
+from multiscale.storage import checksummed, stored_numbers, verified
 
 Array = NDArray[np.float64]
 
 PATCH_FACTOR = 20.0
 """Tolerance of a patch's pressure over that of the force."""
 
-_APPROACH_TOLERANCE = 1e-15  # of an approach under a force, relative to the length of the path
 _REPORTED_REPAIR = 1e-6  # smaller repairs are rounding and the tolerance of the micro model
-_CLOSURE_AND_PRESSURE = slice(0, 2)  # among the curves of a law
 
-
-class ContactValues(NamedTuple):
-    """What laws give beside pressure and closure; every field has the shape (N,).
-
-    Attributes:
-        area_fraction: Real over nominal contact areas.
-        separation: Mean gaps between the plane and the displaced surface [mm].
-        contacts: Numbers of contacts.
-    """
-
-    area_fraction: Array
-    separation: Array
-    contacts: NDArray[np.int64]
-
-
-class PatchLaws:
-    """N patch laws, evaluated together at one local approach each.
-
-    Args:
-        laws: The laws, in the order of the flat patch index.
-
-    Attributes:
-        first_touch: Closures at first touch, infinite where there is nothing to touch, (N,) [mm].
-        end: Local approaches up to which the laws are valid, shape (N,) [mm].
-    """
-
-    def __init__(self, laws: Sequence[PatchLaw]) -> None:
-        self._index = np.arange(len(laws))
-        self._curves = LawCurves.packed([law.curves for law in laws])
-        self._contacts = np.zeros(self._curves.origins.shape, dtype=np.int64)
-        for counts, law in zip(self._contacts, laws, strict=True):
-            counts[1 : len(law.rows) + 1] = law.rows.contacts
-        self._initial_separation = np.array([law.initial_separation for law in laws])
-        self.first_touch = np.array([law.first_touch for law in laws])
-        # without rows the local approach is the closure
-        self.end = np.array(
-            [law.first_touch if law.is_open else law.rows.approach[-1] for law in laws]
-        )
-
-    def along(self, approach: Array) -> LawPoint:
-        """Return closures, pressures and their derivatives at local approaches, shape (N,)."""
-        return LawPoint.of(*self._curves.at(self._index, approach, _CLOSURE_AND_PRESSURE))
-
-    def contact(self, approach: Array) -> ContactValues:
-        """Return area fractions, separations and contacts at local approaches of shape (N,).
-
-        Contacts are those of the rows at or before the approaches.
-        """
-        (closure, _, area, displacement), _ = self._curves.at(self._index, approach)
-        row = self._curves.rows_passed(self._index, approach)
-        return ContactValues(
-            area_fraction=np.asarray(np.clip(area, 0.0, 1.0)),
-            separation=np.asarray(self._initial_separation - closure + displacement),
-            contacts=self._contacts[self._index, row],
-        )
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PlanePath:
-    """How a plane that is free to turn, and so without moment, turns while it approaches.
-
-    Attributes:
-        approach: Approaches at the middle of the interface, increasing, shape (m,) [mm].
-        tilt: Slopes along x and y there, shape (m, 2).
-        force: Forces, increasing from none at first touch, shape (m,) [N].
-        moment: First moments of the contacts' forces: zero within the tolerance of the micro
-            model, shape (m, 2) [N mm].
-
-    Raises:
-        InputError: When the columns do not fit each other, or the approach does not increase.
-    """
-
-    approach: Array
-    tilt: Array
-    force: Array
-    moment: Array
-
-    def __post_init__(self) -> None:
-        count = len(self.approach)
-        shapes = {"approach": (count,), "tilt": (count, 2), "force": (count,), "moment": (count, 2)}
-        for name in (one.name for one in fields(self)):
-            values = getattr(self, name)
-            if not count or values.shape != shapes[name] or not np.all(np.isfinite(values)):
-                raise InputError(
-                    f"a path needs a finite {name}", value=values.shape, allowed=f"{shapes[name]}"
-                )
-        if np.any(np.diff(self.approach) <= 0.0):
-            raise InputError("a path needs a strictly increasing approach")
-
-    def tilt_at(self, approach: float) -> tuple[float, float]:
-        """Return the slopes at an approach; beyond both ends they are those of the end."""
-        return self._interpolated(self.tilt, approach)
-
-    def moment_at(self, approach: float) -> tuple[float, float]:
-        """Return the moments at an approach [N mm]."""
-        return self._interpolated(self.moment, approach)
-
-    def approach_under(self, force: float, force_at: Callable[[float], float]) -> tuple[float, int]:
-        """Return the approach under a force [mm], and the number of evaluations of the force.
-
-        Args:
-            force: The force; zero is that of first touch [N].
-            force_at: Returns the force at an approach, with which it increases [N].
-        """
-        first, last = float(self.approach[0]), float(self.approach[-1])
-        if force == 0.0:
-            return first, 0
-        largest = force_at(last)
-        if largest < force:  # beyond the path: continue its last secant
-            slope = (largest - force_at(0.5 * (first + last))) / (0.5 * (last - first) or 1.0)
-            return last + (force - largest) / (slope or 1.0), 2
-        found, report = brentq(
-            # powers of 2/3 are nearly straight over the approach (Hertz)
-            lambda approach: force_at(approach) ** (2 / 3) - force ** (2 / 3),
-            first,
-            last,
-            xtol=_APPROACH_TOLERANCE * (last - first),
-            full_output=True,
-        )
-        return float(found), report.function_calls + 1
-
-    def _interpolated(self, values: Array, approach: float) -> tuple[float, float]:
-        x, y = values[0]
-        if len(self.approach) > 1:
-            within = np.clip(approach, self.approach[0], self.approach[-1])
-            x, y = PchipInterpolator(self.approach, values)(within)
-        return float(x), float(y)
+FORMAT = "patchlaw laws 3"
+_COLUMNS = {one.metadata.get("stored", one.name): one for one in fields(LawRows)}
+_SCALARS = {
+    "touch": "first_touch",
+    "reach": "initial_separation",
+    "interpolation_error": "interpolation_error",
+    "stiffness_error": "stiffness_error",
+    "warned_from": "warning_pressure",
+    "repaired": "repaired",
+}
+_PATH = "path"
+_PATH_UNITS = {"approach": "mm", "tilt": "1", "force": "N", "moment": "N mm"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -210,3 +98,125 @@ class LawTable:
                 "pressure or closure fell as the plane came nearer; evened out, by up to "
                 f"{max(changes):.1e} of their largest"
             )
+
+
+def write_laws(path: Path, table: LawTable) -> None:
+    """Write all laws to one HDF5 file, see `law_bytes`.
+
+    Args:
+        path: File to write; one that exists is replaced.
+        table: The laws.
+    """
+    path.write_bytes(law_bytes(table))
+
+
+@lru_cache(maxsize=1)  # every checkpoint asks for the same
+def law_bytes(table: LawTable) -> bytes:
+    """Return the content of a law file.
+
+    It has a group ``patch_IX_IY`` per patch with a dataset per column, and a group for the path of
+    the plane where there is one. A checksum stands before the content; see
+    `multiscale.storage`.
+
+    Args:
+        table: The laws.
+    """
+
+    def fill(file: Any) -> None:
+        file.attrs["format"] = FORMAT
+        file.attrs["patch_grid"] = table.patches.grid
+        file.attrs["lengths_mm"] = table.patches.lengths
+        file.attrs["origin_mm"] = table.patches.origin
+        file.attrs["force_error"] = table.force_error
+        for name, text in table.made_by.items():
+            file.attrs[f"made_by_{name}"] = text
+        for index, law in enumerate(table.laws):
+            group = file.create_group(_group_name(table.patches, index))
+            for name, column in _COLUMNS.items():
+                stored = group.create_dataset(name, data=getattr(law.rows, column.name))
+                stored.attrs["unit"] = column.metadata["unit"]
+            for name, attribute in _SCALARS.items():
+                group.attrs[name] = getattr(law, attribute)
+        if table.path is not None:
+            group = file.create_group(_PATH)
+            for name, unit in _PATH_UNITS.items():
+                group.create_dataset(name, data=getattr(table.path, name)).attrs["unit"] = unit
+
+    return checksummed(fill)
+
+
+def read_laws(path: Path | BinaryIO) -> LawTable:
+    """Read a law file.
+
+    The pressure of a patch alone rises with the approach; where noise in a table from elsewhere
+    makes it fall, it is repaired, and the law states by how much (`PatchLaw.repaired`). Consistent
+    laws are taken as they are: neighbours that take load over make their pressures fall.
+
+    Args:
+        path: The file, by name or open.
+
+    Raises:
+        InputError: When the file cannot be read, is no law file, damaged, lacks anything, or was
+            written before law files had a checksum.
+    """
+    name = str(path) if isinstance(path, Path) else None
+    if isinstance(path, Path) and not path.is_file():  # reading a pipe would wait for its writer
+        raise InputError("is not a readable law file: there is no such file", file=name)
+    try:
+        with h5py.File(verified(path), "r") as file:
+            if file.attrs.get("format") != FORMAT:
+                raise InputError("is not a law file of patchlaw", file=name)
+            return _table(file)
+    except InputError as error:
+        raise error.located(file=name) from None
+    except Exception as error:  # h5py raises errors of many families
+        raise InputError(f"is not a readable law file: {error}", file=name) from None
+
+
+def repaired_law(law: PatchLaw) -> PatchLaw:
+    """Return a law whose pressure rises; the same one where it does.
+
+    Args:
+        law: The law of a patch alone, as a table from elsewhere may have it.
+    """
+    if np.all(np.diff(law.rows.pressure) >= 0.0):
+        return law
+    rows, change = law.rows.with_rising_pressure()
+    return replace(law, rows=rows, repaired=max(change, law.repaired))
+
+
+def _table(file: Any) -> LawTable:
+    patches = PatchGrid(
+        grid=tuple(file.attrs["patch_grid"]),
+        lengths=tuple(file.attrs["lengths_mm"]),
+        origin=tuple(file.attrs["origin_mm"]),
+    )
+    if math.prod(patches.grid) > len(file):
+        raise InputError("lacks laws", value=patches.grid, allowed=f"{len(file)} groups")
+    made_by = {
+        name.removeprefix("made_by_"): str(text)
+        for name, text in file.attrs.items()
+        if name.startswith("made_by_")
+    }
+    laws = [_law(file[_group_name(patches, index)]) for index in range(patches.count)]
+    if made_by.get("coupling") != "consistent":
+        laws = [repaired_law(law) for law in laws]
+    path = {name: stored_numbers(file[_PATH][name]) for name in _PATH_UNITS if _PATH in file}
+    return LawTable(
+        patches=patches,
+        laws=tuple(laws),
+        made_by=made_by,
+        force_error=float(file.attrs["force_error"]),
+        path=PlanePath(**path) if path else None,
+    )
+
+
+def _law(group: Any) -> PatchLaw:
+    rows = LawRows(**{one.name: stored_numbers(group[name]) for name, one in _COLUMNS.items()})
+    scalars = {attribute: float(group.attrs[name]) for name, attribute in _SCALARS.items()}
+    return PatchLaw(rows=rows, **scalars)
+
+
+def _group_name(patches: PatchGrid, index: int) -> str:
+    ix, iy = patches.unravel(index)
+    return f"patch_{ix}_{iy}"

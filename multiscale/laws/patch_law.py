@@ -1,37 +1,22 @@
-"""Patch laws: closure and mean pressure of a patch, tabulated over its local rigid approach."""
+"""Patch laws: closure and mean pressure of a patch, tabulated over its local rigid approach.
+
+Theory: demos/theory.md, section 10.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry.errors import InputError
-from multiscale.laws.interpolation import LEAST_SLOPE, LawCurves, LawPoint
-from multiscale.laws.rows import LawRows
+from geometry import InputError
+from multiscale.laws.interpolation import LawCurves, LawPoint
+from multiscale.laws.rows import LawRows, SolvedRows
 
 Array = NDArray[np.float64]
-
-
-class LawValues(NamedTuple):
-    """What a law gives at closures, in their shape.
-
-    Attributes:
-        pressure: Mean pressure of the patch [MPa].
-        stiffness: Its exact derivative over the closure [MPa/mm].
-        contact_area_fraction: Real over nominal contact area.
-        separation: Mean gap between the plane and the patch's displaced surface [mm].
-        contacts: Number of contacts in the last row at or before the closure.
-    """
-
-    pressure: Array
-    stiffness: Array
-    contact_area_fraction: Array
-    separation: Array
-    contacts: NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,6 +59,22 @@ class PatchLaw:
     warning_pressure: float = np.inf
     repaired: float = 0.0
 
+    @classmethod
+    def of(cls, rows: SolvedRows, first_touch: float, initial_separation: float) -> PatchLaw:
+        """Return the law through rows as a micro model gave them, from first touch on.
+
+        Args:
+            rows: The rows; none of a patch that stays open.
+            first_touch: Closure at first touch [mm].
+            initial_separation: Mean separation at zero approach [mm].
+        """
+        return cls(
+            rows=rows,
+            first_touch=float(first_touch),
+            initial_separation=float(initial_separation),
+            warning_pressure=rows.warning_pressure,
+        )
+
     def __post_init__(self) -> None:
         if len(self.rows) == 1:
             raise InputError("a patch law needs no row (open patch) or at least two")
@@ -113,27 +114,18 @@ class PatchLaw:
 
     @cached_property
     def curves(self) -> LawCurves:
-        """Closure, p^(2/3), area fraction and unresolved displacement over the local approach."""
-        rows = self.rows
-        columns = (
-            rows.closure,
-            rows.pressure ** (2 / 3),
-            rows.contact_area_fraction,
-            rows.unresolved_displacement,
-        )
-        return LawCurves.through(rows.approach, columns, before=(1.0, 0.0, 0.0, 0.0))
+        """The interpolants of the law over the local approach."""
+        return LawCurves.through(self.rows, self.initial_separation)
 
     def along(self, approach: ArrayLike) -> LawPoint:
-        """Return closure, pressure and their derivatives at local rigid approaches of any shape.
+        """Return what the law gives at local rigid approaches of any shape.
 
         Args:
             approach: Local rigid approaches [mm].
         """
-        local = np.asarray(approach, dtype=float)
-        found = (part.reshape(-1, *local.shape) for part in self.curves.at(0, local.ravel()))
-        return LawPoint.of(*found)
+        return self.curves.at(0, np.asarray(approach, dtype=float))
 
-    def at(self, closure: ArrayLike, *, extend: bool = False) -> LawValues:
+    def at(self, closure: ArrayLike, *, extend: bool = False) -> LawPoint:
         """Return what the law gives at closures of any shape.
 
         Args:
@@ -146,16 +138,7 @@ class PatchLaw:
         closures = np.asarray(closure, dtype=float)
         if not extend:
             self._check_range(closures)
-        values, slopes = self._over_closure(closures)
-        point = LawPoint.of(values, slopes)
-        row = np.searchsorted(self.rows.closure[: self._rising], closures, side="right") - 1
-        return LawValues(
-            pressure=point.pressure,
-            stiffness=point.dpressure / np.maximum(point.dclosure, LEAST_SLOPE),
-            contact_area_fraction=np.asarray(np.clip(values[2], 0.0, 1.0)),
-            separation=np.asarray(self.initial_separation - closures + values[3]),
-            contacts=np.where(row >= 0, np.append(self.rows.contacts, 0)[row], 0),
-        )
+        return self._rising_curves.at_closure(closures)
 
     def pressure(self, closure: ArrayLike) -> Array:
         """Return the pressure at any closure, as an iteration needs it [MPa].
@@ -178,23 +161,7 @@ class PatchLaw:
     @cached_property
     def _rising_curves(self) -> LawCurves:
         """The curves up to where closure stops rising, and their tangents there."""
-        return self.curves.cut(self._rising)
-
-    def _over_closure(self, closures: Array) -> tuple[Array, Array]:
-        """Return values and derivatives over the approach at closures (…), shapes (f, …)."""
-        given = closures.ravel()
-        piece, distance = np.zeros(given.size, dtype=np.intp), given.copy()
-        if not self.is_open:
-            rows = self.rows.closure[: self._rising]
-            distance -= rows[0]
-            beyond = given >= rows[-1]
-            slope = max(float(self._rising_curves.coefficients[0, -1, 2, 0]), LEAST_SLOPE)
-            piece[beyond], distance[beyond] = len(rows), (given[beyond] - rows[-1]) / slope
-            within = (given > rows[0]) & ~beyond
-            inverse = self._rising_curves.inverted(0, rows, given[within])
-            piece[within], distance[within] = inverse
-        values, slopes = self._rising_curves.within(0, piece, distance)
-        return values.reshape(-1, *closures.shape), slopes.reshape(-1, *closures.shape)
+        return self.curves if self.is_function else self.curves.cut(self._rising)
 
     def _check_range(self, closures: Array) -> None:
         start, end = self.range
@@ -208,3 +175,28 @@ class PatchLaw:
                 value=float(np.max(closures)),
                 allowed=f"closure up to {end:.6g} mm (first touch at {start:.6g} mm)",
             )
+
+
+class PatchLaws:
+    """N patch laws, evaluated together at one local approach each.
+
+    Args:
+        laws: The laws, in the order of the flat patch index.
+
+    Attributes:
+        first_touch: Closures at first touch, infinite where there is nothing to touch, (N,) [mm].
+        end: Local approaches up to which the laws are valid, shape (N,) [mm].
+    """
+
+    def __init__(self, laws: Sequence[PatchLaw]) -> None:
+        self._index = np.arange(len(laws))
+        self._curves = LawCurves.packed([law.curves for law in laws])
+        self.first_touch = np.array([law.first_touch for law in laws])
+        # without rows the local approach is the closure
+        self.end = np.array(
+            [law.first_touch if law.is_open else law.rows.approach[-1] for law in laws]
+        )
+
+    def along(self, approach: Array) -> LawPoint:
+        """Return what the laws give at local approaches, shape (N,) [mm]."""
+        return self._curves.at(self._index, approach)

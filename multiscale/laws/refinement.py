@@ -7,6 +7,8 @@ load step. Halving an interval leaves less than half of its error, also at a kin
 begins or two join, and half of it is recorded. Elsewhere between rows it may be more: on random
 surfaces of 256² cells, in 1 to 256 patches, the force erred by up to 1.7 times and a patch's
 pressure by up to 3 times the largest recorded.
+
+Theory: demos/theory.md, section 10.
 """
 
 from __future__ import annotations
@@ -19,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multiscale.laws.interpolation import LawPoint, Tangent
-from multiscale.laws.law_table import PATCH_FACTOR, PatchLaws
-from multiscale.laws.patch_law import PatchLaw
+from multiscale.laws.law_table import PATCH_FACTOR
+from multiscale.laws.patch_law import PatchLaw, PatchLaws
 from multiscale.laws.rows import SolvedRows
 
 Array = NDArray[np.float64]
@@ -103,7 +105,7 @@ def refined(
         solve: Returns the rows of N patches at approaches of shape (m,), columns of shape (m, N).
         make: Makes the N laws out of such rows, in the order of the approaches.
         start: Approach of the first row [mm].
-        end: Approach of the last row [mm].
+        end: Approach of the last row, or of the only one where it is not beyond the first [mm].
         compliance: Mean displacement of patch i of the half-space by unit pressure on patch j,
             shape (N, N) [mm/MPa].
         tolerance: Error of the force; that of a patch's pressure may be twenty times as large, see
@@ -114,9 +116,9 @@ def refined(
         The N laws, with their errors, and the error of the force.
     """
     approaches = start + (end - start) * np.linspace(0.0, 1.0, _FIRST_ROWS) ** 2
-    rows = solve(approaches)
+    rows = solve(approaches if end > start else approaches[-1:])
     laws = make(rows)
-    if not rows.pressure[-1].any():
+    if end <= start or not rows.pressure[-1].any():
         return list(laws), 0.0
     most_rows = max(most_rows, 2 * _FIRST_ROWS - 1)  # each first interval is measured once
     least = _LEAST_LOAD * float(rows.pressure[-1].mean())

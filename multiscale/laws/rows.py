@@ -1,4 +1,7 @@
-"""Rows of patch laws: their columns, declared once, their first touch and their repair."""
+"""Rows of patch laws: their columns, declared once, first touch and repair; the path of the plane.
+
+Theory: demos/theory.md, section 10.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +11,17 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import brentq
 
-from geometry.errors import InputError
+from geometry import InputError
 
 Array = NDArray[np.float64]
 
 _NOISE = 1e-3
 """Fall of a closure, relative to the range of closures, that counts as noise."""
+
+_APPROACH_TOLERANCE = 1e-15  # of an approach under a force, relative to the length of the path
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -175,6 +182,75 @@ class SolvedRows(LawRows):
             column = getattr(before, name)
             columns[name] = column + share * (getattr(contact, name)[:1] - column)
         return replace(start, **columns).joined(rows[first:])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlanePath:
+    """How a plane that is free to turn, and so without moment, turns while it approaches.
+
+    Attributes:
+        approach: Approaches at the middle of the interface, increasing, shape (m,) [mm].
+        tilt: Slopes along x and y there, shape (m, 2).
+        force: Forces, increasing from none at first touch, shape (m,) [N].
+        moment: First moments of the contacts' forces: zero within the tolerance of the micro
+            model, shape (m, 2) [N mm].
+
+    Raises:
+        InputError: When the columns do not fit each other, or the approach does not increase.
+    """
+
+    approach: Array
+    tilt: Array
+    force: Array
+    moment: Array
+
+    def __post_init__(self) -> None:
+        count = len(self.approach)
+        shapes = {"approach": (count,), "tilt": (count, 2), "force": (count,), "moment": (count, 2)}
+        for name, shape in shapes.items():
+            values = getattr(self, name)
+            if not count or values.shape != shape or not np.all(np.isfinite(values)):
+                raise InputError(
+                    f"a path needs a finite {name}", value=values.shape, allowed=f"{shape}"
+                )
+        if np.any(np.diff(self.approach) <= 0.0):
+            raise InputError("a path needs a strictly increasing approach")
+
+    def at(self, approach: float) -> Array:
+        """Return slopes and moments at an approach, shape (4,); beyond both ends those of the end.
+
+        Args:
+            approach: The approach at the middle [mm].
+        """
+        values = np.column_stack((self.tilt, self.moment))
+        if len(values) == 1:
+            return values[0]
+        within = np.clip(approach, self.approach[0], self.approach[-1])
+        return np.asarray(PchipInterpolator(self.approach, values)(within))
+
+    def approach_under(self, force: float, force_at: Callable[[float], float]) -> tuple[float, int]:
+        """Return the approach under a force [mm], and the number of evaluations of the force.
+
+        Args:
+            force: The force; zero is that of first touch [N].
+            force_at: Returns the force at an approach, with which it increases [N].
+        """
+        first, last = float(self.approach[0]), float(self.approach[-1])
+        if force == 0.0:
+            return first, 0
+        largest = force_at(last)
+        if largest < force:  # beyond the path: continue its last secant
+            slope = (largest - force_at(0.5 * (first + last))) / (0.5 * (last - first) or 1.0)
+            return last + (force - largest) / (slope or 1.0), 2
+        found, report = brentq(
+            # powers of 2/3 are nearly straight over the approach (Hertz)
+            lambda approach: force_at(approach) ** (2 / 3) - force ** (2 / 3),
+            first,
+            last,
+            xtol=_APPROACH_TOLERANCE * (last - first),
+            full_output=True,
+        )
+        return float(found), report.function_calls + 1
 
 
 def _rising(values: Array) -> Array:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry.patches import PatchGrid
+from geometry import PatchGrid
 
 Array = NDArray[np.float64]
 
@@ -49,7 +49,6 @@ class LoadStep:
         patches: The state of every patch.
         imbalance: Force on the plane minus reaction of the support, relative to the force; None
             where there is no support.
-        residuals: Norms of the residual over the Newton steps, relative to the interface load.
         tilt: Slopes (tx, ty) of the approach about the middle of the interface [mm/mm].
         moment_N_mm: First moments (Σ P (x − xc), Σ P (y − yc)) of the forces about the middle
             [N mm].
@@ -78,7 +77,6 @@ class LoadStep:
     reason: str = "CONVERGED"
     patches: PatchState
     imbalance: float | None = None
-    residuals: tuple[float, ...] = ()
     tilt: tuple[float, float] = (0.0, 0.0)
     moment_N_mm: tuple[float, float] = (0.0, 0.0)
     warnings: tuple[str, ...] = ()

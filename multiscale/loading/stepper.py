@@ -9,8 +9,7 @@ from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 
-from geometry.errors import NotConverged
-from geometry.rigid_plane import Control
+from geometry import Control, NotConverged
 from multiscale.loading.load_step import LoadStep
 from multiscale.storage import Arrays
 

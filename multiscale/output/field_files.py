@@ -94,9 +94,10 @@ def _write(write: Callable[[Path], None], path: Path, comm: Any) -> None:
 
 
 def _end_process(comm: Any) -> None:
-    """End the process before HDF5 does.
+    """End a process that could not write fields, before MPI and HDF5 do.
 
-    At the end of a process HDF5 tries again to write what it could not, and crashes.
+    HDF5 1.10 does not survive a file that it could not close: the destructor of dolfinx's file
+    aborts, and without it ``MPI_Finalize``, which closes the file again, is a segmentation fault.
     """
     sys.stdout.flush()
     sys.stderr.flush()
@@ -110,16 +111,16 @@ def _move(partial: Path, folder: Path) -> list[Path]:
 
     That is checked here, because not every writer raises an error when a disk is full.
     """
-    files = sorted(partial.iterdir())
-    for path in files:
-        with written(folder / path.name):
-            _check_complete(path)
-    for path in files:
-        with written(folder / path.name):
-            remove(folder / path.name)
-            path.replace(folder / path.name)
+    names = sorted(path.name for path in partial.iterdir())
+    for name in names:
+        with written(folder / name):
+            _check_complete(partial / name)
+    for name in names:
+        with written(folder / name):
+            remove(folder / name)
+            (partial / name).replace(folder / name)
     partial.rmdir()
-    return [folder / path.name for path in files]
+    return [folder / name for name in names]
 
 
 def _check_complete(path: Path) -> None:

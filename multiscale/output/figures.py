@@ -1,8 +1,7 @@
-"""Figures of a run: surface, force–approach curves, pressure maps, laws, micro models."""
+"""Figures of a run, and their style: surface, force–approach curves, pressure maps, laws."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,18 +11,61 @@ from numpy.typing import NDArray
 from geometry.asperities import Asperities
 from geometry.patches import PatchGrid
 from geometry.surface import Surface
-from micro.response import Response
 from multiscale.laws.law_table import LawTable
-from multiscale.output.figure_style import (
-    PRESSURE_LABEL,
-    add_grid_and_legend,
-    curve_styles,
-    new_figure,
-)
 from multiscale.results.history import History
+
+KINDS = ("analytic", "isolated", "consistent", "concurrent", "reference")
+COLOURS = dict(zip(KINDS, ("#0b3c5d", "#d1495b", "#1b998b", "#edae49", "#6a4c93"), strict=True))
+"""Colour of each coupling."""
+
+MARKERS = dict(zip(KINDS, "osD^*", strict=True))
+"""Marker of each coupling."""
+
+LINE_STYLES = ("-", "--", "-.", ":", (0, (3, 1, 1, 1, 1, 1)))
+"""Line styles of curves that are drawn over each other."""
+
+ERROR_BAND = {"color": "#e8eaed", "zorder": 0}
+"""Look of the band within an error bar, behind everything else."""
+
+PRESSURE_LABEL = "mean pressure of the patch [MPa]"
+"""Label of the colour bars of pressure maps."""
+
 
 MOST_NUMBERED_PATCHES = 100
 """A map of more patches shows colours alone; the numbers would cover each other."""
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Return an empty figure, which shares no global state of matplotlib.
+
+    Args:
+        width: Width [inch].
+        height: Height [inch].
+    """
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def add_grid_and_legend(figure: Figure) -> None:
+    """Draw a grid in every panel, and a legend in the first when it has more than one line."""
+    for axes in figure.axes:
+        axes.grid(alpha=0.3)
+    first = figure.axes[0]
+    if len(first.get_legend_handles_labels()[0]) > 1:
+        first.legend(frameon=False)
+
+
+def panels_above_legend(figure: Figure, panels: int, share: float) -> tuple[list[Any], Any]:
+    """Return panels side by side, and empty axes below them for a common legend.
+
+    Args:
+        figure: The figure.
+        panels: Number of panels.
+        share: Height of the legend relative to that of the panels.
+    """
+    grid = figure.add_gridspec(2, panels, height_ratios=(1.0, share))
+    below = figure.add_subplot(grid[1, :])
+    below.axis("off")
+    return [figure.add_subplot(grid[0, index]) for index in range(panels)], below
 
 
 def surface_figure(surface: Surface, asperities: Asperities, patches: PatchGrid) -> Figure:
@@ -70,25 +112,25 @@ def draw_surface(
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncol=2, frameon=False)
 
 
-def history_figure(histories: Mapping[str, History]) -> Figure:
-    """Draw force, contact area and mean separation of one or more runs over each other.
+def history_figure(history: History, kind: str) -> Figure:
+    """Draw force, contact area and mean separation of a run.
 
     Args:
-        histories: The runs by the name that the legend shows.
+        history: The run.
+        kind: Its coupling.
     """
     figure = new_figure(11.0, 3.6)
     force, area, gap = figure.subplots(1, 3)
-    for style, history in zip(curve_styles(histories), histories.values(), strict=True):
-        look = style | {"marker": "o", "ms": 3.5}
-        pressure = np.append(0.0, history.mean_pressure_MPa)
-        # The first touch of a tilted plane is not at zero approach of the middle.
-        level = not any(any(step.tilt) for step in history)
-        approach = 1e3 * np.append(0.0 if level else np.nan, history.approach_mm)
-        force.plot(approach, pressure, **look)
-        area.plot(pressure, 100 * np.append(0.0, history.contact_area_fraction), **look)
-        gap.plot(1e3 * history.mean_separation_mm, history.mean_pressure_MPa, **look)
-        if history.reference is not None:
-            draw_error_band(force, area, history, colour=style["color"])
+    look: dict[str, Any] = {"marker": "o", "ms": 3.5, "color": COLOURS[kind], "label": kind}
+    pressure = np.append(0.0, history.mean_pressure_MPa)
+    # The first touch of a tilted plane is not at zero approach of the middle.
+    level = not any(any(step.tilt) for step in history)
+    approach = 1e3 * np.append(0.0 if level else np.nan, history.approach_mm)
+    force.plot(approach, pressure, **look)
+    area.plot(pressure, 100 * np.append(0.0, history.contact_area_fraction), **look)
+    gap.plot(1e3 * history.mean_separation_mm, history.mean_pressure_MPa, **look)
+    if history.reference is not None:
+        draw_error_band(force, area, history, colour=COLOURS[kind])
     force.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]")
     area.set(xlabel="mean pressure [MPa]", ylabel="contact area fraction [%]")
     gap.set(xlabel="mean separation [µm]", ylabel="mean pressure [MPa]")
@@ -191,33 +233,7 @@ def law_figure(table: LawTable) -> Figure:
     return figure
 
 
-def models_figure(responses: Mapping[str, Response], *, rms_slope: float) -> Figure:
-    """Draw the four panels of Waddad et al. 2016, Fig. 7, for several micro models.
-
-    Args:
-        responses: Response of each micro model by its name.
-        rms_slope: rms gradient of the surface, which scales κ.
-    """
-    figure = new_figure(9.6, 7.2)
-    (motion, separation), (area, kappa) = figure.subplots(2, 2)
-    for look, response in zip(curve_styles(responses), responses.values(), strict=True):
-        pressure, fraction = response.mean_pressure, 100 * response.contact_area_fraction
-        motion.plot(1e3 * response.approach, pressure, **look)
-        separation.plot(1e3 * response.mean_separation, pressure, **look)
-        area.plot(pressure, fraction, **look)
-        kappa.plot(fraction, response.kappa(rms_slope), **look)
-    motion.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]", title="(i)")
-    separation.set(xlabel="mean separation [µm]", ylabel="mean pressure [MPa]", title="(ii)")
-    area.set(xlabel="mean pressure [MPa]", ylabel="contact area fraction [%]", title="(iii)")
-    kappa.set(xlabel="contact area fraction [%]", ylabel="κ", title="(iv)")
-    add_grid_and_legend(figure)
-    return figure
-
-
 def _draw_patch_borders(axes: Any, patches: PatchGrid, colour: str) -> None:
-    for draw, borders in (
-        (axes.axvline, patches.borders_x[1:-1]),
-        (axes.axhline, patches.borders_y[1:-1]),
-    ):
-        for border in borders:
+    for draw, borders in ((axes.axvline, patches.borders_x), (axes.axhline, patches.borders_y)):
+        for border in borders[1:-1]:
             draw(border, color=colour, lw=0.8, alpha=0.9)

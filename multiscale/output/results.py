@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
 from io import BytesIO
-from itertools import islice, zip_longest
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-from geometry.collective import on_root, together
-from multiscale.laws.files import write_laws
-from multiscale.output.provenance import provenance
-from multiscale.output.report import report_html
-from multiscale.planning import plan
+from geometry.collective import on_root, shared
+from multiscale.laws.law_table import write_laws
+from multiscale.output.report import provenance, report_html
 from multiscale.results.history import COLUMNS, PATCH_COLUMNS, History
 from multiscale.run import Run
 from multiscale.storage import (
@@ -38,23 +34,6 @@ FILES = (
 DOTS_PER_INCH = 130
 """Resolution of the figures."""
 
-MOST_FIGURES = 4
-"""Ranks beyond this number draw nothing, and do not load matplotlib."""
-
-
-class Drawing(NamedTuple):
-    """A figure of a run.
-
-    Attributes:
-        name: Name of its file, without the ending.
-        caption: What it shows.
-        png: The image.
-    """
-
-    name: str
-    caption: str
-    png: bytes
-
 
 def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
     """Write the files of a run, finished or stopped.
@@ -70,14 +49,16 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
     Note:
         Collective: all ranks draw, rank 0 writes.
     """
-    drawings: Sequence[Drawing] = ()
+    pictures: dict[str, bytes] = {}
     if run.scene.output.figures and run.steps:
+        names = ["surface", "curves", "pressures", *["laws"] * (run.table is not None)]
         with run.phase("output"):
-            drawings = _drawings(run)
-    return on_root(run.comm, lambda: _write(folder, run, drawings, options))
+            drawn = shared(run.comm, len(names), lambda index: png(_figure(run, names[index])))
+        pictures = dict(zip(names, drawn, strict=True))
+    return on_root(run.comm, lambda: _write(folder, run, pictures, options))
 
 
-def _write(folder: Path, run: Run, drawings: Sequence[Drawing], options: list[str]) -> list[Path]:
+def _write(folder: Path, run: Run, pictures: dict[str, bytes], options: list[str]) -> list[Path]:
     for name in FILES:  # Files of an earlier run must not stand beside those of this one.
         with written(folder / name):
             remove(folder / name)
@@ -85,17 +66,10 @@ def _write(folder: Path, run: Run, drawings: Sequence[Drawing], options: list[st
     files = write_tables(folder, history)
     if table is not None:
         files.append(write_whole(folder / "laws.h5", lambda path: write_laws(path, table)))
-    files += [write_bytes(folder / f"{one.name}.png", one.png) for one in drawings]
+    files += [write_bytes(folder / f"{name}.png", image) for name, image in pictures.items()]
     files.append(write_json(folder / "provenance.json", provenance(run, options=options)))
     if run.scene.output.report:
-        page = report_html(
-            title=f"patchlaw: {run.scene.name}",
-            statements=plan.statements(run.setup),
-            warnings=list(plan.warnings(run.setup)),
-            history=history,
-            figures={one.caption: one.png for one in drawings},
-        )
-        files.append(write_text(folder / "report.html", page))
+        files.append(write_text(folder / "report.html", report_html(run, pictures)))
     return files
 
 
@@ -110,7 +84,7 @@ def write_tables(folder: Path, history: History) -> list[Path]:
         The files written.
     """
     header = [column.name for column in COLUMNS]
-    rows = ([column.of(step) for column in COLUMNS] for step in history)
+    rows = [list(record.values()) for record in history.records()]
     files = [
         write_csv(folder / "history.csv", header, rows),
         write_csv(folder / "patches.csv", PATCH_COLUMNS, history.patch_rows()),
@@ -134,41 +108,16 @@ def write_figure(path: Path, figure: Figure) -> Path:
     return write_bytes(path, png(figure))
 
 
-def _drawings(run: Run) -> list[Drawing]:
-    """Return the figures on rank 0; every rank draws its share of them."""
-    comm = run.comm
-    rank, size = (0, 1) if comm is None else (comm.rank, comm.size)
-
-    def draw() -> list[Drawing]:
-        mine = islice(_figures(run), rank, None, size) if rank < MOST_FIGURES else ()
-        return [Drawing(name, caption, png(make())) for name, caption, make in mine]
-
-    mine = together(comm, draw)
-    parts = [mine] if comm is None else comm.gather(mine) or []
-    # Rank k has the figures k, k + size, ….
-    return [one for figures in zip_longest(*parts) for one in figures if one is not None]
-
-
-def _figures(run: Run) -> Iterator[tuple[str, str, Callable[[], Figure]]]:
-    """Yield file name, caption and function that draws; matplotlib is loaded only here."""
+def _figure(run: Run, name: str) -> Figure:
+    """Draw one figure; matplotlib is loaded only by ranks that draw."""
     from multiscale.output import figures
 
-    setup, history, table = run.setup, run.history(), run.table
-    yield (
-        "surface",
-        "The rough surface with its summits and the patches.",
-        lambda: figures.surface_figure(setup.surface, setup.asperities, setup.patches),
-    )
-    bands = "" if history.reference is None else " Bands: error bars about mesh size zero."
-    yield (
-        "curves",
-        f"Mean pressure, contact area and mean separation.{bands}",
-        lambda: figures.history_figure({run.scene.coupling.kind: history}),
-    )
-    yield (
-        "pressures",
-        "Mean pressure of every patch at the last load step.",
-        lambda: figures.pressure_figure(history),
-    )
-    if table is not None:
-        yield "laws", "The patch laws.", lambda: figures.law_figure(table)
+    setup = run.setup
+    if name == "surface":
+        return figures.surface_figure(setup.surface, setup.asperities, setup.patches)
+    if name == "curves":
+        return figures.history_figure(run.history(), run.scene.coupling.kind)
+    if name == "pressures":
+        return figures.pressure_figure(run.history())
+    assert run.table is not None
+    return figures.law_figure(run.table)

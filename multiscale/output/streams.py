@@ -56,15 +56,14 @@ class SturdyStream:
     def _attempt(self, write: Any) -> None:
         if self.failure is not None:
             return
-        if self._stream is None or self._stream.closed:
-            self.failure = OSError("it is closed")
-            return
         try:
+            if self._stream is None or self._stream.closed:
+                raise OSError("it is closed")
             write()
         except OSError as error:
             self.failure = error
             # Python flushes the buffer at exit. That must not fail again, so it goes nowhere.
-            with suppress(OSError, ValueError):
+            with suppress(OSError, ValueError, AttributeError):
                 number = self._stream.fileno()
                 with open(os.devnull, "wb") as nowhere:
                     os.dup2(nowhere.fileno(), number)

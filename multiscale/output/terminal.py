@@ -9,7 +9,7 @@ from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn
 from rich.table import Table
 
 from geometry.errors import PatchlawError
@@ -142,14 +142,8 @@ def progress(
         total = "" if steps is None else f"/{steps}"
         yield lambda step: say(comm, f"load step {step.step}{total}: {_summary(step)}")
         return
-    columns = (
-        TextColumn("[bold]load steps"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("{task.description}"),
-    )
-    with Progress(*columns) as bar:
+    columns = ("[bold]load steps", BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, "{task.description}") as bar:
         task = bar.add_task("preparing laws and block", total=steps, completed=done)
         yield lambda step: bar.update(task, advance=1, description=_summary(step))
 
@@ -160,7 +154,7 @@ def _summary(step: LoadStep) -> str:
 
 @contextmanager
 def following(comm: Any) -> Iterator[tuple[Callable[[str], None], Callable[[str], None]]]:
-    """Follow work of many parts: the part under way, where there is a terminal, and those done.
+    """Show which part of a long task is under way, and print a line on every part that is done.
 
     Args:
         comm: MPI communicator, or None.

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 from geometry.errors import InputError, NotConverged
 from micro import HalfSpaceModel
-from multiscale.couplings.blocks import SLOPES, OnBody, on_body
+from multiscale.couplings.contact import SLOPES, OnBody, on_body
 from multiscale.measured_errors import error_probe
 from multiscale.planning.auto_keys import (
     MOST_HEIGHTS,
@@ -28,9 +28,8 @@ from multiscale.planning.auto_keys import (
 from multiscale.planning.costs import predicted_cost
 from multiscale.planning.mesh_accuracy import Build, Errors, MeshError, MeshSearch, refinement
 from multiscale.scene.scene import Scene
-from multiscale.setup.decision import Alternative, Decision
-from multiscale.setup.problem import ProblemSetup
-from multiscale.setup.surface import make_surface
+from multiscale.setup.problem import Alternative, Decision, ProblemSetup
+from multiscale.setup.surface_and_block import make_surface
 
 _TRIALS = 6
 """Most trials of a grid."""

@@ -13,8 +13,8 @@ from micro import HalfSpaceModel
 from multiscale.scene.coupling_sections import CouplingSection
 from multiscale.scene.scene import Scene
 from multiscale.scene.sections import SpectrumSection
-from multiscale.setup.checks import PROVISIONAL_PATCHES
 from multiscale.setup.problem import ProblemSetup
+from multiscale.setup.surface_and_block import PROVISIONAL_PATCHES
 
 DEFAULT_ACCURACY = 0.02
 """Relative error of the force that is kept unless the scene says."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from geometry.meshes.block import BlockShape, alignment
+from geometry.meshes.block import BlockShape, misalignment
 from multiscale.machine import ClusterNodes
 from multiscale.planning.costs import run_memory_requests
 from multiscale.setup.problem import ProblemSetup
@@ -76,9 +76,8 @@ def block_warnings(setup: ProblemSetup) -> Iterator[str]:
             "coupling.compliance = 'decomposed', whose elements are of high order"
         )
     if setup.meshes is None:
-        fit = alignment(setup.shape, setup.patches)
-        if not fit:
-            yield fit.sentence
+        if sentence := misalignment(setup.shape, setup.patches):
+            yield sentence
 
 
 def memory_warnings(setup: ProblemSetup, nodes: ClusterNodes) -> Iterator[str]:

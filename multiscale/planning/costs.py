@@ -19,13 +19,13 @@ from scipy.sparse import diags
 
 from geometry.meshes.block import BlockShape
 from micro import HalfSpaceModel, ScaledModel
-from micro.choice.cost import contact_box_share, solution_seconds
-from multiscale.couplings.newton_choice import CYCLES_PER_PATCH, full_cycles, newton_choice
+from micro.choice.models import contact_box_share, solution_seconds
+from multiscale.couplings.assembly import CYCLES_PER_PATCH, full_cycles, newton_choice
 from multiscale.loading.stepper import LoadHistory
 from multiscale.machine import MemoryRequest, peak_memory
-from multiscale.setup.checks import memory_requests
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import ReferenceMeshes, mesh_unknowns, reference_requests
+from multiscale.setup.surface_and_block import memory_requests
 
 _TRANSFORM, _PRODUCT, _REPETITIONS = 0.51e-3, 2.8e-3, 30
 """Times of the two benchmarks of `Machine` where all other times were measured [s], and how often

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from geometry.statistics import roughness
 from micro import MODELS, AsperityModel, HalfSpaceModel
-from multiscale.couplings.newton_choice import newton_choice
+from multiscale.couplings.assembly import newton_choice
 from multiscale.planning.auto_keys import heights_per_wave
 from multiscale.planning.block_plan import block_statement, block_warnings
 from multiscale.planning.costs import Cost

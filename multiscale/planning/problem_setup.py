@@ -13,12 +13,11 @@ import numpy as np
 
 from geometry.asperities import find_asperities
 from geometry.errors import InputError
-from geometry.materials import Material
 from geometry.patches import PatchGrid, patch_means
 from geometry.rigid_plane import RigidPlane
 from geometry.surface import Surface
 from micro import Choice, HalfSpaceModel, MicroModel, choose, micro_model
-from multiscale.couplings.load_steps import ContactCoupling
+from multiscale.couplings.contact import ContactCoupling
 from multiscale.loading.stepper import Coupling, LoadHistory, load_steps
 from multiscale.machine import ClusterNodes
 from multiscale.planning.accuracy import setup_by_accuracy
@@ -33,10 +32,17 @@ from multiscale.planning.auto_keys import (
 )
 from multiscale.planning.mesh_accuracy import MeshError, measured_mesh_error
 from multiscale.scene.scene import Scene
-from multiscale.setup.checks import check_load, check_memory, check_patches, patch_grid
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import reference_meshes
-from multiscale.setup.surface import make_shape, make_surface
+from multiscale.setup.surface_and_block import (
+    block_material,
+    check_load,
+    check_memory,
+    check_patches,
+    make_shape,
+    make_surface,
+    patch_grid,
+)
 
 _ESTIMATE_CELLS = 96
 """Cells along a side, at most, of the half-space that estimates the plane at the largest load. On
@@ -199,6 +205,4 @@ def _chosen_model(scene: Scene, surface: Surface, patches: PatchGrid, label: str
 
 
 def _modulus(scene: Scene) -> float:
-    block = scene.block
-    material = Material(young_modulus=block.young_modulus, poisson_ratio=block.poisson_ratio)
-    return material.contact_modulus
+    return block_material(scene).contact_modulus

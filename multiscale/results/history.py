@@ -1,16 +1,17 @@
-"""The results of a run: a row for every load step, and a row for every patch in it."""
+"""The results of a run: a row for every load step and every patch in it, and notes on them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import KW_ONLY, dataclass, field
 from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.patches import PatchGrid
+from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.results.html_page import Table, table_html
 from multiscale.results.reference_record import ReferenceRecord
@@ -21,6 +22,7 @@ PATCH_COLUMNS = ("step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area
 """Columns of ``patches.csv``."""
 
 
+@dataclass(eq=False)
 class Column:
     """A column of ``history.csv``, declared as an attribute of `History`.
 
@@ -29,7 +31,6 @@ class Column:
     Args:
         meaning: What the column holds; with the unit it is the column's documentation.
         unit: Unit of the values; empty for plain numbers.
-        value: Returns the value of a load step; by default the step's attribute of this name.
         heading: Heading in the table of reports, terminals and notebooks; empty for a column
             that stands in the file alone.
         scale: Factor between the unit of the file and the unit of the heading.
@@ -41,22 +42,17 @@ class Column:
         name: Name of the column and of the attribute of `History`.
     """
 
-    name: str
+    meaning: str
+    unit: str = ""
+    _: KW_ONLY
+    heading: str = ""
+    scale: float = 1.0
+    shown: str = ".0f"
+    error: str = ""
+    name: str = field(init=False)
 
-    def __init__(
-        self,
-        meaning: str,
-        unit: str = "",
-        *,
-        value: Callable[[LoadStep], Any] | None = None,
-        heading: str = "",
-        scale: float = 1.0,
-        shown: str = ".0f",
-        error: str = "",
-    ) -> None:
-        self.__doc__ = f"{meaning} [{unit}]." if unit else f"{meaning}."
-        self.heading = heading
-        self._value, self._scale, self._shown, self._error = value, scale, shown, error
+    def __post_init__(self) -> None:
+        self.__doc__ = f"{self.meaning} [{self.unit}]." if self.unit else f"{self.meaning}."
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
@@ -74,13 +70,13 @@ class Column:
         return np.array([np.nan if value is None else value for value in values])
 
     def of(self, step: LoadStep) -> Any:
-        """Return the value of a load step; None where it was not measured."""
-        return getattr(step, self.name) if self._value is None else self._value(step)
+        """Return the value of a load step, its attribute of this name; None if not measured."""
+        return getattr(step, self.name)
 
     def text(self, step: LoadStep) -> str:
         """Return the value of a load step as it is shown in tables, with its error."""
-        error = getattr(step, self._error, None) or 0.0
-        return with_error(self._scale * self.of(step), self._scale * error, shown=self._shown)
+        error = getattr(step, self.error, None) or 0.0
+        return with_error(self.scale * self.of(step), self.scale * error, shown=self.shown)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,14 +116,10 @@ class History:
     linear_iterations = Column("Iterations of the linear solver", heading="linear")
     wall_s = Column("Wall time", "s", heading="time [s]", shown=".2f")
     reason = Column("Name of the reason for which the iteration stopped")
-    tilt_x = Column("Slope of the approach along x", "mm/mm", value=lambda step: step.tilt[0])
-    tilt_y = Column("Slope of the approach along y", "mm/mm", value=lambda step: step.tilt[1])
-    moment_x_N_mm = Column(
-        "First moment Σ P (x − xc) of the forces P", "N mm", value=lambda step: step.moment_N_mm[0]
-    )
-    moment_y_N_mm = Column(
-        "First moment Σ P (y − yc) of the forces P", "N mm", value=lambda step: step.moment_N_mm[1]
-    )
+    tilt_x = Column("Slope of the approach along x", "mm/mm")
+    tilt_y = Column("Slope of the approach along y", "mm/mm")
+    moment_x_N_mm = Column("First moment Σ P (x − xc) of the forces P", "N mm")
+    moment_y_N_mm = Column("First moment Σ P (y − yc) of the forces P", "N mm")
     force_error_N = Column("Error of the force; 0 where it is prescribed", "N")
     approach_error_mm = Column("Error of the approach; 0 where it is prescribed", "mm")
 
@@ -215,3 +207,29 @@ def with_error(value: float, error: float | None, *, shown: str) -> str:
         return f"{value:{shown}}"
     places = max(1 - math.floor(math.log10(error)), 0)
     return f"{value:.{places}f} ± {error:.{places}f}"
+
+
+def range_notes(steps: Sequence[LoadStep], table: LawTable | None) -> Iterator[str]:
+    """Yield a sentence when load steps lie outside the range of validity of the micro model.
+
+    Args:
+        steps: The load steps.
+        table: The patch laws; None where the micro model is solved itself.
+    """
+    outside = {step.step: step.warnings[0] for step in steps if step.warnings}
+    if table is not None:
+        limit = np.array([law.warning_pressure for law in table.laws])
+        for step in steps:
+            pressure = step.patches.pressure_MPa
+            if count := int(np.sum((pressure > 0.0) & (pressure >= limit))):
+                outside[step.step] = (
+                    f"{count} of {limit.size} patches are loaded beyond the range of the model "
+                    f"{table.made_by['model']}"
+                )
+    if outside:
+        first = min(outside)
+        yield (
+            f"load steps outside the micro model's range of validity: {len(outside)} of "
+            f"{len(steps)}; first step {first}: {outside[first]}; micro.model = 'half-space' has "
+            "no such range"
+        )

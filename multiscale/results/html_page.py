@@ -1,13 +1,12 @@
-"""HTML pages and tables, filled into templates; a page needs no network and no other file."""
+"""Fills templates of HTML pages and tables; a page needs no network and no other file."""
 
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -16,44 +15,14 @@ Table: TypeAlias = tuple[Sequence[str], Sequence[Sequence[str]]]
 """Headings of the columns, and the rows with a text for each column."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Section:
-    """A section of a page; its parts stand below each other in the order given here.
-
-    Attributes:
-        heading: The heading; empty for none.
-        paragraphs: Paragraphs of text.
-        items: Items of a list.
-        warnings: Paragraphs that a reader should not miss.
-        table: A table.
-        text_columns: Indices of the table's columns that hold text and are aligned to the left.
-        wide: Whether the table is set smaller, and scrolls when the window is narrow.
-        figures: PNG images by caption.
-        preformatted: Text whose lines and spaces stay as they are.
-        notes: Paragraphs of secondary importance.
-    """
-
-    heading: str = ""
-    paragraphs: Sequence[str] = ()
-    items: Sequence[str] = ()
-    warnings: Sequence[str] = ()
-    table: Table | None = None
-    text_columns: Sequence[int] = ()
-    wide: bool = False
-    figures: Mapping[str, bytes] = field(default_factory=dict)
-    preformatted: str = ""
-    notes: Sequence[str] = ()
-
-
-def page_html(title: str, sections: Iterable[Section]) -> str:
-    """Return a complete HTML document; characters that HTML reserves are escaped.
+def filled(template: str, **content: Any) -> str:
+    """Return a template filled with content; characters that HTML reserves are escaped.
 
     Args:
-        title: The title and main heading.
-        sections: The sections.
+        template: Its file, relative to the folder of this package.
+        content: What stands in it, by name.
     """
-    page = _templates().get_template("page.jinja")
-    return page.render(title=title, sections=list(sections)) + "\n"
+    return _templates().get_template(template).render(**content) + "\n"
 
 
 def table_html(table: Table) -> str:
@@ -62,7 +31,7 @@ def table_html(table: Table) -> str:
     Args:
         table: Its headings and rows.
     """
-    return str(_templates().get_template("table.jinja").module.table(table))  # type: ignore[attr-defined]
+    return str(_templates().get_template("results/table.jinja").module.table(table))  # type: ignore[attr-defined]
 
 
 @cache
@@ -71,7 +40,7 @@ def _templates() -> Environment:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     templates = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
+        loader=FileSystemLoader(Path(__file__).parents[1]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

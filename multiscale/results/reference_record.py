@@ -5,6 +5,7 @@ Theory: demos/theory.md, sections 12 and 13.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -59,19 +60,12 @@ class ReferenceRecord:
         return float(found.value[step]), float(found.error[step]), float(found.rate[step])
 
     @property
-    def relative_error(self) -> float:
-        """Relative error bar at the largest force: of the force, or of the approach by force."""
-        if not self.force_N.any():
-            return float("nan")
-        value, error, _ = self._at_largest_force
-        return error / abs(value) if value else error
-
-    @property
     def label(self) -> str:
-        """The discretisation error, as tables and legends show it."""
-        if not np.isfinite(self.relative_error):
+        """The error bar relative to the response at the largest force, for tables and legends."""
+        value, error, _ = self._at_largest_force if self.force_N.any() else (0.0, np.nan, 0.0)
+        if not np.isfinite(error):
             return "no error bar"
-        return f"± {100.0 * self.relative_error:.2g} %"
+        return f"± {100.0 * error / (abs(value) or 1.0):.2g} %"
 
     @property
     def sentence(self) -> str:
@@ -128,11 +122,16 @@ class ReferenceRecord:
         Args:
             steps: The load steps.
         """
-        force = np.abs(self.force_N[-1] - self.force.value) + self.force.error
-        approach = np.abs(self.approach_mm[-1] - self.approach.value) + self.approach.error
+
+        def errors(values: Array, found: Estimate) -> list[float | None]:
+            bounds = (np.abs(values[-1] - found.value) + found.error).tolist()
+            return [None if math.isnan(bound) else bound for bound in bounds]
+
+        force = errors(self.force_N, self.force)
+        approach = errors(self.approach_mm, self.approach)
         return tuple(
-            replace(step, force_error_N=_known(force[i]), approach_error_mm=_known(approach[i]))
-            for i, step in enumerate(steps)
+            replace(step, force_error_N=one, approach_error_mm=other)
+            for step, one, other in zip(steps, force, approach, strict=True)
         )
 
     def columns(self, steps: Sequence[LoadStep]) -> dict[str, Sequence[float] | Array]:
@@ -158,10 +157,6 @@ class ReferenceRecord:
             for name in ("force_N", "approach_mm", "contact_area_fraction")
             for number, values in enumerate(getattr(self, name), 1)
         }
-
-
-def _known(error: float) -> float | None:
-    return None if np.isnan(error) else float(error)
 
 
 def reference_record(

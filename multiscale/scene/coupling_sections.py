@@ -9,23 +9,10 @@ from pydantic import Field, model_validator
 
 from multiscale.loading.stepper import LoadHistory
 from multiscale.scene.quantities import Approaches, Forces, Length, Tilt
-from multiscale.scene.sections import Count, Number, Section
+from multiscale.scene.sections import Cells, Number, Section
 
 
-class _ConsistentSection(Section):
-    @model_validator(mode="after")
-    def _fits_together(self) -> Self:
-        for contradicts, problem, allowed in self._contradictions():
-            if contradicts:
-                raise ValueError(f"{problem} (allowed: {allowed})")
-        return self
-
-    def _contradictions(self) -> Iterator[tuple[bool, str, str]]:
-        """Yield whether keys contradict each other, how, and what is allowed."""
-        raise NotImplementedError
-
-
-class CouplingSection(_ConsistentSection):
+class CouplingSection(Section):
     """How micro and macro model are put together.
 
     ``kind``: ``isolated`` takes every patch's law from what lies in it alone (Waddad et al. 2016);
@@ -58,47 +45,36 @@ class CouplingSection(_ConsistentSection):
     interface: Literal["patchwise", "pointwise"] = "patchwise"
     table_tolerance: Annotated[Number, Field(gt=0, lt=0.1)] | None = None
 
-    def _contradictions(self) -> Iterator[tuple[bool, str, str]]:
-        """Yield whether keys contradict each other, how, and what is allowed."""
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        for statement, key, allowed in self._restrictions():
+            value = getattr(self, key)
+            if value not in allowed:
+                instead = " or ".join(repr(one) for one in allowed if one is not None)
+                raise ValueError(
+                    f"{key} = {value!r} does not go with {statement} "
+                    f"(allowed: {f'{key} = {instead}' if instead else 'leave it out'})"
+                )
+        return self
+
+    def _restrictions(self) -> Iterator[tuple[str, str, tuple[str | None, ...]]]:
+        """Yield a statement of this section, a key, and the values that the key may have then."""
         if self.kind == "analytic":  # ignores what is about patches and finite elements
             return
-        kind, points = f"kind = '{self.kind}'", self.interface == "pointwise"
-        yield (
-            self.kind != "isolated" and self.love == "centre",
-            f"love = 'centre' does not go with {kind}",
-            "love = 'mean', or kind = 'isolated'",
-        )
-        lawless = self.kind in ("concurrent", "reference")
-        yield (
-            lawless and self.table_tolerance is not None,
-            f"table_tolerance = {self.table_tolerance} does not go with {kind}",
-            "leave it out: there are no laws",
-        )
-        for key, value, meant in (
-            ("compliance", self.compliance, "decomposed" if self.kind == "concurrent" else "auto"),
-            ("newton", self.newton, "auto"),
-            ("interface", self.interface, "patchwise"),
-        ):
-            yield (
-                lawless and value not in ("auto", meant),
-                f"{key} = '{value}' does not go with {kind}",
-                f"{key} = '{meant}'",
-            )
-        yield (
-            points and self.compliance == "decomposed",
-            "compliance = 'decomposed' does not go with interface = 'pointwise'",
-            "compliance = 'finite-element', or interface = 'patchwise'",
-        )
-        yield (
-            points and self.newton == "condensed",
-            "newton = 'condensed' does not go with interface = 'pointwise'",
-            "newton = 'full', or interface = 'patchwise'",
-        )
-        yield (
-            self.newton == "full" and self.compliance == "decomposed",
-            "newton = 'full' does not go with compliance = 'decomposed'",
-            "newton = 'condensed', or compliance = 'finite-element'",
-        )
+        kind = f"kind = '{self.kind}'"
+        if self.kind != "isolated":
+            yield kind, "love", ("mean",)
+        if self.kind in ("concurrent", "reference"):  # which have no laws
+            block = ("auto", "decomposed") if self.kind == "concurrent" else ("auto",)
+            yield kind, "compliance", block
+            yield kind, "newton", ("auto",)
+            yield kind, "interface", ("patchwise",)
+            yield kind, "table_tolerance", (None,)
+        if self.interface == "pointwise":
+            yield "interface = 'pointwise'", "compliance", ("auto", "finite-element")
+            yield "interface = 'pointwise'", "newton", ("auto", "full")
+        if self.compliance == "decomposed":
+            yield "compliance = 'decomposed'", "newton", ("auto", "condensed")
 
     @property
     def decomposed(self) -> bool:
@@ -118,7 +94,7 @@ class CouplingSection(_ConsistentSection):
         return self.kind in ("isolated", "consistent", "auto") and not self.decomposed
 
 
-class ReferenceSection(_ConsistentSection):
+class ReferenceSection(Section):
     """The meshed rough surface of ``coupling.kind = "reference"``; other couplings ignore it.
 
     ``method``: how contact is found, see `macro.UnilateralContactProblem`. ``mesh``: ``tetrahedra``
@@ -134,28 +110,24 @@ class ReferenceSection(_ConsistentSection):
     mesh: Literal["auto", "hexahedra", "tetrahedra"] = "auto"
     meshes: Annotated[int, Field(ge=1, le=3, strict=True)] = 2
     fine: Annotated[Length, Field(gt=0)] | None = None
-    cells: Annotated[tuple[Count, Count, Count], Field(description="cells in x, y, z")] | None = (
-        None
-    )
+    cells: Cells | None = None
 
-    def _contradictions(self) -> Iterator[tuple[bool, str, str]]:
-        """Yield whether keys contradict each other, how, and what is allowed."""
-        mesh, fine, cells = f"mesh = '{self.mesh}'", self.fine, self.cells
-        yield (
-            self.mesh == "hexahedra" and cells is None,
-            f"{mesh} needs cells",
-            "cells along x, y and z; or mesh = 'tetrahedra'",
-        )
-        yield (
-            self.mesh == "tetrahedra" and cells is not None,
-            f"cells does not go with {mesh}",
-            "leave it out, and state fine; or mesh = 'hexahedra'",
-        )
-        yield (
-            fine is not None and cells is not None,
-            f"fine = {fine or 0.0:g} mm, of tetrahedra, does not go with cells, of hexahedra",
-            "one of them",
-        )
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        if self.mesh == "hexahedra" and self.cells is None:
+            raise ValueError(
+                "mesh = 'hexahedra' needs cells (allowed: cells along x, y, z; or 'tetrahedra')"
+            )
+        if self.mesh == "tetrahedra" and self.cells is not None:
+            raise ValueError(
+                "cells does not go with mesh = 'tetrahedra' (allowed: fine; or mesh = 'hexahedra')"
+            )
+        if self.fine is not None and self.cells is not None:
+            raise ValueError(
+                f"fine = {self.fine:g} mm, of tetrahedra, does not go with cells, of hexahedra "
+                "(allowed: one of them)"
+            )
+        return self
 
     @property
     def hexahedral(self) -> bool:

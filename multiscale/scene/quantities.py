@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from functools import cache, partial
+from collections.abc import Callable
+from functools import cache
 from itertools import pairwise
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -25,7 +26,7 @@ _UNITS = {
     "mm**4": _Unit('"1e-9 mm^4"', (1e-60, 1e60)),
     "": _Unit('"5 um/mm"', (1e-15, 1e6), {"um/mm": 1e-3}),
     "N": _Unit('"5 N"', (1e-30, 1e30), {"N": 1.0, "mN": 1e-3, "kN": 1e3}),
-    "s": _Unit('"55 min"', (1e-3, 1e12), {"s": 1.0, "min": 60.0, "h": 3600.0}),
+    "s": _Unit('"55 min"', (1e-3, 1e12), {"s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0}),
 }
 """Target units in pint's notation; an empty one is a ratio.
 
@@ -114,8 +115,7 @@ def parse_duration(text: str) -> float:
     Raises:
         ValueError: When it is no duration, or not positive.
     """
-    minutes = re.fullmatch(r"\s*([0-9.]+)\s*m\s*", text)  # to pint, metres
-    seconds = parse_quantity(f"{minutes[1]} min" if minutes else text, "s")
+    seconds = parse_quantity(text, "s")
     if not seconds > 0.0:
         raise ValueError("must be greater than 0")
     return seconds
@@ -149,69 +149,33 @@ def parse_turning_points(value: Any, unit: str) -> tuple[float, ...]:
     return points
 
 
-def parse_tilt(value: Any) -> tuple[float, float] | Literal["free"]:
-    """Turn a pair of slopes into numbers, and let ``"free"`` pass.
-
-    Args:
-        value: Two slopes, or ``"free"``.
-
-    Raises:
-        ValueError: When it is neither.
-    """
-    if value == "free":
-        return "free"
-    if not isinstance(value, list | tuple) or len(value) != 2:
-        raise ValueError(
-            'is not a tilt (allowed: two slopes such as ["5 um/mm", "0 um/mm"], or "free")'
-        )
-    return parse_quantity(value[0], ""), parse_quantity(value[1], "")
-
-
 def _named(unit: str) -> str:
     return unit or "a ratio"
 
 
-def _quantity_schema(unit: str) -> dict[str, Any]:
-    """Describe a quantity for editors and for the JSON Schema of a scene."""
-    return {
+def _schema(unit: str, *, several: bool = False) -> WithJsonSchema:
+    """Describe a quantity, or one or several, for editors and for the JSON Schema of a scene."""
+    one = {
         "anyOf": [{"type": "number"}, {"type": "string"}],
         "description": f"string with a unit, or a bare number in {_named(unit)}",
         "examples": [_UNITS[unit].example.strip('"')],
     }
+    listed = {"anyOf": [one, {"type": "array", "items": one, "minItems": 1}]}
+    return WithJsonSchema(listed if several else one)
 
 
-def _points_schema(unit: str) -> WithJsonSchema:
-    one = _quantity_schema(unit)
-    return WithJsonSchema({"anyOf": [one, {"type": "array", "items": one, "minItems": 1}]})
-
-
-def _schema(unit: str) -> WithJsonSchema:
-    return WithJsonSchema(_quantity_schema(unit))
-
-
-def _parser(unit: str) -> BeforeValidator:
-    return BeforeValidator(partial(parse_quantity, unit=unit))
-
-
-def _points_parser(unit: str) -> BeforeValidator:
-    return BeforeValidator(partial(parse_turning_points, unit=unit))
+def _parser(unit: str, parse: Callable[[Any, str], Any] = parse_quantity) -> BeforeValidator:
+    return BeforeValidator(lambda value: parse(value, unit))
 
 
 Length = Annotated[float, _parser("mm"), _schema("mm")]
 Pressure = Annotated[float, _parser("MPa"), _schema("MPa")]
 SpectralAmplitude = Annotated[float, _parser("mm**4"), _schema("mm**4")]
 Slope = Annotated[float, _parser(""), _schema("")]
-Approaches = Annotated[tuple[float, ...], _points_parser("mm"), _points_schema("mm")]
-Forces = Annotated[tuple[float, ...], _points_parser("N"), _points_schema("N")]
-Tilt = Annotated[
-    tuple[float, float] | Literal["free"],
-    BeforeValidator(parse_tilt),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"const": "free"},
-                {"type": "array", "items": _quantity_schema(""), "minItems": 2, "maxItems": 2},
-            ]
-        }
-    ),
+Approaches = Annotated[
+    tuple[float, ...], _parser("mm", parse_turning_points), _schema("mm", several=True)
 ]
+Forces = Annotated[
+    tuple[float, ...], _parser("N", parse_turning_points), _schema("N", several=True)
+]
+Tilt = tuple[Slope, Slope] | Literal["free"]

@@ -136,13 +136,17 @@ def _first_problem(error: ValidationError, model: type[BaseModel]) -> InputError
     path = [str(part) for part in problem["loc"]]
     if problem["type"] == "extra_forbidden":
         return _unknown_key(path, model)
-    key = ".".join(path) or None
+    # of a key with several types pydantic names the type, and has a problem for each
+    key = ".".join(part for part in path if "[" not in part) or None
     if problem["type"] == "missing":
         return InputError("is required and missing", key=key)
     if problem["type"] == "model_type":
         return InputError("must be a section", key=key, value=problem["input"])
     text, _, allowed = problem["msg"].removeprefix("Value error, ").partition(" (allowed: ")
-    text = text.replace("Input should be", "must be")
+    text = text.replace("Input should be", "must be").replace("valid tuple", "list")
+    for other in problems[1:]:
+        if other["type"] == "literal_error" and other["input"] is problem["input"]:
+            text += f", or {other['ctx']['expected']}"
     value = {} if isinstance(problem["input"], dict) else {"value": problem["input"]}
     return InputError(text, key=key, allowed=allowed.rstrip(")") or None, **value)
 
@@ -174,30 +178,28 @@ def read_scene_file(path: Path) -> dict[str, Any]:
         InputError: When it is no regular file, cannot be read, is too large or no TOML.
     """
     content = _content(path)
-    if len(content) > MOST_BYTES:
-        raise InputError(
-            f"cannot be read: it is larger than any scene (allowed: {MOST_BYTES} bytes)",
-            file=str(path),
-        )
     try:
         return parsed(content.decode("utf-8-sig"))  # some editors put a mark before the text
     except UnicodeDecodeError as error:
-        raise InputError(f"is not UTF-8 text: {error}", file=str(path)) from None
+        problem = f"is not UTF-8 text: {error}"
     except ValueError as error:
-        raise InputError(f"is not valid TOML: {error}", file=str(path)) from None
+        problem = f"is not valid TOML: {error}"
+    raise InputError(problem, file=str(path))
 
 
 def _content(path: Path) -> bytes:
-    """Return the bytes of a file, if it has an end; no more than a scene and one."""
+    """Return the bytes of a regular file, which has an end, if a scene can be that large."""
     try:
-        regular = path.is_file() or not path.exists()  # what does not exist has a better error
-        if regular:
-            with path.open("rb") as file:
-                return file.read(MOST_BYTES + 1)
-    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
+        if path.exists() and not path.is_file():
+            raise ValueError("it is not a regular file")
+        with path.open("rb") as file:
+            content = file.read(MOST_BYTES + 1)
+        if len(content) > MOST_BYTES:
+            raise ValueError(f"it is larger than any scene (allowed: {MOST_BYTES} bytes)")
+    except (OSError, ValueError) as error:  # ValueError: also a zero byte in the name
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"cannot be read: {reason}", file=str(path)) from None
-    raise InputError("cannot be read: it is not a regular file", file=str(path))
+    return content
 
 
 def override(data: dict[str, Any], text: str) -> None:

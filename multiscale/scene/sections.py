@@ -2,19 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    GetCoreSchemaHandler,
-    GetJsonSchemaHandler,
-    model_validator,
-)
-from pydantic_core import CoreSchema, core_schema
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from geometry.errors import InputError
 from geometry.files.content import LENGTH_UNITS, length_unit
@@ -26,48 +16,7 @@ Auto = Literal["auto"]
 """Value of a key that is left to the plan."""
 
 
-@dataclass(frozen=True)
-class OrAuto:
-    """Allows ``"auto"`` beside the values of a type, without changing the type's error messages.
-
-    Args:
-        values: The type of all other values.
-    """
-
-    values: Any
-
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        """Return a schema that leaves ``"auto"`` as it is and checks all other values."""
-
-        def checked(value: Any, check: core_schema.ValidatorFunctionWrapHandler) -> Any:
-            return value if isinstance(value, str) and value == "auto" else check(value)
-
-        def unchanged(value: Any) -> Any:
-            return value
-
-        return core_schema.no_info_wrap_validator_function(
-            checked,
-            handler.generate_schema(self.values),
-            serialization=core_schema.plain_serializer_function_ser_schema(unchanged),
-        )
-
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        """Return the JSON Schema of both."""
-        return {"anyOf": [{"const": "auto"}, handler(schema)]}
-
-
-def _number(value: Any) -> Any:
-    """Refuse what pydantic would turn into a number: truth values and text."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError("is not a number (allowed: a number without quotes)")
-    return value
-
-
-Number = Annotated[float, BeforeValidator(_number)]
+Number = Annotated[float, Field(strict=True)]
 Count = Annotated[int, Field(ge=1, le=1_000_000_000, strict=True)]
 
 
@@ -80,11 +29,10 @@ class Section(BaseModel):
 Flag = Annotated[bool, Field(strict=True)]
 PositiveLength = Annotated[Length, Field(gt=0)]
 Pair = Annotated[tuple[Count, Count], Field(description="x, y")]
+Cells = Annotated[tuple[Count, Count, Count], Field(description="cells in x, y, z")]
 Heights = Annotated[int, Field(ge=4, le=1_000_000_000, strict=True)]
 """Number of heights along a side; fewer than four have no cubic interpolant."""
 
-HeightsGrid = Annotated[tuple[Heights, Heights] | Auto, OrAuto(tuple[Heights, Heights])]
-MeshCells = Annotated[tuple[Count, Count, Count] | Auto, OrAuto(tuple[Count, Count, Count])]
 Band = Annotated[tuple[Number, Number], Field(description="lower, upper number of waves per side")]
 
 
@@ -152,7 +100,9 @@ class SurfaceSection(Section):
     file: str | None = None
     height_unit: str | None = None
     channel: str | Annotated[int, Field(ge=0, strict=True)] | None = None
-    grid: Annotated[HeightsGrid, Field(description="heights in x, y")] | None = None
+    grid: Annotated[tuple[Heights, Heights], Field(description="heights in x, y")] | Auto | None = (
+        None
+    )
     lengths: tuple[PositiveLength, PositiveLength] | None = None
     crop: CropSection = CropSection()
     missing: Literal["refuse", "fill"] = "refuse"
@@ -214,7 +164,7 @@ class BlockSection(Section):
     young_modulus: Annotated[Pressure, Field(gt=0)]
     poisson_ratio: Annotated[Number, Field(gt=-1, lt=0.5)]
     sides: Literal["free", "roller"] = "free"
-    cells: Annotated[MeshCells, Field(description="cells in x, y, z")] | None = None
+    cells: Cells | Auto | None = None
     element: Literal["Q1", "Q2", "P1", "P2"] = "Q1"
     grading: Annotated[Number, Field(ge=1, le=1e6, description="bottom to top layer height")] = 1.0
     margin: Annotated[Length, Field(ge=0, description="block beyond the interface")] = 0.0
@@ -229,7 +179,7 @@ class BlockSection(Section):
 class PatchesSection(Section):
     """The partition of the interface."""
 
-    grid: Annotated[Pair | Auto, OrAuto(Pair)] = (4, 4)
+    grid: Pair | Auto = (4, 4)
 
 
 class MicroSection(Section):

@@ -9,15 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.asperities import Asperities
-from geometry.meshes.block import BlockShape
-from geometry.patches import PatchGrid
-from geometry.rigid_plane import RigidPlane
-from geometry.surface import Surface
+from geometry import Asperities, BlockShape, PatchGrid, RigidPlane, Surface
 from micro import AsperityModel, Choice, HalfSpaceModel, MicroModel, ScaledModel
 from multiscale.laws.refinement import MOST_ROWS
 from multiscale.scene.scene import Scene
-from multiscale.setup.decision import Decision
 from multiscale.setup.reference_meshes import ReferenceMeshes
 
 Array = NDArray[np.float64]
@@ -25,10 +20,82 @@ Array = NDArray[np.float64]
 CLOSURE_RESERVE = 0.15
 """Closure that laws are made for beyond the largest approach, relative to the largest interference.
 The surface of a bent block may rise between the loads of its patches."""
-TABLE_TOLERANCE = {"cells": 5e-4, "summits": 1e-4}
+_CELLS_TOLERANCE, _SUMMITS_TOLERANCE = 5e-4, 1e-4
 """Interpolation error of laws by default. Finer tables would trace the steps of single cells."""
-TABLE_ROWS = {"cells": MOST_ROWS, "summits": 400}
-"""Most rows of laws. Each row costs a solution, which is dear on cells."""
+_SUMMITS_ROWS = 400
+"""Most rows of laws by summits. On cells a row costs a solution, which is dear."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Alternative:
+    """A way to compute a scene.
+
+    Attributes:
+        label: The coupling, and the cells, meshes or micro model that it works on.
+        seconds: Predicted time of the run [s].
+    """
+
+    label: str
+    seconds: float
+
+    @property
+    def text(self) -> str:
+        """The alternative in words."""
+        return f"{self.label}, in about {self.seconds:.2g} s"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Decision:
+    """What was taken, the errors that were measured for it, and what else there was.
+
+    Attributes:
+        accuracy: Relative error of the force that was requested.
+        taken: What was taken.
+        errors: Measured errors of the force by cause, relative to it, at the load where they are
+            worst; empty where they cannot be measured beforehand.
+        others: What was predicted to take longer, or could not keep the accuracy.
+        missed: Errors by cause of what was tried first and could not keep the accuracy, if any.
+    """
+
+    accuracy: float
+    taken: Alternative
+    errors: Mapping[str, float]
+    others: tuple[Alternative, ...] = ()
+    missed: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def error(self) -> float:
+        """Measured relative error of the force; 0 where it was not measured."""
+        return sum(self.errors.values())
+
+    @property
+    def kept(self) -> bool:
+        """Whether the measured error is within the accuracy."""
+        return bool(self.errors) and self.error <= self.accuracy
+
+    @property
+    def sentence(self) -> str:
+        """What was taken, what was measured for it, and what else there was."""
+        parts = [
+            self.taken.text,
+            f"an accuracy of {100 * self.accuracy:.3g} % is asked for, {_listed(self.errors)}",
+        ]
+        if self.missed:
+            parts.append(f"without meshing the roughness {_listed(self.missed)}")
+        if self.others:
+            parts.append(f"instead, {'; '.join(each.text for each in self.others)}")
+        return "; ".join(parts)
+
+    @property
+    def warning(self) -> str | None:
+        """A warning that the accuracy is not kept; None where it is, or is not known beforehand."""
+        if self.kept or not self.errors:
+            return None
+        largest = max(self.errors, key=lambda cause: self.errors[cause])
+        return (
+            f"an accuracy of {100 * self.accuracy:.3g} % is not kept: measured at the largest "
+            f"load, the force may be off by {100 * self.error:.2g} %, most of it by {largest}"
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,16 +174,13 @@ class ProblemSetup:
     @property
     def table_tolerance(self) -> float:
         """Interpolation error that laws are tabulated to."""
-        return self.scene.coupling.table_tolerance or TABLE_TOLERANCE[self._seen]
+        default = _SUMMITS_TOLERANCE if self.uses_summits else _CELLS_TOLERANCE
+        return self.scene.coupling.table_tolerance or default
 
     @property
     def table_rows(self) -> int:
         """Most rows of a table of laws."""
-        return TABLE_ROWS[self._seen]
-
-    @property
-    def _seen(self) -> str:
-        return "summits" if self.uses_summits else "cells"
+        return _SUMMITS_ROWS if self.uses_summits else MOST_ROWS
 
     def interference(self, x: Array, y: Array, z: Array) -> Array:
         """Return how far points lie above the undeformed plane at the largest load [mm].
@@ -158,11 +222,10 @@ class ProblemSetup:
     @property
     def interfering_patches(self) -> int:
         """Number of patches that the largest closures of their laws bring into contact."""
-        if self.ignores_border:
-            x, y, z = self.asperities.x, self.asperities.y, self.asperities.z
-        else:
-            grid = np.meshgrid(self.surface.x, self.surface.y, indexing="ij")
-            x, y, z = (part.ravel() for part in (*grid, self.surface.heights))
+        x, y, z = self.asperities.x, self.asperities.y, self.asperities.z
+        if not self.ignores_border:
+            x, y = (part.ravel() for part in np.meshgrid(self.surface.x, self.surface.y))
+            z = self.surface.heights.T.ravel()
         owner = self.patches.index_of(x, y)
         closes = self.largest_closures[owner] > self.surface.highest - z
         return int(np.unique(owner[closes]).size)
@@ -183,3 +246,10 @@ class ProblemSetup:
         if loading.tilt == "free":
             ends = ends + (ends.max() - plane.approach)
         return ends + CLOSURE_RESERVE * self.largest_interference
+
+
+def _listed(errors: Mapping[str, float]) -> str:
+    if not errors:
+        return "which is not measured beforehand"
+    causes = ", ".join(f"{cause} {100 * error:.2g} %" for cause, error in errors.items())
+    return f"measured at the largest load {100 * sum(errors.values()):.2g} % ({causes})"

@@ -6,24 +6,19 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
-from geometry.errors import InputError
-from geometry.meshes.block import BlockShape
-from geometry.meshes.families import characteristic_size, contact_radius, reference_shapes
-from geometry.meshes.refined_block import RefinedShape
-from geometry.rigid_plane import RigidPlane
-from geometry.surface import Surface
+from geometry import BlockShape, InputError, RefinedShape, RigidPlane, Surface
+from geometry.meshes.families import Shape, characteristic_size, contact_radius, reference_shapes
 from multiscale.machine import ClusterNodes, MemoryRequest
 from multiscale.scene.scene import Scene
-from multiscale.setup.checks import check_memory
+from multiscale.setup.surface_and_block import check_memory, located
 
 Array = NDArray[np.float64]
-Shape: TypeAlias = BlockShape | RefinedShape
 
 BYTES_PER_UNKNOWN = {1: 2000, 2: 3500}
 """Memory of mesh, stiffness and multigrid per unknown, by the element's degree [B]."""
@@ -108,22 +103,32 @@ def reference_meshes(
         InputError: When they cannot be made or would not fit into memory; names file and key.
     """
     _check_block(scene)
-    hexahedral, fine = scene.reference.hexahedral, scene.reference.fine
+    block, reference = scene.block, scene.reference
+    hexahedral, fine = reference.hexahedral, reference.fine
     approach, tilt = plane_at_largest_load.approach, plane_at_largest_load.tilt
     prescribed = scene.loading.force is None and scene.loading.tilt != "free"
     largest = approach if prescribed else (1.0 + _RESERVE) * approach
-    try:
+    with located(scene, _key(hexahedral)):
         if fine is not None and not hexahedral:
+            # the nodes of the top face where contact can occur alone
             plane = RigidPlane.above(surface, largest, tilt)
-            least = _least_bytes(surface, plane, fine)
+            depth = surface.highest - surface.heights
+            share = float((plane.at(surface.x[:, None], surface.y) > depth).mean())
+            least = 3.0 * BYTES_PER_UNKNOWN[1] * surface.area * share / fine / fine
             check_memory(scene, nodes, [_request(scene, "the reference", shared=least)])
-        height = scene.block.height_under(surface.lengths)
         shapes = reference_shapes(
-            surface, largest, height, count=scene.reference.meshes, tilt=tilt, **_mesh_keys(scene)
+            surface,
+            largest,
+            block.height_under(surface.lengths),
+            count=reference.meshes,
+            fine=fine,
+            tilt=tilt,
+            mesh="hexahedra" if hexahedral else "tetrahedra",
+            cells=reference.cells,
+            grading=block.grading,
+            element=block.element if block.element[0] == ("Q" if hexahedral else "P") else None,
         )
         radius = contact_radius(surface, approach, tilt=tilt)
-    except InputError as error:
-        raise error.located(key=_key(hexahedral), file=scene.file) from None
     sizes = np.array([characteristic_size(shape) for shape in shapes])
     meshes = ReferenceMeshes(
         shapes=shapes,
@@ -161,20 +166,6 @@ def _key(hexahedral: bool) -> str:
     return "reference.cells" if hexahedral else "reference.fine"
 
 
-def _mesh_keys(scene: Scene) -> dict[str, Any]:
-    """Return what the scene says of the cells of its meshes."""
-    block, reference = scene.block, scene.reference
-    if reference.hexahedral:
-        return {
-            "mesh": "hexahedra",
-            "cells": reference.cells,
-            "grading": block.grading,
-            "element": block.element,
-        }
-    element = block.element if block.element.startswith("P") else None
-    return {"mesh": "tetrahedra", "fine": reference.fine, "element": element}
-
-
 def _check_block(scene: Scene) -> None:
     """Refuse keys of the block that do not go with a reference."""
     block = scene.block
@@ -194,13 +185,6 @@ def _check_block(scene: Scene) -> None:
             allowed="Q1, Q2, or reference.mesh = 'tetrahedra'",
             file=scene.file,
         )
-
-
-def _least_bytes(surface: Surface, plane: RigidPlane, fine: float) -> float:
-    """Return the memory of the nodes of the top face where contact can occur alone [B]."""
-    depth = surface.highest - surface.heights
-    share = float((plane.at(surface.x[:, None], surface.y) > depth).mean())
-    return 3.0 * BYTES_PER_UNKNOWN[1] * surface.area * share / fine / fine
 
 
 def mesh_unknowns(shape: Shape) -> int:

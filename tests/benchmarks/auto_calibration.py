@@ -19,19 +19,19 @@ from scipy.optimize import linprog
 from geometry import Spectrum, Surface, synthesise
 from geometry.errors import NotConverged
 from micro import MODELS, micro_model
-from micro.choice.candidates import FACTORS, half_space
 from micro.choice.expected_errors import (
-    CONTACT_TERMS,
-    GRID_TERMS,
     ContactMeasures,
     contact_measures,
     contact_terms,
     grid_terms,
 )
+from micro.choice.models import FACTORS, half_space
 
 SCALED = {"curvature": "contact", "border": "include"}
 KINDS = {**{name: (name, {}) for name in MODELS}, "scaled": ("elliptic", SCALED)}
 KINDS["islands"] = ("islands", {})
+CONTACT_TERMS = ("floor", "crowding", "eccentricity", "wave", "eccentric_wave", "border")
+GRID_TERMS = ("radius_few", "radius", "wave")
 FIELDS = list(ContactMeasures.__dataclass_fields__)
 
 
@@ -50,7 +50,7 @@ def models(surface):
     for factor in FACTORS:
         n = round(factor * surface.grid[0])
         if 16 <= n <= 800:
-            yield "half-space", factor, half_space(surface, (n, n), 1.0, False)
+            yield "half-space", factor, half_space(surface, (n, n), 1.0)
 
 
 def measured(count, seed):
@@ -59,7 +59,7 @@ def measured(count, seed):
     for surface, approach in surfaces(count, seed):
         loads = [0.5 * approach, approach]
         truth, own = converged(surface, loads)
-        at = [contact_measures(surface, load, periodic=False) for load in loads]
+        at = [contact_measures(surface, load) for load in loads]
         for kind, factor, model in models(surface):
             for where, error, sure in zip(at, errors(model, loads, truth), own, strict=True):
                 values = [getattr(where, name) for name in FIELDS]

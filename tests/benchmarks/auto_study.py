@@ -1,7 +1,7 @@
 """Does the automatically chosen micro model keep the tolerance? Over 60 random surfaces.
 
 Run by hand, some minutes: python tests/benchmarks/auto_study.py [--surfaces N] [--seed S]
-[--large] [--periodic] [--rows FILE …]. The rows are kept in the first file, or joined from all
+[--large] [--rows FILE …]. The rows are kept in the first file, or joined from all
 files that exist.
 
 Truth is extrapolated from half-space solutions on grids up to four times as fine as the surface's
@@ -23,10 +23,10 @@ TOLERANCES = (0.02, 0.05, 0.1, 0.2)
 LARGE = {512: 0.6, 1024: 0.4}
 
 
-def study(count, seed, grids, periodic):
+def study(count, seed, grids):
     """Return rows (heights, tolerance, error, promised, label, truth's error)."""
     rows = []
-    for surface, approach in surfaces(count, seed, grids, periodic=periodic):
+    for surface, approach in surfaces(count, seed, grids):
         loads = [0.5 * approach, approach]
         truth, own = converged(surface, loads)
         for tolerance in TOLERANCES:
@@ -35,7 +35,6 @@ def study(count, seed, grids, periodic):
                 contact_modulus=1.0,
                 approach=approach,
                 tolerance=tolerance,
-                periodic=periodic,
             )
             error = np.abs(forces(found.model, loads) / truth - 1.0).max()
             taken = found.taken
@@ -73,14 +72,13 @@ def main():
     parser.add_argument("--surfaces", type=int, default=60)
     parser.add_argument("--seed", type=int, default=770_000)
     parser.add_argument("--large", action="store_true", help="512² and 1024² heights only")
-    parser.add_argument("--periodic", action="store_true")
     parser.add_argument("--rows", type=Path, nargs="*", default=[])
     given = parser.parse_args()
     rows = []
     for path in given.rows:
         rows += np.load(path, allow_pickle=True)["rows"].tolist() if path.exists() else []
     if not rows:
-        rows = study(given.surfaces, given.seed, LARGE if given.large else None, given.periodic)
+        rows = study(given.surfaces, given.seed, LARGE if given.large else None)
         if given.rows:
             np.savez(given.rows[0], rows=np.array(rows, dtype=object))
     table(rows)

@@ -10,7 +10,7 @@ GRIDS = {48: 0.15, 64: 0.2, 96: 0.15, 128: 0.2, 192: 0.1, 256: 0.1, 512: 0.1}
 """Heights along a side, and how often they are drawn."""
 
 
-def surfaces(count, seed, grids=None, *, periodic=False):
+def surfaces(count, seed, grids=None):
     """Yield surfaces and their largest approach."""
     grids = grids or GRIDS
     draw = np.random.default_rng(seed)
@@ -24,7 +24,7 @@ def surfaces(count, seed, grids=None, *, periodic=False):
         slope, hurst = draw.choice([0.05, 0.1, 0.2]), draw.uniform(0.3, 1.0)
         spectrum = Spectrum(hurst=hurst, rms_slope=slope, seed=seed + index, **band)
         made = synthesise(spectrum, grid=(n, n), lengths=(1.0, 1.0))
-        rough = Surface(heights=made.heights, lengths=made.lengths, periodic=periodic)
+        rough = Surface(heights=made.heights, lengths=made.lengths)
         yield rough, rough.heights.std() * draw.choice([0.4, 0.7, 1.0, 1.5, 2.0])
 
 
@@ -48,7 +48,6 @@ def converged(surface, loads):
         model = HalfSpaceModel(
             surface=fine,
             contact_modulus=1.0,
-            periodic=surface.periodic,
             highest=surface.highest,
         )
         found.append(forces(model, loads))

@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from multiscale import Scene, make_setup
-from multiscale.couplings.blocks import contact_model
+from multiscale.couplings.contact import contact_model
 
 
 def scene(grid, seed):

@@ -18,8 +18,8 @@ from geometry import BlockShape, Control, PatchGrid, Spectrum, patch_means, synt
 from macro import Material
 from micro import FreeSides, HalfSpaceModel
 from multiscale import CondensedCoupling, LoadHistory, consistent_laws, load_steps
-from multiscale.couplings.body_terms import Body
-from multiscale.couplings.load_steps import ContactCoupling
+from multiscale.couplings.body import Body
+from multiscale.couplings.contact import ContactCoupling
 
 REPEATS = 5
 APPROACH = 8e-3

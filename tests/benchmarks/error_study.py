@@ -21,7 +21,8 @@ import numpy as np
 from geometry.rigid_plane import Control
 from geometry.synthesis import synthesise
 from multiscale import Run, Scene
-from multiscale.couplings.blocks import SLOPES, on_body, scene_body
+from multiscale.couplings.body import scene_body
+from multiscale.couplings.contact import SLOPES, on_body
 
 SCENES, MESHED = 40, 4
 MORE_MODES, FINER, MOST_CELLS = 4, 4, 512
@@ -79,8 +80,9 @@ def meshed_force(data):
 def finer_force(run):
     """Return the force on more cells and with more modes, under the last load step's plane [N]."""
     setup, step = run.setup, run.steps[-1]
-    modes = scene_body(setup).modes + MORE_MODES
-    body = on_body(setup, None, half_space=not setup.has_block, modes=modes)
+    block = scene_body(setup) if setup.has_block else None
+    face = block and block.face(None, modes=block.modes + MORE_MODES)
+    body = on_body(setup, None, half_space=block is None, face=face)
     grid = [min(FINER * count, MOST_CELLS) for count in setup.model.surface.grid]
     spectrum = setup.scene.surface.spectrum.spectrum()
     surface = synthesise(spectrum, grid=tuple(grid), lengths=setup.surface.lengths)

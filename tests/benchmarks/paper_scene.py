@@ -27,7 +27,7 @@ def run(ranks: int) -> dict[str, float]:
     """Run the scene once; return seconds by phase, the whole process included."""
     launcher = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
     with tempfile.TemporaryDirectory() as folder:
-        command = [*launcher, sys.executable, "-m", "multiscale", "run", SCENE, "--out", folder]
+        command = [*launcher, sys.executable, "-m", "patchlaw", "run", SCENE, "--out", folder]
         start = time.perf_counter()
         subprocess.run(command, cwd=ROOT, env=ENVIRONMENT, capture_output=True, check=True)
         whole = time.perf_counter() - start

@@ -30,7 +30,7 @@ from geometry import (
 )
 from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from multiscale import Scene, extrapolated, make_setup
-from multiscale.couplings.blocks import contact_model
+from multiscale.couplings.contact import contact_model
 
 GRID, SIDE, RADIUS, FLOOR = 256, 1.0, 0.16, -0.05
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)

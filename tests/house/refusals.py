@@ -65,9 +65,6 @@ def texts_in(tree):
             for target in node.targets:
                 if isinstance(target, ast.Name) and target.id in PROBLEMS:
                     yield 2, text_of(node.value)
-        elif isinstance(node, ast.Yield) and isinstance(node.value, ast.Tuple):
-            if isinstance(node.value.elts[0], ast.Compare | ast.BoolOp):  # contradictory keys
-                yield 2, text_of(node.value.elts[1])
 
 
 def page():

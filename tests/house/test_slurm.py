@@ -164,7 +164,7 @@ def test_an_array_makes_a_folder_for_each_seed(slurm, reference):
 
 
 def test_slurm_itself_can_start_the_ranks(slurm):
-    doctor = (sys.executable, "-m", "multiscale", "doctor", "--json")
+    doctor = (sys.executable, "-m", "patchlaw", "doctor", "--json")
     done = subprocess.run(
         ["srun", "--mpi=pmix", "--ntasks=2", *doctor],
         cwd=slurm.folder, env=slurm.environment, capture_output=True, text=True, check=False,
@@ -175,7 +175,7 @@ def test_slurm_itself_can_start_the_ranks(slurm):
 
 def test_processes_that_stand_alone_refuse_to_run(slurm):
     """Without PMI every task is an MPI job of its own: Open MPI 4 ends it, 5 leaves it to us."""
-    words = ("-m", "multiscale", "run", SCENE, "--out", slurm.folder / "alone", "--set", *SMALL)
+    words = ("-m", "patchlaw", "run", SCENE, "--out", slurm.folder / "alone", "--set", *SMALL)
     done = subprocess.run(
         ["srun", "--mpi=none", "--ntasks=2", sys.executable, *map(str, words)],
         cwd=slurm.folder, env=slurm.environment, capture_output=True, text=True, check=False,

@@ -29,14 +29,14 @@ def made(make, lengths, height, count):
 
 def failed():
     """Return the error that every rank meets when the last one has no memory."""
-    solve = module.Quarter.response
+    solve = module.ParityBlock.response
 
-    def response(quarter, count):
+    def response(block):
         if COMM.rank == COMM.size - 1:
             raise MemoryError("no room")
-        return solve(quarter, count)
+        return solve(block)
 
-    module.Quarter.response = response
+    module.ParityBlock.response = response
     try:
         face_compliance((1.0, 1.0), 1.0, MATERIAL, "free", 2, COMM)
         found = "none"

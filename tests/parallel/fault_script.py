@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 from geometry.errors import NotConverged
 from multiscale.cli import main
+from multiscale.couplings import assembly
 from multiscale.couplings.condensed import CondensedCoupling
 
 command = import_module("multiscale.cli.run")
@@ -19,8 +20,8 @@ run = sys.modules["multiscale.run"]  # the package's attribute of that name is t
 PLACES = {
     "surface": (run, "on_root"),
     "plan": (command.terminal, "show_plan"),
-    "laws": (run, "make_table"),
-    "block": (run, "assemble"),
+    "laws": (assembly, "make_table"),
+    "block": (assembly, "assemble"),
     "load step": (CondensedCoupling, "press"),
     "checkpoint": (command.CheckpointWriter, "accept"),
     "output": (command, "write_fields"),

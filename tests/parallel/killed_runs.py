@@ -94,7 +94,7 @@ class Runs:
 
     def on_two_ranks(self, words, log, over):
         """Run on two ranks until `over` tells; return the exit code, None when killed."""
-        command = ["mpirun", "-n", "2", sys.executable, "-m", "multiscale", *words]
+        command = ["mpirun", "-n", "2", sys.executable, "-m", "patchlaw", *words]
         with log.open("wb") as file:
             process = subprocess.Popen(
                 command, cwd=self.root, env=self.environment, start_new_session=True, stdout=file,

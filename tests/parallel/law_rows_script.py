@@ -8,7 +8,7 @@ from mpi4py import MPI
 from geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
 from micro import micro_model
 from multiscale.laws.consistent import consistent_laws
-from multiscale.laws.files import law_bytes
+from multiscale.laws.law_table import law_bytes
 
 COMM = MPI.COMM_WORLD
 

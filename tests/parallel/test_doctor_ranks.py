@@ -6,7 +6,7 @@ import pytest
 
 
 def test_doctor_tells_ranks_and_hosts_once(mpirun):
-    done = mpirun(3, "-m", "multiscale", "doctor", "--json", timeout=100)
+    done = mpirun(3, "-m", "patchlaw", "doctor", "--json", timeout=100)
     assert done.returncode == 0, done.stderr
     findings = {found["topic"]: found for found in json.loads(done.stdout)}
     assert findings["ranks"]["text"].startswith("3: 3 on ")
@@ -32,6 +32,6 @@ def test_a_check_that_fails_on_one_rank_fails_for_all(mpirun):
 @pytest.mark.long
 def test_forms_are_compiled_ahead_by_a_job_too(mpirun):
     # PETSc starts on all ranks together: rank 0 alone would bring the others down
-    done = mpirun(2, "-m", "multiscale", "warm", "--element", "Q1", timeout=100)
+    done = mpirun(2, "-m", "patchlaw", "warm", "--element", "Q1", timeout=100)
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("compiled forms in") == 1

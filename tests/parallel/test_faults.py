@@ -62,7 +62,7 @@ def test_signal_to_one_rank_stops_all_and_any_number_goes_on(mpirun, tmp_path):
     done = mpirun(2, SCRIPT, 1, "signal", "checkpoint", *WORDS, out, timeout=100)
     assert done.returncode == 4, done.stderr
     assert done.stderr.count("(SIGUSR1): stopped after load step 2; go on with --resume") == 1
-    done = mpirun(1, "-m", "multiscale", *WORDS, out, "--resume", timeout=100)
+    done = mpirun(1, "-m", "patchlaw", *WORDS, out, "--resume", timeout=100)
     assert done.returncode == 0, done.stderr
     assert "goes on after load step 2" in done.stdout
     with (out / "history.csv").open(encoding="utf-8") as file:
@@ -76,7 +76,7 @@ LONG = [word.replace("steps=3", "steps=60") for word in WORDS]
 def undisturbed(mpirun, tmp_path_factory):
     """Folder of a run that nobody disturbed."""
     out = tmp_path_factory.mktemp("undisturbed")
-    assert mpirun(1, "-m", "multiscale", *LONG, out, timeout=100).returncode == 0
+    assert mpirun(1, "-m", "patchlaw", *LONG, out, timeout=100).returncode == 0
     return out
 
 
@@ -102,7 +102,7 @@ def test_mpirun_that_is_told_to_end_loses_no_load_step(mpirun, root, tmp_path, u
     while members(started.pid):  # mpirun of Open MPI 5 does not wait for those it has signalled
         assert time.monotonic() < until
         time.sleep(0.05)
-    done = mpirun(1, "-m", "multiscale", *LONG, out, "--resume", timeout=100)
+    done = mpirun(1, "-m", "patchlaw", *LONG, out, "--resume", timeout=100)
     assert done.returncode == 0, done.stderr
     shown = done.stdout
     assert "goes on after load step " in shown and "goes on after load step 60" not in shown

@@ -42,7 +42,7 @@ def test_same_numbers_on_any_number_of_ranks(mpirun, root, tmp_path, scene, rank
     results = []
     for count in (1, ranks):
         out = tmp_path / str(count)
-        words = ("-m", "multiscale", "run", path, "--out", out, "--set", *SMALL, *scene)
+        words = ("-m", "patchlaw", "run", path, "--out", out, "--set", *SMALL, *scene)
         done = mpirun(count, *words)
         assert done.returncode == 0, done.stderr
         results.append([
@@ -60,7 +60,7 @@ def test_same_numbers_on_any_number_of_ranks(mpirun, root, tmp_path, scene, rank
 def test_refusal_ends_all_ranks_with_one_message(mpirun, tmp_path):
     out = tmp_path / "out"
     steep = "surface.spectrum.rms_slope=8"
-    words = ("-m", "multiscale", "run", PAPER, "--out", out, "--set", *SMALL, steep)
+    words = ("-m", "patchlaw", "run", PAPER, "--out", out, "--set", *SMALL, steep)
     done = mpirun(2, *words, timeout=60)
     assert done.returncode == 2, done.stderr
     assert done.stderr.count("patchlaw: ") == 1

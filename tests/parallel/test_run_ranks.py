@@ -107,7 +107,7 @@ LONG = {
     "scene", [pytest.param(name, marks=[pytest.mark.long] * (name in LONG)) for name in SCENES]
 )
 def test_same_numbers_on_any_number_of_ranks(mpirun, alone, tmp_path, scene, ranks):
-    words = ("-m", "multiscale", "run", PAPER, "--out", tmp_path, "--set", *SMALL, *SCENES[scene])
+    words = ("-m", "patchlaw", "run", PAPER, "--out", tmp_path, "--set", *SMALL, *SCENES[scene])
     done = mpirun(ranks, *words)
     assert done.returncode == 0, done.stderr
     for one, more in zip(alone(scene), numbers(tmp_path), strict=True):
@@ -121,9 +121,7 @@ def test_ranks_draw_the_figures_of_one(mpirun, tmp_path):
     for ranks in (1, 3):
         out = tmp_path / str(ranks)
         scene = ("coupling.kind=analytic", "output.figures=true")
-        done = mpirun(
-            ranks, "-m", "multiscale", "run", PAPER, "--out", out, "--set", *SMALL, *scene
-        )
+        done = mpirun(ranks, "-m", "patchlaw", "run", PAPER, "--out", out, "--set", *SMALL, *scene)
         assert done.returncode == 0, done.stderr
         drawn.append({path.name: path.read_bytes() for path in out.glob("*.png")})
     assert set(drawn[0]) == {"surface.png", "curves.png", "pressures.png"}
@@ -179,7 +177,7 @@ def test_a_rank_may_own_nothing_of_the_interface(mpirun):
 )
 def test_wrong_input_ends_all_ranks_with_one_message(mpirun, tmp_path, override, text):
     out = tmp_path / "out"
-    done = mpirun(2, "-m", "multiscale", "run", PAPER, "--out", out, "--set", override, timeout=60)
+    done = mpirun(2, "-m", "patchlaw", "run", PAPER, "--out", out, "--set", override, timeout=60)
     assert done.returncode == 2
     assert done.stderr.count("patchlaw: ") == 1
     assert text in done.stderr
@@ -202,7 +200,7 @@ def test_bad_heights_end_all_ranks(mpirun, root, tmp_path, content):
     if content is not None:
         np.save(tmp_path / "h.npy", content)
     out = tmp_path / "out"
-    done = mpirun(2, "-m", "multiscale", "run", tmp_path / "scene.toml", "--out", out, timeout=60)
+    done = mpirun(2, "-m", "patchlaw", "run", tmp_path / "scene.toml", "--out", out, timeout=60)
     assert done.returncode == 2, done.stderr
     assert done.stderr.count("patchlaw: ") == 1
     assert "h.npy" in done.stderr

@@ -5,7 +5,7 @@ from numpy.polynomial import legendre
 
 from geometry import PatchGrid, Spectrum, patch_means, synthesise
 from micro import BodyModes, HalfSpaceModel
-from multiscale.couplings.load_steps import ContactCoupling
+from multiscale.couplings.contact import ContactCoupling
 
 MODULUS = 4000.0
 CELLS = 16

@@ -9,7 +9,7 @@ from scipy.special import gamma
 from geometry import BlockShape, Control, Surface, reference_shapes
 from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from micro import FreeSides, HalfSpaceModel, HertzContact
-from multiscale.couplings.body_terms import Body
+from multiscale.couplings.body import Body
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 MODULUS = MATERIAL.contact_modulus

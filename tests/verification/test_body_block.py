@@ -9,7 +9,7 @@ from mpi4py import MPI
 from geometry import BlockShape, PatchGrid
 from macro import Block, Interface, Material, block_mesh, patch_compliance_matrix
 from micro import FreeSides
-from multiscale.couplings.body_terms import Body
+from multiscale.couplings.body import Body
 
 COMM = MPI.COMM_SELF
 

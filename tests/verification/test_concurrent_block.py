@@ -10,7 +10,7 @@ from reference_cases import on_block
 from geometry import PatchGrid, Spectrum, Surface, patch_means, synthesise
 from geometry.rigid_plane import Control
 from multiscale import Scene, run
-from multiscale.couplings.load_steps import ContactCoupling
+from multiscale.couplings.contact import ContactCoupling
 from multiscale.loading.stepper import LoadHistory, load_steps
 
 SURFACE = synthesise(

@@ -10,7 +10,7 @@ from geometry.rigid_plane import Control
 from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from micro import FiniteSlopes
 from multiscale import Scene, make_setup
-from multiscale.couplings.blocks import contact_model
+from multiscale.couplings.contact import contact_model
 
 MATERIAL = {"young_modulus": 4000.0, "poisson_ratio": 0.15}
 HEIGHT, APPROACH, FINE, LOW = 0.3, 8e-3, 1.4e-2, 0.01

@@ -9,9 +9,9 @@ import pytest
 from hard_cases import KINDS, history, scene
 
 from geometry import PatchGrid, patch_means
-from micro.factory import MODEL_NAMES
+from micro.choice.models import MODEL_NAMES
 from multiscale.planning.problem_setup import stated_model
-from multiscale.setup.surface import make_surface
+from multiscale.setup.surface_and_block import make_surface
 
 MODULUS = 4000.0 / (1.0 - 0.15**2)
 PUNCH = 1.5 * 2.0 * MODULUS * np.sqrt(0.5)  # N/mm

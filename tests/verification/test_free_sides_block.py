@@ -6,6 +6,7 @@ force of a ball that a side cuts in half.
 
 import numpy as np
 import pytest
+from boussinesq import displacements
 from free_side_points import side_displacements
 from reference_cases import COMM, MATERIAL, MODULUS, on_block
 from scipy.interpolate import RectBivariateSpline
@@ -20,7 +21,6 @@ from geometry import (
 )
 from macro import Block, Interface, UnilateralContactProblem, block_mesh, rough_block_mesh
 from micro import FreeSides
-from micro.closed_forms.boussinesq import displacements
 from multiscale.results.extrapolation import extrapolated
 
 SQUARE = (1.0, 1.0)

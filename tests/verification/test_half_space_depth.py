@@ -4,11 +4,10 @@ from functools import partial
 
 import numpy as np
 import pytest
+from boussinesq import displacements, love_integral, stresses
 
 from geometry import Material, PatchGrid
 from geometry.errors import InputError
-from micro.closed_forms.boussinesq import displacements, stresses
-from micro.closed_forms.love import love_integral
 
 LOADS = PatchGrid(grid=(2, 2), lengths=(1.0, 0.6), origin=(-0.2, 0.1))
 POINTS = np.random.default_rng(7).uniform((-1.0, -1.0, 0.05), (1.5, 1.5, 1.0), (30, 3)).T

@@ -5,7 +5,7 @@ import pytest
 from interaction_cases import E_STAR, summits
 from scipy.optimize import brentq
 
-from micro import MODELS, asperity_model
+from micro import MODELS, AsperityModel
 
 every_model = pytest.mark.parametrize("name", MODELS)
 
@@ -14,11 +14,11 @@ every_model = pytest.mark.parametrize("name", MODELS)
 @pytest.mark.parametrize("apart", [1e-9, 1e-13])
 def test_two_summits_that_nearly_coincide(name, apart):
     # hard: the interaction matrix is singular to 1e-7 and less; both together carry one's force
-    pair = asperity_model(name, summits([0.5, 0.5 + apart], 0.5), contact_modulus=E_STAR)
-    one = asperity_model(name, summits(0.5, 0.5), contact_modulus=E_STAR).solve(0.02)
+    pair = AsperityModel(name, summits([0.5, 0.5 + apart], 0.5), contact_modulus=E_STAR)
+    one = AsperityModel(name, summits(0.5, 0.5), contact_modulus=E_STAR).solve(0.02)
     found = pair.solve(0.02)
     # the gap between the summits changes the force by its square over the radius
-    assert found.force.sum() == pytest.approx(one.force[0], rel=1e-6)
+    assert found.contacts.force.sum() == pytest.approx(one.contacts.force[0], rel=1e-6)
     assert found.residual <= 1e-10 and found.iterations <= 30
 
 
@@ -28,9 +28,9 @@ def test_a_twin_a_little_lower_overlaps(name):
     forces = []
     for lower in (0.0, 1e-12, 1e-9, 1e-6, 1e-3):
         twins = summits([0.5, 0.5 + 1e-9], 0.5, z=[0.0, -lower])
-        state = asperity_model(name, twins, contact_modulus=E_STAR).solve(0.02)
+        state = AsperityModel(name, twins, contact_modulus=E_STAR).solve(0.02)
         assert state.residual <= 1e-10
-        forces.append(state.force.sum())
+        forces.append(state.contacts.force.sum())
     np.testing.assert_allclose(forces[:3], forces[0], rtol=1e-6)
     assert np.all(np.isfinite(forces))
 
@@ -43,8 +43,8 @@ def test_radii_from_a_circle_to_a_line(name):
     for ratio in ratios:
         # the same R = √(R'R'') of 0.1 mm
         one = summits(0.5, 0.5, major=0.1 * np.sqrt(ratio), minor=0.1 / np.sqrt(ratio))
-        state = asperity_model(name, one, contact_modulus=E_STAR).solve(1e-3)
-        forces.append(float(state.force[0]))
+        state = AsperityModel(name, one, contact_modulus=E_STAR).solve(1e-3)
+        forces.append(float(state.contacts.force[0]))
     # F1(e) = 1 + O(ε²)
     np.testing.assert_allclose(forces[:4], forces[0], rtol=1e-9)
     if name.startswith("circular"):
@@ -62,9 +62,11 @@ def test_needles_side_by_side():
     # hard: axes of 1 : 2e4 that interact; as far apart as a hundred widths they are alone
     radii = {"major": 0.1 * 1e3, "minor": 0.1 / 1e3}
     two = summits([0.2, 0.8], 0.5, angle=np.pi / 2, **radii)
-    model = asperity_model("elliptic", two, contact_modulus=E_STAR)
+    model = AsperityModel("elliptic", two, contact_modulus=E_STAR)
     state = model.solve(1e-4)
-    alone = asperity_model("elliptic-independent", two, contact_modulus=E_STAR).solve(1e-4)
+    alone = AsperityModel("elliptic-independent", two, contact_modulus=E_STAR).solve(1e-4)
     assert state.residual <= 1e-10
-    assert state.force[0] == pytest.approx(state.force[1], rel=1e-9)
-    assert 0.3 < state.force.sum() / alone.force.sum() < 1.0  # each sinks by the other
+    assert state.contacts.force[0] == pytest.approx(state.contacts.force[1], rel=1e-9)
+    assert (
+        0.3 < state.contacts.force.sum() / alone.contacts.force.sum() < 1.0
+    )  # each sinks by the other

@@ -1,6 +1,7 @@
 """Hard loads: first touch, steps too large, nearly vertical laws, ten thousand steps and back."""
 
 import tracemalloc
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,10 +14,9 @@ from geometry.errors import NotConverged
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from micro import influence_matrix
-from multiscale.couplings.dense_newton import DenseNewton
-from multiscale.laws.files import repaired_law
-from multiscale.laws.law_table import PatchLaws
-from multiscale.laws.patch_law import PatchLaw
+from multiscale.couplings.condensed import equilibrium
+from multiscale.laws.law_table import repaired_law
+from multiscale.laws.patch_law import PatchLaw, PatchLaws
 from multiscale.laws.rows import LawRows
 from multiscale.run import Run
 
@@ -139,11 +139,11 @@ def test_laws_with_a_kink_a_plateau_a_wall_or_noise(name, force):
         pressure = np.abs(pressure * (1.0 + noise))
     one, yields = law(closure, pressure), 1e-4
     patch = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
-    newton = DenseNewton(PatchLaws([one]), np.array([[yields]]), patch)
+    newton = partial(equilibrium, PatchLaws([one]), np.array([[yields]]), patch)
     control = Control(approach=0.012, tilt=(0.0, 0.0))
     if force is not None:
         control = Control(force=force, tilt=(0.0, 0.0))
-    state = newton.solve(control)
+    state = newton(control)
     assert state.iterations <= 40
 
     def missing(local):
@@ -167,10 +167,10 @@ def test_sixteen_patches_with_such_laws(name, by_force):
     laws = laws if name != "noisy" else list(map(repaired_law, laws))
     patches = PatchGrid(grid=(4, 4), lengths=(1.0, 1.0))
     yields = influence_matrix(patches) / (np.pi * 4092.0)
-    newton = DenseNewton(PatchLaws(laws), yields, patches)
-    state = newton.solve(Control(approach=0.01, tilt=(0.0, 0.0)))
+    newton = partial(equilibrium, PatchLaws(laws), yields, patches)
+    state = newton(Control(approach=0.01, tilt=(0.0, 0.0)))
     if by_force:
-        level, state = state, newton.solve(Control(force=float(state.load[0]), tilt=(0.0, 0.0)))
+        level, state = state, newton(Control(force=float(state.load[0]), tilt=(0.0, 0.0)))
         # the force is met to 1e-12, the approach follows from it
         assert state.plane[0] == pytest.approx(level.plane[0], rel=1e-7)
     # 74 and 92 at kinks, and none found at walls, before steps were bent along the laws
@@ -190,7 +190,7 @@ def test_sixteen_patches_with_such_laws(name, by_force):
         if np.abs(found - before).max() <= 1e-11 * found.max():
             break
     # at the wall a rounding of closures, 1e-18 mm, is 1e-7 MPa
-    np.testing.assert_allclose(state.pressure, found, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(state.point.pressure, found, rtol=1e-6, atol=1e-6)
 
 
 LAPS = {
@@ -243,10 +243,10 @@ def test_a_plane_on_nothing_but_its_own_law_counts_from_rounding():
             dclosure=np.ones(2), dpressure=1.5e5 * np.sqrt(depth),
         )  # fmt: skip
 
-    newton = DenseNewton(
-        SimpleNamespace(first_touch=touch, along=along), np.diag([1e-6, 1e-6]), patches
+    newton = partial(
+        equilibrium, SimpleNamespace(first_touch=touch, along=along), np.diag([1e-6, 1e-6]), patches
     )
-    state = newton.solve(Control(approach=1e-6, tilt=(0.0, 0.0)))
+    state = newton(Control(approach=1e-6, tilt=(0.0, 0.0)))
     depth = brentq(lambda s: s + 1e-6 * 1e5 * s**1.5 - 1e-6, 0.0, 1e-6, xtol=1e-20, rtol=1e-14)
-    assert state.pressure[0] == pytest.approx(1e5 * depth**1.5, rel=1e-6)
-    assert state.pressure[1] == 0.0
+    assert state.point.pressure[0] == pytest.approx(1e5 * depth**1.5, rel=1e-6)
+    assert state.point.pressure[1] == 0.0

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from micro.closed_forms.ellipse import axis_ratio, eccentricity, force_factor
+from micro.closed_forms.hertz import factors_at, shape_factors
 
 
 def complete_integrals(beta):
@@ -38,12 +38,13 @@ def test_exact_root(ratio):
         lambda t: np.log(radius_ratio(np.exp(t)) / ratio), -1.6 * np.log(ratio), -1e-3, xtol=1e-14
     )
     # K − E loses up to two digits at 1.1, quad keeps 1e-13.
-    assert axis_ratio(ratio, 1.0) == pytest.approx(np.exp(0.5 * log_beta), rel=1e-11)
-    assert eccentricity(ratio, 1.0) == pytest.approx(np.sqrt(-np.expm1(log_beta)), rel=1e-10)
+    shape = shape_factors(ratio, 1.0)
+    assert shape.axis_ratio == pytest.approx(np.exp(0.5 * log_beta), rel=1e-11)
+    assert shape.eccentricity == pytest.approx(np.sqrt(-np.expm1(log_beta)), rel=1e-10)
 
 
 @pytest.mark.parametrize("e", [0.2, 0.7, 0.99])
 def test_force_factor(e):
     K, E = complete_integrals(1 - e**2)
     F1 = np.pi / np.sqrt(2) / e * ((E / (1 - e**2) - K) * (K - E)) ** 0.25 * K**-1.5
-    assert force_factor(e) == pytest.approx(F1, rel=1e-11)  # cancellation in the reference
+    assert factors_at(e).force == pytest.approx(F1, rel=1e-11)  # cancellation in the reference

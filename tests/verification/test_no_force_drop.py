@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from interaction_cases import E_STAR, PATCHES, set_1
 
-from micro import MODELS, ScaledModel, asperity_model
+from micro import MODELS, AsperityModel, ScaledModel
 
 APPROACHES = np.linspace(0.5e-3, 52e-3, 52)
 
@@ -17,7 +17,7 @@ def test_force_never_falls(seed, kind, scaled):
     model = (
         ScaledModel(kind=kind, surface=surface, contact_modulus=E_STAR)
         if scaled
-        else asperity_model(kind, asperities, contact_modulus=E_STAR)
+        else AsperityModel(kind, asperities, contact_modulus=E_STAR)
     )
     response = model.respond(APPROACHES, patches=PATCHES, mean_heights=means)
     assert np.all(np.diff(response.force) > 0.0)

@@ -77,5 +77,5 @@ def test_summit_cut_by_the_border(centre, force, area):
     exact = force_and_area(pressures(heights, surface.highest - 8e-3))
     state = ScaledModel(kind="elliptic", surface=surface, contact_modulus=1.0).solve(8e-3)
     # The whole one tells the oracle's error, the others what the module states.
-    assert state.force.sum() == pytest.approx(exact[0], rel=force)
-    assert state.contact_area.sum() == pytest.approx(exact[1], rel=area)
+    assert state.contacts.force.sum() == pytest.approx(exact[0], rel=force)
+    assert state.contacts.area.sum() == pytest.approx(exact[1], rel=area)

@@ -65,7 +65,7 @@ def test_settings_that_dolfinx_cannot_read_are_told(monkeypatch, error):
     with pytest.raises(
         InputError, match=r"cannot read its dolfinx_jit settings \(.*set XDG_CONFIG"
     ):
-        compat.form_cache()
+        compat.form_folder()
 
 
 class Doubling:

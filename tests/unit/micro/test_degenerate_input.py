@@ -22,7 +22,6 @@ from micro import (
     HalfSpaceModel,
     IslandModel,
     ScaledModel,
-    asperity_model,
 )
 
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
@@ -33,7 +32,7 @@ def models(surface):
     asperities = find_asperities(surface, periodic=False)
     for kind in MODELS:
         for solver in SOLVERS:
-            yield asperity_model(kind, asperities, contact_modulus=1.0, solver=solver)
+            yield AsperityModel(kind, asperities, contact_modulus=1.0, solver=solver)
         yield ScaledModel(kind=kind, surface=surface, contact_modulus=1.0)
         yield ScaledModel(kind=kind, surface=surface, contact_modulus=1.0, border="ignore")
     yield IslandModel(surface=surface, contact_modulus=1.0)
@@ -97,7 +96,7 @@ def test_heights_in_steps_keep_their_summits_at_the_contacts_scale(step):
     for approach in (4e-3, 12e-3):
         # the model's own error, and half a step of few
         expected = pytest.approx(cells.solve(approach).force, rel=0.05)
-        assert model.solve(approach).force.sum() == expected
+        assert model.solve(approach).contacts.force.sum() == expected
 
 
 def test_before_touch(surface):
@@ -200,7 +199,7 @@ def test_one_contact_alone_stands_for_itself():
     dome = -((x[:, None] - 0.5) ** 2 + (x - 0.5) ** 2) / 2.0
     surface = Surface(heights=dome, lengths=(1.0, 1.0))
     asperities = find_asperities(surface, periodic=False)
-    model = asperity_model("circular", asperities, contact_modulus=1.0)
+    model = AsperityModel("circular", asperities, contact_modulus=1.0)
     response = respond(model, surface, [5e-2])
     assert response.contact_area_fraction[0] == pytest.approx(0.05 * np.pi)  # π R δ, R = 1 mm
     assert response.warnings == ()

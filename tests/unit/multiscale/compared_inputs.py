@@ -10,10 +10,10 @@ from scene_inputs import scenes, takes_long
 
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
-from multiscale.comparison.compare import AGAINST, compare
-from multiscale.comparison.error_measures import Curves
-from multiscale.comparison.report import comparison_html
-from multiscale.comparison.run_result import RunResult
+from multiscale.cli.compare import comparison_html
+from multiscale.comparison import AGAINST
+from multiscale.comparison.compare import compare
+from multiscale.comparison.configuration import Curves, RunResult
 from multiscale.scene.scene import Scene
 from multiscale.storage import write_csv
 
@@ -47,10 +47,10 @@ def ended(dice, configuration, seconds):
         status=status,
         exit_code=dice.choice([0, 2, 3, -9, None]),
         message=dice.choice(["", "told <b>why</b>\nin two lines"]),
-        seconds=dice.choice([{}, {"laws": 0.5, "load steps": 1.0}, {"surface": 0.0}]),
+        phases=dice.choice([{}, {"laws": 0.5, "load steps": 1.0}, {"surface": 0.0}]),
         start_s=dice.uniform(0.0, 1.0),
         cpu_s=dice.choice([0.0, 1.0]),
-        curves=curves if steps.size else None,
+        curves=curves,
         finite_slopes=dice.choice([True, True, False]),
     )
 

@@ -26,7 +26,7 @@ def begin(home, *words, compiler=None):
     if compiler:
         environment["CC"] = compiler
     return subprocess.Popen(
-        [sys.executable, "-m", "multiscale", *map(str, words)],
+        [sys.executable, "-m", "patchlaw", *map(str, words)],
         cwd=Path(__file__).parents[3], env=environment, stdout=subprocess.PIPE,
         stderr=subprocess.PIPE, text=True,
     )  # fmt: skip

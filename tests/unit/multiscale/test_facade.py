@@ -33,3 +33,9 @@ def test_importing_it_loads_nothing(root):
         [sys.executable, "-c", loaded], cwd=root, capture_output=True, text=True, check=True
     )
     assert found.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("name", dir(multiscale))
+def test_the_stub_names_the_modules_of_all_names(name):
+    assert getattr(multiscale, name).__module__.startswith("multiscale.")
+    assert name in multiscale.__all__

@@ -12,7 +12,7 @@ import pytest
 from geometry.errors import NotConverged
 from geometry.rigid_plane import Control
 from multiscale import Run, Scene, run
-from multiscale.couplings.blocks import on_body
+from multiscale.couplings.contact import on_body
 from multiscale.measured_errors import ErrorProbe, MeasuredErrors
 from multiscale.output.results import write_results, write_tables
 from multiscale.restart.checkpoint import checkpoint_of

@@ -12,7 +12,7 @@ import pytest
 
 import micro.interaction.hertz_pairs
 from geometry import Asperities, PatchGrid
-from micro import HalfSpaceModel, asperity_model
+from micro import AsperityModel, HalfSpaceModel
 from multiscale import Run, Scene, make_setup
 from multiscale.cli.command_line import main
 from multiscale.output.results import write_results
@@ -87,9 +87,9 @@ def test_only_the_force_curve(monkeypatch, tmp_path):
 def test_a_plan_solves_nothing_of_the_scene(monkeypatch, kind):
     for solution in ("solve", "solve_force", "equilibrium", "respond", "press"):
         monkeypatch.setattr(HalfSpaceModel, solution, never)
-    monkeypatch.setattr("multiscale.couplings.blocks.embedding", never)
-    monkeypatch.setattr("multiscale.couplings.body_terms.Body.face", never)
-    monkeypatch.setattr("multiscale.couplings.blocks.on_body", never)
+    monkeypatch.setattr("multiscale.couplings.body.embedding", never)
+    monkeypatch.setattr("multiscale.couplings.body.Body.face", never)
+    monkeypatch.setattr("multiscale.couplings.contact.on_body", never)
     monkeypatch.setattr("multiscale.couplings.assembly.make_table", never)
     given = data(kind, grid=128)
     setup = make_setup(Scene.from_dict(given))
@@ -127,7 +127,7 @@ def evaluations(monkeypatch, below: int) -> int:
 
     with monkeypatch.context() as patch:
         patch.setattr(micro.interaction.hertz_pairs, "circular_field", watched)
-        model = asperity_model("circular", summits(below), contact_modulus=1.0)
+        model = AsperityModel("circular", summits(below), contact_modulus=1.0)
         whole = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
         model.respond([0.002, 0.004], patches=whole, mean_heights=[-0.1])
     return counted[0]

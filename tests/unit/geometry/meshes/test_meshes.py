@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from geometry import BlockShape, InputError, PatchGrid, alignment
+from geometry import BlockShape, InputError, PatchGrid, misalignment
 from geometry.meshes.lattice import lattice_cells, lattice_part, node_share
 
 SHAPE = {"interface": (1.0, 2.0), "height": 1.5, "cells": (4, 6, 3)}
@@ -120,15 +120,15 @@ def test_blocks_that_make_no_sense_are_refused(change, message):
     ],
 )
 def test_alignment_says_where_patches_cut_elements(grid, x, y):
-    found = alignment(BlockShape(**SHAPE), PatchGrid(grid=grid, lengths=(1.0, 2.0)))
-    assert (found.x, found.y, bool(found)) == (x, y, x and y)
-    assert (f"x ({grid[0]} patches on 4 cells)" in found.sentence) is not x
-    assert (f"y ({grid[1]} patches on 6 cells)" in found.sentence) is not y
+    found = misalignment(BlockShape(**SHAPE), PatchGrid(grid=grid, lengths=(1.0, 2.0)))
+    assert (found == "") is (x and y)
+    assert (f"x ({grid[0]} patches on 4 cells)" in found) is not x
+    assert (f"y ({grid[1]} patches on 6 cells)" in found) is not y
 
 
 def test_alignment_of_a_single_patch():
     whole = PatchGrid(grid=(4, 4), lengths=(1.0, 2.0))
     shape = BlockShape(**SHAPE)
-    assert alignment(shape, whole.single(0)).x and not alignment(shape, whole.single(0)).y
-    with pytest.raises(InputError, match="patches reach beyond the interface along x"):
-        alignment(shape, PatchGrid(grid=(1, 1), lengths=(1.1, 2.0)))
+    assert "along y (" in misalignment(shape, whole.single(0))
+    with pytest.raises(InputError, match="patches reach beyond the top of the block"):
+        misalignment(shape, PatchGrid(grid=(1, 1), lengths=(1.1, 2.0)))

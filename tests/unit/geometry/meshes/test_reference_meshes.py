@@ -96,8 +96,8 @@ def test_hexahedra_are_halved_in_all_directions():
         ({"fine": 0.0}, "finest edge length is out of range"),
         ({"fine": np.nan}, "finest edge length is out of range"),
         ({"height": 0.0}, "must be positive"),
-        ({"approach": np.nan}, "approach and tilt must be finite"),
-        ({"tilt": (np.inf, 0.0)}, "approach and tilt must be finite"),
+        ({"approach": np.nan}, "the approach must be finite"),
+        ({"tilt": (np.inf, 0.0)}, "the tilt must be two finite slopes"),
     ],
 )
 def test_impossible_families_are_refused(changes, text):

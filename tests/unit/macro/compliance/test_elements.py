@@ -1,50 +1,66 @@
 """Elements of high order along a line: what their shapes span, and integrals in closed form."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from geometry.legendre_modes import mode_values
-from macro.compliance.elements import Line, mode_integrals
+from macro.compliance.elements import across, upwards
 
-LINES = {
-    "any": Line(ticks=(-1.0, -0.3, 0.0), degrees=(3, 5)),
-    "even": Line(ticks=(0.5, 0.8, 1.0), degrees=(6, 4), parity=0),
-    "odd": Line(ticks=(0.5, 1.0), degrees=(7,), parity=1),
-}
+TICKS = np.array([-1.0, -0.3, 0.0])
+LENGTH = 1.2
 
 
-@pytest.mark.parametrize("kind", LINES)
-def test_slopes_are_those_of_the_values(kind):
-    line = LINES[kind]
-    rule = line.sampled(8)
-    # by integration by parts against x and x²: ∫ N' f + ∫ N f' = [N f]
-    start = {"even": None, "odd": 0.0, "any": 0.0}[kind]
-    ends = np.zeros(len(rule.values))
+def places(count):
+    """Return the points of the line across the top that has so many."""
+    return 0.5 * LENGTH * (1.0 + np.polynomial.legendre.leggauss(count)[0])
+
+
+def test_functions_upwards_vanish_at_the_bottom_and_one_is_1_at_the_top():
+    line = upwards(TICKS, (3, 5))
+    t = np.polynomial.legendre.leggauss(6)[0]
+    z = np.concatenate([
+        low + 0.5 * (high - low) * (1.0 + t) for low, high in pairwise(TICKS)
+    ])  # fmt: skip
+    ends = np.zeros(len(line.values))
     ends[line.end] = 1.0
+    # by integration by parts against z + 1 and its square: ∫ N' f + ∫ N f' = [N f]
     for power in (1, 2):
-        x, rise = rule.points**power, power * rule.points ** (power - 1)
-        found = (rule.slopes * x + rule.values * rise) @ rule.weights
-        if start is not None:  # functions vanish at the start
-            np.testing.assert_allclose(found, ends * line.ticks[-1] ** power, atol=1e-14)
-    assert rule.weights.sum() == pytest.approx(line.ticks[-1] - line.ticks[0], rel=1e-15)
+        f, rise = (z + 1.0) ** power, power * (z + 1.0) ** (power - 1)
+        found = (line.slopes * f + line.values * rise) @ line.weights
+        np.testing.assert_allclose(found, ends, atol=1e-14)
+    assert line.weights.sum() == pytest.approx(1.0, rel=1e-15)
+    share, *_ = np.linalg.lstsq(line.values.T, (z + 1.0) ** 3, rcond=None)
+    np.testing.assert_allclose(share @ line.values, (z + 1.0) ** 3, atol=1e-14)
+    np.testing.assert_allclose(share @ line.slopes, 3.0 * (z + 1.0) ** 2, atol=1e-12)
 
 
-@pytest.mark.parametrize(("kind", "power"), [("even", 0), ("even", 4), ("odd", 1), ("odd", 7)])
-def test_polynomials_of_the_parity_are_spanned(kind, power):
-    line = LINES[kind]
-    rule = line.sampled(9)
-    wanted = (rule.points - line.ticks[0]) ** power
-    share, *_ = np.linalg.lstsq(rule.values.T, wanted, rcond=None)
-    np.testing.assert_allclose(share @ rule.values, wanted, atol=1e-14)
-    risen = power * (rule.points - line.ticks[0]) ** max(power - 1, 0)
-    np.testing.assert_allclose(share @ rule.slopes, risen, atol=1e-12)
+@pytest.mark.parametrize("odd", [0, 1])
+def test_polynomials_of_the_parity_are_spanned(odd):
+    line = across(LENGTH, 8, 2).of_parity(odd)
+    x = places(9) - 0.5 * LENGTH
+    for power in range(odd, 8, 2):
+        share, *_ = np.linalg.lstsq(line.values.T, x**power, rcond=None)
+        np.testing.assert_allclose(share @ line.values, x**power, atol=1e-14)
+        risen = power * x ** max(power - 1, 0)
+        np.testing.assert_allclose(share @ line.slopes, risen, atol=1e-12)
 
 
-@pytest.mark.parametrize("parity", [0, 1])
-def test_mode_integrals_are_exact(parity):
-    line = Line(ticks=(0.6, 1.2), degrees=(9,), parity=parity)
-    rule = line.sampled(40)
-    modes = mode_values(rule.points, 1.2, 7)[parity::2]
-    np.testing.assert_allclose(
-        mode_integrals(line, 1.2, 7), (modes * rule.weights) @ rule.values.T, atol=1e-14
-    )
+@pytest.mark.parametrize("odd", [0, 1])
+def test_functions_but_the_end_vanish_at_the_sides(odd):
+    line = across(LENGTH, 8, 2).of_parity(odd)
+    x = places(9)
+    ends = np.zeros(len(line.values))
+    ends[line.end] = 1.0
+    # ∫ N' x + ∫ N is the value at the far side, times the length
+    found = (line.slopes * x + line.values) @ line.weights
+    np.testing.assert_allclose(found, LENGTH * ends, atol=1e-14)
+
+
+def test_mode_integrals_are_exact():
+    line, finer = across(LENGTH, 9, 7), across(LENGTH, 40, 7)
+    modes = mode_values(places(41), LENGTH, 7) * finer.weights
+    # the functions of a degree are among those of a higher one
+    np.testing.assert_allclose(line.modes, modes @ finer.values[:10].T, atol=1e-13)
+    np.testing.assert_allclose(line.mode_slopes, modes @ finer.slopes[:10].T, atol=1e-13)

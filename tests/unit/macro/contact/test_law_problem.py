@@ -14,7 +14,7 @@ from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from macro import Block, Interface, LawContactProblem, Material, block_mesh, compat, write_fields
-from macro.contact.initial_guess import DisplacementBasis
+from macro.contact.newton import DisplacementBasis
 
 
 @dataclass

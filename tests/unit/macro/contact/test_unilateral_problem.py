@@ -121,7 +121,7 @@ def test_free_plane_turns_until_there_is_no_moment():
     assert turned.force == pytest.approx(force, rel=1e-8)
 
 
-@pytest.mark.parametrize("method", ["active-set", "augmented-lagrangian", "penalty"])
+@pytest.mark.parametrize("method", ["active-set", "augmented-lagrangian"])
 def test_no_force_is_first_touch(method):
     found = problem(method=method)
     touch = SURFACE.highest - SURFACE.mean_height - found.top.height.max()
@@ -187,8 +187,6 @@ def test_failed_step_changes_nothing():
 def test_wrong_input_is_refused():
     with pytest.raises(InputError, match=r"unknown contact of the reference.*active-set, augm"):
         problem(method="barrier")
-    with pytest.raises(InputError, match="the penalty must be positive"):
-        problem(method="penalty", penalty=0.0)
     with pytest.raises(InputError, match=r"patches reach beyond the top.*inside .*1\.0, 1\.0"):
         problem(patches=PatchGrid(grid=(2, 2), lengths=(1.0, 1.1)))
     wide = block_mesh(replace(SHAPE, cells=(2, 2, 1), margin=0.5, margin_cells=1), MPI.COMM_SELF)

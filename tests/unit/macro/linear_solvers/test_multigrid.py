@@ -7,8 +7,7 @@ from petsc4py import PETSc
 
 from geometry import BlockShape, RefinedShape, Surface
 from macro import Block, Material, block_mesh, rough_block_mesh
-from macro.linear_solvers.multigrid import coarser_grids, lattice_of, transfers
-from macro.linear_solvers.multigrid_grids import Lines, coarsenings
+from macro.linear_solvers.multigrid import Lines, coarsenings, coarser_grids, lattice_of, transfers
 
 CUBE = {"interface": (1.0, 1.0), "height": 1.0}
 MARGIN = {"margin": 0.7, "margin_cells": 3, "margin_grading": 4.0}

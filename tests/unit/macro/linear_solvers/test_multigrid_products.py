@@ -11,6 +11,7 @@ from geometry import BlockShape
 from macro import Block, Material, block_mesh
 from macro.linear_solvers.multigrid import coarser_grids, lattice_of, transfers
 from macro.linear_solvers.multigrid_products import block_rows, galerkin
+from macro.linear_solvers.node_matrices import dofs_of, node_submatrix
 
 
 def make(sides="free", **changes):
@@ -91,3 +92,10 @@ def test_other_types_of_matrices_are_refused():
     with pytest.raises(PETSc.Error):
         with block_rows(make().stiffness.convert("aij", PETSc.Mat())):
             pass
+
+
+def test_parts_are_those_of_the_matrix():
+    matrix = make("roller").stiffness
+    rows, columns = np.array([0, 3, 40]), np.array([1, 2, 3, 41])
+    expected = dense(matrix)[np.ix_(dofs_of(rows), dofs_of(columns))]
+    np.testing.assert_array_equal(node_submatrix(matrix, rows, columns).toarray(), expected)

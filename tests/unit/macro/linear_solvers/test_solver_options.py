@@ -54,9 +54,9 @@ def laplacian():
 
 
 def test_linear_solver_takes_the_users_options(user_options):
-    assert linear_solver(laplacian(), "patchlaw_test_").getType() == "cg"
+    assert linear_solver(laplacian(), prefix="patchlaw_test_").getType() == "cg"
     user_options["ksp_type"], user_options["pc_type"] = "preonly", "cholesky"
-    solver = linear_solver(laplacian(), "patchlaw_test_")
+    solver = linear_solver(laplacian(), prefix="patchlaw_test_")
     assert (solver.getType(), solver.pc.getType()) == ("preonly", "cholesky")
 
 

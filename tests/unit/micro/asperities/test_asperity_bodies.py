@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from asperity_states import displacement, interference
 from scipy.optimize import brentq
 
 from geometry import (
@@ -15,7 +16,7 @@ from geometry import (
     patch_means,
     synthesise,
 )
-from micro import MODELS, HertzContact, IslandModel, ScaledModel, asperity_model
+from micro import MODELS, AsperityModel, HertzContact, IslandModel, ScaledModel
 from micro.compliance.body_modes import BodyModes
 
 MODULUS = 4000.0
@@ -96,15 +97,14 @@ def dense(model, required):
 @pytest.mark.parametrize("name", MODELS)
 @pytest.mark.parametrize("solver", ["active-set", "truncated-newton"])
 def test_is_the_dense_solution(name, solver, sign):
-    model = asperity_model(name, apart(), contact_modulus=MODULUS, solver=solver, body=body(sign))
+    model = AsperityModel(name, apart(), contact_modulus=MODULUS, solver=solver, body=body(sign))
     state = model.solve(8e-3, tilt=(3e-3, -2e-3))
-    plane = model.equilibrium(Control(approach=8e-3, tilt=(3e-3, -2e-3))).plane
-    t, force = dense(model, model.asperities.interference(plane))
+    t, force = dense(model, model.asperities.interference(state.plane))
     assert 4 < np.count_nonzero(t) < 9  # some are in contact, some are not
     # contact conditions are met to 1e-10 of the approach
-    assert state.force == pytest.approx(force, rel=1e-8, abs=1e-10)
-    on = state.in_contact
-    assert state.displacement[on] == pytest.approx(state.interference[on], abs=1e-11)
+    assert state.contacts.force == pytest.approx(force, rel=1e-8, abs=1e-10)
+    on, required = state.contacts.force > 0.0, interference(model.asperities, state)
+    assert displacement(model, state)[on] == pytest.approx(required[on], abs=1e-11)
 
 
 def test_summit_that_the_body_raises_touches():
@@ -114,23 +114,23 @@ def test_summit_that_the_body_raises_touches():
     # the second mode along y: what presses one half down raises the other
     matrix = np.zeros((4, 4))
     matrix[1, 1] = 2e-3
-    model = asperity_model(
+    model = AsperityModel(
         "elliptic-independent",
         replace(two, x=np.array([0.5, 0.5]), y=np.array([0.2, 0.9])),
         contact_modulus=MODULUS,
         body=BodyModes((1.0, 1.0), matrix),
     )
     state = model.solve(2e-3)
-    assert state.interference[1] == 0.0
+    assert interference(model.asperities, state)[1] == 0.0
     t, force = dense(model, np.array([2e-3, -5e-5]))
     assert np.all(t > 0.0)
-    assert state.force == pytest.approx(force, rel=1e-8)
+    assert state.contacts.force == pytest.approx(force, rel=1e-8)
 
 
 def surface_models():
     asperities = find_asperities(SURFACE, periodic=False)
     for name in MODELS:
-        yield asperity_model(name, asperities, contact_modulus=MODULUS)
+        yield AsperityModel(name, asperities, contact_modulus=MODULUS)
     yield ScaledModel(kind="elliptic", surface=SURFACE, contact_modulus=MODULUS)
     yield IslandModel(surface=SURFACE, contact_modulus=MODULUS)
 

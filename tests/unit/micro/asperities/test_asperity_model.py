@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from asperity_states import displacement, interference, surface_displacement
 
 from geometry import Control, InputError, PatchGrid, Surface
-from micro import MODELS, AsperityModel, HertzContact, asperity_model, micro_model
-from micro.asperities.patch_shares import shares
+from micro import MODELS, AsperityModel, HertzContact, micro_model
+from micro.interaction.patch_sums import patch_loads
 
 E_STAR = 4000.0
 ONE_PATCH = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
@@ -21,62 +22,63 @@ def respond(model, approaches, patches=PATCHES, **options):
 
 @every_model
 def test_name_and_kind(cluster, name):
-    model = asperity_model(name, cluster, contact_modulus=E_STAR)
+    model = AsperityModel(name, cluster, contact_modulus=E_STAR)
     assert model.name == name
-    assert model.elliptic == name.startswith("elliptic")
-    assert model.interacting == (not name.endswith("independent"))
+    assert model.contacts.kind.elliptic == name.startswith("elliptic")
+    assert model.contacts.kind.interacting == (not name.endswith("independent"))
 
 
 @every_model
 def test_single_asperity_is_hertz(summits, name):
     one = summits(0.3, 0.7, z=-1e-3, major=0.4, minor=0.1, highest=0.0)
-    state = asperity_model(name, one, contact_modulus=E_STAR).solve(5e-3)
+    model = AsperityModel(name, one, contact_modulus=E_STAR)
+    state = model.solve(5e-3)
     radii = (0.4, 0.1) if name.startswith("elliptic") else (0.2, 0.2)
     hertz = HertzContact(
         contact_modulus=E_STAR, radius_major=radii[0], radius_minor=radii[1], indentation=4e-3
     )
-    assert state.interference == pytest.approx([4e-3])
-    assert state.displacement == pytest.approx([4e-3])
-    assert state.force == pytest.approx([hertz.force])
-    assert state.contact_area == pytest.approx([hertz.area])
-    assert state.peak_pressure == pytest.approx([hertz.peak_pressure])
-    assert state.semi_axes == pytest.approx(np.array([[hertz.semi_major, hertz.semi_minor]]))
+    assert interference(one, state) == pytest.approx([4e-3])
+    assert displacement(model, state) == pytest.approx([4e-3])
+    assert state.contacts.force == pytest.approx([hertz.force])
+    assert state.contacts.area == pytest.approx([hertz.area])
+    axes = np.array([[hertz.semi_major, hertz.semi_minor]])
+    assert state.contacts.semi_axes == pytest.approx(axes)
 
 
 @pytest.mark.parametrize("name", ["elliptic-independent", "circular-independent"])
 def test_independent_models_are_sums(cluster, name):
-    state = asperity_model(name, cluster, contact_modulus=E_STAR).solve(3e-3)
-    assert state.displacement == pytest.approx(np.maximum(3e-3 + cluster.z, 0.0))
-    assert state.indentation == pytest.approx(state.displacement)
-    assert state.iterations == 0 and state.residual == 0.0
+    solution = AsperityModel(name, cluster, contact_modulus=E_STAR).solve(3e-3).start.solution
+    assert solution.displacement == pytest.approx(np.maximum(3e-3 + cluster.z, 0.0))
+    assert solution.indentation == pytest.approx(solution.displacement)
+    assert solution.iterations == 0 and solution.residual == 0.0
 
 
 @interacting
 def test_neighbours_share_the_load(cluster, name):
-    alone = asperity_model(f"{name}-independent", cluster, contact_modulus=E_STAR).solve(3e-3)
-    state = asperity_model(name, cluster, contact_modulus=E_STAR).solve(3e-3)
-    assert np.all(state.force <= alone.force)
-    assert state.force.sum() < 0.9 * alone.force.sum()
-    assert np.all(state.displacement >= state.interference - 1e-10 * 3e-3)
-    assert np.all(state.displacement > state.indentation)  # the others press every summit
+    alone = AsperityModel(f"{name}-independent", cluster, contact_modulus=E_STAR).solve(3e-3)
+    model = AsperityModel(name, cluster, contact_modulus=E_STAR)
+    state = model.solve(3e-3)
+    moved = displacement(model, state)
+    assert np.all(state.contacts.force <= alone.contacts.force)
+    assert state.contacts.force.sum() < 0.9 * alone.contacts.force.sum()
+    assert np.all(moved >= interference(cluster, state) - 1e-10 * 3e-3)
+    assert np.all(moved > state.start.solution.indentation)  # the others press every summit
 
 
 @every_model
 def test_state_is_consistent(cluster, name):
-    state = asperity_model(name, cluster, contact_modulus=E_STAR).solve(4e-3)
-    on = state.in_contact
-    assert 0 < on.sum() and np.all(state.force[~on] == 0.0)
-    assert state.contact_area == pytest.approx(np.pi * state.semi_axes.prod(axis=1))
-    mean_pressure = state.force[on] / state.contact_area[on]
-    assert state.peak_pressure[on] == pytest.approx(1.5 * mean_pressure)
+    state = AsperityModel(name, cluster, contact_modulus=E_STAR).solve(4e-3)
+    on = state.start.solution.indentation > 0.0
+    assert 0 < on.sum() and np.all(state.contacts.force[~on] == 0.0)
+    assert state.contacts.area == pytest.approx(np.pi * state.contacts.semi_axes.prod(axis=1))
 
 
 @every_model
 @pytest.mark.parametrize("approach", [0.0, -1e-3])
 def test_before_touch(cluster, name, approach):
-    model = asperity_model(name, cluster, contact_modulus=E_STAR)
+    model = AsperityModel(name, cluster, contact_modulus=E_STAR)
     state = model.solve(approach)
-    assert not state.in_contact.any() and not state.displacement.any()
+    assert not state.contacts.force.any() and not displacement(model, state).any()
     response = respond(model, [approach])
     assert response.force == [0.0] and response.contacts == [0] and not response.patch_force.any()
     assert response.mean_separation == pytest.approx([0.02 - approach])
@@ -85,39 +87,38 @@ def test_before_touch(cluster, name, approach):
 @every_model
 def test_no_asperities(summits, name):
     none = summits([], [], highest=0.0)
-    model = asperity_model(name, none, contact_modulus=E_STAR)
-    assert len(model.solve(1e-3).force) == 0
+    model = AsperityModel(name, none, contact_modulus=E_STAR)
+    assert len(model.solve(1e-3).contacts.force) == 0
     assert respond(model, [1e-3, 2e-3]).force.tolist() == [0.0, 0.0]
 
 
 @interacting
 def test_warm_start(cluster, name):
-    model = asperity_model(name, cluster, contact_modulus=E_STAR)
+    model = AsperityModel(name, cluster, contact_modulus=E_STAR)
     near = model.solve(4.0e-3)
-    cold, warm = model.solve(4.1e-3), model.solve(4.1e-3, start=near)
+    cold, warm = model.solve(4.1e-3), model.solve(4.1e-3, start=near.start)
     assert warm.iterations < cold.iterations
-    assert warm.force == pytest.approx(cold.force, rel=1e-8)  # both stop at 1e-10 in displacement
+    # both stop at 1e-10 in displacement
+    assert warm.contacts.force == pytest.approx(cold.contacts.force, rel=1e-8)
 
 
 @every_model
 def test_curve_is_made_of_states(cluster, name):
-    model = asperity_model(name, cluster, contact_modulus=E_STAR)
+    model = AsperityModel(name, cluster, contact_modulus=E_STAR)
     approaches = np.array([4e-3, 0.0, 1e-3, 8e-3, 4e-3])  # any order, repeated
     response = respond(model, approaches)
     assert response.approach.tolist() == approaches.tolist()
-    place = np.stack([cluster.x, cluster.y], axis=1)
     for row, approach in enumerate(approaches):
         state = model.solve(approach)
-        assert response.force[row] == pytest.approx(state.force.sum(), rel=1e-7, abs=1e-15)
-        assert response.contact_area[row] == pytest.approx(state.contact_area.sum(), rel=1e-7)
-        assert response.contacts[row] == state.in_contact.sum()
-        share = shares(PATCHES, place, state.semi_axes, cluster.angle)
-        by_patch = np.bincount(share.patch, share.force * state.force[share.contact], minlength=4)
+        assert response.force[row] == pytest.approx(state.contacts.force.sum(), rel=1e-7, abs=1e-15)
+        assert response.contact_area[row] == pytest.approx(state.contacts.area.sum(), rel=1e-7)
+        assert response.contacts[row] == (state.contacts.force > 0.0).sum()
+        by_patch, _ = patch_loads(PATCHES, state.contacts)
         assert response.patch_force[row] == pytest.approx(by_patch, rel=1e-7, abs=1e-12)
 
 
 def test_without_patches_the_whole_surface_is_one(cluster):
-    model = asperity_model("elliptic", cluster, contact_modulus=E_STAR)
+    model = AsperityModel("elliptic", cluster, contact_modulus=E_STAR)
     alone, given = model.respond([4e-3]), respond(model, [4e-3], ONE_PATCH)
     assert alone.patch_force[0] == alone.force == given.force
     assert alone.mean_separation == given.mean_separation
@@ -130,7 +131,7 @@ def test_without_patches_the_whole_surface_is_one(cluster):
 
 @every_model
 def test_tilt(cluster, name):
-    model = asperity_model(name, cluster, contact_modulus=E_STAR)
+    model = AsperityModel(name, cluster, contact_modulus=E_STAR)
     tilt = (5e-3, -8e-3)
     state = model.solve(3e-3, tilt=tilt)
     # The same as asperities of other heights under a level plane.
@@ -144,10 +145,10 @@ def test_tilt(cluster, name):
         highest=0.0,
         mean_height=-0.02,
     )
-    level = asperity_model(name, turned, contact_modulus=E_STAR).solve(3e-3)
-    assert state.force == pytest.approx(level.force, rel=1e-9)
+    level = AsperityModel(name, turned, contact_modulus=E_STAR).solve(3e-3)
+    assert state.contacts.force == pytest.approx(level.contacts.force, rel=1e-9)
     response = respond(model, [3e-3], tilt=tilt)
-    assert response.force[0] == pytest.approx(state.force.sum(), rel=1e-9)
+    assert response.force[0] == pytest.approx(state.contacts.force.sum(), rel=1e-9)
     # The plane's mean approach is that of its centre, patch by patch that of the patch's centre.
     local = 3e-3 + (PATCHES.centres - 0.5) @ np.array(tilt)
     gap = 0.02 - local + response.patch_displacement[0]
@@ -157,10 +158,12 @@ def test_tilt(cluster, name):
 
 @every_model
 def test_homogeneous_in_the_modulus(cluster, name):
-    soft, hard = (asperity_model(name, cluster, contact_modulus=E).solve(4e-3) for E in (1.0, 7e4))
-    assert hard.force == pytest.approx(7e4 * soft.force, rel=1e-12)  # rounding only
-    assert hard.contact_area == pytest.approx(soft.contact_area, rel=1e-12)
-    assert hard.displacement == pytest.approx(soft.displacement, rel=1e-12)
+    soft, hard = (AsperityModel(name, cluster, contact_modulus=E).solve(4e-3) for E in (1.0, 7e4))
+    # rounding only
+    assert hard.contacts.force == pytest.approx(7e4 * soft.contacts.force, rel=1e-12)
+    assert hard.contacts.area == pytest.approx(soft.contacts.area, rel=1e-12)
+    moved = [state.start.solution.displacement for state in (soft, hard)]
+    assert moved[1] == pytest.approx(moved[0], rel=1e-12)
 
 
 def test_round_asperities_make_the_models_equal(summits):
@@ -169,36 +172,36 @@ def test_round_asperities_make_the_models_equal(summits):
         *rng.random((2, 40)), z=-5e-3 * rng.random(40), major=0.02 + 0.1 * rng.random(40)
     )
     ellipse, circle = (
-        asperity_model(name, balls, contact_modulus=E_STAR).solve(8e-3)
+        AsperityModel(name, balls, contact_modulus=E_STAR).solve(8e-3)
         for name in ("elliptic", "circular")
     )
-    assert circle.in_contact.sum() > 10
+    assert (circle.contacts.force > 0.0).sum() > 10
     # Kernels agree to 1e-13; both iterations take the same path to the same 1e-10.
-    assert ellipse.force == pytest.approx(circle.force, rel=1e-12)
-    assert ellipse.contact_area == pytest.approx(circle.contact_area, rel=1e-12)
+    assert ellipse.contacts.force == pytest.approx(circle.contacts.force, rel=1e-12)
+    assert ellipse.contacts.area == pytest.approx(circle.contacts.area, rel=1e-12)
 
 
 @interacting
 def test_surface_displacement(cluster, name):
-    model = asperity_model(name, cluster, contact_modulus=E_STAR)
+    model = AsperityModel(name, cluster, contact_modulus=E_STAR)
     state = model.solve(2e-4)  # small contacts: no kernel is continued
     assert state.overlapping_contacts == 0
-    summits = model.surface_displacement(state, cluster.x, cluster.y)
-    assert summits == pytest.approx(state.displacement, rel=1e-12)
-    far = model.surface_displacement(state, 1e3, 0.0)
-    assert far == pytest.approx(state.force.sum() / (np.pi * E_STAR * 1e3), rel=1e-2)
+    summits = surface_displacement(model, state, cluster.x, cluster.y)
+    assert summits == pytest.approx(displacement(model, state), rel=1e-12)
+    far = surface_displacement(model, state, 1e3, 0.0)
+    assert far == pytest.approx(state.contacts.force.sum() / (np.pi * E_STAR * 1e3), rel=1e-2)
 
 
 def test_refuses(cluster):
     with pytest.raises(
         InputError, match=r"'flat': this micro model is unknown.*elliptic, circular"
     ):
-        asperity_model("flat", cluster, contact_modulus=1.0)
+        AsperityModel("flat", cluster, contact_modulus=1.0)
     with pytest.raises(InputError, match=r"'lemke': this solver is unknown.*truncated-newton"):
-        asperity_model("circular", cluster, contact_modulus=1.0, solver="lemke")
+        AsperityModel("circular", cluster, contact_modulus=1.0, solver="lemke")
     with pytest.raises(InputError, match=r"-1\.0: the contact modulus must be positive"):
-        asperity_model("circular", cluster, contact_modulus=-1.0)
-    model = AsperityModel(asperities=cluster, contact_modulus=1.0, elliptic=True, interacting=True)
+        AsperityModel("circular", cluster, contact_modulus=-1.0)
+    model = AsperityModel("elliptic", cluster, contact_modulus=1.0)
     with pytest.raises(InputError, match="inf: the approach must be finite"):
         model.solve(np.inf)
     with pytest.raises(InputError, match=r"\(3,\): every patch needs one mean height"):

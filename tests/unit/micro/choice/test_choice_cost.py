@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from micro.choice.cost import contact_box_share, solution_seconds
+from micro.choice.models import contact_box_share, solution_seconds
 
 
 def test_the_box_of_a_cap_grows_with_the_load():

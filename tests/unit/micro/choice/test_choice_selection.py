@@ -12,18 +12,18 @@ from micro import AsperityModel, HalfSpaceModel, choose
 WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
 
 
-def rough(seed: int, grid: int = 64, top: int = 6, periodic: bool = False) -> Surface:
+def rough(seed: int, grid: int = 64, top: int = 6) -> Surface:
     spectrum = Spectrum(hurst=0.8, waves=(2, top), rms_slope=0.2, seed=seed)
     made = synthesise(spectrum, grid=(grid, grid), lengths=(1.0, 1.0))
-    return Surface(heights=made.heights, lengths=made.lengths, periodic=periodic)
+    return Surface(heights=made.heights, lengths=made.lengths)
 
 
 def force(model, approaches):
     return model.respond(approaches, patches=WHOLE, mean_heights=[0.0]).force
 
 
-def fine(surface, cells, **options):
-    return HalfSpaceModel(surface, contact_modulus=1.0, **options).resampled((cells, cells))
+def fine(surface, cells):
+    return HalfSpaceModel(surface, contact_modulus=1.0).resampled((cells, cells))
 
 
 @pytest.mark.parametrize(
@@ -49,16 +49,6 @@ def test_promised_tolerances_are_kept(grid, hurst, band):
         np.testing.assert_allclose(force(choice.model, loads), truth, rtol=tolerance)
 
 
-def test_a_periodic_surface_gets_a_periodic_model():
-    surface = rough(6, periodic=True)
-    approach = 0.8 * surface.heights.std()
-    choice = choose(surface, contact_modulus=1.0, approach=approach, tolerance=0.05, periodic=True)
-    assert choice.model.name == "half-space-periodic"
-    assert all(c.label.startswith("half-space on") for c in choice.candidates)
-    truth = force(fine(surface, 256, periodic=True), [approach])
-    np.testing.assert_allclose(force(choice.model, [approach]), truth, rtol=0.05)
-
-
 def test_a_looser_tolerance_costs_no_more():
     costs = [
         choose(rough(3), contact_modulus=1.0, approach=0.02, tolerance=t).taken.cost
@@ -80,7 +70,7 @@ def test_the_check_is_the_difference_from_the_surfaces_own_grid():
     choice = choose(surface, contact_modulus=1.0, approach=0.02, tolerance=0.2)
     own = HalfSpaceModel(surface=surface, contact_modulus=1.0)
     expected = abs(force(choice.model, [0.01])[0] / force(own, [0.01])[0] - 1.0)
-    assert choice.checked_error == pytest.approx(expected, abs=1e-12)
+    assert choice.taken.checked_error == pytest.approx(expected, abs=1e-12)
     assert (
         f"{100 * expected:.2g} % from the half-space solution on 96 × 96 cells" in choice.sentence
     )
@@ -91,12 +81,12 @@ def test_the_surfaces_own_grid_is_checked_against_a_finer_one():
     choice = choose(surface, contact_modulus=1.0, approach=0.02, tolerance=0.2, label=own)
     expected = abs(force(choice.model, [0.01])[0] / force(fine(surface, 96), [0.01])[0] - 1.0)
     assert choice.taken.label == own
-    assert 0.0 < choice.checked_error == pytest.approx(expected, abs=1e-12)
+    assert 0.0 < choice.taken.checked_error == pytest.approx(expected, abs=1e-12)
 
 
 def test_a_failed_check_gives_way_to_the_next_and_says_so(monkeypatch):
     # A bound far too good promises everything; the check refuses what asperities give.
-    monkeypatch.setattr("micro.choice.candidates.contact_error", lambda kind, at: 1e-5)
+    monkeypatch.setattr("micro.choice.models.contact_error", lambda kind, at: 1e-5)
     choice = choose(rough(5), contact_modulus=1.0, approach=0.02, tolerance=0.005)
     assert "circular-independent differs by" in choice.sentence
     assert "none that was checked keeps" in choice.sentence
@@ -109,7 +99,7 @@ def test_a_model_without_a_solution_gives_way(monkeypatch):
     def stuck(*_, **__):
         raise NotConverged("nothing", reason="STUCK", iterations=1, remedy="none")
 
-    monkeypatch.setattr("micro.choice.candidates.contact_error", lambda kind, at: 1e-5)
+    monkeypatch.setattr("micro.choice.models.contact_error", lambda kind, at: 1e-5)
     monkeypatch.setattr(AsperityModel, "respond", stuck)
     choice = choose(rough(5), contact_modulus=1.0, approach=0.02, tolerance=0.1)
     assert "circular-independent has no solution when checked" in choice.sentence
@@ -137,7 +127,6 @@ def test_coarse_grids_must_resolve_the_patches():
         ({"tolerance": 0.0}, "tolerance is out of range"),
         ({"tolerance": 0.5}, "tolerance is out of range"),
         ({"solutions": 0}, "number of solutions is out of range"),
-        ({"periodic": True}, "surface to continue is out of range"),
     ],
 )
 def test_refuses(options, problem):
@@ -153,3 +142,11 @@ def test_an_earlier_choice_is_taken_again():
     assert again.taken.label == other
     with pytest.raises(InputError, match="'a better one': is no micro model here"):
         choose(surface, contact_modulus=1.0, approach=0.01, label="a better one")
+
+
+def test_interacting_asperities_are_left_out_where_their_pairs_do_not_fit(monkeypatch):
+    monkeypatch.setattr("micro.interaction.contact_problem.process_memory", lambda: 1e3)
+    choice = choose(rough(5, top=20), contact_modulus=1.0, approach=0.02, tolerance=0.3)
+    labels = {candidate.label for candidate in choice.candidates}
+    assert "circular-independent" in labels and "half-space on 64 × 64 cells" in labels
+    assert not labels & {"circular", "elliptic"} and not any("scale" in name for name in labels)

@@ -4,7 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from geometry import PatchGrid, UnevenPartition
+from geometry import PatchGrid
 from micro import influence_matrix
 from micro.closed_forms.love import love_mean, mutual_influence
 from micro.compliance.grid_compliance import Compliance
@@ -74,15 +74,3 @@ def test_means_over_patches_agree_with_the_cell_kernel():
     error = [np.abs(found / expected - 1.0).max() for found in displaced]
     assert error[1] < 1e-3
     assert error[1] < 0.4 * error[0]
-
-
-def test_unequal_rectangles_sum_up_equal_ones():
-    fine = PatchGrid(grid=(8, 6), lengths=(1.0, 1.3), origin=(0.2, -0.1))
-    uneven = UnevenPartition(
-        ticks_x=tuple(fine.borders_x[[0, 1, 4, 6, 8]]), ticks_y=tuple(fine.borders_y[[0, 3, 4, 6]])
-    )
-    gather = np.equal.outer(np.arange(uneven.count), uneven.index_of(*fine.centres.T))
-    means = gather / gather.sum(axis=1, keepdims=True)
-    whole = means @ influence_matrix(fine) @ gather.T
-    # rounding of the closed form, (distance / side)⁴
-    assert influence_matrix(uneven) == pytest.approx(whole, rel=1e-12)

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from boussinesq import love_integral
 from scipy import fft
 
-from micro.closed_forms.love import love_integral
 from micro.compliance.grid_compliance import Compliance, GridCompliance
 from micro.compliance.half_space_grid import (
     Cells,

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from boussinesq import stresses
 
 from geometry import Material, UnevenPartition
-from micro.closed_forms.boussinesq import stresses
 from micro.compliance.quarter_space import side_pressure_stresses, side_stresses
 
 RATIOS = [-0.5, 0.0, 0.15, 0.45]

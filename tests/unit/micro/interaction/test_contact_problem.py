@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from asperity_states import places
 
 from geometry import InputError, NotConverged
-from micro.closed_forms.ellipse import shape_factors
+from micro.closed_forms.hertz import shape_factors
+from micro.interaction import contact_problem
 from micro.interaction.contact_problem import (
     BYTES_PER_PAIR,
     TOLERANCE,
@@ -19,8 +21,8 @@ from micro.interaction.hertz_pairs import HertzPairs
 @pytest.fixture
 def problem(cluster):
     shape = shape_factors(cluster.radius_major, cluster.radius_minor)
-    kernel = HertzPairs.among(cluster, shape, circular=False)
-    return ContactProblem(interaction=kernel, interference=5e-3 + cluster.z)
+    kernel = HertzPairs(**places(cluster), shape=shape, circular=False)
+    return ContactProblem(interaction=kernel.evaluate, interference=5e-3 + cluster.z)
 
 
 def refusing(limit):
@@ -65,14 +67,15 @@ def test_gives_up_loudly(problem):
         solve(problem, method, np.zeros(7))
 
 
-def test_pairs_that_do_not_fit_into_the_memory_are_refused():
+def test_pairs_that_do_not_fit_into_the_memory_are_refused(monkeypatch):
     most = BYTES_PER_PAIR * 3000.0**2
-    checked_pairs(3000, 3000, "asperities", available=most)
+    monkeypatch.setattr(contact_problem, "process_memory", lambda: most)
+    checked_pairs(3000, 3000, "asperities")
     message = (
         r"^micro\.model: the interaction of 3001 asperities needs 0\.432 GB of memory and 0\.432 GB"
         r" are there \(allowed: half-space, "
     )
     with pytest.raises(InputError, match=message):
-        checked_pairs(3001, 3001, "asperities", available=most)
+        checked_pairs(3001, 3001, "asperities")
     with pytest.raises(InputError, match="of 1000 islands needs 480 GB"):
-        checked_pairs(10**7, 1000, "islands", available=most)
+        checked_pairs(10**7, 1000, "islands")

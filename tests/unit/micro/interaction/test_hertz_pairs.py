@@ -2,17 +2,19 @@
 
 import numpy as np
 import pytest
+from asperity_states import places
 from scipy.special import elliprf
 
-from micro.closed_forms.ellipse import shape_factors
-from micro.closed_forms.hertz import HertzContact
-from micro.interaction.hertz_pairs import MERGING_SLOPE, HertzPairs, merging_parameter
+from micro.closed_forms.hertz import HertzContact, shape_factors
+from micro.compliance.body_modes import BodyModes
+from micro.interaction.hertz_pairs import MERGING_SLOPE, BodyPoints, HertzPairs, merging_parameter
 
 
 def interaction(asperities, circular):
     major = asperities.radius if circular else asperities.radius_major
     minor = asperities.radius if circular else asperities.radius_minor
-    return HertzPairs.among(asperities, shape_factors(major, minor), circular=circular)
+    shape = shape_factors(major, minor)
+    return HertzPairs(**places(asperities), shape=shape, circular=circular)
 
 
 both_shapes = pytest.mark.parametrize("circular", [True, False], ids=["circular", "elliptic"])
@@ -103,3 +105,15 @@ def test_round_ellipses_are_circles(summits):
     circle, ellipse = (interaction(balls, circular).evaluate(own) for circular in (True, False))
     assert ellipse.displacement == pytest.approx(circle.displacement, rel=1e-12)
     assert ellipse.derivative == pytest.approx(circle.derivative, rel=1e-12, abs=0.0)
+
+
+def test_body_between_points_counts_from_the_corner_of_its_top():
+    rng = np.random.default_rng(2)
+    half = rng.normal(size=(9, 9))
+    body = BodyModes((2.0, 3.0), half @ half.T, (-0.5, -1.0))
+    x, y = rng.random((2, 5))
+    points = BodyPoints.at(body, x, y)
+    expected = body.between(x, y)
+    np.testing.assert_allclose(points.by(points), expected, atol=1e-12 * np.abs(expected).max())
+    force = rng.random(5)
+    np.testing.assert_allclose(points.displacement(force), expected @ force, rtol=1e-10)

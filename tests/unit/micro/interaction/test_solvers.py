@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from asperity_states import places
 
 from geometry import NotConverged
-from micro.closed_forms.ellipse import shape_factors
+from micro.closed_forms.hertz import shape_factors
 from micro.interaction.contact_problem import TOLERANCE, ContactProblem, active_set, damped_step
 from micro.interaction.hertz_pairs import HertzPairs
 from micro.interaction.truncated_newton import truncated_newton
@@ -12,9 +13,9 @@ from micro.interaction.truncated_newton import truncated_newton
 
 def problem(asperities, approach):
     shape = shape_factors(asperities.radius_major, asperities.radius_minor)
-    kernel = HertzPairs.among(asperities, shape, circular=False)
+    kernel = HertzPairs(**places(asperities), shape=shape, circular=False)
     interference = np.maximum(approach + asperities.z, 1e-9)
-    return ContactProblem(interaction=kernel, interference=interference)
+    return ContactProblem(interaction=kernel.evaluate, interference=interference)
 
 
 both = pytest.mark.parametrize("method", [active_set, truncated_newton])

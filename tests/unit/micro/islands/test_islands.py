@@ -17,9 +17,9 @@ from geometry import (
 )
 from geometry.rigid_plane import PlaneLevers
 from micro import IslandModel
+from micro.interaction.plane_on_peaks import Peaks
 from micro.islands.equilibrium import IslandContact
 from micro.islands.watersheds import Watersheds
-from micro.plane_on_peaks import Peaks
 
 PATCHES = PatchGrid(grid=(2, 3), lengths=(1.0, 1.0))
 
@@ -46,9 +46,13 @@ def test_curve_is_made_of_states(model):
     assert response.model == "islands" and response.approach.tolist() == approaches.tolist()
     for row, approach in enumerate(approaches):
         state = model.solve(approach)
-        assert response.force[row] == state.force.sum()  # no result depends on another
-        assert response.contact_area[row] == state.contact_area.sum()
-        assert response.contacts[row] == len(state.force) == response.patch_contacts[row].sum()
+        assert response.force[row] == state.contacts.force.sum()  # no result depends on another
+        assert response.contact_area[row] == state.contacts.area.sum()
+        assert (
+            response.contacts[row]
+            == len(state.contacts.force)
+            == response.patch_contacts[row].sum()
+        )
     # Shares of an island add up to one, to rounding.
     assert response.patch_force.sum(axis=1) == pytest.approx(response.force, rel=1e-13)
     assert response.patch_contact_area.sum(axis=1) == pytest.approx(response.contact_area)
@@ -65,8 +69,8 @@ def test_before_touch(model):
 def test_is_homogeneous_in_the_modulus(surface, model):
     soft = IslandModel(surface=surface, contact_modulus=1.0).solve(8e-3)
     hard = model.solve(8e-3)
-    assert hard.force == pytest.approx(4000.0 * soft.force, rel=1e-13)
-    assert hard.semi_axes == pytest.approx(soft.semi_axes, rel=1e-13)
+    assert hard.contacts.force == pytest.approx(4000.0 * soft.contacts.force, rel=1e-13)
+    assert hard.contacts.semi_axes == pytest.approx(soft.contacts.semi_axes, rel=1e-13)
 
 
 def test_tilt_is_a_tilted_surface(surface):
@@ -78,9 +82,9 @@ def test_tilt_is_a_tilted_surface(surface):
     approach = 8e-3 + turned.highest - surface.highest
     level = IslandModel(surface=turned, contact_modulus=4000.0).solve(approach)
     tilted = model.solve(8e-3, tilt=tilt)
-    assert tilted.force.sum() == pytest.approx(level.force.sum(), rel=1e-9)
+    assert tilted.contacts.force.sum() == pytest.approx(level.contacts.force.sum(), rel=1e-9)
     response = respond(model, [8e-3], tilt=tilt)
-    assert response.force[0] == pytest.approx(tilted.force.sum(), rel=1e-9)
+    assert response.force[0] == pytest.approx(tilted.contacts.force.sum(), rel=1e-9)
 
 
 def test_border_cuts_a_summit_in_half():
@@ -94,10 +98,12 @@ def test_border_cuts_a_summit_in_half():
         ).solve(2e-3)
         for centre in (0.5, 0.0)
     )
-    assert half.indentation == pytest.approx(whole.indentation, rel=1e-9)  # the spline is exact
+    assert half.contacts.depth == pytest.approx(
+        whole.contacts.depth, rel=1e-9
+    )  # the spline is exact
     # Half the volume: R is halved, so the force is 1/√2 of the whole but for the shape's factor.
-    assert half.force[0] / whole.force[0] == pytest.approx(np.sqrt(0.5), rel=0.06)
-    assert half.x[0] > 0.0
+    assert half.contacts.force[0] / whole.contacts.force[0] == pytest.approx(np.sqrt(0.5), rel=0.06)
+    assert half.contacts.x[0] > 0.0
 
 
 def test_patches_share_an_island_by_area():
@@ -118,9 +124,9 @@ def test_flat_surface_is_reported():
         surface=Surface(heights=np.zeros((16, 16)), lengths=(1.0, 1.0)), contact_modulus=1.0
     )
     state = flat.solve(1e-3)
-    assert state.contact_area == pytest.approx([1.0])  # half a cap's base would be; it is flagged
-    assert "the islands cover 100.0% of the surface, the largest 100% of it" in state.warning
-    assert respond(flat, [-1e-3, 1e-3]).warnings == (state.warning,)
+    assert state.contacts.area == pytest.approx([1.0])  # half a cap's base would be; it is flagged
+    (warning,) = respond(flat, [-1e-3, 1e-3]).warnings
+    assert "the islands cover 100.0% of the surface, the largest 100% of it" in warning
 
 
 def test_plateau_is_one_contact():
@@ -128,16 +134,19 @@ def test_plateau_is_one_contact():
     dome = -((x[:, None] - 0.5) ** 2 + (x - 0.5) ** 2) / 0.4
     surface = Surface(heights=np.minimum(dome, -5e-3), lengths=(1.0, 1.0))
     state = IslandModel(surface=surface, contact_modulus=1.0).solve(2e-3)
-    assert len(state.force) == 1 and state.merged > 0  # ties and the spline's ripples on the edge
+    assert (
+        len(state.contacts.force) == 1 and state.overlapping_contacts > 0
+    )  # ties and the spline's ripples on the edge
     # More than the plateau's own area touches, and less than the base of what lies above.
     flat, base = np.pi * 0.4 * 5e-3, np.pi * 0.4 * 7e-3
-    assert 0.5 * flat < state.contact_area[0] < base
+    assert 0.5 * flat < state.contacts.area[0] < base
 
 
 def test_approach_beyond_the_range_of_heights(model):
     depth = 3.0 * np.ptp(model.surface.heights)
     state = model.solve(depth)
-    assert len(state.force) == 1 and np.isfinite(state.force[0]) and state.warning
+    assert len(state.contacts.force) == 1 and np.isfinite(state.contacts.force[0])
+    assert respond(model, [depth]).warnings
 
 
 def test_refuses(surface, model):

@@ -25,7 +25,7 @@ def patchlaw(root, tmp_path):
             *options,
         ]
         return subprocess.run(
-            [sys.executable, "-m", "multiscale", *map(str, words)],
+            [sys.executable, "-m", "patchlaw", *map(str, words)],
             cwd=root,
             capture_output=True,
             text=True,

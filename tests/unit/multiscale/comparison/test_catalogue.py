@@ -9,13 +9,12 @@ import pytest
 
 from geometry.patches import PatchGrid
 from multiscale.comparison.catalogue import SMALL_SLOPES, configurations
-from multiscale.comparison.compare import ranked, refinements, resolved_scene
-from multiscale.comparison.configuration import pressure_grid
-from multiscale.comparison.error_measures import Curves
-from multiscale.comparison.run_result import RunResult
+from multiscale.comparison.compare import resolved_scene
+from multiscale.comparison.comparison import ranked, refinements
+from multiscale.comparison.configuration import Curves, RunResult, pressure_grid
 from multiscale.planning.auto_keys import auto_keys
 from multiscale.scene.scene import Scene
-from multiscale.setup.checks import LAW_BLOCK_CELLS
+from multiscale.setup.surface_and_block import LAW_BLOCK_CELLS
 
 COLUMNS = (
     "approach", "force", "area", "separation", "approach_error", "force_error", "area_error",
@@ -179,8 +178,8 @@ def test_the_best_has_finite_slopes_and_then_the_most_heights():
     best = ranked(found, "concurrent")
     assert best[0].configuration.heights == (256, 256)
     assert best[-1].configuration.name.endswith(SMALL_SLOPES)
-    ((coarse, fine),) = refinements(best)
-    assert (coarse, fine) == tuple(f"concurrent, half-space {n} × {n}" for n in (128, 256))
+    (pair,) = refinements(best)
+    assert [one.name for one in pair] == [f"concurrent, half-space {n} × {n}" for n in (128, 256)]
 
 
 def test_all_configurations_but_one_of_low_heights_see_the_true_ones():

@@ -8,15 +8,20 @@ import pytest
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from multiscale.comparison.comparison import Comparison, Row
-from multiscale.comparison.error_measures import ErrorMeasures
+from multiscale.comparison.configuration import Configuration
+from multiscale.comparison.errors import ErrorMeasures
 
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
 
 
 def row(name, seconds, error, status="done"):
+    content = {
+        "surface": {"grid": [8, 8]}, "patches": {"grid": [2, 2]}, "block": {},
+        "coupling": {"kind": "analytic"}, "micro": {"model": "elliptic"},
+    }  # fmt: skip
     return Row(
-        name=name, kind="analytic", model="elliptic", heights="8x8", patches="2x2", cells="",
-        status=status, seconds=seconds,
+        configuration=Configuration(name=name, content=content, cost=1.0),
+        status=status, phases={"load steps": seconds},
         errors=ErrorMeasures(force_max=error, approach_max=2 * error),
     )  # fmt: skip
 

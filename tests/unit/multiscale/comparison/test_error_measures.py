@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.stats import wasserstein_distance
 
-from geometry.errors import InputError
 from geometry.patches import PatchGrid
-from multiscale.comparison.error_measures import Curves, error_measures, on_grid, uncertainty
+from multiscale.comparison.configuration import Curves
+from multiscale.comparison.errors import error_measures, on_grid, uncertainty
 
 ROUNDING = 1e-12  # sums of a few dozen doubles
 
@@ -115,8 +115,3 @@ def test_nothing_is_known_without_error_bar_or_refinement():
     best = curves([2.0, 4.0])
     found = uncertainty(best, [], best.patches)
     assert np.isnan([getattr(found, name) for name in found.__slots__]).all()
-
-
-def test_pressures_must_fit():
-    with pytest.raises(InputError, match="patch pressures do not fit the load steps"):
-        curves([1.0], [[1.0, 2.0]])

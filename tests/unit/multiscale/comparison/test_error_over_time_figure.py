@@ -1,16 +1,17 @@
 """What the figure of error over time tells: the whole frontier, and nothing over another."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from matplotlib.text import Text
 
 from geometry.patches import PatchGrid
 from multiscale.comparison.comparison import Comparison, Row
-from multiscale.comparison.error_measures import ErrorMeasures
+from multiscale.comparison.configuration import Configuration, Curves
+from multiscale.comparison.errors import ErrorMeasures
 from multiscale.comparison.figures import pareto_figure
 
+PATCHES = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
+CURVES = ("approach", "force", "area", "separation", "approach_error", "force_error", "area_error")
 KINDS = ("analytic", "isolated", "consistent", "concurrent", "reference")
 
 
@@ -18,11 +19,17 @@ def errors(size):
     return ErrorMeasures(force_max=size, area_max=size, distribution=size)
 
 
-def row(number, seconds, size, **more):
+def row(number, seconds, size, *, steps=8, name="", status="done", is_measure=False):
     kind = KINDS[number % len(KINDS)]
-    given = {"model": "", "heights": "", "patches": "", "cells": "", "status": "done", "steps": 8}
-    given |= {"name": f"{kind}, number {number}", "kind": kind, "seconds": seconds}
-    return Row(errors=errors(size), **given | more)
+    configuration = Configuration(
+        name=name or f"{kind}, number {number}", content={"coupling": {"kind": kind}}, cost=1.0
+    )
+    numbers = dict.fromkeys(CURVES, np.ones(steps))
+    curves = Curves(patches=PATCHES, patch_pressure=np.ones((steps, 1)), **numbers)
+    return Row(
+        configuration=configuration, status=status, phases={"load steps": seconds}, curves=curves,
+        is_measure=is_measure, errors=errors(size),
+    )  # fmt: skip
 
 
 def comparison(rows, bar=1e-3):
@@ -32,7 +39,7 @@ def comparison(rows, bar=1e-3):
         rows=(*rows, measure),
         quantity="approach",
         steps=8,
-        grid=PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)),
+        grid=PATCHES,
         measure="measure",
         uncertainty=errors(bar),
     )
@@ -75,7 +82,7 @@ def labels(figure):
 def test_legend_tells_of_configurations_that_ended_early_where_there_are_any():
     rows = [row(0, 0.1, 0.1), row(1, 1.0, 0.01)]
     assert not any(label.startswith("hollow") for label in labels(pareto_figure(comparison(rows))))
-    rows[0] = replace(rows[0], status="not converged", steps=3)
+    rows[0] = row(0, 0.1, 0.1, status="not converged", steps=3)
     figure = pareto_figure(comparison(rows))
     assert "hollow: ended before the last load step" in labels(figure)
     hollow = [line for line in panels(figure)[0].lines if line.get_markerfacecolor() == "none"]

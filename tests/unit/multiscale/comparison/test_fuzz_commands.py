@@ -1,13 +1,16 @@
 """Comparisons of any scenes, and command lines of any words, end in order or in one line."""
 
-import json
-
 from command_words import called, lines
 from compared_inputs import asked, compared
 from hypothesis import HealthCheck, given, settings
 from scene_inputs import BASE, toml
 
-from multiscale.comparison.run_result import RunResult, read_result, write_result
+from multiscale.comparison.configuration import (
+    Configuration,
+    RunResult,
+    read_result,
+    write_result,
+)
 
 few = settings(
     derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)
@@ -31,12 +34,13 @@ def test_command_lines_of_any_words(tmp_path_factory, words):
 
 
 def test_a_damaged_file_is_no_result(tmp_path):
-    result = RunResult(configuration=None, status="done", start_s=0.25)
+    one = Configuration(name="one", content={}, cost=1.0)
+    result = RunResult(configuration=one, status="done", start_s=0.25)
     path = write_result(tmp_path / "a.json", result)
     whole = path.read_text(encoding="utf-8")
-    assert read_result(path, None).start_s == 0.25
+    assert read_result(path).start_s == 0.25
     for damaged in (whole.replace("0.25", "0.35"), whole[:-9], "[" * 10**5, "{}", '"sha256"', ""):
         path.write_text(damaged, encoding="utf-8")
-        assert read_result(path, None) is None
-    path.write_text(json.dumps(json.loads(whole)["result"]), encoding="utf-8")  # of earlier ones
-    assert read_result(path, None) is None
+        assert read_result(path) is None
+    path.write_text(whole.partition("\n")[2], encoding="utf-8")
+    assert read_result(path) is None

@@ -1,5 +1,6 @@
 """The dense Newton method against closed forms and scipy, bordered by force and moment."""
 
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,7 +10,7 @@ from scipy.optimize import brentq, root
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
-from multiscale.couplings.dense_newton import DenseNewton
+from multiscale.couplings.condensed import equilibrium
 
 
 class HertzLaws:
@@ -58,8 +59,8 @@ def imbalance(state, laws, matrix):
 
 def test_one_patch_is_a_scalar_equation():
     patch = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
-    newton = DenseNewton(HertzLaws([1e-3]), np.array([[2e-4]]), patch)
-    state = newton.solve(Control(approach=8e-3))
+    newton = partial(equilibrium, HertzLaws([1e-3]), np.array([[2e-4]]), patch)
+    state = newton(Control(approach=8e-3))
     depth = brentq(lambda w: w + 2e-4 * 1e5 * w**1.5 - 7e-3, 0.0, 7e-3, xtol=1e-18)
     # the solver's residual of 1e-12, and brentq's
     assert state.load[0] == pytest.approx(1e5 * depth**1.5, rel=1e-11)
@@ -68,7 +69,7 @@ def test_one_patch_is_a_scalar_equation():
 def test_many_patches_agree_with_another_solver():
     laws, matrix = HertzLaws(touches()), compliance()
     tilt = (4e-3, -2e-3)
-    state = DenseNewton(laws, matrix, PATCHES).solve(Control(approach=8e-3, tilt=tilt))
+    state = equilibrium(laws, matrix, PATCHES, Control(approach=8e-3, tilt=tilt))
 
     def gap(closure):
         depth = np.maximum(closure - laws.first_touch, 0.0)
@@ -78,8 +79,8 @@ def test_many_patches_agree_with_another_solver():
     other = root(gap, np.full(16, 6e-3), method="hybr", options={"xtol": 1e-12})
     assert other.success
     # MINPACK's own convergence
-    np.testing.assert_allclose(state.closure, other.x, rtol=1e-9)
-    assert np.any(state.pressure == 0.0)
+    np.testing.assert_allclose(state.point.closure, other.x, rtol=1e-9)
+    assert np.any(state.point.pressure == 0.0)
 
 
 CONTROLS = {
@@ -96,10 +97,10 @@ def test_every_load_is_met_from_nothing(given, tilt, own):
     """Also where closure falls as the local approach rises ("falling")."""
     laws = HertzLaws(touches(), own=own)
     matrix = compliance() + own * np.eye(16)
-    newton = DenseNewton(laws, matrix, PATCHES)
+    newton = partial(equilibrium, laws, matrix, PATCHES)
     if own > OWN:
         assert laws.along(np.full(16, 8e-3)).dclosure.min() < 0.0
-    state = newton.solve(Control(**given, tilt=tilt))
+    state = newton(Control(**given, tilt=tilt))
     # residuals of 1e-12 relative to approaches of 1e-2, forces of 10 N, and moments alike
     assert imbalance(state, laws, matrix) < 2e-14
     if "force" in given:
@@ -110,55 +111,57 @@ def test_every_load_is_met_from_nothing(given, tilt, own):
         assert np.abs(state.load[1:]).max() < 1e-11 * state.load[0]
     else:
         np.testing.assert_array_equal(state.plane[1:], tilt)
-    moments = LEVERS.T @ state.pressure * PATCHES.area
+    moments = LEVERS.T @ state.point.pressure * PATCHES.area
     np.testing.assert_allclose(state.load[1:], moments, atol=1e-12)  # rounding of sums of ~1
 
 
 @pytest.mark.parametrize("tilt", [(0.0, 0.0), None], ids=["level", "free"])
 def test_force_and_approach_are_two_views_of_one_state(tilt):
     laws, matrix = HertzLaws(touches()), compliance()
-    newton = DenseNewton(laws, matrix, PATCHES)
-    first = newton.solve(Control(approach=7e-3, tilt=tilt))
-    again = newton.solve(Control(force=float(first.load[0]), tilt=tilt))
+    newton = partial(equilibrium, laws, matrix, PATCHES)
+    first = newton(Control(approach=7e-3, tilt=tilt))
+    again = newton(Control(force=float(first.load[0]), tilt=tilt))
     np.testing.assert_allclose(again.plane, first.plane, atol=1e-13)  # residuals of 1e-14 mm
-    np.testing.assert_allclose(again.pressure, first.pressure, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(again.point.pressure, first.point.pressure, rtol=1e-9, atol=1e-12)
 
 
 def test_path_does_not_matter():
     laws, matrix = HertzLaws(touches()), compliance()
-    newton = DenseNewton(laws, matrix, PATCHES)
+    newton = partial(equilibrium, laws, matrix, PATCHES)
     state = None
     for approach in (*np.linspace(0.1e-3, 12e-3, 30), 0.5e-3, 8e-3):
-        state = newton.solve(Control(approach=approach), state)
-    fresh = newton.solve(Control(approach=8e-3))
-    np.testing.assert_allclose(state.pressure, fresh.pressure, rtol=1e-10, atol=1e-12)  # 1e-12
+        state = newton(Control(approach=approach), state)
+    fresh = newton(Control(approach=8e-3))
+    np.testing.assert_allclose(
+        state.point.pressure, fresh.point.pressure, rtol=1e-10, atol=1e-12
+    )  # 1e-12
 
 
 def test_free_plane_rests_on_three_patches_at_least():
     """At a small force the plane turns until its supports surround the middle."""
     laws, matrix = HertzLaws(touches()), compliance()
-    state = DenseNewton(laws, matrix, PATCHES).solve(Control(force=1e-4, tilt=None))
-    assert np.sum(state.pressure > 0.0) >= 3
+    state = equilibrium(laws, matrix, PATCHES, Control(force=1e-4, tilt=None))
+    assert np.sum(state.point.pressure > 0.0) >= 3
     assert np.abs(state.load[1:]).max() < 1e-15
 
 
 def test_free_plane_of_a_symmetric_interface_stays_level():
     laws = HertzLaws(np.zeros(16))
-    state = DenseNewton(laws, compliance(), PATCHES).solve(Control(approach=5e-3, tilt=None))
+    state = equilibrium(laws, compliance(), PATCHES, Control(approach=5e-3, tilt=None))
     np.testing.assert_allclose(state.plane[1:], 0.0, atol=1e-13)  # residuals of 1e-14 mm
 
 
 def test_one_patch_cannot_turn():
     patch = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
-    newton = DenseNewton(HertzLaws([1e-3]), np.array([[2e-4]]), patch)
-    state = newton.solve(Control(force=2.0, tilt=None))
+    newton = partial(equilibrium, HertzLaws([1e-3]), np.array([[2e-4]]), patch)
+    state = newton(Control(force=2.0, tilt=None))
     np.testing.assert_array_equal(state.plane[1:], 0.0)
 
 
 def test_no_force_is_first_touch():
     laws = HertzLaws(touches())
-    newton = DenseNewton(laws, compliance(), PATCHES)
-    state = newton.solve(Control(force=0.0, tilt=(1e-3, 0.0)))
+    newton = partial(equilibrium, laws, compliance(), PATCHES)
+    state = newton(Control(force=0.0, tilt=(1e-3, 0.0)))
     assert state.plane[0] == pytest.approx(
         np.min(laws.first_touch - 1e-3 * LEVERS[:, 0]), rel=1e-12
     )
@@ -167,29 +170,29 @@ def test_no_force_is_first_touch():
 
 def test_plane_that_touches_nothing_carries_nothing():
     laws = HertzLaws(np.full(16, 5e-3))
-    state = DenseNewton(laws, compliance(), PATCHES).solve(Control(approach=4e-3, tilt=None))
-    assert not state.pressure.any()
-    np.testing.assert_allclose(state.closure, 4e-3, rtol=1e-12)  # the iteration's residual
+    state = equilibrium(laws, compliance(), PATCHES, Control(approach=4e-3, tilt=None))
+    assert not state.point.pressure.any()
+    np.testing.assert_allclose(state.point.closure, 4e-3, rtol=1e-12)  # the iteration's residual
 
 
 def test_force_on_open_patches_is_refused():
-    newton = DenseNewton(HertzLaws(np.full(16, np.inf)), compliance(), PATCHES)
+    newton = partial(equilibrium, HertzLaws(np.full(16, np.inf)), compliance(), PATCHES)
     for force in (0.0, 1.0):
         with pytest.raises(NotConverged, match=r"the condensed block at force .* NO_CONTACT"):
-            newton.solve(Control(force=force))
+            newton(Control(force=force))
 
 
 def test_free_plane_on_a_single_patch_beside_the_middle_is_refused():
     touch = np.full(16, np.inf)
     touch[0] = 1e-3
-    newton = DenseNewton(HertzLaws(touch), compliance(), PATCHES)
+    newton = partial(equilibrium, HertzLaws(touch), compliance(), PATCHES)
     with pytest.raises(
         NotConverged, match=r"the equilibrium of the plane .*NO_SUPPORT.*load\.tilt"
     ):
-        newton.solve(Control(force=1.0, tilt=None))
+        newton(Control(force=1.0, tilt=None))
 
 
 @pytest.mark.parametrize("matrix", [np.eye(3), np.full((16, 16), np.nan)])
 def test_compliance_must_fit(matrix):
     with pytest.raises(InputError, match="compliance does not fit the patches"):
-        DenseNewton(HertzLaws(touches()), matrix, PATCHES)
+        equilibrium(HertzLaws(touches()), matrix, PATCHES, Control(approach=1e-3))

@@ -7,7 +7,7 @@ import pytest
 
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
-from multiscale.couplings.load_steps import EmbeddedCoupling
+from multiscale.couplings.law_couplings import EmbeddedCoupling
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.rows import LawRows
@@ -67,10 +67,10 @@ def test_steps_read_the_laws_at_their_closures():
     )  # initial separation − closure + unresolved displacement
     assert step.mean_pressure_MPa == pytest.approx(0.45**1.5, rel=1e-12)  # force over area
     assert step.imbalance == pytest.approx(1e-11, rel=1e-4)  # of a difference of near equals
-    assert (step.tilt_x, step.tilt_y) == (1e-3, 0.0)
+    assert step.tilt == (1e-3, 0.0)
     # patches of a quarter of a square millimetre, a quarter of a millimetre beside the middle
-    assert step.moment_x_N_mm == pytest.approx(-0.0625 * 0.45**1.5, rel=1e-12)
-    assert step.moment_y_N_mm == 0.0
+    assert step.moment_N_mm[0] == pytest.approx(-0.0625 * 0.45**1.5, rel=1e-12)
+    assert step.moment_N_mm[1] == 0.0
 
 
 def test_closure_beyond_a_law_is_refused_and_the_state_stays():

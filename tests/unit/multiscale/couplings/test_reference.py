@@ -94,7 +94,7 @@ def test_one_mesh_has_no_error_bar():
 
 
 def test_figures_show_the_error_bar_or_that_there_is_none(history):
-    (force, area, _) = history_figure({"reference": history}).axes
+    (force, area, _) = history_figure(history, "reference").axes
     assert [band.get_label() for band in force.collections] == [history.reference.label]
     assert len(area.collections) == 1
     alone = replace(
@@ -107,7 +107,7 @@ def test_figures_show_the_error_bar_or_that_there_is_none(history):
             area_order=1.0,
         ),
     )
-    (force, area, _) = history_figure({"reference": alone}).axes
+    (force, area, _) = history_figure(alone, "reference").axes
     assert not force.collections
     assert not area.collections
     assert "(no error bar)" in force.get_legend_handles_labels()[1]

@@ -8,7 +8,8 @@ import pytest
 from geometry import PatchGrid, Spectrum, patch_means, synthesise
 from geometry.rigid_plane import Control
 from micro import influence_matrix, micro_model
-from multiscale.couplings.condensed import CondensedCoupling, FreePlaneCoupling
+from multiscale.couplings.condensed import CondensedCoupling
+from multiscale.couplings.law_couplings import FreePlaneCoupling
 from multiscale.laws.consistent import WholeSurface, consistent_laws
 
 MODULUS = 4000.0

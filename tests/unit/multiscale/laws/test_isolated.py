@@ -7,7 +7,7 @@ import pytest
 
 from geometry import PatchGrid, Spectrum, find_asperities, patch_means, synthesise
 from geometry.errors import InputError
-from micro import asperity_model, micro_model
+from micro import AsperityModel, micro_model
 from micro.closed_forms.love import love_centre, love_mean
 from multiscale.laws.isolated import IsolatedPatch, isolated_laws
 
@@ -25,7 +25,7 @@ def surface():
 @pytest.fixture(scope="module")
 def model(surface):
     asperities = find_asperities(surface, periodic=False)
-    return asperity_model("circular", asperities, contact_modulus=MODULUS)
+    return AsperityModel("circular", asperities, contact_modulus=MODULUS)
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +76,7 @@ def test_table_reaches_the_closure_asked_for(whole):
 def test_patch_is_open_when_out_of_reach(surface, model, whole):
     low = model.asperities.z < model.asperities.highest - 5e-3
     assert low.any()
-    model = asperity_model("circular", model.asperities.subset(low), contact_modulus=MODULUS)
+    model = AsperityModel("circular", model.asperities.subset(low), contact_modulus=MODULUS)
     patch = IsolatedPatch(model=model, patch=whole.patch, mean_height=0.0)
     law = patch.law(4e-3, TOLERANCE, ROWS)
     assert law.is_open
@@ -86,7 +86,7 @@ def test_patch_is_open_when_out_of_reach(surface, model, whole):
 
 def test_stiff_patch_goes_on_where_closure_falls(surface, model):
     """Many asperities in a patch without interaction: dp/dδ outgrows the patch's own stiffness."""
-    model = asperity_model("circular-independent", model.asperities, contact_modulus=MODULUS)
+    model = AsperityModel("circular-independent", model.asperities, contact_modulus=MODULUS)
     patch = IsolatedPatch(
         model=model,
         patch=PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)),

@@ -29,7 +29,8 @@ def hertz(indentation):
 def test_hertz_law_is_exact_between_rows():
     law = law_of(hertz)
     closure = np.linspace(1e-3, 9e-3, 357)
-    pressure, stiffness, *_ = law.at(closure)
+    found = law.at(closure)
+    pressure, stiffness = found.pressure, found.stiffness
     # p^(2/3) is a straight line: only round-off remains
     np.testing.assert_allclose(pressure, hertz(closure - 1e-3), rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(stiffness, 6e3 * np.sqrt(closure - 1e-3), rtol=1e-12, atol=1e-9)
@@ -45,13 +46,15 @@ def test_stiffness_is_the_derivative_of_the_interpolant():
 
 def test_interpolant_never_decreases():
     law = law_of(lambda w: 4e3 * w**1.5 + 1e4 * np.maximum(w - 2e-3, 0) ** 1.5, rows=7)
-    pressure, stiffness, *_ = law.at(np.linspace(0, 9e-3, 4001))
+    found = law.at(np.linspace(0, 9e-3, 4001))
+    pressure, stiffness = found.pressure, found.stiffness
     assert np.all(np.diff(pressure) >= 0)
     assert np.all(stiffness >= 0)
 
 
 def test_zero_before_touch():
-    pressure, stiffness, *_ = law_of(hertz).at(np.array([-1.0, 0.0, 1e-3]))
+    found = law_of(hertz).at(np.array([-1.0, 0.0, 1e-3]))
+    pressure, stiffness = found.pressure, found.stiffness
     assert not pressure.any()
     assert not stiffness.any()
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from multiscale import Run, Scene
-from multiscale.laws.law_table import PatchLaws
-from multiscale.laws.patch_law import PatchLaw
+from multiscale.laws.patch_law import PatchLaw, PatchLaws
 from multiscale.laws.refinement import Errors, refined
 from multiscale.laws.rows import SolvedRows
 
@@ -66,7 +65,7 @@ def found(some, approach):
         local = np.full(2, delta)
         for _ in range(12):  # Newton's steps, from afar
             points = [law.along(s) for law, s in zip(some, local, strict=True)]
-            c, p, dc, dp = np.array(points).T
+            c, p, dc, dp = np.array([point[:4] for point in points]).T
             local = local - np.linalg.solve(
                 np.diag(dc) + COMPLIANCE * dp, c + COMPLIANCE @ p - delta
             )

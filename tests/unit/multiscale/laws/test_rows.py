@@ -7,8 +7,7 @@ import pytest
 from scipy.optimize import minimize
 
 from geometry.patches import PatchGrid
-from multiscale.laws.files import read_laws, repaired_law, write_laws
-from multiscale.laws.law_table import LawTable
+from multiscale.laws.law_table import LawTable, read_laws, repaired_law, write_laws
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.rows import LawRows
 

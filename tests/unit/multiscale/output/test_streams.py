@@ -116,7 +116,7 @@ def test_interrupt_during_imports_is_quiet(root, seconds):
 
 
 def is_configuration(number):
-    return b"run_result" in Path(f"/proc/{number}/cmdline").read_bytes()
+    return b"comparison.process" in Path(f"/proc/{number}/cmdline").read_bytes()
 
 
 def test_processes_end_with_the_comparison_that_was_told_to(root, tmp_path):

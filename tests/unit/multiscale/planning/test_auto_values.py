@@ -6,7 +6,7 @@ import pytest
 
 from geometry.errors import InputError
 from micro import choose
-from multiscale.output.provenance import provenance
+from multiscale.output.report import provenance
 from multiscale.planning.plan import statements, warnings
 from multiscale.planning.problem_setup import make_setup
 from multiscale.run import Run
@@ -52,7 +52,7 @@ def assert_chosen_for(load, approach, solutions):
         assert found.label == expected.label
         assert found.expected_error == pytest.approx(expected.expected_error, rel=1e-12)
         assert found.cost == pytest.approx(expected.cost, rel=1e-12)
-    assert setup.choice.checked_error == pytest.approx(known.checked_error, abs=1e-5)
+    assert setup.choice.taken.checked_error == pytest.approx(known.taken.checked_error, abs=1e-5)
 
 
 def test_the_model_is_chosen_for_the_largest_approach_anywhere():
@@ -104,5 +104,5 @@ def test_results_record_the_chosen_model():
     recorded = provenance(done, options=[])
     choice = done.setup.choice
     assert recorded["micro_model"]["chosen"]["label"] == choice.taken.label
-    assert recorded["micro_model"]["chosen"]["checked_error"] == choice.checked_error
+    assert recorded["micro_model"]["chosen"]["checked_error"] == choice.taken.checked_error
     assert recorded["notes"] == [f"micro model chosen: {choice.sentence}"]

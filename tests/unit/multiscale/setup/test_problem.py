@@ -8,7 +8,7 @@ import pytest
 from geometry import InputError
 from geometry.errors import NotConverged
 from multiscale import Scene, make_setup, run
-from multiscale.couplings.load_steps import ContactCoupling
+from multiscale.couplings.contact import ContactCoupling
 from multiscale.planning.plan import statements, warnings
 from multiscale.planning.problem_setup import plane_at_largest_load
 

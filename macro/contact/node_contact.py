@@ -1,0 +1,219 @@
+"""What methods of contact on a rough top share: the plane over its nodes, solutions and guesses.
+
+A rough top has no smooth energy in a basis of earlier solutions; guesses are extrapolated.
+
+Theory: section 12 of ``demos/theory.md``.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from geometry.errors import NotConverged
+from geometry.plane_equilibrium import UNSUPPORTED, PlaneResponse, find_equilibrium
+from geometry.rigid_plane import Control, PlaneLevers
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+_LARGEST_STEP = 1.0
+"""Largest extrapolation, forwards or backwards, in steps between the last two solutions."""
+
+
+class PlaneOverNodes:
+    """A rigid plane above this rank's nodes on the top.
+
+    Args:
+        x: Abscissae of the nodes, shape (n,) [mm].
+        y: Their ordinates [mm].
+        distance: Their distances from the plane at no approach and no tilt [mm].
+        lengths: Sides of the interface, about whose centre the plane turns [mm].
+        comm: MPI communicator.
+
+    Attributes:
+        distance: As given.
+        levers: Levers of the nodes.
+        centre: Centre of the interface, shape (2,) [mm].
+
+    Note:
+        Methods that sum over the nodes are collective.
+    """
+
+    def __init__(
+        self, x: Array, y: Array, distance: Array, lengths: tuple[float, float], comm: Any
+    ) -> None:
+        self.distance, self.centre = distance, 0.5 * np.asarray(lengths)
+        self.levers = PlaneLevers.at(x, y, lengths, comm=comm)
+
+    def placed(self, control: Control, plane: Array) -> Array:
+        """Return where the plane is, as far as that is prescribed, and elsewhere the start.
+
+        Without any force the plane just touches the top.
+
+        Args:
+            control: What the load step prescribes.
+            plane: Where the plane may start, shape (3,).
+        """
+        plane = control.prescribed(plane)
+        if control.force == 0.0:
+            plane[0] = self.levers.first_touch(self.distance, plane[1:])
+        return plane
+
+    def penetration(self, plane: Array, displacement: Array) -> Array:
+        """Return how far the plane is below the nodes, negative where it is above, (n,) [mm].
+
+        Args:
+            plane: Approach [mm] and slopes, shape (3,).
+            displacement: Downward displacements of the nodes, shape (n,) [mm].
+        """
+        return self.levers.matrix @ plane - displacement - self.distance
+
+    def supported_motions(self, free: Flags, at: Flags) -> Array:
+        """Return the combinations of free motions that move some of the nodes, shape (k, k').
+
+        They are scaled so that ``levers.scaled(free)[at]`` times them has orthonormal columns, all
+        ranks together.
+
+        Args:
+            free: Motions that are free, shape (3,).
+            at: Which of this rank's nodes are meant, shape (n,).
+        """
+        levers = self.levers.scaled(free)[at]
+        values, vectors = np.linalg.eigh(self.levers.summed(levers.T @ levers))
+        found = values > UNSUPPORTED * max(values.max(initial=0.0), 1.0)
+        scaled: Array = vectors[:, found] / np.sqrt(values[found])
+        return scaled
+
+    def on_springs(
+        self, control: Control, start: Array, displacement: Array, stiffness: Array
+    ) -> Array:
+        """Return where the plane comes to rest on springs at the nodes, shape (3,).
+
+        Args:
+            control: What the load step prescribes.
+            start: The plane to start from, with what is prescribed of it, shape (3,).
+            displacement: Downward displacements of the nodes, shape (n,) [mm].
+            stiffness: Stiffnesses of springs that only push, shape (n,) [N/mm].
+
+        Raises:
+            NotConverged: When nothing can hold the plane.
+        """
+
+        def respond(plane: Array) -> PlaneResponse[None]:
+            depth = self.penetration(plane, displacement)
+            return PlaneResponse(
+                loads=self.levers.loads(stiffness * np.maximum(depth, 0.0)),
+                stiffness=lambda: self.levers.stiffness(np.where(depth > 0.0, stiffness, 0.0)),
+                state=None,
+            )
+
+        return find_equilibrium(respond, control, start, self.levers.half)[0]
+
+
+def not_found(control: Control, reason: str, iterations: int) -> NotConverged:
+    """Return the error of a load step whose contact was not found.
+
+    Args:
+        control: What the load step prescribes.
+        reason: Name of the reason.
+        iterations: Iterations that were made.
+    """
+    return NotConverged(
+        f"the contact of the rough block at {control}",
+        reason=reason,
+        iterations=iterations,
+        remedy="take smaller load steps (load.steps)",
+    )
+
+
+class ContactSolution(NamedTuple):
+    """Contact of a rough top with a rigid plane; arrays hold this rank's part.
+
+    Attributes:
+        plane: Approach at the middle [mm] and slopes, shape (3,).
+        displacement: Owned degrees of freedom [mm].
+        nodal_force: Contact forces of the nodes of the top, shape (n,) [N].
+        touching: Whether these nodes are in contact, shape (n,).
+        active_sets: Active sets that were solved for.
+        linear_iterations: Iterations of the linear solver.
+        reason: Name of the reason to stop.
+    """
+
+    plane: Array
+    displacement: Array
+    nodal_force: Array
+    touching: NDArray[np.bool_]
+    active_sets: int
+    linear_iterations: int
+    reason: str
+
+
+class Guess(NamedTuple):
+    """Where an iteration starts.
+
+    Attributes:
+        plane: Approach [mm] and slopes of the plane, shape (3,).
+        displacement: This rank's owned degrees of freedom [mm].
+        contact: Contact forces of its nodes, or pressures of its quadrature points, shape (n,).
+    """
+
+    plane: Array
+    displacement: Array
+    contact: Array
+
+
+class Extrapolation:
+    """Extrapolates the last two solutions along the approach or the force.
+
+    Args:
+        dofs: Number of this rank's degrees of freedom.
+        points: Number of its nodes or quadrature points on the top.
+    """
+
+    def __init__(self, dofs: int, points: int) -> None:
+        self._at_rest = Guess(np.zeros(3), np.zeros(dofs), np.zeros(points))
+        self._last: list[tuple[Guess, float]] = []
+
+    def add(self, solution: Guess, force: float) -> None:
+        """Add a solution.
+
+        Args:
+            solution: The solution.
+            force: Its force [N].
+        """
+        self._last = [*self._last[-1:], (solution, force)]
+
+    def guess(self, control: Control) -> Guess:
+        """Return the line through the last two solutions at the prescribed approach or force.
+
+        Args:
+            control: What the load step prescribes.
+        """
+        if not self._last:
+            return self._at_rest
+        (before, force_before), (last, force) = self._last[0], self._last[-1]
+        if control.approach is not None:
+            run, ahead = last.plane[0] - before.plane[0], control.approach - last.plane[0]
+        else:
+            run, ahead = force - force_before, (control.force or 0.0) - force
+        share = float(np.clip(ahead / run, -_LARGEST_STEP, _LARGEST_STEP)) if run else 0.0
+        pairs = zip(last, before, strict=True)
+        return Guess(*(new + share * (new - old) for new, old in pairs))
+
+
+def largest(values: Array, comm: Any) -> float:
+    """Return the largest size of numbers over all ranks; 0 where there are none.
+
+    Args:
+        values: This rank's numbers.
+        comm: MPI communicator.
+
+    Note:
+        Collective.
+    """
+    return float(comm.allreduce(float(np.abs(values).max(initial=0.0)), op=MPI.MAX))

@@ -1,0 +1,122 @@
+"""Distributed matrices of nodes with three unknowns each: parts of them, and interpolations."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.sparse import csr_matrix
+
+Indices = NDArray[np.intp]
+
+
+def node_submatrix(matrix: PETSc.Mat, rows: Indices, columns: Indices) -> csr_matrix:
+    """Return the part of a matrix that belongs to some nodes.
+
+    Whole nodes are taken because matrices of PETSc's type ``baij`` give no smaller parts.
+
+    Args:
+        matrix: The matrix; of this process alone, or of all ranks.
+        rows: Global numbers of the rows' nodes, ascending.
+        columns: Global numbers of the columns' nodes, ascending.
+
+    Note:
+        Collective over the ranks of the matrix.
+    """
+    rows_of, columns_of = (
+        PETSc.IS().createBlock(3, nodes.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
+        for nodes in (rows, columns)
+    )
+    part = matrix.createSubMatrices(rows_of, columns_of)[0]
+    starts, places, entries = part.getValuesCSR()
+    part.destroy()
+    return csr_matrix((entries, places, starts), shape=(3 * len(rows), 3 * len(columns)))
+
+
+def coupled_nodes(matrix: PETSc.Mat) -> Indices:
+    """Return this rank's nodes whose rows have entries in columns of other ranks, ascending.
+
+    There, and nowhere else, the product of the matrix with random numbers differs from the
+    product of the rank's own part with them.
+
+    Args:
+        matrix: The matrix of all ranks.
+
+    Returns:
+        Local numbers, shape (n,).
+
+    Note:
+        Collective.
+    """
+    local = matrix.getDiagonalBlock()
+    numbers, whole = matrix.createVecs()
+    part, alone = local.createVecs()
+    part.array[:] = np.random.default_rng(1).standard_normal(part.local_size)
+    numbers.array[:] = part.array_r
+    matrix.mult(numbers, whole)
+    local.mult(part, alone)
+    differs = (whole.array_r != alone.array_r).reshape(-1, 3)
+    return np.flatnonzero(differs.any(axis=1))
+
+
+def dofs_of(nodes: Indices) -> Indices:
+    """Return the three unknowns of every node, shape (3 n,)."""
+    return (3 * nodes[:, None] + np.arange(3)).ravel()
+
+
+def distributed(
+    rows: csr_matrix, columns: int, comm: PETSc.Comm, block_size: int | None = None
+) -> PETSc.Mat:
+    """Return a matrix from the rows of every rank.
+
+    Args:
+        rows: This rank's rows; columns are numbered through all ranks.
+        columns: Number of columns that this rank owns.
+        comm: Communicator of the matrix.
+        block_size: PETSc's block size of the matrix; None: none.
+
+    Note:
+        Collective.
+    """
+    pattern = (part.astype(PETSc.IntType) for part in (rows.indptr, rows.indices))
+    size = ((rows.shape[0], None), (columns, None))
+    return PETSc.Mat().createAIJ(size, bsize=block_size, csr=(*pattern, rows.data), comm=comm)
+
+
+def for_displacements(
+    weights: csr_matrix, stay: Indices, free: PETSc.Vec, *, blocks: bool = False
+) -> tuple[PETSc.Mat, PETSc.Vec]:
+    """Interpolate all three components of displacements, constrained unknowns apart.
+
+    Args:
+        weights: Weights of all coarse nodes, numbered rank after rank, in this rank's nodes.
+        stay: This rank's nodes that are its coarse nodes.
+        free: 1 for unknowns that are free, 0 for constrained ones.
+        blocks: Whether the matrix has PETSc's block size 3, which products with it inherit.
+
+    Returns:
+        The matrix, and ``free`` of the coarse unknowns.
+
+    Note:
+        Collective.
+    """
+    count = weights.shape[0]
+    rows = weights[np.repeat(np.arange(count), 3)]
+    component = np.repeat(np.tile(np.arange(3), count), np.diff(rows.indptr))
+    rows.indices = 3 * rows.indices + component
+    matrix = distributed(rows, 3 * len(stay), free.comm, 3 if blocks else None)
+    coarse = matrix.createVecRight()
+    same = dofs_of(stay)
+    coarse.array[:] = free.array_r[same]
+    matrix.diagonalScale(free, coarse)
+    fixed = np.flatnonzero(coarse.array_r == 0.0)
+    if len(fixed):
+        first_row, first_column = matrix.getOwnershipRange()[0], coarse.getOwnershipRange()[0]
+        matrix.setValuesIJV(
+            np.arange(len(fixed) + 1, dtype=PETSc.IntType),
+            (fixed + first_column).astype(PETSc.IntType),
+            np.ones(len(fixed)),
+            rowmap=(same[fixed] + first_row).astype(PETSc.IntType),
+        )
+    matrix.assemble()
+    return matrix, coarse

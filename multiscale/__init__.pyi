@@ -1,0 +1,22 @@
+"""Public names of the package and their modules, for type checkers and for `multiscale` itself."""
+
+from multiscale.comparison.compare import compare as compare
+from multiscale.comparison.comparison import Comparison as Comparison
+from multiscale.couplings.condensed import CondensedCoupling as CondensedCoupling
+from multiscale.couplings.reference import ReferenceCoupling as ReferenceCoupling
+from multiscale.laws.consistent import consistent_laws as consistent_laws
+from multiscale.laws.isolated import isolated_laws as isolated_laws
+from multiscale.laws.law_table import LawTable as LawTable
+from multiscale.laws.law_table import read_laws as read_laws
+from multiscale.laws.law_table import write_laws as write_laws
+from multiscale.laws.patch_law import PatchLaw as PatchLaw
+from multiscale.laws.patch_law import PatchLaws as PatchLaws
+from multiscale.loading.load_step import LoadStep as LoadStep
+from multiscale.loading.stepper import LoadHistory as LoadHistory
+from multiscale.loading.stepper import load_steps as load_steps
+from multiscale.planning.problem_setup import make_setup as make_setup
+from multiscale.results.extrapolation import extrapolated as extrapolated
+from multiscale.results.history import History as History
+from multiscale.run import Run as Run
+from multiscale.run import run as run
+from multiscale.scene.scene import Scene as Scene

@@ -1,0 +1,303 @@
+"""The block of a scene: its terms in the contact problem, its compliance, its mesh.
+
+The body correction is what the block adds to the compliance of a half-space. In Legendre modes of
+the block's top it is the compliance of the block, from finite elements, less that of the
+half-space, and less the effect of free sides where they are a term of their own.
+
+Theory: demos/theory.md, sections 5, 6 and 11.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry import InputError, Material, Surface
+from geometry.checks import process_memory
+from micro import (
+    BodyModes,
+    BodyStresses,
+    FreeSides,
+    HalfSpaceModel,
+    SurfaceStress,
+    coarse_grid,
+    half_space_modes,
+    half_space_stress_modes,
+    influence_matrix,
+    side_modes,
+    side_stress_modes,
+    side_stresses,
+)
+from multiscale.setup.problem import ProblemSetup
+from multiscale.setup.surface_and_block import block_material
+
+if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
+    from geometry import BlockShape, PatchGrid
+    from macro import FaceCompliance, Interface
+    from macro.block import Sides
+
+Array = NDArray[np.float64]
+Displacements = Callable[[Array], Array]
+"""From pressures of N patches at m load steps to their mean displacements, [MPa] to [mm]."""
+
+_DECAY_LENGTH = 0.25
+"""Decay length of the effect of free sides in the micro model, relative to the shortest side of
+the block."""
+
+_CUBE_MODES = 8
+"""Modes along a side of a cube whose free sides are a term of their own. On Set 1's recipe (seed 1,
+8 µm) the force with 6, 8, 10 and 14 differs by 0.04, 0.012, 0.009 and 0.005 % from that with 20. On
+a ball in the middle, near a side, cut by a side and by a corner 8 are within 0.003, 0.002, 0.02 and
+0.1 %, 6 within 3 %."""
+
+_FLATNESS_POWER = 0.42
+"""Power of the shape's width by its depth that modes grow with: a block 0.3, 0.1 and 0.05 mm high
+and 1 mm wide needs 13, 21 and 28 for 0.1 to 0.2 %."""
+
+_LEAST_WITH_SIDES = 16
+"""Modes at least where they describe free sides too: with 16 on a cube Set 1's recipe is 0.4 % off,
+a ball that a side cuts in half 3 % (with 8: 1.7 and 14 %; with 24: 0.15 and 0.6 %)."""
+
+_LEAST_WITH_MARGIN = 12
+"""Modes at least where the block is wider than the contact: with a margin of 0.05 mm on a cube 8
+are up to 1.2 % off, 12 up to 0.1 %; a corner 0.7 %."""
+
+_MODES_OF_CORNERS = 12
+"""Modes for many patches where free sides are a term of their own: of 16 × 16 patches the one in
+the corner is 0.3 % off with 8 and less than 0.1 % with 12."""
+
+_MODES_PER_PATCH, _MOST_MODES = 2, 32
+"""Modes per patch along a side where they describe free sides too, and their largest number. Of
+4 × 4, 8 × 8 and 16 × 16 patches 16, 16 and 24 modes leave 0.01, 0.07 and 0.3 % of the largest
+entry."""
+
+_BYTES = 190.0
+"""Memory of solving for K × K modes over K⁴: free blocks 100 and 200 times as wide as high, with 56
+and 75 modes, take 1.8 and 5.8 GB (and 15 and 48 s)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Body:
+    """An elastic block under a contact.
+
+    Args:
+        shape: Size of the block; its cells do not matter.
+        material: Elastic constants.
+        sides: Support of its sides.
+        side_term: Free sides that are a term of their own in the contact's compliance; None where
+            the body correction includes them.
+    """
+
+    shape: BlockShape
+    material: Material
+    sides: Sides
+    side_term: FreeSides | None = None
+
+    @property
+    def lengths(self) -> tuple[float, float]:
+        """Sides of the top, margin included [mm]."""
+        x, y = (length + 2.0 * self.shape.margin for length in self.shape.interface)
+        return x, y
+
+    @property
+    def modes(self) -> int:
+        """Modes along a side that resolve the body correction; see the constants above."""
+        flatness = max(self.lengths) / min(*self.lengths, self.shape.height)
+        count = _CUBE_MODES * flatness**_FLATNESS_POWER
+        if self.shape.margin:
+            count = max(count, _LEAST_WITH_MARGIN)
+        elif self.side_term is None:
+            count = max(count, _LEAST_WITH_SIDES)
+        return math.ceil(round(count, 6))
+
+    def face(self, comm: Any, *, modes: int | None = None) -> FaceCompliance:
+        """Return the compliance of the top in modes, from finite elements.
+
+        Args:
+            comm: MPI communicator; None for this process alone.
+            modes: Modes along a side; by default those of the shape.
+
+        Raises:
+            InputError: When the modes of so flat a block do not fit into memory.
+
+        Note:
+            Collective.
+        """
+        from mpi4py import MPI
+
+        from macro import face_compliance
+
+        count = modes or self.modes
+        needed, memory = _BYTES * float(count) ** 4, process_memory()
+        if needed > memory:
+            ratio = ((memory / _BYTES) ** 0.25 / _CUBE_MODES) ** (1.0 / _FLATNESS_POWER)
+            raise InputError(
+                f"the compliance of so flat a block, in {count} modes a side, needs about "
+                f"{needed / 1e9:.3g} GB of memory",
+                key="block.margin" if self.shape.margin else "block.height",
+                value=self.shape.margin or self.shape.height,
+                allowed="blocks whose longest side is at most "
+                f"{ratio:.3g} times the shortest or the height",
+            )
+        return face_compliance(
+            self.lengths,
+            self.shape.height,
+            self.material,
+            self.sides,
+            count,
+            comm or MPI.COMM_SELF,
+            use_cache=True,
+        )
+
+    def term(self, face: FaceCompliance, *, higher: float = 0.0) -> BodyModes:
+        """Return the body correction.
+
+        Args:
+            face: Compliance of the top.
+            higher: Height that is added to the block, to first order [mm].
+        """
+        half_space = half_space_modes(self.lengths, face.count)
+        if self.side_term is not None:
+            half_space = half_space + side_modes(self.side_term, face.count)
+        whole = face.normal + higher * face.growth
+        compliance = whole - half_space / self.material.contact_modulus
+        origin = -self.shape.margin, -self.shape.margin
+        return BodyModes(self.lengths, compliance, origin)
+
+    def stresses(self, face: FaceCompliance, surface: Surface) -> list[SurfaceStress]:
+        """Return the stresses in the contact face beyond those of the half-space.
+
+        Args:
+            face: Compliance of the top.
+            surface: The rough surface, whose cells fill the contact face.
+        """
+        grid, count = coarse_grid(surface), face.count
+        without = half_space_stress_modes(self.lengths, self.material.poisson_ratio, count)
+        found: list[SurfaceStress] = []
+        if self.side_term is not None:
+            spacing = surface.lengths[0] / grid[0], surface.lengths[1] / grid[1]
+            found.append(side_stresses(self.side_term, spacing))
+            without = without + side_stress_modes(self.side_term, count)
+        own = BodyStresses(self.lengths, grid, face.stresses - without, self.shape.margin)
+        return [*found, own]
+
+    def patch_compliance(self, patches: PatchGrid, comm: Any) -> Array:
+        """Return the whole compliance of the block under its patches.
+
+        Args:
+            patches: N patches of the contact face; free sides with a term of their own bound it.
+            comm: MPI communicator; None for this process alone.
+
+        Returns:
+            Mean displacement of patch i by unit pressure on patch j, shape (N, N) [mm/MPa].
+
+        Note:
+            Collective. On 1 to 256 patches of a free cube entries are within 0.1 % of the largest
+            one's limit.
+        """
+        modulus, count = self.material.contact_modulus, self.modes
+        half_space = influence_matrix(patches) / (np.pi * modulus)
+        if self.side_term is not None:
+            half_space += self.side_term.patch_compliance(patches) / modulus
+            count = max(count, min(max(patches.shape), _MODES_OF_CORNERS))
+        else:
+            count = max(count, min(_MODES_PER_PATCH * max(patches.shape), _MOST_MODES))
+        correction = self.term(self.face(comm, modes=count))
+        return np.asarray(half_space + correction.patch_compliance(patches))
+
+
+def scene_body(setup: ProblemSetup, *, side_term: bool | None = None) -> Body:
+    """Return the block of a scene.
+
+    Args:
+        setup: The problem set up from the scene, of a coupling with a block.
+        side_term: Whether free sides that bound the interface are a term of their own; by default
+            they are in half-space models.
+    """
+    block, lengths, shape = setup.scene.block, setup.surface.lengths, setup.shape
+    if side_term is None:
+        side_term = isinstance(setup.micro, HalfSpaceModel)
+    sides = None
+    if side_term and block.sides == "free" and not shape.margin:
+        sides = FreeSides(
+            lengths=lengths,
+            poisson_ratio=block.poisson_ratio,
+            decay_length=_DECAY_LENGTH * min(*lengths, shape.height),
+        )
+    material = block_material(setup.scene)
+    return Body(shape=shape, material=material, sides=block.sides, side_term=sides)
+
+
+def patch_displacements(setup: ProblemSetup, comm: Any, *, dense: bool) -> Displacements:
+    """Return what gives the mean displacements of patches in the macro model of a scene.
+
+    Args:
+        setup: The problem set up from the scene.
+        comm: MPI communicator; None for this process alone.
+        dense: Whether the macro model is the compliance of the patches, or the mesh itself.
+
+    Returns:
+        A function from pressures of N patches at m load steps to displacements, (m, N) both, [MPa]
+        to [mm]. It is collective.
+
+    Note:
+        Collective.
+    """
+    # with fewer patches than rows of laws the compliance takes fewer solutions of the mesh
+    if dense or setup.patches.count <= setup.table_rows:
+        compliance = patch_compliance(setup, comm)
+        return lambda pressures: np.asarray(pressures @ compliance.T)
+    from macro import displacements_under
+
+    interface = embedding(setup, comm)
+    return lambda pressures: displacements_under(interface, pressures)
+
+
+def patch_compliance(setup: ProblemSetup, comm: Any) -> Array:
+    """Return the compliance of a scene's block under its patches, shape (N, N) [mm/MPa].
+
+    Args:
+        setup: The problem set up from the scene.
+        comm: MPI communicator; None for this process alone.
+
+    Note:
+        Collective.
+    """
+    if setup.scene.coupling.decomposed:
+        return scene_body(setup, side_term=True).patch_compliance(setup.patches, comm)
+    from mpi4py import MPI
+
+    from macro import patch_compliance_matrix
+    from macro.compliance.cache import cached
+    from macro.linear_solvers.options import users_options
+
+    def compute() -> dict[str, Array]:
+        return {"compliance": patch_compliance_matrix(embedding(setup, comm))}
+
+    sides = setup.scene.block.sides
+    key = (setup.shape, block_material(setup.scene), sides, setup.patches, users_options())
+    return cached("plain", key, compute, comm or MPI.COMM_SELF)["compliance"]
+
+
+def embedding(setup: ProblemSetup, comm: Any) -> Interface:
+    """Mesh and assemble the block of a scene, with its patches on top.
+
+    Args:
+        setup: The problem set up from the scene.
+        comm: MPI communicator; None for this process alone.
+
+    Note:
+        Collective.
+    """
+    from mpi4py import MPI
+
+    from macro import Block, Interface, block_mesh
+
+    section = setup.scene.block
+    mesh = block_mesh(setup.shape, comm or MPI.COMM_SELF)
+    return Interface(Block(mesh, block_material(setup.scene), sides=section.sides), setup.patches)

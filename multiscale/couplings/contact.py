@@ -1,0 +1,162 @@
+"""The contact problem on the body of a scene, and the coupling that solves it at every load step.
+
+Theory: demos/theory.md, sections 3 and 7.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry import Control, PatchGrid
+from geometry.collective import on_root
+from micro import START_KINDS, FiniteSlopes, HalfSpaceModel, MicroModel
+from multiscale.couplings.body import scene_body
+from multiscale.loading.load_step import LoadStep
+from multiscale.setup.problem import ProblemSetup
+from multiscale.setup.surface_and_block import block_material
+from multiscale.storage import Arrays, packed, unpacked
+
+if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
+    from macro import FaceCompliance
+
+Array = NDArray[np.float64]
+
+OnBody = Callable[[HalfSpaceModel, int], HalfSpaceModel]
+"""Puts a half-space model on a body; with finite slopes up to an order, 0 for none."""
+
+SLOPES = 2
+"""Order of finite slopes where they are taken into account."""
+
+_RESIDUAL = 1e-10
+"""Residual of half-space solutions. Their forces are then right to 1e-12, so that neither the unit
+of length nor the number of ranks changes a result. It costs a tenth more than 1e-8."""
+
+
+class ContactCoupling:
+    """The contact problem itself at every load step, without laws.
+
+    ``analytic`` is the micro model on a half-space, ``concurrent`` the same on the scene's block:
+    they differ by a term of the compliance. Rank 0 solves for all.
+
+    Args:
+        model: Micro model of the whole surface, with the body that it is pressed on.
+        patches: Partition that the results are summed over; it does not change the solution.
+        mean_heights: Mean height of each patch, shape (N,) [mm].
+        comm: MPI communicator (mpi4py) or None.
+    """
+
+    def __init__(
+        self, model: MicroModel, patches: PatchGrid, mean_heights: Array, comm: Any = None
+    ) -> None:
+        self._model, self._patches, self._mean_heights = model, patches, mean_heights
+        self._comm = comm
+        self._start: Any = None
+
+    def press(self, control: Control) -> LoadStep:
+        """Solve one load step; see `Coupling.press`."""
+
+        def solve() -> LoadStep:
+            response, plane, self._start = self._model.press(
+                control, patches=self._patches, mean_heights=self._mean_heights, start=self._start
+            )
+            return LoadStep.of_patches(
+                self._patches,
+                plane=(plane.approach, *plane.tilt),
+                load=(response.force[0], *response.moment[0]),
+                closure=plane.means(self._patches) - response.patch_displacement[0],
+                pressure=response.patch_force[0] / self._patches.area,
+                area_fraction=response.patch_contact_area[0] / self._patches.area,
+                separation=response.mean_separation,
+                contacts=response.contacts,
+                newton_iterations=int(response.iterations[0]),
+                warnings=response.warnings,
+            )
+
+        return on_root(self._comm, solve)
+
+    def state(self) -> Arrays:
+        """Return the latest solution; see `Restorable`. It is whole on rank 0 alone."""
+        return packed(self._start)
+
+    def restore(self, state: Arrays) -> None:
+        """Start from a solution; see `Restorable`."""
+        self._start = unpacked(state, START_KINDS)
+
+
+def contact_model(setup: ProblemSetup, comm: Any, put_on_body: OnBody | None = None) -> MicroModel:
+    """Return a scene's micro model on the body that it is pressed on, finite slopes included.
+
+    Args:
+        setup: The problem set up from the scene.
+        comm: MPI communicator; None for this process alone.
+        put_on_body: What puts a half-space model on the scene's body, where that was solved for
+            already, see `on_body`.
+
+    Note:
+        Collective.
+    """
+    model = setup.model
+    isolated = setup.scene.coupling.kind == "isolated"
+    if isinstance(model, HalfSpaceModel):
+        put_on_body = put_on_body or on_body(setup, comm, half_space=isolated)
+        return put_on_body(model, SLOPES if setup.finite_slopes else 0)
+    if isolated or not setup.has_block:
+        return model
+    body = scene_body(setup)
+    return replace(model, body=body.term(body.face(comm)))  # type: ignore[type-var]
+
+
+def on_body(
+    setup: ProblemSetup,
+    comm: Any,
+    *,
+    half_space: bool = False,
+    face: FaceCompliance | None = None,
+) -> OnBody:
+    """Return what puts half-space models on a scene's body, which is solved for once.
+
+    Args:
+        setup: The problem set up from the scene, with a half-space model.
+        comm: MPI communicator; None for this process alone.
+        half_space: Whether the body is a half-space even where the scene has a block.
+        face: Compliance of the body's top, where that was solved for; then it is not collective.
+
+    Returns:
+        A function from a model and the order of finite slopes, 0 for none, to the model on the
+        body. It is not collective.
+
+    Note:
+        Collective.
+    """
+    body = None if half_space or not setup.has_block else scene_body(setup)
+    if body is not None and face is None:
+        face = body.face(comm)
+    material = block_material(setup.scene)
+
+    def put(model: HalfSpaceModel, order: int) -> HalfSpaceModel:
+        surface, model = model.surface, replace(model, tolerance=_RESIDUAL)
+        # With finite slopes heights count from the highest point, near the loads, where slopes add
+        # least. The flat body then ends at it, while the block's height is that of the mean plane.
+        higher = surface.highest - surface.mean_height if order else 0.0
+        if body is not None and face is not None:
+            model = replace(model, sides=body.side_term, body=body.term(face, higher=higher))
+        if not order:
+            return model
+        stresses = [] if body is None or face is None else body.stresses(face, surface)
+        plane = surface.highest if stresses else None
+        slopes = FiniteSlopes(
+            surface,
+            material,
+            order=order,
+            periodic=model.periodic,
+            plane=plane,
+            edge_stresses=stresses,
+        )
+        return replace(model, slopes=slopes)
+
+    return put

@@ -1,0 +1,219 @@
+"""Couplings of patch laws with the mesh of a block, and with a plane that turns as in their rows.
+
+Theory: demos/theory.md, section 11.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry import Control, InputError, NotConverged, RigidPlane
+from multiscale.couplings.body import Displacements
+from multiscale.laws.law_table import LawTable
+from multiscale.laws.patch_law import PatchLaws
+from multiscale.loading.load_step import LoadStep
+from multiscale.loading.stepper import BeyondLaws
+from multiscale.storage import Arrays, packed, unpacked
+
+if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
+    from macro import Block, Interface, LawContactProblem, LawContactState
+
+Array = NDArray[np.float64]
+
+ROUNDING = 1e-12
+"""Share of a law's end by which a converged approach may exceed it."""
+
+_OTHER_MODEL = 0.05
+"""Residual of closures, relative to the largest local approach, that shows that the laws were made
+for another macro model; between their rows it is hundredths of that."""
+
+
+class EmbeddedCoupling:
+    """Patch laws on the flat interface of an elastic block (Waddad et al. 2016, section 3.2).
+
+    Args:
+        problem: The block with the laws on its interface.
+        table: The laws, which also give contact area, contacts and separation.
+        interface: The interface of the block.
+    """
+
+    def __init__(self, problem: LawContactProblem, table: LawTable, interface: Interface) -> None:
+        self._problem, self._table, self.interface = problem, table, interface
+        self._last: LawContactState | None = None
+
+    @property
+    def blocks(self) -> list[Block]:
+        """The block, as a list of one."""
+        return [self.interface.block]
+
+    @property
+    def displacement(self) -> Array:
+        """This rank's displacements at the latest load step; earlier ones are not kept [mm].
+
+        Raises:
+            ValueError: Before the first load step.
+        """
+        if self._last is None:
+            raise ValueError("no load step has been accepted yet")
+        return self._last.displacement
+
+    def press(self, control: Control) -> LoadStep:
+        """Solve one load step; see `Coupling.press`."""
+        try:
+            state = self._problem.solve(control)
+        except NotConverged as error:
+            if not any(law.is_flat for law in self._table.laws):
+                raise
+            problem = "a flat patch, whose pressure is a function of closure nowhere"
+            raise beyond_law(control, problem, self._table) from error
+        step = self._step(control, state)
+        self._last = state
+        return step
+
+    def state(self) -> Arrays:
+        """Return the latest plane and pressures, which determine the displacements."""
+        last = self._last
+        return {} if last is None else packed((last.approach, last.tilt, last.pressure))
+
+    def restore(self, state: Arrays) -> None:
+        """Find the equilibrium under a plane again, from the pressures; see `Restorable`.
+
+        It agrees with the earlier one to the tolerance of the Newton iteration.
+        """
+        if state:
+            approach, tilt, pressure = unpacked(state, ())
+            self._problem.start_from(pressure)
+            self._last = self._problem.solve(Control(approach=approach, tilt=tilt))
+
+    def _step(self, control: Control, state: LawContactState) -> LoadStep:
+        """Return the load step, with area, contacts and separation of the laws."""
+        laws = self._table.laws
+
+        def means(name: str) -> Array:
+            functions = [lambda closure, at=law.at: getattr(at(closure), name) for law in laws]
+            return self._problem.patch_means(functions)
+
+        try:
+            area_fraction, separation = means("contact_area_fraction"), means("separation")
+        except InputError as error:
+            falls = not all(law.is_function for law in laws)
+            raise beyond_law(control, str(error), self._table, falls=falls) from error
+        mean_closures = zip(laws, state.closure, strict=True)
+        contacts = [law.at(closure, extend=True).contacts for law, closure in mean_closures]
+        return LoadStep.of_patches(
+            self._table.patches,
+            plane=(state.approach, *state.tilt),
+            load=(state.force, *state.moment),
+            closure=state.closure,
+            pressure=state.pressure,
+            area_fraction=area_fraction,
+            separation=separation,
+            contacts=contacts,
+            newton_iterations=state.newton_iterations,
+            linear_iterations=state.linear_iterations,
+            reason=state.reason,
+            imbalance=(state.force - state.reaction) / state.force if state.force else 0.0,
+        )
+
+
+class FreePlaneCoupling:
+    """Consistent laws under a plane without moment.
+
+    It is the contacts that balance such a plane, not the mean pressures of patches at their
+    centres: laws of few large patches do not determine how it turns, and a single law not at all.
+    Therefore it turns as it did in the rows of the laws, and the macro model that the laws were
+    made for is in equilibrium with their pressures there.
+
+    Args:
+        table: The laws, with the path of the plane.
+        displacements: Mean displacements of the patches by their pressures in the macro model.
+            Collective.
+
+    Raises:
+        ValueError: When the laws have no path.
+    """
+
+    def __init__(self, table: LawTable, displacements: Displacements) -> None:
+        if table.path is None:
+            raise ValueError("the laws were made under a plane of given tilt")
+        self._table, self._path, self._laws = table, table.path, PatchLaws(table.laws)
+        self._displacements = displacements
+
+    def press(self, control: Control) -> LoadStep:
+        """Find the equilibrium of one load step; see `Coupling.press`.
+
+        Raises:
+            NotConverged: Also when the laws were made for another macro model.
+        """
+        path, patches = self._path, self._table.patches
+        approach, evaluations = control.approach, 0
+        if approach is None:
+            approach, evaluations = path.approach_under(control.force or 0.0, self._force)
+        end = float(path.approach[-1])
+        if approach > end + ROUNDING * abs(end):
+            problem = f"the plane at an approach of {approach:.6g} mm (allowed: up to {end:.6g} mm)"
+            raise beyond_law(control, problem, self._table)
+        tx, ty, *moment = map(float, path.at(approach))
+        point = self._laws.along(np.full(patches.count, approach))
+        local = RigidPlane.above(patches, approach, (tx, ty)).means(patches)
+        closure = local - self._displacements(point.pressure[None])[0]
+        residual = np.abs(np.where(point.pressure > 0.0, closure - point.closure, 0.0)).max()
+        residual /= float(np.abs(local).max()) or 1.0
+        if residual > _OTHER_MODEL:
+            raise NotConverged(
+                f"the patches at {control}",
+                reason="OTHER_BODY",
+                iterations=0,
+                remedy=f"their closures miss {residual:.1%} of the approach: make the laws for "
+                "this block and mesh",
+            )
+        return LoadStep.of_patches(
+            patches,
+            plane=(approach, tx, ty),
+            load=(self._force(approach), *moment),
+            closure=closure,
+            pressure=point.pressure,
+            area_fraction=point.contact_area_fraction,
+            separation=point.separation,
+            contacts=point.contacts,
+            newton_iterations=evaluations,
+        )
+
+    def _force(self, approach: float) -> float:
+        everywhere = np.full(self._table.patches.count, approach)
+        return self._table.patches.area * float(self._laws.along(everywhere).pressure.sum())
+
+
+def beyond_law(
+    control: Control, problem: str, table: LawTable, *, falls: bool = False
+) -> BeyondLaws:
+    """Return the error of a patch outside the range of its law.
+
+    Args:
+        control: The load step.
+        problem: Which patch, and the range of its law.
+        table: The laws.
+        falls: Whether closure falls somewhere in a law, where the mesh cannot follow.
+    """
+    if table.made_by.get("coupling") != "consistent":
+        remedy = (
+            "near full contact a patch taken alone has no pressure as a function of closure: take "
+            "coupling.newton = 'condensed', which goes on, coupling.kind = 'consistent' or "
+            "'concurrent', larger patches (patches.grid) or a smaller load"
+        )
+    elif falls:
+        remedy = (
+            "where the closure of a law falls the mesh cannot follow: take coupling.newton = "
+            "'condensed', which goes on, or coupling.kind = 'concurrent', which needs no law"
+        )
+    else:
+        remedy = (
+            "the block lets the plane come or turn further than the half-space that the laws were "
+            "made for: take coupling.kind = 'concurrent', which needs none"
+        )
+    return BeyondLaws(
+        f"the patches at {control}", reason=f"LAW_RANGE: {problem}", iterations=0, remedy=remedy
+    )

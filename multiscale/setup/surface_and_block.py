@@ -1,0 +1,242 @@
+"""Makes the surface and the block of a scene, and refuses what could never fit.
+
+Refused are too much memory, too many patches and too large loads, before anything is allocated.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from geometry import BlockShape, InputError, Material, Surface, read_surface, synthesise
+from geometry.files.content import BYTES_PER_HEIGHT
+from geometry.preparation import prepared
+from multiscale.machine import ClusterNodes, MemoryRequest
+from multiscale.scene.scene import Scene
+
+BYTES_PER_CELL = 5000
+"""Memory that mesh, stiffness and multigrid take per cell, roughly, over all ranks [B]."""
+BYTES_PER_SENT_HEIGHT = 17
+"""Memory of a height and its spline on every rank, once the surface is made [B]."""
+BYTES_PER_PAIR = 40
+"""Memory of dense matrices per pair of patches: compliance, tangent and factors [B]."""
+BYTES_PER_LAW, BYTES_PER_NEW_LAW = 3_600, 11_400
+"""Memory of a law with 65 rows of 7 numbers on every rank, and of what it takes besides where it
+is made, while rows are inserted [B]."""
+BYTES_PER_STATE, BYTES_PER_STEP = 24, 1000
+"""Memory of a patch's results and of the other results of a load step [B]."""
+
+LAW_BLOCK_CELLS, FIELD_CELLS = (40, 40, 25), (20, 20, 12)
+"""Cells of a block that carries laws on its mesh, those of Waddad et al. 2016, and of one that is
+meshed after the load for its fields alone."""
+_ROUNDING = 16.0 * float(np.finfo(float).eps)
+"""Approach over the largest height below which it does not change where the plane is."""
+PROVISIONAL_PATCHES = (4, 4)
+"""Patches that stand for ``"auto"`` until they are chosen."""
+
+
+def make_surface(scene: Scene) -> Surface:
+    """Make or read the surface of a scene.
+
+    Raises:
+        InputError: When it cannot be made or read; names file and key.
+    """
+    section = scene.surface
+    extent: dict[str, Any] = {"grid": section.grid, "lengths": section.lengths}
+    if section.spectrum is not None:
+        with located(scene, "surface.spectrum"):
+            surface = synthesise(section.spectrum.spectrum(), **extent)
+        with located(scene, "surface"):
+            surface = prepared(surface, section.preparation)
+    else:
+        extent |= {"height_unit": section.height_unit, "channel": section.channel}
+        extent |= {"periodic": section.periodic, **asdict(section.preparation)}
+        with located(scene, "surface.file"):
+            surface = read_surface(scene.surface_path or Path(), **extent)
+    if section.periodic and not surface.periodic:  # it continues so, whatever was removed of it
+        return replace(surface, periodic=True)
+    return surface
+
+
+def make_shape(scene: Scene, surface: Surface) -> BlockShape:
+    """Return the shape and cells of a scene's block under its surface.
+
+    Raises:
+        InputError: When they do not fit together or the coupling; names file and key.
+    """
+    block = scene.block
+    with located(scene, "block"):
+        return BlockShape(
+            interface=surface.lengths,
+            height=block.height_under(surface.lengths),
+            cells=block_cells(scene),
+            element=block.element,
+            grading=block.grading,
+            margin=block.margin,
+            margin_cells=block.margin_cells if block.margin else 0,
+            margin_grading=block.margin_grading if block.margin else 1.0,
+        )
+
+
+def block_material(scene: Scene) -> Material:
+    """Return the elastic constants of a scene's block."""
+    block = scene.block
+    return Material(young_modulus=block.young_modulus, poisson_ratio=block.poisson_ratio)
+
+
+def block_cells(scene: Scene) -> tuple[int, int, int]:
+    """Return the cells of the flat block's mesh: those of the scene, or as many as its use needs.
+
+    Laws need a fine mesh under every patch; fields do not.
+    """
+    cells = scene.block.cells
+    if cells is None or cells == "auto":
+        return LAW_BLOCK_CELLS if scene.coupling.on_mesh else FIELD_CELLS
+    return cells
+
+
+def meshes_block(scene: Scene) -> bool:
+    """Tell whether the flat block is meshed: under laws, or for fields after the load."""
+    return scene.coupling.on_mesh or (
+        scene.output.fields and scene.coupling.kind not in ("analytic", "reference")
+    )
+
+
+def patch_grid(scene: Scene) -> tuple[int, int]:
+    """Return the patches along x and y, or what stands for ``"auto"`` until they are chosen."""
+    grid = scene.patches.grid
+    return PROVISIONAL_PATCHES if grid == "auto" else grid
+
+
+def check_memory(
+    scene: Scene, nodes: ClusterNodes, requests: Iterable[MemoryRequest] | None = None
+) -> None:
+    """Refuse what does not fit into the memory of the nodes, before it is allocated.
+
+    Args:
+        scene: The scene.
+        nodes: The nodes of the run.
+        requests: The memory that is needed; by default `memory_requests` of the scene.
+
+    Raises:
+        InputError: Names the key, its value and what is allowed.
+    """
+    for request in memory_requests(scene) if requests is None else requests:
+        if not nodes.fits(request):
+            value, other = request.value, request.alternative
+            raise InputError(
+                request.sentence,
+                key=request.key,
+                value=list(value) if isinstance(value, tuple) else value,
+                allowed=f"what fits into {nodes.remedy(request)}{'; or ' * bool(other)}{other}",
+                file=scene.file,
+            )
+
+
+def memory_requests(scene: Scene) -> Iterator[MemoryRequest]:
+    """Yield the memory that a scene needs, key by key.
+
+    Auto values are left out: none is chosen that would not fit. A reference requests the memory of
+    its meshes itself.
+
+    Args:
+        scene: The scene.
+    """
+
+    def request(key: str, value: Any, purpose: str = "", **sizes: Any) -> MemoryRequest:
+        return MemoryRequest(key=key, value=value, purpose=purpose, **sizes)
+
+    grid, patches, kind = scene.surface.grid, scene.patches.grid, scene.coupling.kind
+    for key, heights in (("surface.grid", grid), ("surface.resample", scene.surface.resample)):
+        if isinstance(heights, tuple):
+            sent = math.prod(heights) * BYTES_PER_SENT_HEIGHT
+            made = math.prod(heights) * BYTES_PER_HEIGHT - sent
+            yield request(key, heights, per_rank=sent, root_only=made)
+    if meshes_block(scene):
+        nx, ny, nz = block_cells(scene)
+        yield request("block.cells", (nx, ny, nz), shared=nx * ny * nz * BYTES_PER_CELL)
+        if scene.block.margin:
+            margin = scene.block.margin_cells
+            cells = (nx + 2 * margin) * (ny + 2 * margin) * nz
+            yield request("block.margin_cells", margin, shared=cells * BYTES_PER_CELL)
+    if not isinstance(patches, tuple):
+        return
+    key, count = "patches.grid", math.prod(patches)
+    yield request(key, patches, per_rank=count * BYTES_PER_HEIGHT)
+    if kind not in ("analytic", "reference"):
+        purpose = "the interaction of all patches with each other"
+        yield request(key, patches, purpose, per_rank=count**2 * BYTES_PER_PAIR)
+    if kind in ("isolated", "consistent"):  # isolated laws are divided over the ranks
+        where = "shared" if kind == "isolated" else "root_only"
+        sizes = {"per_rank": count * BYTES_PER_LAW, where: count * BYTES_PER_NEW_LAW}
+        yield request(key, patches, "a law for every patch", **sizes)
+    steps, purpose = scene.loading.load_history.count, f"the history of {count} patches"
+    size = steps * (count * BYTES_PER_STATE + BYTES_PER_STEP)
+    yield request("load.steps", scene.loading.steps, purpose, per_rank=size)
+
+
+def check_patches(scene: Scene, surface: Surface) -> None:
+    """Refuse more patches than heights of the surface or cells of the interface."""
+    limits: dict[str, Sequence[int]] = {"heights of the surface": surface.grid}
+    if meshes_block(scene):
+        limits["cells of the interface (block.cells)"] = block_cells(scene)[:2]
+    grid = patch_grid(scene)
+    for what, limit in limits.items():
+        if np.any(np.greater(grid, limit)):
+            raise InputError(
+                f"more patches than {what}",
+                key="patches.grid",
+                value=list(grid),
+                allowed=f"at most {list(limit)}",
+                file=scene.file,
+            )
+
+
+def check_load(scene: Scene, surface: Surface) -> None:
+    """Refuse loads lost in the rounding of heights, or that press the block to nothing."""
+    block, loading = scene.block, scene.loading
+    resolved = _ROUNDING * float(np.abs(surface.heights).max())
+    if loading.approach is not None and 0.0 < max(loading.approach) < resolved:
+        raise InputError(
+            "is lost in the rounding of the heights",
+            key="load.approach",
+            value=list(loading.approach),
+            allowed=f"at least {resolved:.3g} mm, for heights of this size",
+            file=scene.file,
+        )
+    if scene.coupling.kind == "analytic":
+        return
+    if loading.force is not None:
+        key, points = "load.force", loading.force
+        most, named, unit = block.young_modulus * surface.area, "E times area", "N"
+    else:
+        key, points = "load.approach", loading.approach or ()
+        most, named, unit = block.height_under(surface.lengths), "the block's height", "mm"
+    if max(points) > most:
+        raise InputError(
+            "presses the block to nothing",
+            key=key,
+            value=list(points),
+            allowed=f"at most {named}, {most:.6g} {unit}",
+            file=scene.file,
+        )
+
+
+@contextmanager
+def located(scene: Scene, key: str) -> Iterator[None]:
+    """Give errors of the input that occur within the scene's file and a key.
+
+    Args:
+        scene: The scene.
+        key: The key.
+    """
+    try:
+        yield
+    except InputError as error:
+        raise error.located(key=key, file=scene.file) from None

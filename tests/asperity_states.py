@@ -1,0 +1,38 @@
+"""What contacts do to the summits and the surface around them, beyond what models return."""
+
+import numpy as np
+
+from micro import HertzContact
+
+
+def places(asperities):
+    """Return what pairs of contacts need of asperities, by name."""
+    return {name: getattr(asperities, name) for name in ("x", "y", "angle", "radius")}
+
+
+def interference(asperities, state):
+    """Return the depth of the plane below each undisplaced summit, 0 for summits below it."""
+    return np.maximum(asperities.interference(state.plane), 0.0)
+
+
+def displacement(model, state):
+    """Return the displacements of all summits by all contacts, also of summits below the plane."""
+    own = state.start.solution.indentation
+    interacting = model.contacts.kind.interacting or model.body is not None
+    return own + model.contacts.pairs.evaluate(own).displacement if interacting else own
+
+
+def surface_displacement(model, state, x, y):
+    """Add up the fields of all contacts at points, each Hertz's, also where contacts merge."""
+    total = np.zeros(np.broadcast_shapes(np.shape(x), np.shape(y)))
+    a, hertz, own = model.asperities, model.contacts.hertz, state.start.solution.indentation
+    for k in np.flatnonzero(own):  # one field at a time bounds the memory
+        contact = HertzContact(
+            contact_modulus=hertz.contact_modulus,
+            radius_major=hertz.radius_major[k],
+            radius_minor=hertz.radius_minor[k],
+            indentation=own[k],
+        )
+        turned = ((x - a.x[k]) + 1j * (y - a.y[k])) * np.exp(-1j * a.angle[k])
+        total += contact.displacement(turned.real, turned.imag)
+    return total

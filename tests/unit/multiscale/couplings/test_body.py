@@ -1,0 +1,118 @@
+"""What the contact problem sees of a scene's block: sides, body, finite slopes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from geometry.errors import InputError
+from micro import BodyModes, FiniteSlopes, FreeSides
+from multiscale import Scene, make_setup
+from multiscale.couplings.body import patch_displacements, scene_body
+from multiscale.couplings.contact import contact_model
+from multiscale.planning.costs import solution_time
+
+
+def setup(
+    kind="concurrent",
+    model="half-space",
+    patches=4,
+    coupling=None,
+    slopes=None,
+    approach=0.008,
+    **block,
+):
+    spectrum = {"hurst": 0.95, "waves": [2, 8], "rms_slope": 0.215, "seed": 1}
+    material = {"height": 0.8, "young_modulus": 4000.0, "poisson_ratio": 0.15, "cells": [8, 8, 5]}
+    micro = {"model": model} | ({} if slopes is None else {"finite_slopes": slopes})
+    return make_setup(
+        Scene.from_dict(
+            {
+                "surface": {"spectrum": spectrum, "grid": [32, 32], "lengths": [1.0, 1.0]},
+                "block": material | block,
+                "patches": {"grid": [patches, patches]},
+                "micro": micro,
+                "coupling": {"kind": kind} | (coupling or {}),
+                "load": {"approach": approach},
+            }
+        )
+    )
+
+
+@pytest.mark.parametrize(
+    ("kind", "coupling"),
+    [
+        ("concurrent", {}),
+        ("consistent", {}),
+        ("consistent", {"compliance": "finite-element"}),
+    ],
+)
+def test_cells_know_the_free_sides_of_their_block(kind, coupling):
+    found = setup(kind, coupling=coupling)
+    # a quarter of the block's height, its shortest side
+    expected = FreeSides(lengths=(1.0, 1.0), poisson_ratio=0.15, decay_length=0.2)
+    assert scene_body(found).side_term == expected
+    model = contact_model(found, None)
+    assert model.sides == expected
+    assert isinstance(model.body, BodyModes)
+    assert isinstance(model.slopes, FiniteSlopes)
+    assert (found.model.sides, found.model.body, found.model.slopes) == (None, None, None)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [{"sides": "roller"}, {"margin": 0.5, "margin_cells": 2}, {"model": "islands"}],
+)
+def test_other_bodies_have_their_sides_in_the_body_term(given):
+    found = setup(slopes=False, **given)
+    assert scene_body(found).side_term is None
+    model = contact_model(found, None)
+    assert isinstance(model.body, BodyModes)
+    assert getattr(model, "sides", None) is None
+
+
+def test_patches_alone_lie_on_a_half_space():
+    model = contact_model(setup("isolated"), None)
+    assert (model.sides, model.body, model.slopes) == (None, None, None)
+
+
+@pytest.mark.parametrize("kind", ["analytic", "concurrent", "consistent"])
+@pytest.mark.parametrize("slopes", [None, True, False])
+def test_slopes_are_finite_unless_the_scene_says_otherwise(kind, slopes):
+    found = setup(kind, slopes=slopes)
+    model = contact_model(found, None)
+    assert (model.slopes is not None) == (slopes is not False)
+    assert (model.body is not None) == (kind != "analytic")
+
+
+def test_slopes_and_bodies_are_more_work():
+    flat, rough = setup(slopes=False), setup()
+    assert solution_time(rough) > 2.0 * solution_time(flat)
+    assert solution_time(flat) > solution_time(setup("analytic", slopes=False))
+
+
+@pytest.mark.parametrize("way", ["decomposed", "finite-element"])
+def test_displacements_of_patches_are_those_of_the_macro_model(way):
+    found = setup("consistent", patches=2, coupling={"compliance": way, "newton": "condensed"})
+    dense = patch_displacements(found, None, dense=True)
+    pressures = np.array([[0.0, 0.0, 0.0, 0.0], [1.0, 2.0, 0.0, 4.0]])
+    sunk = dense(pressures)
+    assert not sunk[0].any()
+    # a loaded patch sinks by its own compliance and more
+    assert np.all(sunk[1] > 0.0)
+    if way == "finite-element":
+        # the linear solver's tolerance
+        solved = patch_displacements(found, None, dense=False)(pressures)
+        np.testing.assert_allclose(solved, sunk, rtol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("key", "block"),
+    [("block.height", {"height": 1e-5}), ("block.margin", {"margin": 6e5, "margin_cells": 2})],
+)
+def test_blocks_too_flat_for_their_modes_are_refused(key, block):
+    with pytest.raises(
+        InputError, match=r"so flat a block, in \d+ modes a side, needs about"
+    ) as caught:
+        contact_model(setup(approach=1e-6, **block), None)
+    assert caught.value.key == key

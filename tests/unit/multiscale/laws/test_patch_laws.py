@@ -1,0 +1,116 @@
+"""All laws at once against the laws one by one, also where they are no functions of closure."""
+
+import numpy as np
+import pytest
+
+from geometry.errors import InputError
+from multiscale.laws.patch_law import PatchLaw, PatchLaws
+from multiscale.laws.rows import LawRows, SolvedRows
+
+
+def law(touch=1e-3, rows=12, own=0.0, stiffness=4e3):
+    approach = np.linspace(touch, 9e-3, rows)
+    pressure = stiffness * (approach - touch) ** 1.5
+    columns = LawRows(
+        closure=approach - own * pressure,
+        pressure=pressure,
+        approach=approach,
+        contact_area_fraction=3.0 * (approach - touch),
+        contacts=np.arange(rows),
+        unresolved_displacement=0.5 * (approach - touch),
+    )
+    return PatchLaw(rows=columns, first_touch=touch, initial_separation=0.02)
+
+
+def open_law(touch=5e-3):
+    return PatchLaw(rows=SolvedRows.none(), first_touch=touch, initial_separation=0.03)
+
+
+LAWS = [law(), law(2e-3, 7, own=2e-4), open_law(), law(own=6e-3, rows=40), open_law(np.inf)]
+FALLING = LAWS[3]
+
+
+@pytest.mark.parametrize("common", [-1e-3, 1e-3, 1.7e-3, 4e-3, 8.99e-3, 9e-3, 0.02])
+def test_packed_laws_are_the_laws(common):
+    packed = PatchLaws(LAWS)
+    local = common + 1e-4 * np.arange(5)
+    for together, each in zip(
+        packed.along(local),
+        zip(*(one.along(s) for one, s in zip(LAWS, local, strict=True)), strict=True),
+        strict=True,
+    ):
+        np.testing.assert_array_equal(together, np.array(each).ravel())
+    point = packed.along(local)
+    for index in (0, 1):  # those whose pressure is a function of closure
+        values = LAWS[index].at(point.closure[index], extend=True)
+        found = point.contact_area_fraction[index], point.separation[index]
+        expected = values.contact_area_fraction, values.separation
+        np.testing.assert_allclose(expected, found, rtol=1e-11, atol=1e-14)  # the inversion's
+    rows = [np.searchsorted(one.rows.approach, s, side="right") - 1
+            for one, s in zip(LAWS, local, strict=True)]  # fmt: skip
+    assert point.contacts.tolist() == [max(row, 0) for row in rows]
+
+
+def test_derivatives_are_exact():
+    packed, h = PatchLaws(LAWS), 1e-9
+    local = np.full(5, 6.123e-3)
+    high, low, point = packed.along(local + h), packed.along(local - h), packed.along(local)
+    # second-order differences of smooth pieces, and rounding of closures over h
+    np.testing.assert_allclose(point.dclosure, (high.closure - low.closure) / 2e-9, rtol=1e-6)
+    np.testing.assert_allclose(
+        point.dpressure, (high.pressure - low.pressure) / 2e-9, rtol=1e-5, atol=1e-9
+    )
+
+
+def test_falling_closure_is_kept_along_the_approach():
+    assert not FALLING.is_function
+    local = np.linspace(1e-3, 9e-3, 101)
+    point = FALLING.along(local)
+    # p^(2/3) is a straight line; closure is interpolated on 40 rows
+    np.testing.assert_allclose(point.pressure, 4e3 * (local - 1e-3) ** 1.5, rtol=1e-11, atol=1e-15)
+    assert point.dclosure.min() < -0.5
+    np.testing.assert_allclose(point.closure, local - 6e-3 * point.pressure, atol=3e-6)
+
+
+def test_falling_closure_ends_the_law_over_closure():
+    start, end = FALLING.range
+    assert start == 1e-3
+    assert end == FALLING.rows.closure.max()
+    found = FALLING.at(np.linspace(start, end, 50))
+    pressure, stiffness = found.pressure, found.stiffness
+    assert np.all(np.diff(pressure) > 0.0)
+    assert np.all(stiffness >= 0.0)
+    with pytest.raises(InputError, match=r"beyond the end .* stops being a function of closure"):
+        FALLING.at(1.01 * end)
+
+
+def test_newton_may_look_beyond_where_closure_turns():
+    """The law over closure goes on steeply there, and never onto the branch that falls."""
+    _, end = FALLING.range
+    turn = FALLING.rows.pressure[np.argmax(FALLING.rows.closure)]
+    beyond = end + np.array([0.0, 1e-9, 1e-8, 1e-3])
+    pressure, stiffness = FALLING.pressure(beyond), FALLING.stiffness(beyond)
+    assert pressure[0] == pytest.approx(turn, rel=1e-12)
+    assert np.all(np.diff(pressure) > 0.0)
+    h = 1e-3 * (beyond[1:] - end)
+    higher, lower = (FALLING.pressure(beyond[1:] + way * h) for way in (1, -1))
+    # second-order differences of a power of 3/2
+    np.testing.assert_allclose(stiffness[1:], (higher - lower) / (2 * h), rtol=1e-5)
+
+
+@pytest.mark.parametrize("one", [LAWS[0], LAWS[1]])
+def test_law_over_closure_is_the_law_along_the_approach(one):
+    local = np.random.default_rng(2).uniform(0.0, 10e-3, 500)
+    point = one.along(local)
+    found = one.at(point.closure, extend=True)
+    # the inversion ends at the rounding of the closure: 1e-16 over the distance from touch
+    np.testing.assert_allclose(found.pressure, point.pressure, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(
+        found.stiffness, point.dpressure / point.dclosure, rtol=1e-8, atol=1e-9
+    )
+
+
+def test_ends_and_touches():
+    packed = PatchLaws(LAWS)
+    np.testing.assert_array_equal(packed.first_touch, [1e-3, 2e-3, 5e-3, 1e-3, np.inf])
+    np.testing.assert_allclose(packed.end, [9e-3, 9e-3, 5e-3, 9e-3, np.inf], rtol=1e-15)
