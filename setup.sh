@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Install everything patchlaw needs on a Debian machine (12 or newer), then the package itself into .venv.
-# Run it as root or with sudo at hand; when all is there it does nothing.
+# With --instruments also the readers of instruments' formats. Run it as root or with sudo at hand; when
+# all is there it does nothing.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
@@ -11,11 +12,26 @@ packages=(
   python3-numpy python3-scipy python3-h5py python3-matplotlib
   mpi-default-bin libopenblas0-pthread gcc libc6-dev
 )
+# SurfaceTopography reads instruments' formats. What it is compiled against, and all else that Debian
+# has, comes from Debian: pip would follow its requirements to a numpy that nothing here is built for.
+instrument_packages=(
+  python3-dateutil python3-defusedxml python3-olefile python3-openpyxl python3-pandas python3-pil
+  python3-requests python3-tifffile python3-xmltodict python3-yaml python3-zstandard
+)
+instrument_wheels=(SurfaceTopography==1.27.1 NuMPI==0.18.1 array-api-compat==1.16.0 igor2==0.5.15)
 python=/usr/bin/python3 # dolfinx belongs to Debian's interpreter; another python3 may come first on PATH
 stamp=.venv/patchlaw-ready
 
 say() { printf 'setup: %s\n' "$*"; }
 fail() { printf 'setup: %s\n' "$*" >&2; exit 1; }
+
+# Once asked for, the readers stay: a later plain ./setup.sh keeps them.
+case "${1-}" in
+  "") instruments=$(grep -sq instruments "$stamp" && echo instruments || true) ;;
+  --instruments) instruments=instruments ;;
+  *) fail "unknown option $1 (allowed: --instruments)" ;;
+esac
+[ -z "$instruments" ] || packages+=("${instrument_packages[@]}")
 
 missing=()
 for package in "${packages[@]}"; do
@@ -36,7 +52,7 @@ fi
 "$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || fail "$python is older than Python 3.11; Debian 12 or newer is needed"
 
 # The stamp ties the environment to this checkout, this interpreter and these requirements.
-wanted="$PWD $("$python" --version) $(sha256sum pyproject.toml)"
+wanted="$PWD $("$python" --version) $(sha256sum pyproject.toml) ${instruments:+instruments ${instrument_wheels[*]}}"
 if [ ! -x .venv/bin/patchlaw ] || [ "$(cat "$stamp" 2>/dev/null)" != "$wanted" ]; then
   say "making .venv"
   "$python" -m venv --clear --system-site-packages .venv || fail "could not make .venv with $python"
@@ -44,6 +60,12 @@ if [ ! -x .venv/bin/patchlaw ] || [ "$(cat "$stamp" 2>/dev/null)" != "$wanted" ]
     fail "pip could not install patchlaw and its pure-Python requirements (is a package index reachable?)"
   .venv/bin/python -c 'import dolfinx, petsc4py, mpi4py, gmsh, h5py, scipy, matplotlib, filelock, jinja2, pint, pydantic, rich, threadpoolctl' ||
     fail "the installed packages cannot be imported together; see the message above"
+  if [ "$instruments" ]; then
+    say "installing readers of instruments' formats"
+    .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --only-binary :all: \
+      "${instrument_wheels[@]}" || fail "pip could not install: ${instrument_wheels[*]}"
+    .venv/bin/python -c 'import SurfaceTopography' || fail "SurfaceTopography cannot be imported; see the message above"
+  fi
   printf '%s\n' "$wanted" >"$stamp"
 fi
 say "ready: .venv/bin/patchlaw"

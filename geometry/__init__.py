@@ -7,7 +7,7 @@ contact modulus, and block shapes the mesh of the body under the surface.
 
 from geometry.asperities import Asperities, find_asperities
 from geometry.errors import InputError, NotConverged, PatchlawError
-from geometry.files import read_surface
+from geometry.files.reading import read_surface
 from geometry.materials import Material, MaterialPair
 from geometry.meshes.block import BlockShape, misalignment
 from geometry.meshes.families import (
@@ -19,9 +19,10 @@ from geometry.meshes.families import (
 from geometry.meshes.refined_block import RefinedShape
 from geometry.patches import Partition, PatchGrid, UnevenPartition, overlaps, patch_means
 from geometry.rigid_plane import Control, RigidPlane
-from geometry.spectrum import Spectrum, synthesise
+from geometry.spectrum import Spectrum
 from geometry.statistics import PowerSpectrum, Roughness, power_spectrum, roughness
 from geometry.surface import Surface
+from geometry.synthesis import synthesise
 
 __all__ = [
     "Asperities",

@@ -95,6 +95,32 @@ def cell_counts(value: Any, what: str, *, dimension: int = 2, smallest: int = 1)
     return tuple(int(n) for n in counts)
 
 
+def cells_between(
+    interval: tuple[float, float] | None, length: float, count: int, axis: str
+) -> slice:
+    """Return the cells between two coordinates, rounded to whole cells.
+
+    Args:
+        interval: Coordinates (lo, hi) [mm]; all cells when None.
+        length: Side of the rectangle [mm].
+        count: Its cells.
+        axis: Name of the axis, for the error.
+
+    Raises:
+        InputError: When the interval leaves the rectangle or keeps no cell.
+    """
+    if interval is None:
+        return slice(None)
+    lo, hi = (round(float(edge) / length * count) for edge in interval)
+    if not 0 <= lo < hi <= count:
+        raise InputError(
+            f"the crop along {axis} does not lie within the surface or keeps no cell",
+            value=tuple(interval),
+            allowed=f"0 ≤ lo < hi ≤ {length} mm",
+        )
+    return slice(lo, hi)
+
+
 def frozen_array(value: Any) -> NDArray[np.float64]:
     """Return a contiguous, read-only float64 copy."""
     with np.errstate(over="ignore", invalid="ignore"):  # long doubles may become infinite

@@ -59,6 +59,17 @@ class InputError(PatchlawError, ValueError):
             file=self.file or file,
         )
 
+    def of_content(self, file: str) -> InputError:
+        """Return the same error about what a file holds, its value last, as it is that of no key.
+
+        Args:
+            file: The file.
+        """
+        if self.value is _Value.NONE or self.key:
+            return self.located(file=file)
+        problem = f"{self.problem}: {_shortened(self.value)}"
+        return type(self)(problem, allowed=self.allowed, file=self.file or file)
+
     def __str__(self) -> str:
         shown = None if self.value is _Value.NONE else _shortened(self.value)
         key = self.key and (self.key if len(self.key) <= _LONGEST else f"{self.key[:_LONGEST]}…")

@@ -9,7 +9,13 @@ from math import ceil
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry.checks import LARGEST, frozen_array, is_level, positive_lengths
+from geometry.checks import (
+    LARGEST,
+    cells_between,
+    frozen_array,
+    is_level,
+    positive_lengths,
+)
 from geometry.errors import InputError
 from geometry.interpolant import Interpolant
 
@@ -34,7 +40,8 @@ class Surface:
             differ by rounding alone become one height.
         lengths: Sides (Lx, Ly) of the rectangle [mm].
         periodic: Whether the heights continue periodically in both directions.
-        source: Where the heights came from, for reports.
+        source: Where the heights came from and what was done to them, for reports.
+        notes: What a user should know of the heights before they are pressed.
 
     Raises:
         InputError: When the heights are not a finite array of at least 4 × 4 or a length is not
@@ -45,6 +52,7 @@ class Surface:
     lengths: tuple[float, float]
     periodic: bool = False
     source: str = ""
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "lengths", positive_lengths(self.lengths, "the surface"))
@@ -168,8 +176,8 @@ class Surface:
         Raises:
             InputError: When an interval is empty or leaves the surface.
         """
-        rows = _cells_between(x, self.lengths[0], self.grid[0], "x")
-        columns = _cells_between(y, self.lengths[1], self.grid[1], "y")
+        rows = cells_between(x, self.lengths[0], self.grid[0], "x")
+        columns = cells_between(y, self.lengths[1], self.grid[1], "y")
         heights = self.heights[rows, columns]
         lengths = (heights.shape[0] * self.spacing[0], heights.shape[1] * self.spacing[1])
         return replace(self, heights=heights, lengths=lengths, periodic=False)
@@ -258,22 +266,6 @@ def _checked_heights(heights: ArrayLike) -> Array:
     if is_level(array):  # summits of rounding are none
         return frozen_array(np.full(array.shape, array[0, 0]))
     return array
-
-
-def _cells_between(
-    interval: tuple[float, float] | None, length: float, count: int, axis: str
-) -> slice:
-    """Return the cells between two coordinates, rounded to whole cells."""
-    if interval is None:
-        return slice(None)
-    lo, hi = (round(float(edge) / length * count) for edge in interval)
-    if not 0 <= lo < hi <= count:
-        raise InputError(
-            f"the crop along {axis} does not lie within the surface or keeps no cell",
-            value=tuple(interval),
-            allowed=f"0 ≤ lo < hi ≤ {length} mm",
-        )
-    return slice(lo, hi)
 
 
 def _within(interval: tuple[float, float], length: float, axis: str) -> tuple[float, float]:

@@ -20,6 +20,7 @@ from typing import Any
 import threadpoolctl
 
 from geometry.errors import InputError, PatchlawError
+from multiscale.installation import removal, shadows
 from multiscale.machine import control_group_memory, detached_processes
 
 _SEVERITY = {"ok": 0, "warning": 1, "fail": 2}
@@ -83,7 +84,9 @@ def examine(comm: Any, checks: Mapping[str, Check]) -> dict[str, CheckResult]:
             return CheckResult("fail", str(failure))
         except Exception as failure:
             text = f"{type(failure).__name__}: {failure}"
-            return CheckResult("fail", text, "please report this with the lines above")
+            found = shadows()
+            advice = removal(found) if found else "please report this with the lines above"
+            return CheckResult("fail", text, advice)
 
     return {
         topic: max(gathered(comm, made(check)), key=lambda result: _SEVERITY[result.state])
@@ -132,6 +135,9 @@ def packages(comm: Any, load: Callable[[str], Any] = importlib.import_module) ->
         numbers = re.match(r"(\d+)\.(\d+)", version)
         if numbers and tuple(map(int, numbers.groups())) < oldest:
             wrong[name] = f"{name} {version} is older than {'.'.join(map(str, oldest))}"
+    if shadowing := shadows():
+        text = "; ".join([*map(str, shadowing), *wrong.values()])
+        return CheckResult("fail" if wrong else "warning", text, removal(shadowing))
     if not wrong:
         return CheckResult("ok", ", ".join(found))
     state = "warning" if set(wrong) == {"matplotlib"} else "fail"  # it draws figures alone

@@ -26,6 +26,7 @@ COMPARE_ENDING = "-compare"
 """What the results folder of a comparison is called after the scene's name."""
 
 _INTERRUPTED = 130  # exit code after SIGINT, as shells have it
+_WRONG_INPUT = 2  # and of what is installed; errors with exit codes need numpy
 
 
 class Ended(KeyboardInterrupt):
@@ -90,6 +91,10 @@ def _run(words: list[str]) -> int:
         choice = _parser().parse_args(words[:cut])
     except UsageError as error:  # for rank 0 to say, which is known once MPI has started
         choice = str(error)
+    from multiscale.installation import works_together
+
+    if not works_together():
+        return _WRONG_INPUT
     from multiscale.cli.execution import execute
 
     return execute(choice, words[cut + 1 :])

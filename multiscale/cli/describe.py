@@ -85,7 +85,7 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
     scene, folder = scene_and_folder(choice, comm)
     with locked(folder, comm):
         setup = _setup(scene, comm)
-        terminal.show_pairs(comm, _surface_facts(setup))
+        terminal.show_pairs(comm, _surface_facts(setup), setup.surface.notes)
 
         def write() -> list[Path]:
             from multiscale.output.figures import surface_figure

@@ -149,7 +149,14 @@ def on_body(
             return model
         stresses = [] if body is None or face is None else body.stresses(face, surface)
         plane = surface.highest if stresses else None
-        slopes = FiniteSlopes(surface, material, order=order, plane=plane, edge_stresses=stresses)
+        slopes = FiniteSlopes(
+            surface,
+            material,
+            order=order,
+            periodic=model.periodic,
+            plane=plane,
+            edge_stresses=stresses,
+        )
         return replace(model, slopes=slopes)
 
     return put

@@ -79,6 +79,7 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "units": "mm, N, MPa",
         "surface": {
             "source": setup.surface.source,
+            "notes": list(setup.surface.notes),
             "heights_sha256": run.heights,
             "highest_mm": setup.surface.highest,
             "summits": setup.asperities.count,

@@ -48,6 +48,7 @@ def warnings(setup: ProblemSetup) -> Iterator[str]:
     Args:
         setup: The problem.
     """
+    yield from setup.surface.notes
     excess = setup.surface.highest - setup.surface.heights.max()
     if excess > 0.1 * setup.largest_interference:
         x, y = setup.surface.highest_point
@@ -85,10 +86,11 @@ def surface_statement(setup: ProblemSetup) -> str:
     """
     surface, spectrum = setup.surface, setup.scene.surface.spectrum
     rough = roughness(surface)
+    continued = ", continued periodically" if setup.scene.surface.periodic else ""
     text = (
         f"{surface.source}; {surface.grid[0]} × {surface.grid[1]} heights on "
-        f"{surface.lengths[0]:g} × {surface.lengths[1]:g} mm, rms height {1e3 * rough.sq:.3g} µm, "
-        f"rms gradient {rough.sdq:.3g}"
+        f"{surface.lengths[0]:g} × {surface.lengths[1]:g} mm{continued}, "
+        f"rms height {1e3 * rough.sq:.3g} µm, rms gradient {rough.sdq:.3g}"
     )
     if spectrum is None:
         return text
@@ -128,7 +130,10 @@ def _coupling(setup: ProblemSetup) -> str:
             "the results"
         )
     if not setup.has_block:
-        return "analytic: the micro model alone on a half-space, no finite elements"
+        counted = "; displacements, and so the approach, count from the mean of the surface"
+        return "analytic: the micro model alone on a half-space, no finite elements" + (
+            counted if setup.scene.surface.periodic else ""
+        )
     if not setup.uses_laws:
         return (
             "concurrent: the whole surface on the block at every load step, no laws; "

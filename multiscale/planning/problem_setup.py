@@ -141,7 +141,7 @@ def stated_model(scene: Scene, surface: Surface) -> MicroModel:
         scene: The scene.
         surface: Its surface.
     """
-    return micro_model(
+    model = micro_model(
         scene.micro.model,
         surface,
         contact_modulus=_modulus(scene),
@@ -149,6 +149,9 @@ def stated_model(scene: Scene, surface: Surface) -> MicroModel:
         curvature=scene.micro.curvature,
         border=scene.micro.border,
     )
+    if scene.surface.periodic and isinstance(model, HalfSpaceModel):
+        return replace(model, periodic=True)
+    return model
 
 
 def plane_at_largest_load(
@@ -174,7 +177,8 @@ def plane_at_largest_load(
 def _estimated_plane(scene: Scene, surface: Surface) -> RigidPlane:
     """Return the rigid plane at the largest load on a half-space of few cells."""
     x, y = surface.grid
-    fine = HalfSpaceModel(surface, contact_modulus=_modulus(scene))
+    periodic = scene.surface.periodic
+    fine = HalfSpaceModel(surface, contact_modulus=_modulus(scene), periodic=periodic)
     model = fine.resampled((min(x, _ESTIMATE_CELLS), min(y, _ESTIMATE_CELLS)))
     whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
     coupling = ContactCoupling(model, whole, patch_means(surface, whole))

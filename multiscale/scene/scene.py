@@ -7,9 +7,9 @@ import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, Field, PrivateAttr, ValidationError
+from pydantic import BaseModel, Field, PrivateAttr, ValidationError, model_validator
 
 from geometry.errors import InputError
 from multiscale.scene.coupling_sections import CouplingSection, LoadSection, ReferenceSection
@@ -61,6 +61,20 @@ class Scene(Section):
     output: OutputSection = OutputSection()
     _source: Path | None = None
     _data: dict[str, Any] = PrivateAttr(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _continues_periodically(self) -> Self:
+        """Refuse a periodic contact where something ends or turns."""
+        kind, model, tilt = self.coupling.kind, self.micro.model, self.loading.tilt
+        if self.surface.periodic and (
+            kind != "analytic" or model != "half-space" or tilt != (0, 0)
+        ):
+            raise ValueError(
+                "surface.periodic = true: a body or a plane that turns does not continue "
+                "periodically (allowed: coupling.kind = 'analytic', micro.model = 'half-space', "
+                "a level plane)"
+            )
+        return self
 
     @classmethod
     def load(cls, path: str | Path, overrides: Sequence[str] = ()) -> Scene:

@@ -6,6 +6,9 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from geometry.errors import InputError
+from geometry.files.content import LENGTH_UNITS, length_unit
+from geometry.preparation import Preparation
 from geometry.spectrum import LARGEST_SEED, Spectrum
 from multiscale.scene.quantities import Length, Pressure, Slope, SpectralAmplitude
 
@@ -55,21 +58,59 @@ class SpectrumSection(Section):
         return Spectrum(**self.model_dump())
 
 
-class SurfaceSection(Section):
-    """Exactly one source of heights, and the rectangle it covers.
+Interval = Annotated[tuple[Length, Length], Field(description="from, to")]
 
-    ``missing``: what is done with heights of a file that are not a number. They are refused, or
-    filled by the smoothest membrane between the others, see `geometry.missing.filled`.
+
+class CropSection(Section):
+    """The rectangle of a map that is kept, rounded to whole cells; all of an axis not given."""
+
+    x: Interval | None = None
+    y: Interval | None = None
+
+
+class FilterSection(Section):
+    """Cut-off wavelengths of the areal Gaussian filter, ISO 16610-61.
+
+    Waves shorter than ``short`` (S-filter) and longer than ``long`` (L-filter) are removed; half of
+    the amplitude passes at a cut-off.
+    """
+
+    short: PositiveLength | None = None
+    long: PositiveLength | None = None
+
+
+class SurfaceSection(Section):
+    """Exactly one source of heights, the rectangle it covers, and what is done to the map.
+
+    Of a file: ``height_unit`` is the unit of its heights where the file does not state one, mm when
+    not given; ``channel`` the name or number of a channel, counted from 0.
+
+    ``grid`` is what a spectrum is sampled on, or what the file must have, ``lengths`` its sides,
+    needed where the file does not state them.
+
+    A map is prepared in this order: ``crop``; ``missing``, heights that are not a number are
+    refused, or filled by the smoothest membrane between the others, see `geometry.missing.filled`;
+    ``outliers``, spikes are removed and filled; ``detrend``, its form is removed; ``filter``;
+    ``resample``, the numbers of heights on a new grid.
+
+    ``periodic``: whether surface and contact continue over the borders, on a half-space.
     """
 
     spectrum: SpectrumSection | None = None
     file: str | None = None
+    height_unit: str | None = None
+    channel: str | Annotated[int, Field(ge=0, strict=True)] | None = None
     grid: Annotated[tuple[Heights, Heights], Field(description="heights in x, y")] | Auto | None = (
         None
     )
     lengths: tuple[PositiveLength, PositiveLength] | None = None
-    detrend: Literal["none", "mean", "plane", "quadratic"] = "none"
+    crop: CropSection = CropSection()
     missing: Literal["refuse", "fill"] = "refuse"
+    outliers: Literal["keep", "remove"] = "keep"
+    detrend: Literal["none", "mean", "plane", "quadratic"] = "none"
+    filter: FilterSection = FilterSection()
+    resample: tuple[Heights, Heights] | None = None
+    periodic: Flag = False
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
@@ -77,13 +118,36 @@ class SurfaceSection(Section):
             raise ValueError("needs exactly one source (allowed: either 'spectrum' or 'file')")
         if self.spectrum is not None and (self.grid is None or self.lengths is None):
             raise ValueError("a 'spectrum' needs 'grid' and 'lengths' beside it")
-        if self.file is None and self.missing == "fill":
-            raise ValueError("missing = 'fill' needs a 'file' (allowed: leave it out)")
+        fields = type(self).model_fields
+        for key in ("height_unit", "channel", "crop", "missing", "outliers", "resample"):
+            if self.file is None and getattr(self, key) != fields[key].default:
+                raise ValueError(f"'{key}' needs a 'file' (allowed: leave it out)")
         if self.file is not None and self.grid == "auto":
             raise ValueError(
                 "grid = 'auto' needs a 'spectrum' (allowed: the grid of the file, or leave it out)"
             )
+        if self.height_unit is not None:
+            try:
+                length_unit(self.height_unit)
+            except InputError:
+                raise ValueError(
+                    f"height_unit = '{self.height_unit}' is no unit of heights "
+                    f"(allowed: {', '.join(LENGTH_UNITS)})"
+                ) from None
         return self
+
+    @property
+    def preparation(self) -> Preparation:
+        """What is done to the map."""
+        return Preparation(
+            crop=(self.crop.x, self.crop.y),
+            missing=self.missing,
+            outliers=self.outliers,
+            form=self.detrend,
+            short=self.filter.short,
+            long=self.filter.long,
+            resample=self.resample,
+        )
 
 
 class BlockSection(Section):

@@ -8,13 +8,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from geometry import BlockShape, InputError, Material, Surface, read_surface, synthesise
-from geometry.files import BYTES_PER_HEIGHT
+from geometry.files.content import BYTES_PER_HEIGHT
+from geometry.preparation import prepared
 from multiscale.machine import ClusterNodes, MemoryRequest
 from multiscale.scene.scene import Scene
 
@@ -37,7 +39,6 @@ _ROUNDING = 16.0 * float(np.finfo(float).eps)
 """Approach over the largest height below which it does not change where the plane is."""
 PROVISIONAL_PATCHES = (4, 4)
 """Patches that stand for ``"auto"`` until they are chosen."""
-_DETREND_ORDER = {"mean": 0, "plane": 1, "quadratic": 2}
 
 
 def make_surface(scene: Scene) -> Surface:
@@ -51,13 +52,16 @@ def make_surface(scene: Scene) -> Surface:
     if section.spectrum is not None:
         with located(scene, "surface.spectrum"):
             surface = synthesise(section.spectrum.spectrum(), **extent)
+        with located(scene, "surface"):
+            surface = prepared(surface, section.preparation)
     else:
+        extent |= {"height_unit": section.height_unit, "channel": section.channel}
+        extent |= {"periodic": section.periodic, **asdict(section.preparation)}
         with located(scene, "surface.file"):
-            path = scene.surface_path or Path()
-            surface = read_surface(path, missing=section.missing, **extent)
-    if section.detrend == "none":
-        return surface
-    return surface.detrended(_DETREND_ORDER[section.detrend])
+            surface = read_surface(scene.surface_path or Path(), **extent)
+    if section.periodic and not surface.periodic:  # it continues so, whatever was removed of it
+        return replace(surface, periodic=True)
+    return surface
 
 
 def make_shape(scene: Scene, surface: Surface) -> BlockShape:
@@ -149,10 +153,11 @@ def memory_requests(scene: Scene) -> Iterator[MemoryRequest]:
         return MemoryRequest(key=key, value=value, purpose=purpose, **sizes)
 
     grid, patches, kind = scene.surface.grid, scene.patches.grid, scene.coupling.kind
-    if isinstance(grid, tuple):
-        sent = math.prod(grid) * BYTES_PER_SENT_HEIGHT
-        made = math.prod(grid) * BYTES_PER_HEIGHT - sent
-        yield request("surface.grid", grid, per_rank=sent, root_only=made)
+    for key, heights in (("surface.grid", grid), ("surface.resample", scene.surface.resample)):
+        if isinstance(heights, tuple):
+            sent = math.prod(heights) * BYTES_PER_SENT_HEIGHT
+            made = math.prod(heights) * BYTES_PER_HEIGHT - sent
+            yield request(key, heights, per_rank=sent, root_only=made)
     if meshes_block(scene):
         nx, ny, nz = block_cells(scene)
         yield request("block.cells", (nx, ny, nz), shared=nx * ny * nz * BYTES_PER_CELL)

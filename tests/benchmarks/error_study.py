@@ -19,7 +19,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 
 from geometry.rigid_plane import Control
-from geometry.spectrum import synthesise
+from geometry.synthesis import synthesise
 from multiscale import Run, Scene
 from multiscale.couplings.body import scene_body
 from multiscale.couplings.contact import SLOPES, on_body

@@ -19,11 +19,12 @@ FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 # folders and flat modules from the ground up: each imports only from lines above its own
 FLOORS = {
     "geometry": [
-        "collective errors legendre_modes",
-        "checks instruments interpolant materials missing",
-        "surface",
-        "files patches spectrum statistics summits",
-        "rigid_plane",
+        "blocked_spline collective errors legendre_modes",
+        "checks interpolant materials missing",
+        "filters spectrum surface",
+        "patches statistics summits synthesis",
+        "plausibility preparation rigid_plane",
+        "files",
         "asperities meshes plane_equilibrium",
     ],
     "micro": [
@@ -44,7 +45,7 @@ FLOORS = {
         "compliance fields",
     ],
     "multiscale": [
-        "machine storage",
+        "installation machine storage",
         "doctor laws loading",
         "compiled_forms results scene",
         "setup",

@@ -24,7 +24,7 @@ def test_recorded_forces(periodic):
 
 @pytest.mark.parametrize("periodic", [False, True])
 def test_forces_today(periodic):
-    pytest.importorskip("ContactMechanics", reason="needs the extra patchlaw[peers]")
+    pytest.importorskip("ContactMechanics", reason="ContactMechanics is not installed")
     rough = surface()
     model = HalfSpaceModel(surface=rough, contact_modulus=E_STAR, periodic=periodic)
     for approach in APPROACHES[::4]:

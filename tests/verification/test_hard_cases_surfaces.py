@@ -5,7 +5,7 @@ import pytest
 from hard_cases import centred, from_file, history, scene
 
 from geometry.errors import InputError
-from geometry.files import read_surface
+from geometry.files.reading import read_surface
 from geometry.missing import filled
 from multiscale import make_setup, run
 from multiscale.planning.plan import statements, warnings
@@ -131,7 +131,7 @@ def with_gaps(heights):
 
 def test_missing_heights_are_refused_or_filled_on_request(tmp_path):
     gaps = from_file(tmp_path, with_gaps(DOME))
-    with pytest.raises(InputError, match=r"49 of 1024 heights are not finite.*missing = 'fill'"):
+    with pytest.raises(InputError, match=r"49 of 1024 heights are missing.*missing = 'fill'"):
         history(**gaps)
     made = make_setup(scene(surface__missing="fill", **gaps))
     said = dict(statements(made))["surface"]
@@ -143,7 +143,7 @@ def test_missing_heights_are_refused_or_filled_on_request(tmp_path):
     gaps = from_file(tmp_path, with_gaps(DOME))
     filled_in = history(surface__missing="fill", **small, **gaps).force_N[-1]
     assert filled_in == pytest.approx(whole, rel=1e-6)
-    with pytest.raises(InputError, match="missing = 'fill' needs a 'file'"):
+    with pytest.raises(InputError, match="'missing' needs a 'file'"):
         scene(surface__missing="fill")
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from geometry import Spectrum, Surface, synthesise
-from geometry.spectrum import random_waves
+from geometry.synthesis import random_waves
 
 LENGTHS = (1.3, 0.9)
 GRIDS = (32, 64, 128)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import RectBivariateSpline
 
-from geometry.interpolant import MOST_KNOTS, BlockedSpline
+from geometry.blocked_spline import MOST_KNOTS, BlockedSpline
 
 
 @pytest.fixture(scope="module", params=[(5, 3000), (3000, 6), (2100, 2100)])

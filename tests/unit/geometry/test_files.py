@@ -7,7 +7,7 @@ from height_files import Bomb, header
 
 from geometry import InputError, read_surface
 
-HEIGHTS = np.random.default_rng(0).normal(size=(5, 4))
+HEIGHTS = 0.1 * np.random.default_rng(0).normal(size=(5, 4))
 SIDES = (2.5, 2.0)
 
 
@@ -26,7 +26,11 @@ def test_text_matrices_have_rows_along_x(tmp_path, suffix, separator):
     file.write_text("# heights, in mm; [ix, iy]\n\n" + "\n".join(rows) + "\n")
     surface = read_surface(file, lengths=SIDES, grid=(5, 4), periodic=True)
     np.testing.assert_array_equal(surface.heights, HEIGHTS)
-    assert surface.lengths == SIDES and surface.periodic and surface.source == str(file)
+    assert (
+        surface.lengths == SIDES
+        and surface.periodic
+        and surface.source == f"{file}, heights taken in mm"
+    )
 
 
 @pytest.mark.parametrize("dtype", ["float64", "float32", "int16"])
@@ -34,7 +38,8 @@ def test_numpy_arrays(tmp_path, dtype):
     file = tmp_path / "scan.npy"
     heights = (100 * HEIGHTS).astype(dtype)
     np.save(file, heights)
-    np.testing.assert_array_equal(read_surface(str(file), lengths=SIDES).heights, heights)
+    found = read_surface(str(file), lengths=(250.0, 200.0))
+    np.testing.assert_array_equal(found.heights, heights)
 
 
 @pytest.mark.parametrize("seed", [None, 0, 1])
@@ -68,12 +73,19 @@ def test_point_lists_may_carry_rounded_coordinates(tmp_path):
         ("a.csv", "1,5 2,5\n1,5 2,5\n", "not a matrix of numbers"),
         ("a.dat", "", "the file is empty"),
         ("a.dat", "# nothing\n", "the file is empty"),
-        ("a.txt", "1 2 3 4\n" * 3 + "1 nan 3 4\n", r"1 of 16 heights are not finite.*\(3, 1\)"),
-        ("a.txt", "1 2 3 4 5\n", r"\(1, 5\): a surface needs at least 4 × 4"),
+        (
+            "a.txt",
+            "1 2 3 4\n" * 3 + "1 nan 3 4\n",
+            r"1 of 16 heights are missing, the first at .*\(3, 1\)",
+        ),
+        ("a.txt", "1 2 3 4 5\n", "1 rows of 5 numbers are a profile, not a surface"),
+        ("a.dat", "0 1\n1 1\n2 3\n", "3 rows of 2 numbers are a profile, not a surface"),
+        ("a.txt", "0 1 2 3\n" * 3, r"a surface needs at least 4 × 4 heights.*: \(3, 4\)"),
+        ("a.txt", "# Value units: V\n" + "0 1 2 3\n" * 4, "the values are in 'V': they are no hei"),
         ("a.npy", "not an array", "not a readable numpy array"),
         ("a.npy", "", "not a readable numpy array"),
-        ("a.xyz", "1 2\n3 4\n", "2: a point list needs three columns"),
-        ("a.xyz", "0 0 1\n0 1 1\n0 2 1\n", "all points have the same x"),
+        ("a.xyz", "1 2\n3 4\n", "a point list needs three columns x, y, z: 2 .*a profile"),
+        ("a.xyz", "0 0 1\n0 1 1\n0 2 1\n", "all points have the same x, they are a profile"),
         ("a.xyz", "0 0 1\n1 0 1\nnan 1 1\n", "some coordinates x, y are not finite"),
         ("a.xyz", "0 0 1\n1 0 1\n1 1 1\n", "2 × 2: 1 places are empty, 0 taken more than once"),
         ("a.xyz", "0 0 1\n1 0 1\n1 1 1\n0 1 1\n0 1 1\n", "0 places are empty, 1 taken more"),
@@ -96,7 +108,7 @@ def test_missing_files_and_folders(tmp_path):
 def test_pickled_objects_are_never_loaded(tmp_path):
     file = tmp_path / "scan.npy"
     np.save(file, np.array([{"a": 1}], dtype=object), allow_pickle=True)
-    with pytest.raises(InputError, match=r"'object': the heights are not an array of re"):
+    with pytest.raises(InputError, match="the heights are not an array of real numbers: 'object'"):
         read_surface(file, lengths=SIDES)
 
 
@@ -104,7 +116,7 @@ def test_pickled_objects_are_never_loaded(tmp_path):
 def test_arrays_of_other_kinds_are_refused(tmp_path, array):
     file = tmp_path / "scan.npy"
     np.save(file, array)
-    with pytest.raises(InputError, match=r"scan\.npy: .*: the heights are not an array of r"):
+    with pytest.raises(InputError, match=r"scan\.npy: the heights are not an array of real"):
         read_surface(file, lengths=SIDES)
 
 
@@ -118,7 +130,7 @@ def test_lengths_are_needed_where_the_file_has_none(tmp_path, name):
 
 def test_the_grid_must_match_when_given(tmp_path):
     np.save(tmp_path / "scan.npy", HEIGHTS)
-    with pytest.raises(InputError, match=r"\(5, 4\): the file's number of heights.*\(4, 5\)"):
+    with pytest.raises(InputError, match=r"the file's number of heights.*: \(5, 4\) .*\(4, 5\)"):
         read_surface(tmp_path / "scan.npy", lengths=SIDES, grid=(4, 5))
 
 
@@ -126,11 +138,11 @@ def test_the_grid_must_match_when_given(tmp_path):
     ("content", "message"),
     [
         (header((10**5, 10**5)) + bytes(800), "not a whole numpy array: it has 800 bytes of the 8"),
-        (header((4, 4), "<c16") + bytes(256), "'complex128': the heights are not an array of real"),
-        (header((4, 4), "|O") + pickle.dumps(Bomb()), "'object': the heights are not an array of"),
+        (header((4, 4), "<c16") + bytes(256), "not an array of real numbers: 'complex128'"),
+        (header((4, 4), "|O") + pickle.dumps(Bomb()), "not an array of real numbers: 'object'"),
         (pickle.dumps(Bomb()), "not a readable numpy array"),
-        (header((16,)) + bytes(128), r"\(16,\): not a two-dimensional array \(allowed: \(nx, ny"),
-        (header((-4, -4)) + bytes(128), r"\(-4, -4\): not a two-dimensional array"),
+        (header((16,)) + bytes(128), r"not a two-dimensional array: \(16,\) \(allowed: \(nx, ny"),
+        (header((-4, -4)) + bytes(128), r"not a two-dimensional array: \(-4, -4\)"),
         (b"\x93NUMPY\3\0" + header((4, 4))[8:], "not a numpy array of a known version"),
         (np.lib.format.MAGIC_PREFIX + b"\1\0v\0{'descr'", "not a readable numpy array: EOF"),
     ],
@@ -172,7 +184,7 @@ def test_sizes_of_no_scale_are_refused(tmp_path):
 def test_heights_below_any_scale_are_refused(tmp_path):
     np.save(tmp_path / "h.npy", 1e-110 * HEIGHTS)
     with pytest.raises(
-        InputError, match=r"h.npy: [0-9.]*e-110: the heights differ by less than any"
+        InputError, match=r"h.npy: the heights differ by less than any roughness: [0-9.]*e-11"
     ):
         read_surface(tmp_path / "h.npy", lengths=SIDES)
 
@@ -181,5 +193,5 @@ def test_rounding_is_no_roughness(tmp_path):
     np.save(tmp_path / "h.npy", 1.0 + 1e-15 * HEIGHTS)
     surface = read_surface(tmp_path / "h.npy", lengths=SIDES)
     assert np.ptp(surface.heights) == 0.0 and surface.source.endswith(", level but for rounding")
-    np.save(tmp_path / "h.npy", 1.0 + 1e-13 * HEIGHTS)
+    np.save(tmp_path / "h.npy", 1.0 + 1e-12 * HEIGHTS)
     assert np.ptp(read_surface(tmp_path / "h.npy", lengths=SIDES).heights) > 1e-13

@@ -1,78 +1,140 @@
 import sys
-from types import ModuleType, SimpleNamespace
 
+import instrument_files as files
 import numpy as np
 import pytest
 
 from geometry import InputError, read_surface
 
-HEIGHTS = np.random.default_rng(0).normal(size=(5, 4))
+REASON = "SurfaceTopography is not installed: ./setup.sh --instruments"
+SINGLE = 2e-7  # relative rounding of single precision, in which several formats keep numbers
 
 
-def install(monkeypatch, read):
-    """Put a stand-in with SurfaceTopography's interface in its place."""
-    library = ModuleType("SurfaceTopography")
-    library.read_topography = read
-    monkeypatch.setitem(sys.modules, "SurfaceTopography", library)
+def library():
+    return pytest.importorskip("SurfaceTopography", reason=REASON)
 
 
-def topography(heights, *, unit="um", dim=2):
-    def to_unit(name):
-        assert name == "mm"
-        return SimpleNamespace(heights=lambda: heights * 1e-3, physical_sizes=(0.5, 0.4))
-
-    return SimpleNamespace(dim=dim, unit=unit, to_unit=to_unit)
-
-
-@pytest.fixture
-def file(tmp_path):
-    path = tmp_path / "scan.opd"
-    path.write_bytes(b"\0")
-    return path
+def expected(name):
+    """Return heights and sides [mm] that a file was made of."""
+    heights = files.UNIT * files.NUMBERS
+    if name not in files.WITHOUT_GAPS:
+        heights[files.GAP] = np.nan
+    y = files.STEP[0] if name in files.SQUARE_CELLS else files.STEP[1]
+    return heights, (files.NX * files.STEP[0], files.NY * y)
 
 
-def test_heights_and_lengths_arrive_in_mm(monkeypatch, file):
-    install(monkeypatch, lambda path: topography(HEIGHTS))
-    surface = read_surface(file)
-    np.testing.assert_array_equal(surface.heights, HEIGHTS * 1e-3)
-    assert surface.lengths == (0.5, 0.4)
+def what_the_library_reads(reader, channel):
+    """Return heights, masked where missing, and sides [mm] of a channel."""
+    chosen = reader.default_channel if channel is None else reader.channels[channel]
+    topography = chosen.topography().to_unit("mm")
+    return np.ma.array(topography.heights(), copy=True), topography.physical_sizes
 
 
-def test_points_that_the_instrument_missed_are_reported(monkeypatch, file):
-    masked = np.ma.masked_array(HEIGHTS, mask=HEIGHTS > 1.0)
-    install(monkeypatch, lambda path: topography(masked))
-    with pytest.raises(InputError, match=rf"{(HEIGHTS > 1.0).sum()} of 20 heights are not finite"):
-        read_surface(file)
+def same_as_the_library(path, channel=None):
+    """Compare a surface with what SurfaceTopography itself says of the file."""
+    with library().open_topography(str(path)) as reader:
+        heights, lengths = what_the_library_reads(reader, channel)
+    surface = read_surface(path, missing="fill", channel=channel)
+    known = ~np.ma.getmaskarray(heights)
+    np.testing.assert_allclose(surface.heights[known], heights.data[known], rtol=1e-13)
+    assert surface.lengths == pytest.approx(lengths, rel=1e-13)
+    assert ("missing and filled" in surface.source) == (not known.all())
+    return surface, known
 
 
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (topography(HEIGHTS, dim=1), "1: the file holds a profile"),
-        (topography(HEIGHTS, unit=None), "the file does not state the unit"),
-    ],
-)
-def test_files_that_are_not_enough_are_refused(monkeypatch, file, content, message):
-    install(monkeypatch, lambda path: content)
-    with pytest.raises(InputError, match=rf"scan\.opd: {message}"):
-        read_surface(file)
+@pytest.mark.parametrize("name", files.MAKERS)
+def test_instruments_files(tmp_path, name):
+    path = tmp_path / name
+    path.write_bytes(files.MAKERS[name]())
+    heights, lengths = expected(name)
+    channel = 1 if name == "scan.mi" else None  # its default is a deflection
+    surface, known = same_as_the_library(path, channel)
+    np.testing.assert_array_equal(known, ~np.isnan(heights))
+    np.testing.assert_allclose(surface.heights[known], heights[known], rtol=SINGLE)
+    assert surface.lengths == pytest.approx(lengths, rel=SINGLE)
+    if not known.all():
+        with pytest.raises(InputError, match=r"1 of 35 heights are missing, .* index \(2, 1\)"):
+            read_surface(path)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [("truncated", "SurfaceTopography cannot read it: trunc"), ("a\nb", "read it: OSError")],
-)
-def test_errors_of_the_library_are_passed_on_in_one_line(monkeypatch, file, text, message):
-    def fail(path):
-        raise OSError(text)
+@pytest.mark.parametrize("name", ["scan.nc", "scan.x3p", "scan.gwy"])
+def test_files_of_the_formats_own_writers(tmp_path, name):
+    heights, lengths = expected(name)
+    masked = np.ma.masked_invalid(1e3 * heights)
+    made = library().Topography(masked, tuple(1e3 * side for side in lengths), unit="µm")
+    writers = {"scan.nc": "to_netcdf", "scan.x3p": "to_x3p", "scan.gwy": "to_gwy"}
+    getattr(made, writers[name])(str(tmp_path / name))
+    surface, known = same_as_the_library(tmp_path / name)
+    np.testing.assert_array_equal(known, ~np.isnan(heights))
+    np.testing.assert_allclose(surface.heights[known], heights[known], rtol=SINGLE)
+    assert surface.lengths == pytest.approx(lengths, rel=SINGLE)
 
-    install(monkeypatch, fail)
-    with pytest.raises(InputError, match=message):
-        read_surface(file)
+
+@pytest.mark.parametrize("suffix", ["", ".txt", ".xyz", ".bin"])
+def test_the_content_tells_the_format(tmp_path, suffix):
+    library()
+    path = tmp_path / f"scan{suffix}"
+    path.write_bytes(files.sur())
+    assert read_surface(path, missing="fill").grid == (files.NX, files.NY)
 
 
-def test_without_the_library_the_formats_and_the_extra_are_named(monkeypatch, file):
+def test_channels(tmp_path):
+    library()
+    path = tmp_path / "scan.mi"
+    path.write_bytes(files.mi())
+    heights = files.UNIT * files.NUMBERS
+    for channel in (None, "Topography", 1):  # the first channel of heights by default
+        surface = read_surface(path, channel=channel)
+        np.testing.assert_allclose(surface.heights, heights, rtol=SINGLE)
+        assert surface.source == f"{path}, channel 'Topography'"
+    with pytest.raises(InputError, match=r"no such channel: 'Höhe' .*0 'Deflection', 1 'Topogr"):
+        read_surface(path, channel="Höhe")
+    with pytest.raises(InputError, match="the channel 'Deflection' holds deflection, no heights"):
+        read_surface(path, channel=0)
+
+
+def test_lengths_are_passed_on_to_formats_without(tmp_path):
+    from scipy.io import savemat
+
+    library()
+    savemat(tmp_path / "scan.mat", {"heights": 1e-3 * files.NUMBERS})
+    with pytest.raises(InputError, match="the file has no lengths, they must be given"):
+        read_surface(tmp_path / "scan.mat")
+    surface = read_surface(tmp_path / "scan.mat", lengths=(0.7, 0.5), height_unit="um")
+    assert surface.lengths == (0.7, 0.5)
+    assert np.ptp(surface.heights) == pytest.approx(1e-6 * np.ptp(files.NUMBERS))
+    assert surface.source.endswith("heights taken in um")
+
+
+@pytest.mark.parametrize("words", [("Channel", "Width", "Height"), ("Kanal", "Breite", "Höhe")])
+def test_text_exports_state_unit_and_size(tmp_path, words):
+    path = tmp_path / "scan.txt"
+    path.write_text(files.gwyddion_text(words=words), encoding="utf-8")
+    surface = read_surface(path)
+    np.testing.assert_allclose(surface.heights, files.UNIT * files.NUMBERS, rtol=1e-13)
+    assert surface.lengths == pytest.approx((0.014, 0.015))
+    with pytest.raises(InputError, match="states its heights in m, height_unit says um"):
+        read_surface(path, height_unit="um")
+    same_as_the_library(path)
+
+
+def test_profiles_are_refused_as_profiles(tmp_path):
+    made = library().UniformLineScan(np.arange(9.0), 9.0, unit="um")
+    made.to_netcdf(str(tmp_path / "profile.nc"))
+    with pytest.raises(InputError, match=r"profile\.nc: the file holds a profile, not a surface"):
+        read_surface(tmp_path / "profile.nc")
+
+
+def test_what_no_reader_knows(tmp_path):
+    library()
+    (tmp_path / "scan.opd").write_bytes(b"\0")
+    with pytest.raises(InputError, match=r"scan\.opd: SurfaceTopography cannot read it: Cannot"):
+        read_surface(tmp_path / "scan.opd")
+
+
+@pytest.mark.parametrize("name", ["scan.opd", "scan.dat"])
+def test_without_the_library_the_formats_and_the_option_are_named(monkeypatch, tmp_path, name):
     monkeypatch.setitem(sys.modules, "SurfaceTopography", None)  # an import of None fails
-    message = r"\.opd is not known here; instruments' formats need .*patchlaw\[instruments\].*\.xyz"
-    with pytest.raises(InputError, match=message):
-        read_surface(file)
+    (tmp_path / name).write_bytes(b"\0")
+    with pytest.raises(InputError, match=r"not known here; \./setup\.sh --instruments .*\.xyz"):
+        read_surface(tmp_path / name)

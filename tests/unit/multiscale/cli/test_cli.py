@@ -291,7 +291,7 @@ def test_areas_beyond_the_asperity_models_are_said(capsys, tmp_path):
     [
         (None, "heights.npy"),
         (np.zeros((1, 64)), "at least 4 × 4"),
-        (np.where(np.eye(16) > 0, np.nan, 0.0), "not finite"),
+        (np.where(np.eye(16) > 0, np.nan, 0.0), "heights are missing"),
         (np.zeros((4, 4, 4)), "heights.npy"),
     ],
     ids=["missing", "one row", "NaN", "three-dimensional"],

@@ -232,14 +232,14 @@ def test_paths_start_in_the_folder_of_the_scene(tmp_path):
 def test_where_files_of_heights_are_looked_for(tmp_path, named, found):
     for place in (tmp_path / "heights", tmp_path / "scenes" / "~"):
         place.mkdir(parents=True)
-        np.save(place / "scan.npy", np.random.default_rng(1).random((8, 8)))
+        np.save(place / "scan.npy", 0.1 * np.random.default_rng(1).random((8, 8)))
     path = tmp_path / "scenes" / "scene.toml"
     text = f'surface = {{ file = "{named.format(tmp_path)}", lengths = [1.0, 1.0] }}\n'
     text += "block = { young_modulus = 4e3, poisson_ratio = 0.3 }\npatches.grid = [1, 1]\n"
     path.write_text(text + "load.approach = 0.01\n", encoding="utf-8")
     scene = Scene.load(path)
     assert scene.surface_path.resolve() == tmp_path / found
-    assert make_setup(scene).surface.source == str(scene.surface_path)
+    assert make_setup(scene).surface.source == f"{scene.surface_path}, heights taken in mm"
 
 
 def test_scene_is_frozen():

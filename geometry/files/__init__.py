@@ -1,0 +1,1 @@
+"""Surfaces from files: numpy arrays, text matrices, point lists, instruments' formats."""

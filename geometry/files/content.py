@@ -1,0 +1,74 @@
+"""What a file of heights holds, and the units that files state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.checks import process_memory
+from geometry.errors import InputError
+
+Array = NDArray[np.float64]
+
+LENGTH_UNITS = {
+    "m": 1e3, "cm": 10.0, "mm": 1.0, "um": 1e-3, "nm": 1e-6, "pm": 1e-9, "Å": 1e-7, "in": 25.4,
+}  # fmt: skip
+"""Units of heights and what they are in mm."""
+
+_SPELLINGS = {"µm": "um", "μm": "um", "\u212b": "Å", "A": "Å", "inch": "in", '"': "in"}
+
+BYTES_PER_HEIGHT = 100
+"""Memory that surface, spline and spectrum take per height, roughly [B]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FileContent:
+    """Heights as a file has them.
+
+    Args:
+        heights: Heights, shape (nx, ny), in the unit of the file; not a number where missing.
+        lengths: Sides (Lx, Ly) [mm]; None where the file does not say.
+        unit: Unit of the heights, a name in `LENGTH_UNITS`; None where the file does not say.
+        channel: Name of the channel that was read; empty where a file has only one.
+    """
+
+    heights: Array
+    lengths: tuple[float, float] | None = None
+    unit: str | None = None
+    channel: str = ""
+
+
+def length_unit(text: str) -> str:
+    """Return the usual spelling of a unit of length.
+
+    Args:
+        text: A unit such as ``µm``.
+
+    Raises:
+        InputError: When it is no unit of length.
+    """
+    unit = _SPELLINGS.get(text.strip(), text.strip())
+    if unit not in LENGTH_UNITS:
+        raise InputError(
+            f"the values are in '{text}': they are no heights", allowed=", ".join(LENGTH_UNITS)
+        )
+    return unit
+
+
+def check_memory(needed: float) -> None:
+    """Refuse heights that do not fit into the memory of this process.
+
+    Args:
+        needed: Memory that they need [B].
+
+    Raises:
+        InputError: Says how much is needed and how much there is.
+    """
+    memory = process_memory()
+    if needed > memory:
+        raise InputError(
+            f"the heights need about {needed / 1e9:.3g} GB of memory",
+            allowed=f"what fits into {memory / 1e9:.3g} GB",
+        )

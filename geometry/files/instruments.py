@@ -1,0 +1,99 @@
+"""Heights from instruments' formats, through the optional package SurfaceTopography."""
+
+from __future__ import annotations
+
+import importlib
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from geometry.errors import InputError
+from geometry.files.arrays import first_line
+from geometry.files.content import LENGTH_UNITS, FileContent, check_memory, length_unit
+
+_BYTES_PER_BYTE = 20
+"""Memory that readers and the surface take per byte of a file, roughly; heights take 2 to 8 [B]."""
+
+
+def read_instrument(file: Path, channel: str | int | None = None) -> FileContent:
+    """Read a channel of an instrument's file, whichever of its readers knows the content.
+
+    Args:
+        file: The file.
+        channel: Name or number of the channel, counted from 0; when not given, the reader's
+            default if it holds heights, or else the first that does.
+
+    Raises:
+        InputError: When SurfaceTopography is not installed or cannot read the file, when the file
+            is too large, the channel unknown or none of heights, or when it is a profile.
+    """
+    check_memory(file.stat().st_size * _BYTES_PER_BYTE)
+    library = _library(file)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of readers, about metadata
+            with library.open_topography(str(file)) as reader:
+                return _content(reader, _channel(reader, channel))
+    except InputError:
+        raise
+    except Exception as error:  # its readers raise errors of many families
+        several = len(str(error).splitlines()) > 1  # it tried all its readers in vain
+        reason = type(error).__name__ if several else first_line(error)
+        raise InputError(f"SurfaceTopography cannot read it: {reason}") from None
+
+
+def _content(reader: Any, channel: Any) -> FileContent:
+    """Return what a channel holds, in memory of its own."""
+    # sizes that a file lacks must be given; what is made up here is not used
+    sizes = {} if channel.physical_sizes is not None else {"physical_sizes": (1.0, 1.0)}
+    topography = channel.topography(**sizes)
+    measured = np.ma.array(topography.heights(), dtype=np.float64, copy=True)
+    unit, lengths = topography.unit and length_unit(topography.unit), None
+    if not sizes and unit:
+        length_x, length_y = (float(side) * LENGTH_UNITS[unit] for side in channel.physical_sizes)
+        lengths = length_x, length_y
+    return FileContent(
+        heights=np.ma.filled(measured, np.nan),
+        lengths=lengths,
+        unit=unit,
+        channel=channel.name if len(reader.channels) > 1 else "",
+    )
+
+
+def _library(file: Path) -> Any:
+    """Return SurfaceTopography."""
+    try:
+        return importlib.import_module("SurfaceTopography")
+    except ImportError:
+        raise InputError(
+            f"the format {file.suffix or 'without suffix'} is not known here; ./setup.sh "
+            "--instruments installs the readers of instruments' formats",
+            allowed=".npy, .txt, .dat, .csv, .xyz",
+        ) from None
+
+
+def _channel(reader: Any, wanted: str | int | None) -> Any:
+    """Return the channel of a name or number, or the first of heights.
+
+    Raises:
+        InputError: When there is none such, or it is none of heights on an area.
+    """
+    channels = reader.channels
+    if wanted is None:
+        maps = [one for one in channels if one.is_height_channel and one.dim == 2]
+        default = reader.default_channel
+        found = default if default in maps or not maps else maps[0]
+    else:
+        named: dict[str | int, Any] = {one.name: one for one in reversed(channels)}
+        named |= enumerate(channels)
+        if wanted not in named:
+            names = ", ".join(f"{number} {one.name!r}" for number, one in enumerate(channels))
+            raise InputError("there is no such channel", value=wanted, allowed=names)
+        found = named[wanted]
+    if found.dim != 2:
+        raise InputError("the file holds a profile, not a surface", allowed="areal measurements")
+    if not found.is_height_channel:
+        raise InputError(f"the channel {found.name!r} holds {found.data_kind.value}, no heights")
+    return found

@@ -1,0 +1,145 @@
+"""Reads a surface from a file of any known format, and prepares it."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from geometry.checks import cell_counts, check_scale, is_level, positive_lengths
+from geometry.errors import InputError
+from geometry.files.arrays import read_array
+from geometry.files.content import LENGTH_UNITS, FileContent, length_unit
+from geometry.files.instruments import read_instrument
+from geometry.files.text import is_plain, read_text
+from geometry.plausibility import surface_notes
+from geometry.preparation import Preparation, completed, prepared
+from geometry.surface import Surface
+
+_TEXT = (".txt", ".dat", ".csv", ".xyz")
+
+
+def read_surface(
+    path: str | os.PathLike[str],
+    *,
+    lengths: tuple[float, float] | None = None,
+    grid: tuple[int, int] | None = None,
+    height_unit: str | None = None,
+    channel: str | int | None = None,
+    periodic: bool = False,
+    **steps: Any,
+) -> Surface:
+    """Read heights at cell centres from a file.
+
+    * ``.npy``: an array with index [ix, iy];
+    * ``.txt``, ``.dat``, ``.csv``: numbers in rows, see `geometry.files.text.read_text`;
+    * ``.xyz``, or three columns: x, y, z of the points of a regular grid in any order, x, y in mm;
+    * any other, and text that does not begin with numbers: an instrument's format, told by its
+      content, through the optional package SurfaceTopography.
+
+    Args:
+        path: The file.
+        lengths: Sides (Lx, Ly) of the whole map [mm]. Needed where the file does not state them;
+            overrides what it states.
+        grid: Numbers of heights (nx, ny) that the file must have; any when not given.
+        height_unit: Unit of the heights where the file does not state one, such as ``um``; mm when
+            not given.
+        channel: Name or number of the channel of an instrument's file, counted from 0.
+        periodic: Whether the heights continue periodically.
+        steps: What is done to the map, the arguments of `Preparation`, such as
+            ``missing="fill", form="plane"``; nothing when not given.
+
+    Returns:
+        The surface, with heights in mm. Its source says what was done to the map, its notes what a
+        user should know of it.
+
+    Raises:
+        InputError: When the file is missing, unreadable or does not fit, naming the file.
+    """
+    file, preparation = Path(path), Preparation(**steps)
+    try:
+        if not _is_file(file):  # pipes and devices are refused too: they may never end
+            raise InputError("there is no such file")
+        content = _content(file, channel)
+        sides = lengths if lengths is not None else content.lengths
+        if sides is None:
+            raise InputError(
+                "the file has no lengths, they must be given", allowed="lengths (Lx, Ly) in mm"
+            )
+        sides = positive_lengths(sides, "the surface")
+        shape = content.heights.shape
+        if grid is not None and shape != cell_counts(grid, "the grid of the surface"):
+            raise InputError(
+                "the file's number of heights differs from the grid that was asked for",
+                value=shape,
+                allowed=f"{tuple(grid)}",
+            )
+        unit = _unit(content, height_unit)
+        surface = _surface(file, content, sides, unit, preparation, periodic)
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", file=str(file)) from None
+    except InputError as error:
+        raise error.of_content(str(file)) from None
+    return surface
+
+
+def _surface(
+    file: Path,
+    content: FileContent,
+    sides: tuple[float, float],
+    unit: str,
+    steps: Preparation,
+    periodic: bool,
+) -> Surface:
+    """Return the surface of what a file holds."""
+    said = [str(file), *([f"channel {content.channel!r}"] if content.channel else [])]
+    if content.unit is None:  # a factor of 1000 is not to go unnoticed
+        said.append(f"heights taken in {unit}")
+    notes: list[str] = []
+    heights = content.heights
+    if heights.ndim == 2 and heights.size and heights.dtype.kind in "iuf":
+        with np.errstate(over="ignore", invalid="ignore"):
+            heights = np.asarray(heights, dtype=np.float64)
+            heights = heights * LENGTH_UNITS[unit] if unit != "mm" else heights
+        heights, sides, done, notes = completed(heights, sides, steps)
+        check_scale(heights)
+        if is_level(heights) and 0.0 < np.ptp(heights) < np.inf:
+            heights = np.full_like(heights, heights.mean())
+            done.append("level but for rounding")
+        said += done
+    raw = Surface(heights=heights, lengths=sides, periodic=periodic, source=", ".join(said))
+    surface = prepared(raw, steps)
+    return replace(surface, notes=(*notes, *surface_notes(surface)))
+
+
+def _content(file: Path, channel: str | int | None) -> FileContent:
+    """Read a file by the reader that its suffix, or else its content, asks for."""
+    suffix = file.suffix.lower()
+    if suffix != ".npy" and not (suffix in _TEXT and is_plain(file)):
+        return read_instrument(file, channel)
+    if channel is not None:
+        raise InputError(
+            "the file has one channel only", value=channel, allowed="leave out the channel"
+        )
+    return read_array(file) if suffix == ".npy" else read_text(file)
+
+
+def _unit(content: FileContent, given: str | None) -> str:
+    """Return the unit of the heights: the file's, or else the one that is given, or mm."""
+    unit = None if given is None else length_unit(given)
+    if unit and content.unit and unit != content.unit:
+        raise InputError(
+            f"the file states its heights in {content.unit}, height_unit says {unit}",
+            allowed=f"leave out height_unit, or {content.unit}",
+        )
+    return content.unit or unit or "mm"
+
+
+def _is_file(file: Path) -> bool:
+    try:
+        return file.is_file()
+    except OSError:  # a name longer than any, a folder that may not be entered
+        return False

@@ -1,0 +1,178 @@
+"""What is done to a measured map before it is a surface that is pressed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.checks import cell_counts, cells_between
+from geometry.errors import InputError
+from geometry.filters import regridded, smoothed, spikes
+from geometry.missing import filled
+from geometry.surface import Surface
+
+Array = NDArray[np.float64]
+Interval = tuple[float, float]
+
+_MUCH_MISSING = 0.3
+
+_ORDERS = {"mean": 0, "plane": 1, "quadratic": 2}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Preparation:
+    """What is done to a map, in the order of the arguments.
+
+    Args:
+        crop: Rectangle that is kept, intervals along x and along y [mm]; all along an axis that is
+            None. Rounded to whole cells.
+        outliers: ``remove`` makes spikes missing heights, which are filled; see `spikes`.
+        missing: What is done with missing heights: refuse the map, or ``fill`` them by a membrane,
+            see `geometry.missing.filled`.
+        form: Form that is removed by least squares: ``none``, ``mean``, ``plane``, ``quadratic``.
+        short: Cut-off wavelength below which waves are removed (S-filter) [mm].
+        long: Cut-off wavelength beyond which waves are removed (L-filter) [mm].
+        resample: New numbers of heights, see `regridded`.
+
+    Note:
+        ISO 25178-3 takes the S-filter before the form. Here the form goes first, as a tilt would
+        disturb the filter along the borders of the map.
+    """
+
+    crop: tuple[Interval | None, Interval | None] = (None, None)
+    outliers: Literal["keep", "remove"] = "keep"
+    missing: Literal["refuse", "fill"] = "refuse"
+    form: Literal["none", "mean", "plane", "quadratic"] = "none"
+    short: float | None = None
+    long: float | None = None
+    resample: tuple[int, int] | None = None
+
+
+def prepared(surface: Surface, steps: Preparation) -> Surface:
+    """Remove the form of a surface, filter it and put it on another grid.
+
+    Args:
+        surface: The surface; its source then says what was done.
+        steps: What is done; `completed` does what comes before the form.
+
+    Raises:
+        InputError: When a cut-off or the new grid does not fit the surface.
+    """
+    done = []
+    if steps.form != "none":
+        surface = surface.detrended(_ORDERS[steps.form])
+        done.append(f"its {steps.form} removed")
+    _check_cut_offs(surface, steps.short, steps.long)
+    h, spacing, periodic = surface.heights, surface.spacing, surface.periodic
+    if steps.short is not None:
+        h = smoothed(h, spacing, steps.short, periodic=periodic)
+        done.append(f"waves below {1e3 * steps.short:g} µm removed (Gaussian)")
+    if steps.long is not None:
+        h = h - smoothed(h, spacing, steps.long, periodic=periodic)
+        done.append(f"waves beyond {1e3 * steps.long:g} µm removed (Gaussian)")
+    if steps.resample is not None:
+        mx, my = cell_counts(steps.resample, "the new grid of the surface", smallest=4)
+        h = regridded(h, surface.lengths, (mx, my), periodic=periodic)
+        done.append(f"resampled from {surface.grid[0]} × {surface.grid[1]} heights")
+    if not done:
+        return surface
+    return replace(surface, heights=h, source=", ".join((surface.source, *done)))
+
+
+def completed(
+    heights: Array, lengths: tuple[float, float], steps: Preparation
+) -> tuple[Array, tuple[float, float], list[str], list[str]]:
+    """Crop a map, remove its spikes and fill its gaps.
+
+    Args:
+        heights: Heights, shape (nx, ny) [mm]; not a number where missing.
+        lengths: Sides (Lx, Ly) [mm].
+        steps: What is done; what comes after the gaps is left to `prepared`.
+
+    Returns:
+        Heights without gaps, their sides [mm], what was done, and what a user should know of it.
+
+    Raises:
+        InputError: When the crop does not fit, or heights are missing that are not to be filled.
+    """
+    done: list[str] = []
+    notes: list[str] = []
+    if steps.crop != (None, None):
+        heights, lengths, sentence = _cropped(heights, lengths, steps.crop)
+        done.append(sentence)
+    if np.isinf(heights).any():  # refused as a surface
+        return heights, lengths, done, notes
+    gaps = np.isnan(heights)
+    if steps.missing == "refuse" and gaps.any():
+        first = np.argwhere(gaps)[0]
+        raise InputError(
+            f"{np.count_nonzero(gaps)} of {heights.size} heights are missing, the first at index "
+            f"({first[0]}, {first[1]})",
+            allowed="finite heights; missing = 'fill' closes gaps by a membrane",
+        )
+    spacing = lengths[0] / heights.shape[0], lengths[1] / heights.shape[1]
+    whole, share = filled(heights, spacing)
+    if share:
+        done.append(f"{share:.3g} of the heights missing and filled by a membrane")
+    if share > _MUCH_MISSING:
+        notes.append(
+            f"{100 * share:.0f} % of the heights are missing: what fills them is smooth and has no "
+            "summits, and forces and contact areas are those of the rest"
+        )
+    outlying = spikes(whole) & ~gaps
+    count = int(np.count_nonzero(outlying))
+    if count and steps.outliers == "remove":
+        whole, _ = filled(np.where(outlying, np.nan, heights), spacing)
+        done.append(f"{count} spikes removed and filled")
+    elif count and (above := float(whole.max() - whole[~outlying].max())) > 0.0:
+        notes.append(
+            f"{count} heights are spikes, out of line with their neighbours; the highest stands "
+            f"{1e3 * above:.3g} µm above all others and touches first; outliers = 'remove' fills "
+            "their places"
+        )
+    return whole, lengths, done, notes
+
+
+def _cropped(
+    heights: Array, lengths: tuple[float, float], crop: tuple[Interval | None, Interval | None]
+) -> tuple[Array, tuple[float, float], str]:
+    """Return what lies in a rectangle, its sides [mm], and a sentence on it."""
+    cells, corner, sides = [], [], []
+    for interval, length, count, axis in zip(crop, lengths, heights.shape, "xy", strict=True):
+        try:
+            part = cells_between(interval, length, count, axis)
+        except InputError as error:
+            raise error.located(key=f"surface.crop.{axis}") from None
+        first, last, _ = part.indices(count)
+        cells.append(part)
+        corner.append(first * length / count)
+        sides.append((last - first) * length / count)
+    (x, y), (x0, y0) = sides, corner
+    sentence = (
+        f"cropped to {1e3 * x:g} × {1e3 * y:g} µm from x = {1e3 * x0:g} µm, y = {1e3 * y0:g} µm"
+    )
+    return heights[cells[0], cells[1]], (x, y), sentence
+
+
+def _check_cut_offs(surface: Surface, short: float | None, long: float | None) -> None:
+    """Refuse cut-offs that the grid cannot resolve, that exceed the map or leave no waves."""
+    least, most = 2.0 * max(surface.spacing), min(surface.lengths)
+    for name, value in (("short", short), ("long", long)):
+        if value is not None and not (math.isfinite(value) and least <= value <= most):
+            raise InputError(
+                f"the {name} cut-off of the filter does not fit the map",
+                key=f"surface.filter.{name}",
+                value=value,
+                allowed=f"two cells to the shorter side, {least:g} to {most:g} mm",
+            )
+    if short is not None and long is not None and not short < long:
+        raise InputError(
+            "the cut-offs of the filter leave no waves",
+            key="surface.filter.short",
+            value=short,
+            allowed=f"less than the long cut-off, {long:g} mm",
+        )

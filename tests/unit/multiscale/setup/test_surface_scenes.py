@@ -1,0 +1,76 @@
+"""Surfaces as scenes describe them: files, units, preparation, periodic contact."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from geometry.errors import InputError
+from micro import HalfSpaceModel
+from multiscale.planning.problem_setup import make_setup
+from multiscale.run import run
+from multiscale.scene.scene import Scene
+
+PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
+SMALL_SLOPES = ["micro.finite_slopes=false", "load.steps=2", "output.check=none"]
+PERIODIC = ["surface.periodic=true", "coupling.kind=analytic", "micro.model=half-space"]
+
+
+def test_a_map_is_prepared_as_the_scene_says(tmp_path):
+    np.save(tmp_path / "scan.npy", 10.0 * np.random.default_rng(1).random((40, 40)))
+    section = {
+        "file": str(tmp_path / "scan.npy"),
+        "lengths": ["1 mm", "1 mm"],
+        "height_unit": "um",
+        "crop": {"x": ["0.1 mm", "0.9 mm"]},
+        "detrend": "plane",
+        "filter": {"short": "100 um", "long": "500 um"},
+        "resample": [16, 20],
+    }
+    block = {"young_modulus": "4 GPa", "poisson_ratio": 0.3}
+    rest = {"block": block, "patches": {"grid": [2, 2]}, "load": {"approach": "1 um"}}
+    surface = make_setup(Scene.from_dict({"surface": section, **rest})).surface
+    assert surface.grid == (16, 20) and surface.lengths == (pytest.approx(0.8), 1.0)
+    for done in ("taken in um", "cropped to 800 × 1000 µm", "its plane removed", "below 100 µm"):
+        assert done in surface.source
+    with pytest.raises(InputError, match=r"surface.filter.short = 0.01: the short cut-off"):
+        changed = {**section, "filter": {"short": "10 um"}}
+        make_setup(Scene.from_dict({"surface": changed, **rest}))
+    with pytest.raises(InputError, match=r"'furlong' is no unit of heights \(allowed: m, cm, mm"):
+        Scene.from_dict({"surface": {**section, "height_unit": "furlong"}, **rest})
+
+
+@pytest.mark.parametrize("key", ["height_unit='um'", "outliers='remove'", "resample=[9, 9]"])
+def test_what_is_done_to_maps_needs_a_file(key):
+    with pytest.raises(InputError, match=rf"'{key.split('=')[0]}' needs a 'file' \(allowed: leave"):
+        Scene.load(PAPER, [f"surface.{key}"])
+
+
+def test_missing_heights_are_no_value_of_the_file_key(tmp_path):
+    heights = np.zeros((8, 8))
+    heights[3, 1] = np.nan
+    np.save(tmp_path / "scan.npy", heights)
+    data = {"file": str(tmp_path / "scan.npy"), "lengths": [1.0, 1.0]}
+    block = {"young_modulus": 4e3, "poisson_ratio": 0.3}
+    scene = Scene.from_dict({"surface": data, "block": block, "load": {"approach": 1e-3}})
+    text = r"scan\.npy: surface\.file: 1 of 64 heights are missing, the first at index \(3, 1\)"
+    with pytest.raises(InputError, match=text):
+        make_setup(scene)
+
+
+def test_a_periodic_scene_is_pressed_periodically():
+    scene = Scene.load(PAPER, [*PERIODIC, "surface.grid=[32, 32]"])
+    setup = make_setup(scene)
+    assert setup.model.name == "half-space-periodic"
+    small = run(Scene.load(PAPER, [*PERIODIC, "surface.grid=[32, 32]", *SMALL_SLOPES]))
+    alone = HalfSpaceModel(setup.surface, contact_modulus=4e3 / (1 - 0.15**2), periodic=True)
+    forces = [alone.solve(approach).force for approach in small.approach_mm]
+    np.testing.assert_allclose(small.force_N, forces, rtol=1e-7)  # ten times the tolerance
+
+
+@pytest.mark.parametrize(
+    "left", ["coupling.kind=consistent", "micro.model=islands", "load.tilt=free"]
+)
+def test_what_does_not_continue_is_refused_periodically(left):
+    with pytest.raises(InputError, match=r"does not continue periodically .*coupling.kind = 'ana"):
+        Scene.load(PAPER, [*PERIODIC, left])
