@@ -34,6 +34,7 @@ if TYPE_CHECKING:  # what `_HOMES` says, for editors and type checkers
         Scene,
         compare,
         make_setup,
+        read_history,
         read_laws,
         run,
         sweep,
@@ -43,8 +44,8 @@ _NAMES = {
     "geometry": "Control InputError NotConverged PatchGrid Spectrum Surface read_surface "
     "synthesise",
     "micro": "HalfSpaceModel",
-    "multiscale": "Comparison History LawTable LoadStep Run Scene compare make_setup read_laws run "
-    "sweep",
+    "multiscale": "Comparison History LawTable LoadStep Run Scene compare make_setup read_history "
+    "read_laws run sweep",
 }
 _HOMES = {name: package for package, names in _NAMES.items() for name in names.split()}
 

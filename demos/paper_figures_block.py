@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from paper.page import Page
 
 from multiscale import Scene, run
-from multiscale.output.figures import draw_error_band
+from multiscale.figures.curves import draw_error_band
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -17,6 +17,7 @@ from multiscale.loading.stepper import load_steps as load_steps
 from multiscale.planning.problem_setup import make_setup as make_setup
 from multiscale.results.extrapolation import extrapolated as extrapolated
 from multiscale.results.history import History as History
+from multiscale.results.reading import read_history as read_history
 from multiscale.run import Run as Run
 from multiscale.run import run as run
 from multiscale.scene.scene import Scene as Scene

@@ -8,7 +8,7 @@ from itertools import cycle
 from matplotlib.figure import Figure
 
 from micro.model import Response
-from multiscale.output.figures import COLOURS, LINE_STYLES, add_grid_and_legend, new_figure
+from multiscale.figures.style import COLOURS, LINE_STYLES, add_grid_and_legend, new_figure
 
 
 def models_figure(responses: Mapping[str, Response], *, rms_slope: float) -> Figure:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from geometry.checks import cell_counts, check_scale, is_level, positive_lengths
 from geometry.errors import InputError
@@ -78,7 +79,7 @@ def read_surface(
                 allowed=f"{tuple(grid)}",
             )
         unit = _unit(content, height_unit)
-        surface = _surface(file, content, sides, unit, preparation, periodic)
+        surface = _surface(str(file), content, sides, unit, preparation, periodic)
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", file=str(file)) from None
     except InputError as error:
@@ -86,16 +87,41 @@ def read_surface(
     return surface
 
 
+def surface_of(
+    heights: ArrayLike,
+    *,
+    lengths: tuple[float, float],
+    height_unit: str = "mm",
+    periodic: bool = False,
+    **steps: Any,
+) -> Surface:
+    """Return the surface of measured heights in memory, as `read_surface` does of a file.
+
+    Args:
+        heights: Heights at cell centres, shape (nx, ny); not a number where missing.
+        lengths: Sides (Lx, Ly) of the map [mm].
+        height_unit: Unit of the heights, such as ``um``.
+        periodic: Whether the heights continue periodically.
+        steps: What is done to the map, the arguments of `Preparation`.
+
+    Raises:
+        InputError: When the heights are no surface.
+    """
+    content = FileContent(heights=np.asarray(heights), unit=length_unit(height_unit))
+    sides = positive_lengths(lengths, "the surface")
+    return _surface("heights", content, sides, _unit(content, None), Preparation(**steps), periodic)
+
+
 def _surface(
-    file: Path,
+    name: str,
     content: FileContent,
     sides: tuple[float, float],
     unit: str,
     steps: Preparation,
     periodic: bool,
 ) -> Surface:
-    """Return the surface of what a file holds."""
-    said = [str(file), *([f"channel {content.channel!r}"] if content.channel else [])]
+    """Return the surface of what a file or an array holds."""
+    said = [name, *([f"channel {content.channel!r}"] if content.channel else [])]
     if content.unit is None:  # a factor of 1000 is not to go unnoticed
         said.append(f"heights taken in {unit}")
     notes: list[str] = []

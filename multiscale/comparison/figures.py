@@ -10,16 +10,16 @@ from matplotlib.figure import Figure
 from multiscale.comparison.comparison import Comparison, Row
 from multiscale.comparison.configuration import OWN
 from multiscale.comparison.errors import on_grid
-from multiscale.output.figures import (
+from multiscale.figures.style import (
     COLOURS,
     ERROR_BAND,
     LINE_STYLES,
     MARKERS,
     PRESSURE_LABEL,
-    draw_pressures,
     new_figure,
     panels_above_legend,
 )
+from multiscale.output.figures import draw_pressures
 
 PALE = 0.4
 """Opacity of configurations that another one beats in time and error."""

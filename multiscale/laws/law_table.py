@@ -145,7 +145,7 @@ def law_bytes(table: LawTable) -> bytes:
     return checksummed(fill)
 
 
-def read_laws(path: Path | BinaryIO) -> LawTable:
+def read_laws(path: str | Path | BinaryIO) -> LawTable:
     """Read a law file.
 
     The pressure of a patch alone rises with the approach; where noise in a table from elsewhere
@@ -159,6 +159,7 @@ def read_laws(path: Path | BinaryIO) -> LawTable:
         InputError: When the file cannot be read, is no law file, damaged, lacks anything, or was
             written before law files had a checksum.
     """
+    path = Path(path) if isinstance(path, str) else path
     name = str(path) if isinstance(path, Path) else None
     if isinstance(path, Path) and not path.is_file():  # reading a pipe would wait for its writer
         raise InputError("is not a readable law file: there is no such file", file=name)

@@ -1,4 +1,4 @@
-"""Figures of a run, and their style: surface, force–approach curves, pressure maps, laws."""
+"""Figures of a run: surface, pressure maps, laws."""
 
 from __future__ import annotations
 
@@ -11,61 +11,12 @@ from numpy.typing import NDArray
 from geometry.asperities import Asperities
 from geometry.patches import PatchGrid
 from geometry.surface import Surface
+from multiscale.figures.style import PRESSURE_LABEL, add_grid_and_legend, new_figure
 from multiscale.laws.law_table import LawTable
 from multiscale.results.history import History
 
-KINDS = ("analytic", "isolated", "consistent", "concurrent", "reference")
-COLOURS = dict(zip(KINDS, ("#0b3c5d", "#d1495b", "#1b998b", "#edae49", "#6a4c93"), strict=True))
-"""Colour of each coupling."""
-
-MARKERS = dict(zip(KINDS, "osD^*", strict=True))
-"""Marker of each coupling."""
-
-LINE_STYLES = ("-", "--", "-.", ":", (0, (3, 1, 1, 1, 1, 1)))
-"""Line styles of curves that are drawn over each other."""
-
-ERROR_BAND = {"color": "#e8eaed", "zorder": 0}
-"""Look of the band within an error bar, behind everything else."""
-
-PRESSURE_LABEL = "mean pressure of the patch [MPa]"
-"""Label of the colour bars of pressure maps."""
-
-
 MOST_NUMBERED_PATCHES = 100
 """A map of more patches shows colours alone; the numbers would cover each other."""
-
-
-def new_figure(width: float, height: float) -> Figure:
-    """Return an empty figure, which shares no global state of matplotlib.
-
-    Args:
-        width: Width [inch].
-        height: Height [inch].
-    """
-    return Figure(figsize=(width, height), layout="constrained")
-
-
-def add_grid_and_legend(figure: Figure) -> None:
-    """Draw a grid in every panel, and a legend in the first when it has more than one line."""
-    for axes in figure.axes:
-        axes.grid(alpha=0.3)
-    first = figure.axes[0]
-    if len(first.get_legend_handles_labels()[0]) > 1:
-        first.legend(frameon=False)
-
-
-def panels_above_legend(figure: Figure, panels: int, share: float) -> tuple[list[Any], Any]:
-    """Return panels side by side, and empty axes below them for a common legend.
-
-    Args:
-        figure: The figure.
-        panels: Number of panels.
-        share: Height of the legend relative to that of the panels.
-    """
-    grid = figure.add_gridspec(2, panels, height_ratios=(1.0, share))
-    below = figure.add_subplot(grid[1, :])
-    below.axis("off")
-    return [figure.add_subplot(grid[0, index]) for index in range(panels)], below
 
 
 def surface_figure(surface: Surface, asperities: Asperities, patches: PatchGrid) -> Figure:
@@ -110,62 +61,6 @@ def draw_surface(
     axes.set_title(f"{len(asperities)} summits, {patches.grid[0]} × {patches.grid[1]} patches")
     if len(asperities) or asperities.border_x.size:
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncol=2, frameon=False)
-
-
-def history_figure(history: History, kind: str) -> Figure:
-    """Draw force, contact area and mean separation of a run.
-
-    Args:
-        history: The run.
-        kind: Its coupling.
-    """
-    figure = new_figure(11.0, 3.6)
-    force, area, gap = figure.subplots(1, 3)
-    look: dict[str, Any] = {"marker": "o", "ms": 3.5, "color": COLOURS[kind], "label": kind}
-    pressure = np.append(0.0, history.mean_pressure_MPa)
-    # The first touch of a tilted plane is not at zero approach of the middle.
-    level = not any(any(step.tilt) for step in history)
-    approach = 1e3 * np.append(0.0 if level else np.nan, history.approach_mm)
-    force.plot(approach, pressure, **look)
-    area.plot(pressure, 100 * np.append(0.0, history.contact_area_fraction), **look)
-    gap.plot(1e3 * history.mean_separation_mm, history.mean_pressure_MPa, **look)
-    if history.reference is not None:
-        draw_error_band(force, area, history, colour=COLOURS[kind])
-    force.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]")
-    area.set(xlabel="mean pressure [MPa]", ylabel="contact area fraction [%]")
-    gap.set(xlabel="mean separation [µm]", ylabel="mean pressure [MPa]")
-    add_grid_and_legend(figure)
-    return figure
-
-
-def draw_error_band(force: Any, area: Any, history: History, *, colour: str) -> None:
-    """Draw the error bands of a reference about its values at mesh size zero.
-
-    Args:
-        force: Axes of pressure [MPa] over approach [µm].
-        area: Axes of the contact area fraction [%] over pressure [MPa]; None draws no band of it.
-        history: The reference.
-        colour: Colour of the bands.
-    """
-    record = history.reference
-    if record is None or len(record.sizes) == 1:
-        force.plot([], [], " ", label="(no error bar)")
-        return
-    nominal = history.patches.area * history.patches.count
-    pressure = record.force.value / nominal
-    approach = 1e3 * record.approach.value
-    look: dict[str, Any] = {"color": colour, "alpha": 0.25, "lw": 0.0}
-    if record.by_force:
-        error = 1e3 * record.approach.error
-        force.fill_betweenx(
-            pressure, approach - error, approach + error, label=record.label, **look
-        )
-    else:
-        error = record.force.error / nominal
-        force.fill_between(approach, pressure - error, pressure + error, label=record.label, **look)
-    if area is not None:
-        middle, error = 100 * record.area.value, 100 * record.area.error
-        area.fill_between(pressure, middle - error, middle + error, **look)
 
 
 def pressure_figure(history: History) -> Figure:

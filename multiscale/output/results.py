@@ -116,7 +116,7 @@ def _figure(run: Run, name: str) -> Figure:
     if name == "surface":
         return figures.surface_figure(setup.surface, setup.asperities, setup.patches)
     if name == "curves":
-        return figures.history_figure(run.history(), run.scene.coupling.kind)
+        return run.history().plot(run.scene.coupling.kind)
     if name == "pressures":
         return figures.pressure_figure(run.history())
     assert run.table is not None

@@ -179,6 +179,19 @@ class History:
             heading, texts[heading] = self.reference.cells
         return list(texts), list(zip(*texts.values(), strict=True))
 
+    def plot(self, label: str = "history") -> Any:
+        """Draw mean pressure, contact area and mean separation.
+
+        Args:
+            label: Name of the curves.
+
+        Returns:
+            A matplotlib figure; a notebook shows it.
+        """
+        from multiscale.figures.curves import history_figure  # loads matplotlib
+
+        return history_figure(self, label)
+
     def _repr_html_(self) -> str:
         """Return the table as HTML, which notebooks show for a history."""
         return table_html(self.table())

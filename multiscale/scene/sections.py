@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic.json_schema import SkipJsonSchema
 
 from geometry.errors import InputError
 from geometry.files.content import LENGTH_UNITS, length_unit
 from geometry.preparation import Preparation
 from geometry.spectrum import LARGEST_SEED, Spectrum
+from multiscale.scene.height_map import HeightsOfArray
 from multiscale.scene.quantities import Length, Pressure, Slope, SpectralAmplitude
 
 Auto = Literal["auto"]
@@ -82,6 +84,8 @@ class FilterSection(Section):
 class SurfaceSection(Section):
     """Exactly one source of heights, the rectangle it covers, and what is done to the map.
 
+    From Python, ``heights`` may be an array with index [ix, iy], in mm or in ``height_unit``.
+
     Of a file: ``height_unit`` is the unit of its heights where the file does not state one, mm when
     not given; ``channel`` the name or number of a channel, counted from 0.
 
@@ -98,6 +102,7 @@ class SurfaceSection(Section):
 
     spectrum: SpectrumSection | None = None
     file: str | None = None
+    heights: SkipJsonSchema[HeightsOfArray] = None
     height_unit: str | None = None
     channel: str | Annotated[int, Field(ge=0, strict=True)] | None = None
     grid: Annotated[tuple[Heights, Heights], Field(description="heights in x, y")] | Auto | None = (
@@ -114,14 +119,21 @@ class SurfaceSection(Section):
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
-        if (self.spectrum is None) == (self.file is None):
-            raise ValueError("needs exactly one source (allowed: either 'spectrum' or 'file')")
+        if sum(source is not None for source in (self.spectrum, self.file, self.heights)) != 1:
+            raise ValueError(
+                "needs exactly one source (allowed: either 'spectrum' or 'file'; from Python also "
+                "'heights')"
+            )
+        if self.heights is not None and self.lengths is None:
+            raise ValueError("'heights' need 'lengths' beside them")
         if self.spectrum is not None and (self.grid is None or self.lengths is None):
             raise ValueError("a 'spectrum' needs 'grid' and 'lengths' beside it")
         fields = type(self).model_fields
         for key in ("height_unit", "channel", "crop", "missing", "outliers", "resample"):
-            if self.file is None and getattr(self, key) != fields[key].default:
+            if self.spectrum is not None and getattr(self, key) != fields[key].default:
                 raise ValueError(f"'{key}' needs a 'file' (allowed: leave it out)")
+        if self.heights is not None and (self.grid, self.channel) != (None, None):
+            raise ValueError("'heights' have their own grid, and no channel (allowed: neither)")
         if self.file is not None and self.grid == "auto":
             raise ValueError(
                 "grid = 'auto' needs a 'spectrum' (allowed: the grid of the file, or leave it out)"

@@ -16,6 +16,7 @@ import numpy as np
 
 from geometry import BlockShape, InputError, Material, Surface, read_surface, synthesise
 from geometry.files.content import BYTES_PER_HEIGHT
+from geometry.files.reading import surface_of
 from geometry.preparation import prepared
 from multiscale.machine import ClusterNodes, MemoryRequest
 from multiscale.scene.scene import Scene
@@ -54,6 +55,15 @@ def make_surface(scene: Scene) -> Surface:
             surface = synthesise(section.spectrum.spectrum(), **extent)
         with located(scene, "surface"):
             surface = prepared(surface, section.preparation)
+    elif section.heights is not None:
+        with located(scene, "surface.heights"):
+            return surface_of(
+                section.heights.values,
+                lengths=section.lengths or (0.0, 0.0),
+                height_unit=section.height_unit or "mm",
+                periodic=section.periodic,
+                **asdict(section.preparation),
+            )
     else:
         extent |= {"height_unit": section.height_unit, "channel": section.channel}
         extent |= {"periodic": section.periodic, **asdict(section.preparation)}

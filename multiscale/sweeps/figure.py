@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import cycle
 from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from multiscale.output.figures import add_grid_and_legend, curve_styles, new_figure
+from multiscale.figures.style import COLOURS, add_grid_and_legend, new_figure
 
 MOST_CURVES = 200
 """Cases that are drawn as curves; bands show those beyond."""
@@ -48,9 +49,8 @@ def sweep_figure(ensembles: Sequence[Ensemble]) -> Figure:
     figure = new_figure(9.0, 4.0)
     force, area = figure.subplots(1, 2)
     shown = ensembles[:MOST_ENSEMBLES]
-    for style, ensemble in zip(curve_styles(one.label for one in shown), shown, strict=True):
+    for colour, ensemble in zip(cycle(COLOURS.values()), shown, strict=False):
         x, y, a = 1e3 * ensemble.approach, ensemble.pressure, 100 * ensemble.area_fraction
-        colour = style["color"]
         for row in range(min(len(x), MOST_CURVES // len(shown))):
             force.plot(x[row], y[row], color=colour, lw=0.5, alpha=0.4)
             area.plot(y[row], a[row], color=colour, lw=0.5, alpha=0.4)

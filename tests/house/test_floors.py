@@ -45,7 +45,7 @@ FLOORS = {
         "compliance fields",
     ],
     "multiscale": [
-        "installation machine storage",
+        "figures installation machine storage",
         "doctor laws loading",
         "compiled_forms results scene",
         "setup",

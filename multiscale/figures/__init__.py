@@ -1,0 +1,1 @@
+"""Draws what results hold, in one style."""

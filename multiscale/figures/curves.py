@@ -1,0 +1,71 @@
+"""The curves of a history: force, contact area and mean separation."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from multiscale.figures.style import COLOURS, add_grid_and_legend, new_figure
+
+
+def history_figure(history: Any, kind: str) -> Figure:
+    """Draw force, contact area and mean separation of a run.
+
+    Args:
+        history: A `multiscale.results.history.History`.
+        kind: Its coupling, which has a colour of its own, or another label.
+    """
+    figure = new_figure(11.0, 3.6)
+    force, area, gap = figure.subplots(1, 3)
+    look: dict[str, Any] = {
+        "marker": "o",
+        "ms": 3.5,
+        "color": COLOURS.get(kind, COLOURS["analytic"]),
+        "label": kind,
+    }
+    pressure = np.append(0.0, history.mean_pressure_MPa)
+    # The first touch of a tilted plane is not at zero approach of the middle.
+    level = not any(any(step.tilt) for step in history.steps)
+    approach = 1e3 * np.append(0.0 if level else np.nan, history.approach_mm)
+    force.plot(approach, pressure, **look)
+    area.plot(pressure, 100 * np.append(0.0, history.contact_area_fraction), **look)
+    gap.plot(1e3 * history.mean_separation_mm, history.mean_pressure_MPa, **look)
+    if history.reference is not None:
+        draw_error_band(force, area, history, colour=colour)
+    force.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]")
+    area.set(xlabel="mean pressure [MPa]", ylabel="contact area fraction [%]")
+    gap.set(xlabel="mean separation [µm]", ylabel="mean pressure [MPa]")
+    add_grid_and_legend(figure)
+    return figure
+
+
+def draw_error_band(force: Any, area: Any, history: Any, *, colour: str) -> None:
+    """Draw the error bands of a reference about its values at mesh size zero.
+
+    Args:
+        force: Axes of pressure [MPa] over approach [µm].
+        area: Axes of the contact area fraction [%] over pressure [MPa]; None draws no band of it.
+        history: The history of a reference.
+        colour: Colour of the bands.
+    """
+    record = history.reference
+    if record is None or len(record.sizes) == 1:
+        force.plot([], [], " ", label="(no error bar)")
+        return
+    nominal = history.patches.area * history.patches.count
+    pressure = record.force.value / nominal
+    approach = 1e3 * record.approach.value
+    look: dict[str, Any] = {"color": colour, "alpha": 0.25, "lw": 0.0}
+    if record.by_force:
+        error = 1e3 * record.approach.error
+        force.fill_betweenx(
+            pressure, approach - error, approach + error, label=record.label, **look
+        )
+    else:
+        error = record.force.error / nominal
+        force.fill_between(approach, pressure - error, pressure + error, label=record.label, **look)
+    if area is not None:
+        middle, error = 100 * record.area.value, 100 * record.area.error
+        area.fill_between(pressure, middle - error, middle + error, **look)

@@ -1,0 +1,83 @@
+"""Reads the history of a run back from its folder of results."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from geometry.errors import InputError
+from geometry.patches import PatchGrid
+from multiscale.loading.load_step import LoadStep, PatchState
+from multiscale.results.history import PATCH_COLUMNS, History
+
+_TEXT = "reason"
+_COUNTS = {"step", "contacts", "newton_iterations", "linear_iterations"}
+
+
+def read_history(folder: str | Path) -> History:
+    """Read the history of a run from its results.
+
+    Args:
+        folder: Folder that ``patchlaw run`` wrote; ``history.csv``, ``patches.csv`` and
+            ``provenance.json`` are read.
+
+    Returns:
+        The history. Results of single meshes of a reference are in ``reference.csv`` alone.
+
+    Raises:
+        InputError: When a file is missing, cannot be read or is no result of a run.
+    """
+    folder = Path(folder)
+    rows, patch_rows = _rows(folder / "history.csv"), _rows(folder / "patches.csv")
+    path = folder / "provenance.json"
+    try:
+        provenance = json.loads(path.read_text(encoding="utf-8"))
+        lengths, grid = provenance["surface"]["lengths_mm"], provenance["patches"]
+        patches = PatchGrid(grid=tuple(grid), lengths=tuple(lengths))
+        states = _patch_states(patch_rows, patches.count)
+        steps = tuple(_load_step(row, state) for row, state in zip(rows, states, strict=True))
+        seconds, notes = provenance["seconds"], tuple(provenance["notes"])
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(
+            f"is not the result of a run: {type(error).__name__}: {error}", file=str(path)
+        ) from None
+    return History(steps=steps, patches=patches, seconds=seconds, notes=notes)
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            return list(csv.DictReader(file))
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"cannot be read: {reason}", file=str(path)) from None
+
+
+def _load_step(row: dict[str, str], patches: PatchState) -> LoadStep:
+    """Return a load step of its row."""
+    values: dict[str, Any] = {
+        name: text if name == _TEXT else _number(name, text) for name, text in row.items()
+    }
+    values["tilt"] = (values["tilt_x"], values["tilt_y"])
+    values["moment_N_mm"] = (values["moment_x_N_mm"], values["moment_y_N_mm"])
+    known = {item.name for item in fields(LoadStep)}
+    return LoadStep(patches=patches, **{key: values[key] for key in values.keys() & known})
+
+
+def _number(name: str, text: str) -> float | int | None:
+    if name in _COUNTS:
+        return int(text)
+    return float(text) if text else None
+
+
+def _patch_states(rows: list[dict[str, str]], count: int) -> list[PatchState]:
+    """Return the states of all patches, at one load step after another."""
+    columns = {name: np.array([float(row[name]) for row in rows]) for name in PATCH_COLUMNS[3:]}
+    tables = {name: column.reshape(-1, count) for name, column in columns.items()}
+    steps = len(rows) // count
+    return [PatchState(**{name: tables[name][k] for name in tables}) for k in range(steps)]
