@@ -19,12 +19,8 @@ def history_figure(history: Any, kind: str) -> Figure:
     """
     figure = new_figure(11.0, 3.6)
     force, area, gap = figure.subplots(1, 3)
-    look: dict[str, Any] = {
-        "marker": "o",
-        "ms": 3.5,
-        "color": COLOURS.get(kind, COLOURS["analytic"]),
-        "label": kind,
-    }
+    colour = COLOURS.get(kind, COLOURS["analytic"])
+    look: dict[str, Any] = {"marker": "o", "ms": 3.5, "color": colour, "label": kind}
     pressure = np.append(0.0, history.mean_pressure_MPa)
     # The first touch of a tilted plane is not at zero approach of the middle.
     level = not any(any(step.tilt) for step in history.steps)

@@ -23,7 +23,7 @@ class HeightMap:
     def __init__(self, values: Any) -> None:
         self.values = np.asarray(values)
         if self.values.ndim != 2 or self.values.dtype.kind not in "iuf":
-            raise ValueError("is no map of heights (allowed: numbers, shape (nx, ny))")
+            raise ValueError("is no map of heights (allowed: numbers with an index [ix, iy])")
 
     @cached_property
     def digest(self) -> str:
