@@ -149,17 +149,20 @@ def vector_space(mesh: Any, degree: int) -> Any:
 
 
 @_compiling()
-def scalar_space(mesh: Any, degree: int, family: str = "Lagrange") -> Any:
-    """Return a space of scalars.
+def scalar_space(
+    mesh: Any, degree: int, family: str = "Lagrange", *, shape: tuple[int, ...] = ()
+) -> Any:
+    """Return a space of scalars, or of as many in every node as a tensor has components.
 
     Args:
         mesh: dolfinx mesh.
         degree: Polynomial degree.
         family: ``"Lagrange"``, continuous, or ``"DG"``, discontinuous between cells.
+        shape: Shape of the values: that of scalars, or (3, 3).
     """
     if hasattr(fem, "functionspace"):
-        return fem.functionspace(mesh, (family, degree))
-    return fem.FunctionSpace(mesh, (family, degree))
+        return fem.functionspace(mesh, (family, degree, *[shape] * bool(shape)))
+    return (fem.TensorFunctionSpace if shape else fem.FunctionSpace)(mesh, (family, degree))
 
 
 def cell_nodes(space: Any) -> NDArray[np.int32]:
@@ -193,16 +196,20 @@ def lagrange_values(cell_name: str, degree: int, points: NDArray[np.float64]) ->
     return element.tabulate(0, points)[0].reshape(len(points), -1)
 
 
-def lagrange_gradients(cell_name: str, degree: int) -> NDArray[np.float64]:
-    """Return the gradients of the scalar Lagrange basis at its nodes, shape (nodes, basis, 3).
+def lagrange_gradients(
+    cell_name: str, degree: int, points: NDArray[np.float64] | None = None
+) -> NDArray[np.float64]:
+    """Return the gradients of the scalar Lagrange basis, shape (points, basis, 3).
 
     Args:
         cell_name: Name of the cell, such as ``hexahedron``.
         degree: Polynomial degree.
+        points: Reference coordinates, shape (points, 3); the nodes of the basis by default.
     """
     element = _lagrange(cell_name, degree)
-    slopes = np.asarray(element.tabulate(1, element.points)[1:])
-    return np.moveaxis(slopes.reshape(3, element.dim, element.dim), 0, 2)
+    points = element.points if points is None else points
+    slopes = np.asarray(element.tabulate(1, points)[1:])
+    return np.moveaxis(slopes.reshape(3, len(points), element.dim), 0, 2)
 
 
 def lagrange_points(cell_name: str, degree: int) -> NDArray[np.float64]:
@@ -285,15 +292,35 @@ def collect_garbage(comm: PETSc.Comm) -> None:
             PETSc.garbage_cleanup(of)
 
 
-def write_vtx(path: str, function: Any) -> None:
-    """Write a Lagrange function of any degree as VTX; only where `HAS_VTX`.
+class VtxFile:
+    """A VTX file of one Lagrange function of any degree at many times; none without ADIOS2.
 
     Args:
         path: Folder to write, ending in ``.bp``.
-        function: The function.
 
     Note:
-        Collective.
+        Collective. It is made with the first function that is written.
     """
-    with io.VTXWriter(function.function_space.mesh.comm, path, [function]) as file:
-        file.write(0.0)
+
+    def __init__(self, path: str) -> None:
+        self._path = path
+        self._file: Any = None
+        self._shown: Any = None
+
+    def __enter__(self) -> VtxFile:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._file is not None:
+            self._file.close()
+
+    def write(self, time: float, function: Any) -> None:
+        """Write the function at a time."""
+        if not HAS_VTX:
+            return
+        if self._file is None:
+            self._shown = function
+            comm = function.function_space.mesh.comm
+            self._file = io.VTXWriter(comm, self._path, [function])
+        self._shown.x.array[:] = function.x.array
+        self._file.write(float(time))

@@ -1,17 +1,23 @@
-"""Writes displacements and contact pressures of a block for ParaView."""
+"""Writes displacements, stresses and contact pressures of a block for ParaView.
+
+Theory: demos/theory.md, section 11.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 from dolfinx import fem, io
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from geometry.collective import on_root
 from macro import compat
+from macro.block import Block
 from macro.contact.law_interface import Interface
 from macro.contact.unilateral_problem import UnilateralContactProblem, UnilateralContactState
 from macro.mesh.contact_face import top_facets
@@ -26,69 +32,127 @@ _ZERO = 1e-9
 
 
 def write_fields(
-    path: Path | str, interface: Interface, displacement: Array, pressure: Array
+    path: Path | str, interface: Interface, steps: Iterable[tuple[int, Array, Array]]
 ) -> None:
-    """Write displacements [mm] and patch pressures [MPa] as XDMF, with an HDF5 file beside it.
+    """Write displacements [mm], stresses and contact pressures [MPa] of load steps as XDMF.
 
+    The numbers of the load steps are the times. A stress, and its equivalent by von Mises, is that
+    at the middle of a cell, computed from the displacements there; it is constant on the cell.
     Quadratic displacements are written at the vertices. The pressure of a cell is the mean pressure
     over its facet on the top, weighted by the areas of the patches there, and zero elsewhere. Where
     dolfinx has ADIOS2, displacements of any degree are also written as VTX, in a folder of the same
     name that ends in ``.bp``.
 
     Args:
-        path: File to write, ending in ``.xdmf``.
+        path: File to write, ending in ``.xdmf``; an HDF5 file goes beside it.
         interface: Patches on the block.
-        displacement: This rank's owned displacements, dof by dof [mm].
-        pressure: Mean pressures of the patches, shape (N,) [MPa].
+        steps: Number of each load step, this rank's owned displacements, dof by dof [mm], and mean
+            pressures of the N patches, shape (N,) [MPa].
 
     Note:
         Collective.
     """
     block = interface.block
-    mesh = block.mesh.mesh
-    shown = block.function(displacement)
-    if compat.HAS_VTX:
-        compat.write_vtx(str(Path(path).with_suffix(".bp")), shown)
-    if block.degree > 1:
-        shown = _interpolated(compat.vector_space(mesh, 1), shown, shown.name)
-    pressures = fem.Function(compat.scalar_space(mesh, 0, "DG"), name="pressure")
-    points, facets = interface.quadrature, top_facets(block.mesh)
-    cells = compat.cell_nodes(pressures.function_space)[:, 0]
-    force = points.weight * pressure[points.patch]
-    total = np.bincount(cells[points.cell], force, minlength=len(pressures.x.array))
-    loaded = cells[facets.cell]
-    pressures.x.array[loaded] = total[loaded] / facets.area
-    pressures.x.scatter_forward()
-    _write_xdmf(str(path), mesh, [shown, pressures])
+
+    def functions() -> Iterator[tuple[int, list[Any]]]:
+        for number, displacement, pressure in steps:
+            moved = block.function(displacement)
+            vtx.write(number, moved)
+            yield number, [*_of_block(block, moved), _facet_pressures(interface, pressure)]
+
+    with compat.VtxFile(str(Path(path).with_suffix(".bp"))) as vtx:
+        _write_xdmf(str(path), block.mesh.mesh, functions())
 
 
 def write_rough_fields(
-    path: Path | str, problem: UnilateralContactProblem, state: UnilateralContactState
+    path: Path | str,
+    problem: UnilateralContactProblem,
+    steps: Iterable[tuple[int, UnilateralContactState]],
 ) -> None:
-    """Write displacements [mm] and contact pressures [MPa] of a rough block as XDMF.
+    """Write displacements [mm], stresses and contact pressures [MPa] of a rough block as XDMF.
 
-    The pressure of a vertex is its contact force over its tributary area, including its shares of
-    the nodes between vertices; the pressure is linear between vertices. Quadratic displacements of
-    straight cells are written at the vertices.
+    The numbers of the load steps are the times; displacements and stresses are those of
+    `write_fields`. The pressure of a vertex is its contact force over its tributary area, including
+    its shares of the nodes between vertices; the pressure is linear between vertices.
 
     Args:
         path: File to write, ending in ``.xdmf``; an HDF5 file goes beside it.
         problem: The contact problem of the rough block.
-        state: The load step.
+        steps: Number of each load step, and its state.
 
     Note:
         Collective.
     """
     block, mesh = problem.block, problem.block.mesh.mesh
-    # XDMF files hold functions of the degree of the mesh's cells only
-    degree = 2 if compat.cell_vertices(mesh).shape[1] == 10 else 1
-    displacements = _interpolated(
-        compat.vector_space(mesh, degree), block.function(state.displacement), "displacement"
+
+    def functions() -> Iterator[tuple[int, list[Any]]]:
+        space = compat.scalar_space(mesh, _file_degree(mesh))
+        for number, state in steps:
+            pressures = _interpolated(space, _vertex_pressures(problem, state), "pressure")
+            yield number, [*_of_block(block, block.function(state.displacement)), pressures]
+
+    _write_xdmf(str(path), mesh, functions())
+
+
+def cell_stresses(block: Block, displacement: Any) -> Array:
+    """Return the stresses at the middles of this rank's cells, shape (cells, 3, 3) [MPa].
+
+    Args:
+        block: The block.
+        displacement: Its displacements, ghosts up to date.
+    """
+    mesh = block.mesh.mesh
+    name, geometry = mesh.topology.cell_name(), compat.cell_vertices(mesh)
+    middle = compat.reference_facets(name)[0].mean(axis=0)[None]
+
+    def gradient(values: Array, cells: NDArray[np.int32], degree: int) -> Array:
+        total = np.zeros((len(cells), 3, 3))
+        for node, slope in enumerate(compat.lagrange_gradients(name, degree, middle)[0]):
+            total += values[cells[:, node], :, None] * slope
+        return total
+
+    moved = displacement.x.array.reshape(-1, 3)
+    strain = gradient(moved, compat.cell_nodes(block.space), block.degree) @ np.linalg.inv(
+        gradient(mesh.geometry.x, geometry, _file_degree(mesh))
     )
-    pressures = _interpolated(
-        compat.scalar_space(mesh, degree), _vertex_pressures(problem, state), "pressure"
+    strain = 0.5 * (strain + np.swapaxes(strain, 1, 2))
+    first, shear = block.material.lame
+    pressure = first * np.trace(strain, axis1=1, axis2=2)
+    return np.asarray(pressure[:, None, None] * np.eye(3) + 2.0 * shear * strain)
+
+
+def _of_block(block: Block, displacement: Any) -> list[Any]:
+    """Return displacement, stress and von Mises' stress, as XDMF files can hold them."""
+    mesh = block.mesh.mesh
+    shown = _interpolated(
+        compat.vector_space(mesh, _file_degree(mesh)), displacement, "displacement"
     )
-    _write_xdmf(str(path), mesh, [displacements, pressures])
+    stress = fem.Function(compat.scalar_space(mesh, 0, "DG", shape=(3, 3)), name="stress")
+    equivalent = fem.Function(compat.scalar_space(mesh, 0, "DG"), name="von_Mises")
+    values = cell_stresses(block, displacement)
+    deviator = values - np.trace(values, axis1=1, axis2=2)[:, None, None] * np.eye(3) / 3.0
+    rows = compat.cell_nodes(equivalent.function_space)[:, 0]
+    stress.x.array.reshape(-1, 9)[rows] = values.reshape(-1, 9)
+    equivalent.x.array[rows] = np.sqrt(1.5 * np.square(deviator).sum(axis=(1, 2)))
+    return [shown, stress, equivalent]
+
+
+def _facet_pressures(interface: Interface, pressure: Array) -> Any:
+    """Return the mean pressures over the facets of the top, on their cells [MPa]."""
+    block, points = interface.block, interface.quadrature
+    pressures = fem.Function(compat.scalar_space(block.mesh.mesh, 0, "DG"), name="pressure")
+    facets, cells = top_facets(block.mesh), compat.cell_nodes(pressures.function_space)[:, 0]
+    force = points.weight * pressure[points.patch]
+    total = np.bincount(cells[points.cell], force, minlength=len(pressures.x.array))
+    loaded = cells[facets.cell]
+    pressures.x.array[loaded] = total[loaded] / facets.area
+    pressures.x.scatter_forward()
+    return pressures
+
+
+def _file_degree(mesh: Any) -> int:
+    """Return the degree of the mesh's cells, the only one of functions that XDMF files hold."""
+    return 2 if compat.cell_vertices(mesh).shape[1] == 10 else 1
 
 
 def _vertex_pressures(problem: UnilateralContactProblem, state: UnilateralContactState) -> Any:
@@ -129,15 +193,39 @@ def _interpolated(space: Any, function: Any, name: str) -> Any:
     return other
 
 
-def _write_xdmf(path: str, mesh: Any, functions: Sequence[Any]) -> None:
+def _write_xdmf(path: str, mesh: Any, steps: Iterable[tuple[int, Sequence[Any]]]) -> None:
     """Write a mesh and functions of its degree, or constant on cells, as XDMF with HDF5."""
     file = io.XDMFFile(mesh.comm, path, "w")
     try:
         file.write_mesh(mesh)
-        for function in functions:
-            file.write_function(function)
+        for number, functions in steps:
+            for function in functions:
+                file.write_function(function, float(number))
         file.close()
     except RuntimeError:
         # On a full disk it cannot be closed, and its destructor would end the process
         _FILES_NOT_CLOSED.append(file)
         raise
+    on_root(mesh.comm, lambda: _gather_fields(path))
+
+
+def _gather_fields(path: str) -> None:
+    """Put all fields of a load step onto one grid of the file.
+
+    dolfinx makes a grid for every field. ParaView takes them for different meshes, and would not
+    show stresses on the deformed block.
+    """
+    ElementTree.register_namespace("xi", "http://www.w3.org/2001/XInclude")
+    try:
+        tree = ElementTree.parse(path)
+    except ElementTree.ParseError:
+        raise OSError("it is cut short") from None
+    domain = tree.getroot()[0]
+    _, first, *others = domain.findall("Grid")
+    first.set("Name", "fields")
+    for other in others:
+        for step, more in zip(first, other, strict=True):
+            step.extend(more.findall("Attribute"))
+        domain.remove(other)
+    ElementTree.indent(tree)
+    tree.write(path, encoding="utf-8", xml_declaration=True)

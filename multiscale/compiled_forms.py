@@ -216,4 +216,4 @@ def _use_all_forms(element: str) -> None:
     block.reaction(rest)
     interface = Interface(block, PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)))
     with tempfile.TemporaryDirectory() as folder:
-        write_fields(Path(folder) / "fields.xdmf", interface, rest.array_r, np.zeros(1))
+        write_fields(Path(folder) / "fields.xdmf", interface, [(0, rest.array_r, np.zeros(1))])

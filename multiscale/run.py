@@ -7,16 +7,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 from io import BytesIO
-from typing import TYPE_CHECKING, Any
-
-from numpy.typing import NDArray
+from pathlib import Path
+from typing import Any
 
 from geometry import NotConverged
 from geometry.collective import on_root
 from micro import HalfSpaceModel, MicroModel
 from multiscale.couplings import assembly
 from multiscale.couplings.contact import OnBody, contact_model, on_body
-from multiscale.couplings.law_couplings import EmbeddedCoupling
+from multiscale.couplings.fields import FieldRecord
 from multiscale.laws.law_table import LawTable, law_bytes, read_laws
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling, LoadPosition, LoadStepper, Restorable
@@ -28,9 +27,6 @@ from multiscale.results.history import History
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
 from multiscale.storage import Arrays, digest
-
-if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import Interface
 
 
 class Run:
@@ -51,6 +47,7 @@ class Run:
         table: The patch laws, once made.
         coupling: What finds the load steps, once made.
         steps: The load steps accepted so far.
+        fields: What the fields of those that the scene names are made from.
         position: Position in the load history after them.
     """
 
@@ -69,6 +66,7 @@ class Run:
         nodes, large = cluster_nodes(comm), large_object_comm(comm)
         self.setup: ProblemSetup = on_root(large, lambda: make_setup(scene, resolved, nodes))
         self.scene, self.seconds = self.setup.scene, dict(self.setup.seconds)
+        self.fields = FieldRecord(self.setup, comm)
 
     def make_body(self) -> OnBody | None:
         """Make what puts the half-space model on its body, once; None for other micro models."""
@@ -114,6 +112,7 @@ class Run:
         with self.phase("load steps"):
             for step in stepper:
                 self.position = stepper.position
+                self.fields.keep(stepper.coupling, step)
                 self.steps.append(self._checked(step))
                 yield self.steps[-1]
 
@@ -192,16 +191,18 @@ class Run:
         meshed = assembly.meshed_blocks(self.coupling)
         return meshed[-1].dofs if meshed else None
 
-    def last_field(self) -> tuple[Interface, NDArray]:
-        """Return the meshed block and its displacements at the last load step, this rank's part.
+    def write_fields(self, path: Path) -> None:
+        """Write the fields of the load steps that the scene names, see `FieldRecord.write`.
 
-        Where load steps are not solved on a mesh, one is loaded by the patches' mean pressures.
+        Those that an earlier run has found are pressed to again once the run is finished.
+
+        Args:
+            path: File to write, ending in ``.xdmf``.
         """
-        if isinstance(self.coupling, EmbeddedCoupling):
-            return self.coupling.interface, self.coupling.displacement
-        pressure = self.steps[-1].patches.pressure_MPa
+        if self.finished:
+            self.fields.complete(self.make_coupling(), self.steps)
         with self.phase("field"):
-            return assembly.field_under(self.setup, pressure, self.comm)
+            self.fields.write(path, self.coupling, self.steps)
 
     def close(self) -> None:
         """Free the blocks. Accepted load steps stay, fields are gone.

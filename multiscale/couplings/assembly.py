@@ -27,7 +27,7 @@ from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import Block, Interface
+    from macro import Block
 
 Array = NDArray[np.float64]
 
@@ -182,22 +182,6 @@ def meshed_blocks(coupling: Coupling | None) -> list[Block]:
     if isinstance(coupling, ReferenceCoupling | EmbeddedCoupling):
         return coupling.blocks
     return []
-
-
-def field_under(setup: ProblemSetup, pressure: Array, comm: Any) -> tuple[Interface, Array]:
-    """Return the meshed block and its displacements under pressures that are uniform on patches.
-
-    Args:
-        setup: The problem set up from the scene.
-        pressure: Pressures of the patches, shape (N,) [MPa].
-        comm: MPI communicator; None for this process alone.
-
-    Note:
-        Collective.
-    """
-    interface = embedding(setup, comm)
-    function = interface.block.solve(interface.load(pressure))
-    return interface, function.x.array[: interface.block.owned_dofs].copy()
 
 
 def free_blocks(blocks: list[Block]) -> None:

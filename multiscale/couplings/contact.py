@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Control, PatchGrid
+from geometry import Control, PatchGrid, overlaps
 from geometry.collective import on_root
 from micro import START_KINDS, FiniteSlopes, HalfSpaceModel, MicroModel
 from multiscale.couplings.body import scene_body
@@ -78,6 +78,35 @@ class ContactCoupling:
             )
 
         return on_root(self._comm, solve)
+
+    def pressures_on(self, parts: PatchGrid, step: LoadStep) -> Array:
+        """Return the mean pressures of parts of the contact face, whose force is the whole one.
+
+        Args:
+            parts: The N parts.
+            step: The load step that was pressed last.
+
+        Returns:
+            Shape (N,) [MPa].
+
+        Note:
+            Collective.
+        """
+
+        def pressures() -> Array:
+            if isinstance(self._model, HalfSpaceModel):
+                (pressure, _), surface = self._start, self._model.surface
+                borders = parts.borders_x, parts.borders_y
+                x, y = map(overlaps, borders, surface.lengths, surface.grid)
+                return np.asarray((x @ pressure @ y.T).ravel() / parts.area)
+            control = Control(approach=step.approach_mm, tilt=step.tilt)
+            unused = np.zeros(parts.count)  # of separations
+            response, *_ = self._model.press(
+                control, patches=parts, mean_heights=unused, start=self._start
+            )
+            return np.asarray(response.patch_force[0] / parts.area)
+
+        return on_root(self._comm, pressures)
 
     def state(self) -> Arrays:
         """Return the latest solution; see `Restorable`. It is whole on rank 0 alone."""

@@ -159,13 +159,14 @@ class LoadStepper:
         position: Where to start.
 
     Attributes:
+        coupling: The same.
         position: Position in the load history; up to date whenever a load step is yielded.
     """
 
     def __init__(
         self, coupling: Coupling, load_history: LoadHistory, position: LoadPosition | None = None
     ) -> None:
-        self._coupling, self._load_history = coupling, load_history
+        self.coupling, self._load_history = coupling, load_history
         self.position = position or LoadPosition()
         self._newton = self._linear = 0
         self._seconds = 0.0
@@ -212,7 +213,7 @@ class LoadStepper:
         while True:
             control = self._load_history.control(ahead[-1])
             try:
-                step = self._coupling.press(control)
+                step = self.coupling.press(control)
             except NotConverged as error:
                 self._newton += error.iterations
                 beyond = isinstance(error, BeyondLaws)

@@ -1,4 +1,4 @@
-"""Writes displacement and pressure of the last load step for ParaView: all files, or none."""
+"""Writes the fields of load steps for ParaView: all files, or none."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import os
 import re
 import shutil
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -16,7 +15,6 @@ import h5py
 
 from geometry.collective import on_root
 from geometry.errors import NotWritten, PatchlawError
-from multiscale.couplings.reference import ReferenceCoupling
 from multiscale.run import Run
 from multiscale.storage import remove, written
 
@@ -28,18 +26,19 @@ _FILE_ERROR = re.compile("file|HDF5|XDMF|ADIOS", re.IGNORECASE)
 
 
 def write_fields(folder: Path, run: Run) -> list[Path]:
-    """Write displacement and pressure of the last load step as XDMF and VTX, for ParaView.
+    """Write displacements, stresses and pressures of the load steps that a scene names.
 
-    Where no mesh was pressed itself, the displacements are those of the scene's block under the
-    mean pressures of the patches. Of a reference, the fields are those of its finest rough block,
-    with the pressures of the nodes.
+    Where no mesh was pressed itself, they are those of the scene's block under the contact
+    pressures, or with laws under the mean pressures of the patches. Of a reference they are those
+    of its finest rough block, with the pressures of the nodes.
 
     Args:
         folder: Folder of the results; made when missing.
         run: The run.
 
     Returns:
-        The files written; none when no block took part.
+        The files written; none when no block took part, or a run that ended early came to none of
+        the load steps.
 
     Raises:
         NotWritten: When they cannot be written whole.
@@ -47,12 +46,12 @@ def write_fields(folder: Path, run: Run) -> list[Path]:
     Note:
         Collective: every rank writes its part.
     """
-    if not run.setup.has_block or not run.steps:
+    if not run.setup.has_block or not (run.finished or run.fields.kept):
         return []
 
     # The XDMF file contains the name of its HDF5 file. Both are therefore written under their
     # final names into a partial folder, and moved when they are complete.
-    partial, write = folder / PARTIAL_FOLDER, _writer(run)
+    partial = folder / PARTIAL_FOLDER
 
     def make_empty() -> None:
         shutil.rmtree(partial, ignore_errors=True)  # A killed run may have left one.
@@ -61,7 +60,7 @@ def write_fields(folder: Path, run: Run) -> list[Path]:
 
     on_root(run.comm, make_empty)
     try:
-        _write(write, partial / "fields.xdmf", run.comm)
+        _write(run, partial / "fields.xdmf")
         return on_root(run.comm, lambda: _move(partial, folder))
     except BaseException:
         # Every rank removes the folder: the others may be blocked in a collective call.
@@ -69,26 +68,14 @@ def write_fields(folder: Path, run: Run) -> list[Path]:
         raise
 
 
-def _writer(run: Run) -> Callable[[Path], None]:
-    """Return the function that writes the fields of the last load step to a path."""
-    import macro
-
-    if isinstance(run.coupling, ReferenceCoupling):
-        finest, latest = run.coupling.finest, run.coupling.latest
-        return lambda path: macro.write_rough_fields(path, finest, latest)
-    interface, displacement = run.last_field()
-    pressure = run.steps[-1].patches.pressure_MPa
-    return lambda path: macro.write_fields(path, interface, displacement, pressure)
-
-
-def _write(write: Callable[[Path], None], path: Path, comm: Any) -> None:
-    """Write a file; an error of dolfinx about files becomes NotWritten, a bug stays as it is."""
+def _write(run: Run, path: Path) -> None:
+    """Write fields; an error of dolfinx about files becomes NotWritten, a bug stays as it is."""
     try:
-        write(path)
+        run.write_fields(path)
     except (OSError, RuntimeError) as error:
         if isinstance(error, PatchlawError) or not _FILE_ERROR.search(str(error)):
             raise
-        atexit.register(_end_process, comm)
+        atexit.register(_end_process, run.comm)
         final = path.parent.parent / path.name
         raise NotWritten(f"{final}: cannot be written: {error}") from error
 

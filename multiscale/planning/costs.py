@@ -147,7 +147,8 @@ def predicted_cost(setup: ProblemSetup, machine: Machine = THIS_MACHINE) -> Cost
         solutions = (_ERROR_CHECK + setup.uses_laws) * (steps if output.check == "all" else 1)
         seconds["check"] = machine.arrays * solutions * solution_time(setup)
     if output.fields and setup.has_block and not (on_mesh or setup.meshes):
-        seconds["field"] = _mesh_seconds(setup.shape, machine, CYCLES_PER_PATCH)
+        fields = sum(output.wants_fields(one, last=one == steps) for one in range(1, steps + 1))
+        seconds["field"] = _mesh_seconds(setup.shape, machine, CYCLES_PER_PATCH * fields)
     if output.figures:
         figures = (4 if setup.uses_laws else 3) * _FIGURE
         seconds["output"] = machine.arrays * (figures + _unless_imported("matplotlib", _DRAWING))

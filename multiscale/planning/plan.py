@@ -71,7 +71,11 @@ def warnings(setup: ProblemSetup) -> Iterator[str]:
             "they carry no load here; take micro.curvature = 'contact', islands or half-space"
         )
     if setup.scene.output.fields and not setup.has_block:
-        yield "output.fields: there is no block, and no fields are written"
+        yield (
+            "output.fields: there is no block, and no fields are written; the analytic coupling "
+            "presses a half-space (a block has coupling.kind = 'concurrent', 'consistent', "
+            "'isolated' or 'reference')"
+        )
     if setup.has_block:
         yield from block_warnings(setup)
     if setup.decision is not None and setup.decision.warning:

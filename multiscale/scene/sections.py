@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 from pydantic.json_schema import SkipJsonSchema
 
 from geometry.errors import InputError
@@ -234,11 +234,43 @@ class MicroSection(Section):
 class OutputSection(Section):
     """What is written beside the tables of results.
 
+    ``fields``: the load steps whose displacements, stresses and contact pressures are written for
+    ParaView: ``"last"`` (or true), ``"all"``, or a list of their numbers.
+
     ``check``: the load steps whose errors are measured by solving further contact problems, where
     the micro model is ``half-space``.
     """
 
     figures: Flag = True
     report: Flag = True
-    fields: Flag = False
+    fields: (
+        Flag
+        | Literal["last", "all"]
+        | Annotated[list[Count], Field(min_length=1, description="numbers of load steps")]
+    ) = False
     check: Literal["last", "none", "all"] = "last"
+
+    @field_validator("fields", mode="before")
+    @classmethod
+    def _names_load_steps(cls, value: Any) -> Any:
+        """Refuse anything else in one sentence, not one for each type that it is not."""
+        numbers = isinstance(value, list | tuple) and len(value) > 0
+        if numbers and all(type(one) is int and one > 0 for one in value):
+            return list(value)
+        if isinstance(value, bool) or value in ("last", "all"):
+            return value
+        raise ValueError(
+            "does not name load steps (allowed: true or false, 'last', 'all', or a list of numbers "
+            "of load steps, from 1)"
+        )
+
+    def wants_fields(self, step: int, *, last: bool) -> bool:
+        """Tell whether the fields of a load step are written.
+
+        Args:
+            step: Its number.
+            last: Whether it is the last one.
+        """
+        if isinstance(self.fields, list):
+            return step in self.fields
+        return self.fields == "all" or (last and bool(self.fields))

@@ -34,8 +34,8 @@ BYTES_PER_STATE, BYTES_PER_STEP = 24, 1000
 """Memory of a patch's results and of the other results of a load step [B]."""
 
 LAW_BLOCK_CELLS, FIELD_CELLS = (40, 40, 25), (20, 20, 12)
-"""Cells of a block that carries laws on its mesh, those of Waddad et al. 2016, and of one that is
-meshed after the load for its fields alone."""
+"""Cells of a block that carries laws on its mesh, those of Waddad et al. 2016, or contacts, and of
+one that is meshed after the load for its fields under the mean pressures of patches."""
 _ROUNDING = 16.0 * float(np.finfo(float).eps)
 """Approach over the largest height below which it does not change where the plane is."""
 PROVISIONAL_PATCHES = (4, 4)
@@ -103,19 +103,20 @@ def block_material(scene: Scene) -> Material:
 def block_cells(scene: Scene) -> tuple[int, int, int]:
     """Return the cells of the flat block's mesh: those of the scene, or as many as its use needs.
 
-    Laws need a fine mesh under every patch; fields do not.
+    Laws need a fine mesh under every patch, and contacts are to be seen in fields; the mean
+    pressures of patches need less.
     """
     cells = scene.block.cells
     if cells is None or cells == "auto":
-        return LAW_BLOCK_CELLS if scene.coupling.on_mesh else FIELD_CELLS
+        fine = scene.coupling.on_mesh or scene.coupling.kind == "concurrent"
+        return LAW_BLOCK_CELLS if fine else FIELD_CELLS
     return cells
 
 
 def meshes_block(scene: Scene) -> bool:
     """Tell whether the flat block is meshed: under laws, or for fields after the load."""
-    return scene.coupling.on_mesh or (
-        scene.output.fields and scene.coupling.kind not in ("analytic", "reference")
-    )
+    flat = scene.coupling.kind not in ("analytic", "reference")
+    return scene.coupling.on_mesh or (flat and bool(scene.output.fields))
 
 
 def patch_grid(scene: Scene) -> tuple[int, int]:
@@ -209,8 +210,20 @@ def check_patches(scene: Scene, surface: Surface) -> None:
 
 
 def check_load(scene: Scene, surface: Surface) -> None:
-    """Refuse loads lost in the rounding of heights, or that press the block to nothing."""
-    block, loading = scene.block, scene.loading
+    """Refuse loads lost in the rounding of heights, or that press the block to nothing.
+
+    Numbers of load steps that there will not be are refused, too.
+    """
+    block, loading, fields = scene.block, scene.loading, scene.output.fields
+    count = loading.load_history.count
+    if isinstance(fields, list) and loading.force_change is None and max(fields) > count:
+        raise InputError(
+            "there are fewer load steps",
+            key="output.fields",
+            value=fields,
+            allowed=f"numbers up to {count}",
+            file=scene.file,
+        )
     resolved = _ROUNDING * float(np.abs(surface.heights).max())
     if loading.approach is not None and 0.0 < max(loading.approach) < resolved:
         raise InputError(

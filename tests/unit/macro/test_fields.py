@@ -27,7 +27,7 @@ def test_a_confined_block_has_one_pressure(element, tmp_path):
     mesh, _ = rough_block_mesh(shape, flat, MPI.COMM_SELF)
     rough = UnilateralContactProblem(Block(mesh, MATERIAL, sides="roller"), 0.0)
     state = rough.solve(Control(approach=5e-3))
-    write_rough_fields(tmp_path / "fields.xdmf", rough, state)
+    write_rough_fields(tmp_path / "fields.xdmf", rough, [(0, state)])
     with h5py.File(tmp_path / "fields.h5") as file:
         pressure = file["Function/pressure/0"][...].ravel()
         displacement = file["Function/displacement/0"][...]

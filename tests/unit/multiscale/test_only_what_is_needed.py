@@ -75,7 +75,7 @@ def never(*given, **options):
 
 
 def test_only_the_force_curve(monkeypatch, tmp_path):
-    monkeypatch.setattr(Run, "last_field", never)
+    monkeypatch.setattr(Run, "write_fields", never)
     run = Run(Scene.from_dict(data("concurrent", block=data()["block"] | {"cells": [4, 4, 4]})))
     assert len(list(run.load_steps())) == 2
     names = {path.name for path in write_results(tmp_path, run, options=[])}

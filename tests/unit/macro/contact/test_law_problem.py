@@ -155,7 +155,8 @@ def test_fields_are_written_for_paraview(element, tmp_path):
     state = LawContactProblem(block, interface, [Spring(), Spring(k=5e3)]).solve(
         Control(approach=1e-3)
     )
-    write_fields(tmp_path / "fields.xdmf", interface, state.displacement, state.pressure)
+    step = (0, state.displacement, state.pressure)
+    write_fields(tmp_path / "fields.xdmf", interface, [step])
     h5py = pytest.importorskip("h5py")
     with h5py.File(tmp_path / "fields.h5") as file:
         found = file["Function/pressure/0"][...].ravel()
@@ -181,7 +182,8 @@ def test_fields_share_cells_that_borders_cut(element, tmp_path):
     )
     interface = Interface(block, PatchGrid(grid=(3, 1), lengths=(1.0, 1.0)))
     given = np.array([3.0, 5.0, 8.0])
-    write_fields(tmp_path / "fields.xdmf", interface, np.zeros(block.owned_dofs), given)
+    step = (0, np.zeros(block.owned_dofs), given)
+    write_fields(tmp_path / "fields.xdmf", interface, [step])
     with h5py.File(tmp_path / "fields.h5") as file:
         found = file["Function/pressure/0"][...].ravel()
     loaded = found[found > 0.0]

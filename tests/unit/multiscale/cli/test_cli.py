@@ -102,7 +102,7 @@ def test_files_of_an_earlier_scene_do_not_stay(capsys, tmp_path):
         ),
         (
             ["coupling.kind=analytic", "output.fields=true"],
-            "output.fields: there is no block, and no fields are written",
+            "output.fields: there is no block, and no fields are written; the analytic coupling",
         ),
     ],
 )

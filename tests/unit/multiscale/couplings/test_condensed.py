@@ -146,12 +146,16 @@ def test_leaving_a_law_ends_the_run_and_keeps_what_was_accepted():
 def test_fields_are_those_of_the_patch_pressures():
     """Without a mesh that was pressed, one is loaded by the pressures that were found."""
     (full, condensed) = (
-        Run(scene(f"coupling.newton={newton}")) for newton in ("full", "condensed")
+        Run(scene(f"coupling.newton={newton}", "output.fields=true"))
+        for newton in ("full", "condensed")
     )
     fields = []
     for whole in (full, condensed):
         list(whole.load_steps())
-        interface, displacement = whole.last_field()
+        interface, steps = whole.fields.on_block(whole.coupling, whole.steps)
+        ((number, displacement, pressure),) = steps
+        assert number == len(whole.steps)
+        np.testing.assert_array_equal(pressure, whole.steps[-1].patches.pressure_MPa)
         fields.append(displacement)
         assert interface.block.owned_dofs == displacement.size
     # linear solves to 1e-10 of the load

@@ -400,7 +400,8 @@ def test_fields_cut_short_in_silence_are_told(tmp_path, monkeypatch, name):
 
     write = macro.write_fields
     monkeypatch.setattr(macro, "write_fields", cut)
-    run = Run(scene({"coupling": {"kind": "concurrent"}, "block": {"cells": [6, 6, 4]}}))
+    fields = {"output": {"fields": True}}
+    run = Run(scene({"coupling": {"kind": "concurrent"}, "block": {"cells": [6, 6, 4]}} | fields))
     next(run.load_steps())
     with pytest.raises(NotWritten, match=rf"{name}: cannot be written: "):
         write_fields(tmp_path, run)
