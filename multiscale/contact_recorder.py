@@ -90,6 +90,17 @@ class ContactRecorder:
             self.records.append(ContactRecord.of(coupling.detail(latest), step, lengths))
         return step
 
+    @property
+    def notes(self) -> list[str]:
+        """What a report says of contacts that laws stand for."""
+        if not (self._setup.uses_laws and self.records):
+            return []
+        last = self.records[-1]
+        return [
+            f"contact of load step {last.step}: the contact problem that the laws stand for, solved "
+            f"under the plane of the step, with a force of {last.force_N:.5g} N"
+        ]
+
     def _solved(self, step: LoadStep) -> LoadStep:
         """Solve the contact problem under the plane of a load step of laws."""
         setup = self._setup

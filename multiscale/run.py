@@ -219,6 +219,7 @@ class Run:
         """Return the load steps accepted so far, with times and notes."""
         steps, record, mesh_notes = assembly.with_mesh_errors(self.coupling, self.steps)
         notes = [*assembly.approximation_notes(self.setup, self.table, self.steps), *self._notes]
+        notes += self._recorder.notes
         return History(
             steps=steps,
             patches=self.setup.patches,

@@ -11,25 +11,25 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from multiscale.figures.style import COLOURS, new_figure
-from multiscale.results.contact_record import ContactRecord
 
 Array = NDArray[np.float64]
 
 _PRESSURES, _GAPS = "magma_r", "cividis_r"
 _CLOSED = "#d1495b"
 """Colour of the contact on the map of gaps."""
-_BINS = 24
+_PER_DECADE = 8
+"""Bars of the histogram per factor of ten in the area."""
 _MOST_POINTS = 1024
 """Cells a side of a map that is drawn; of more, the largest pressure of a block is shown."""
 
 
-def contact_figure(record: ContactRecord) -> Figure:
+def contact_figure(record: Any) -> Figure:
     """Draw pressures and gaps as maps, and how large the spots are.
 
     Spots without fields are drawn as circles of their areas, coloured by their largest pressures.
 
     Args:
-        record: The contact.
+        record: A `multiscale.results.contact_record.ContactRecord`.
     """
     fields = record.pressure_MPa is not None
     figure = new_figure(13.5 if fields else 9.5, 4.2)
@@ -50,7 +50,7 @@ def contact_figure(record: ContactRecord) -> Figure:
     return figure
 
 
-def _draw_pressures(figure: Figure, axes: Any, record: ContactRecord) -> None:
+def _draw_pressures(figure: Figure, axes: Any, record: Any) -> None:
     pressure = np.asarray(record.pressure_MPa)
     shown = np.ma.masked_less_equal(pressure, 0.0)
     scale = Normalize(0.0, float(pressure.max()) or 1.0)
@@ -59,7 +59,7 @@ def _draw_pressures(figure: Figure, axes: Any, record: ContactRecord) -> None:
     axes.set_title(f"pressure, at most {pressure.max():.4g} MPa")
 
 
-def _draw_gaps(figure: Figure, axes: Any, record: ContactRecord) -> None:
+def _draw_gaps(figure: Figure, axes: Any, record: Any) -> None:
     closed = np.asarray(record.pressure_MPa) > 0.0
     gap = 1e3 * np.maximum(np.asarray(record.gap_mm), 0.0)
     shown = np.ma.masked_where(closed, gap)
@@ -71,7 +71,7 @@ def _draw_gaps(figure: Figure, axes: Any, record: ContactRecord) -> None:
 
 
 def _draw_field(
-    axes: Any, record: ContactRecord, values: Any, colours: str, scale: Any, *, largest: bool
+    axes: Any, record: Any, values: Any, colours: str, scale: Any, *, largest: bool
 ) -> Any:
     """Draw a field of cells as an image, one of nodes as triangles between them."""
     from matplotlib import colormaps
@@ -108,7 +108,7 @@ def _coarsened(values: Any, *, largest: bool) -> Any:
     return np.ma.masked_where(closed, blocks.mean(axis=(1, 3)))
 
 
-def _draw_spots(figure: Figure, axes: Any, record: ContactRecord) -> None:
+def _draw_spots(figure: Figure, axes: Any, record: Any) -> None:
     diameter = 2.0 * np.sqrt(record.area_mm2 / np.pi)
     spots = EllipseCollection(
         diameter, diameter, np.zeros(len(diameter)), units="xy", offsets=record.place_mm,
@@ -121,21 +121,15 @@ def _draw_spots(figure: Figure, axes: Any, record: ContactRecord) -> None:
     axes.set_title("spots, as circles of their areas")
 
 
-def _draw_sizes(axes: Any, record: ContactRecord) -> None:
-    """Draw how many spots have which area, and which part of the force they carry."""
+def _draw_sizes(axes: Any, record: Any) -> None:
+    """Draw how many spots have which area."""
     axes.set(xlabel="area of a spot [µm²]", ylabel="number of spots")
     axes.set_title("sizes of the spots")
-    area = 1e6 * record.area_mm2
-    if not area.size:
+    exponent = np.log10(1e6 * record.area_mm2)
+    if not exponent.size:
         return
-    low, high = 0.8 * area.min(), 1.25 * area.max()
-    bins = np.geomspace(low, high, min(_BINS, 4 + len(area)))
-    axes.hist(area, bins, color=COLOURS["analytic"], label="number")
-    axes.set_xscale("log")
+    low, high = np.floor(exponent.min()), np.floor(exponent.max()) + 1.0
+    bins = np.logspace(low, high, int(_PER_DECADE * (high - low)) + 1)
+    axes.hist(10.0**exponent, bins, color=COLOURS["analytic"], ec="white", lw=0.5)
+    axes.set(xscale="log", xlim=(10.0**low, 10.0**high))
     axes.yaxis.get_major_locator().set_params(integer=True)
-    force = axes.twinx()
-    order = np.argsort(area, kind="stable")
-    share = 100.0 * np.cumsum(record.spot_force_N[order]) / record.spot_force_N.sum()
-    force.step(area[order], share, where="post", color=_CLOSED)
-    force.set(ylim=(0.0, 103.0))
-    force.set_ylabel("force on spots up to this area [%]", color=_CLOSED)

@@ -28,7 +28,7 @@ class ContactRecord:
     Attributes:
         step: Number of the load step.
         approach_mm: Approach of the plane [mm].
-        force_N: Force on the plane [N].
+        force_N: Force of all spots [N].
         lengths_mm: Sides of the surface [mm].
         spots: A row for each spot, see `SPOT_COLUMNS`: the place of its largest pressure, its real
             contact area, its force and that pressure, shape (m, 5).
@@ -66,7 +66,7 @@ class ContactRecord:
         return cls(
             step=step.step,
             approach_mm=step.approach_mm,
-            force_N=step.force_N,
+            force_N=float(detail.force.sum()),
             lengths_mm=(float(lengths[0]), float(lengths[1])),
             spots=np.ascontiguousarray(spots[order]),
             x_mm=detail.x,
