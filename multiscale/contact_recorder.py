@@ -97,8 +97,8 @@ class ContactRecorder:
             return []
         last = self.records[-1]
         return [
-            f"contact of load step {last.step}: the contact problem that the laws stand for, solved "
-            f"under the plane of the step, with a force of {last.force_N:.5g} N"
+            f"contact of load step {last.step}: the contact problem behind the laws, solved under "
+            f"the plane of the step, with a force of {last.force_N:.5g} N"
         ]
 
     def _solved(self, step: LoadStep) -> LoadStep:
