@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from geometry import Control, PatchGrid, overlaps
 from geometry.collective import on_root
 from micro import START_KINDS, FiniteSlopes, HalfSpaceModel, MicroModel
+from micro.contact_detail import ContactDetail
+from micro.model import SolvedContact
 from multiscale.couplings.body import scene_body
 from multiscale.loading.load_step import LoadStep
 from multiscale.setup.problem import ProblemSetup
@@ -48,6 +50,9 @@ class ContactCoupling:
         patches: Partition that the results are summed over; it does not change the solution.
         mean_heights: Mean height of each patch, shape (N,) [mm].
         comm: MPI communicator (mpi4py) or None.
+
+    Attributes:
+        latest: The contact at the latest load step; on rank 0 alone.
     """
 
     def __init__(
@@ -56,14 +61,17 @@ class ContactCoupling:
         self._model, self._patches, self._mean_heights = model, patches, mean_heights
         self._comm = comm
         self._start: Any = None
+        self._turns = False
+        self.latest: SolvedContact | None = None
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `Coupling.press`."""
 
         def solve() -> LoadStep:
-            response, plane, self._start = self._model.press(
+            response, plane, self._start, self.latest = self._model.press(
                 control, patches=self._patches, mean_heights=self._mean_heights, start=self._start
             )
+            self._turns = control.tilt is None
             return LoadStep.of_patches(
                 self._patches,
                 plane=(plane.approach, *plane.tilt),
@@ -75,16 +83,19 @@ class ContactCoupling:
                 contacts=response.contacts,
                 newton_iterations=int(response.iterations[0]),
                 warnings=response.warnings,
+                peak_pressure_MPa=self.latest.peak_pressure,
             )
 
         return on_root(self._comm, solve)
 
-    def pressures_on(self, parts: PatchGrid, step: LoadStep) -> Array:
-        """Return the mean pressures of parts of the contact face, whose force is the whole one.
+    def pressures_on(self, parts: PatchGrid) -> Array:
+        """Return the mean pressures of parts of the contact face at the latest load step.
+
+        Their forces add up to the force on the plane. A spot that is not made of cells counts for
+        the part that holds its largest pressure.
 
         Args:
             parts: The N parts.
-            step: The load step that was pressed last.
 
         Returns:
             Shape (N,) [MPa].
@@ -94,19 +105,25 @@ class ContactCoupling:
         """
 
         def pressures() -> Array:
+            assert self.latest is not None
             if isinstance(self._model, HalfSpaceModel):
                 (pressure, _), surface = self._start, self._model.surface
                 borders = parts.borders_x, parts.borders_y
                 x, y = map(overlaps, borders, surface.lengths, surface.grid)
                 return np.asarray((x @ pressure @ y.T).ravel() / parts.area)
-            control = Control(approach=step.approach_mm, tilt=step.tilt)
-            unused = np.zeros(parts.count)  # of separations
-            response, *_ = self._model.press(
-                control, patches=parts, mean_heights=unused, start=self._start
-            )
-            return np.asarray(response.patch_force[0] / parts.area)
+            spots = self.latest.detail
+            owner = parts.index_of(*spots.place.T)
+            return np.bincount(owner, spots.force, minlength=parts.count) / parts.area
 
         return on_root(self._comm, pressures)
+
+    def stiffness(self) -> tuple[float | None, int]:
+        """Return dF/dδ at the latest load step, and its iterations; see `HasStiffness`."""
+        return on_root(self._comm, lambda: self._model.stiffness(self.latest, turns=self._turns))
+
+    def detail(self, latest: Any) -> ContactDetail:
+        """Return the contact of a load step in detail; see `HasContact`."""
+        return on_root(self._comm, lambda: latest.detail)
 
     def state(self) -> Arrays:
         """Return the latest solution; see `Restorable`. It is whole on rank 0 alone."""

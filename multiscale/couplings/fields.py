@@ -68,7 +68,7 @@ class FieldRecord:
         elif isinstance(coupling, EmbeddedCoupling):
             self.kept[step.step] = coupling.displacement
         elif isinstance(coupling, ContactCoupling):
-            self.kept[step.step] = coupling.pressures_on(self._parts(coupling), step)
+            self.kept[step.step] = coupling.pressures_on(self._parts(coupling))
         else:
             self.kept[step.step] = step.patches.pressure_MPa
 

@@ -58,8 +58,9 @@ def block_figure(
         figure.colorbar(ScalarMappable(scale, colours), cax=bar).set_label(label, fontsize=8)
         bar.tick_params(labelsize=7)
     figure.text(0.03, 0.95, title, fontsize=10)
-    drawn = "to scale" if scene.exaggeration == 1.0 else f"{scene.exaggeration:g} × too high"
-    said = f"cut through the largest pressure; roughness drawn undeformed, {drawn}"
+    times = scene.exaggeration
+    drawn = "to scale" if times == 1.0 else f"heights exaggerated {times:g} times"
+    said = f"cut through the largest pressure, stresses of a half-space; undeformed, {drawn}"
     figure.text(0.03, 0.905, said, fontsize=8, color="0.35")
     return figure
 
@@ -100,8 +101,7 @@ class _Scene:
         self.row = row
         self.pressure = largest[:, row:]
         relief = 1e3 * self.exaggeration * np.pad(height, 1, mode="edge")
-        corners = relief[1:] + relief[:-1]
-        self.relief = 0.25 * (corners[:, 1:] + corners[:, :-1])[:, row:]
+        self.relief = _means(relief)[:, row:]
         self.pressures = Normalize(0.0, float(pressure.max()) or 1.0)
         self.stresses = PowerNorm(0.5, 0.0, float(self.stress.max()) or 1.0)
 
@@ -116,12 +116,7 @@ class _Scene:
         """Draw the surface in grey, lit from the left, and the contacts in their pressures."""
         y = self.y[self.row :]
         light = LightSource(azdeg=300, altdeg=40)
-        middle = 0.25 * (
-            self.relief[1:, 1:]
-            + self.relief[:-1, 1:]
-            + self.relief[1:, :-1]
-            + self.relief[:-1, :-1]
-        )
+        middle = _means(self.relief)
         shade = light.hillshade(middle.T, dx=self.x[1], dy=self.y[1], fraction=1.0).T
         grey = 0.45 + 0.5 * shade
         colour = np.stack([grey, grey, grey * 0.98, np.ones_like(grey)], axis=-1)
@@ -209,6 +204,12 @@ def _blocks(field: Array, steps: list[int]) -> Array:
     mx, my = (n // step for n, step in zip(field.shape, steps, strict=True))
     whole = field[: mx * steps[0], : my * steps[1]]
     return whole.reshape(mx, steps[0], my, steps[1])
+
+
+def _means(field: Array) -> Array:
+    """Return the means of all four neighbours, shape (nx − 1, ny − 1)."""
+    rows = field[1:] + field[:-1]
+    return 0.25 * (rows[:, 1:] + rows[:, :-1])
 
 
 def _nice(value: float) -> float:
