@@ -57,6 +57,8 @@ def stresses_below(
     cx, cy = kx / across, ky / across
     factors = np.stack([np.ones_like(q), cx * cx, cx * cy, cy * cy, cx, cy])
     factors[[1, 3], 0, 0] = 0.5  # the mean over all directions
+    factors[[2, 4], -1] = 0.0  # waves of two cells run either way
+    factors[[2, 5], :, grid[1]] = 0.0
     waves = fft.fft(fft.rfft(pressure, n=padded[0], axis=0), n=padded[1], axis=1)
     waves *= np.exp(2j * np.pi * np.arange(padded[1]) * row / padded[1]) / padded[1]
     found = np.empty((len(depths), grid[0], 3, 3))

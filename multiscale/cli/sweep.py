@@ -50,7 +50,7 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
                     ended(f"case {case.number}: {result.failure}")
 
             found = sweep(scene, vary, comm, folder=folder, part=(which, parts), observe=observe)
-        files = on_root(comm, lambda: _write(folder, found, scene.output.figures))
+        files = on_root(comm, lambda: _write(folder, found, bool(scene.output.figures)))
     for text in _summary(found):
         terminal.say(comm, text)
     terminal.show_files(comm, files)

@@ -41,31 +41,31 @@ def block_figure(
         poisson_ratio: Poisson's ratio of the body.
         title: What the figure shows.
     """
-    scene = _Scene(surface, pressure, poisson_ratio)
-    figure = Figure(figsize=(7.6, 4.9))
+    view = BlockView(surface, pressure, poisson_ratio)
+    figure = Figure(figsize=(7.6, 4.9), dpi=200)
     axes = figure.add_axes((0.01, 0.0, 0.83, 0.93))
     axes.set_aspect("equal")
     axes.axis("off")
-    scene.draw_side(axes)
-    scene.draw_cut(axes)
-    scene.draw_top(axes)
-    scene.draw_edges(axes)
+    view.draw_side(axes)
+    view.draw_cut(axes)
+    view.draw_top(axes)
+    view.draw_edges(axes)
     for at, scale, colours, label in (
-        (0.56, scene.pressures, _PRESSURES, "contact pressure [MPa]"),
-        (0.10, scene.stresses, _STRESSES, "von Mises stress on the cut [MPa]"),
+        (0.56, view.pressures, _PRESSURES, "contact pressure [MPa]"),
+        (0.10, view.stresses, _STRESSES, "von Mises stress on the cut [MPa]"),
     ):
         bar = figure.add_axes((0.86, at, 0.02, 0.32))
         figure.colorbar(ScalarMappable(scale, colours), cax=bar).set_label(label, fontsize=8)
         bar.tick_params(labelsize=7)
     figure.text(0.03, 0.95, title, fontsize=10)
-    times = scene.exaggeration
+    times = view.exaggeration
     drawn = "to scale" if times == 1.0 else f"heights exaggerated {times:g} times"
     said = f"cut through the largest pressure, stresses of a half-space; undeformed, {drawn}"
     figure.text(0.03, 0.905, said, fontsize=8, color="0.35")
     return figure
 
 
-class _Scene:
+class BlockView:
     """Everything that is drawn, in µm; seen from the front right corner above.
 
     Args:

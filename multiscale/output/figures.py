@@ -1,4 +1,4 @@
-"""Figures of a run: surface, pressure maps, laws."""
+"""Figures of a run: surface, pressure maps, laws, the block in contact."""
 
 from __future__ import annotations
 
@@ -11,9 +11,12 @@ from numpy.typing import NDArray
 from geometry.asperities import Asperities
 from geometry.patches import PatchGrid
 from geometry.surface import Surface
+from multiscale.figures.block import block_figure
 from multiscale.figures.style import PRESSURE_LABEL, add_grid_and_legend, new_figure
 from multiscale.laws.law_table import LawTable
+from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
+from multiscale.setup.problem import ProblemSetup
 
 MOST_NUMBERED_PATCHES = 100
 """A map of more patches shows colours alone; the numbers would cover each other."""
@@ -109,6 +112,22 @@ def draw_pressures(
             axes.text(x, y, text, ha="center", va="center", color=colour)
     axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
     return image
+
+
+def block_figure_of(setup: ProblemSetup, record: ContactRecord) -> Figure:
+    """Draw the block of a scene in three dimensions, with the contact of a load step.
+
+    Args:
+        setup: The problem set up from the scene.
+        record: The contact, with the pressures of the surface's cells.
+    """
+    pressure = np.asarray(record.pressure_MPa)
+    title = (
+        f"load step {record.step}: approach {1e3 * record.approach_mm:.3g} µm, "
+        f"force {record.force_N:.4g} N, {len(record.spots)} spots"
+    )
+    poisson_ratio = setup.scene.block.poisson_ratio
+    return block_figure(setup.surface, pressure, poisson_ratio, title=title)
 
 
 def law_figure(table: LawTable) -> Figure:

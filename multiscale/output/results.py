@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 FILES = (
     "history.csv", "patches.csv", "reference.csv", "laws.h5", "provenance.json", "report.html",
     "contacts.csv", "contact.h5", "surface.png", "curves.png", "pressures.png", "contact.png",
-    "laws.png", "fields.xdmf", "fields.h5", "fields.bp",
+    "laws.png", "block.png", "fields.xdmf", "fields.h5", "fields.bp",
 )  # fmt: skip
 """All files that a run may write."""
 
@@ -38,7 +38,7 @@ _COMPRESSION = 1
 """Level of gzip for maps: most of a map of pressures is zero."""
 
 DOTS_PER_INCH = 130
-"""Resolution of the figures."""
+"""Resolution of the figures, unless they need more."""
 
 
 def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
@@ -58,6 +58,7 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
     pictures: dict[str, bytes] = {}
     if run.scene.output.figures and run.steps:
         names = ["surface", "curves", "pressures"]
+        names += ["block"] * (run.scene.output.figures == "all" and has_block_figure(run))
         names += ["contact"] * bool(run.contacts) + ["laws"] * (run.table is not None)
         with run.phase("output"):
             drawn = shared(run.comm, len(names), lambda index: png(_figure(run, names[index])))
@@ -132,10 +133,16 @@ def write_contacts(folder: Path, contacts: Sequence[ContactRecord]) -> list[Path
     return files
 
 
+def has_block_figure(run: Run) -> bool:
+    """Tell whether the pressures of a surface's cells are known, which ``block.png`` shows."""
+    pressure = run.contacts[-1].pressure_MPa if run.contacts else None
+    return pressure is not None and pressure.shape == run.setup.surface.grid
+
+
 def png(figure: Figure) -> bytes:
     """Return a matplotlib figure as a PNG image."""
     content = BytesIO()
-    figure.savefig(content, dpi=DOTS_PER_INCH)
+    figure.savefig(content, dpi=max(figure.dpi, DOTS_PER_INCH))
     return content.getvalue()
 
 
@@ -153,6 +160,8 @@ def _figure(run: Run, name: str) -> Figure:
         return figures.surface_figure(setup.surface, setup.asperities, setup.patches)
     if name == "curves":
         return run.history().plot(run.scene.coupling.kind)
+    if name == "block":
+        return figures.block_figure_of(setup, run.contacts[-1])
     if name == "contact":
         return run.contacts[-1].plot()
     if name == "pressures":

@@ -56,8 +56,8 @@ _IMPORT, _BODY = 0.7, 0.065
 take several times longer."""
 _MESH, _REFERENCE_MESH, _ACTIVE_SETS = 0.026, 0.052, 0.013
 """Times of meshing a block, of meshing a rough block, and of a load step by active sets."""
-_DRAWING, _FIGURE = 0.21, 0.16
-"""Times of importing matplotlib, and of a figure."""
+_DRAWING, _FIGURE, _BLOCK_FIGURE = 0.21, 0.16, 0.9
+"""Times of importing matplotlib, of a figure, and of that in three dimensions."""
 _NEWTON_STEPS = 2.7
 """Newton steps of a load step of laws whose compliance is condensed to the patches."""
 
@@ -151,6 +151,7 @@ def predicted_cost(setup: ProblemSetup, machine: Machine = THIS_MACHINE) -> Cost
         seconds["field"] = _mesh_seconds(setup.shape, machine, CYCLES_PER_PATCH * fields)
     if output.figures:
         figures = (4 if setup.uses_laws else 3) * _FIGURE
+        figures += (output.figures == "all") * _BLOCK_FIGURE
         seconds["output"] = machine.arrays * (figures + _unless_imported("matplotlib", _DRAWING))
     return Cost(seconds=seconds, memory=_memory(setup))
 
@@ -265,6 +266,6 @@ def _memory(setup: ProblemSetup) -> float:
     if isinstance(setup.micro, HalfSpaceModel):
         half_space = _BYTES_PER_CELL * setup.micro.surface.heights.size
     libraries = setup.has_block * _unless_imported("dolfinx", _FINITE_ELEMENTS)
-    pictures = setup.scene.output.figures * _unless_imported("matplotlib", _PICTURES)
+    pictures = bool(setup.scene.output.figures) * _unless_imported("matplotlib", _PICTURES)
     needs = sum(need.total for need in run_memory_requests(setup))
     return peak_memory() + needs + max(half_space, libraries) + pictures

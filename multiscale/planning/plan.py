@@ -76,6 +76,13 @@ def warnings(setup: ProblemSetup) -> Iterator[str]:
             "presses a half-space (a block has coupling.kind = 'concurrent', 'consistent', "
             "'isolated' or 'reference')"
         )
+    without = ("auto", "none") if setup.uses_laws else ("none",)
+    cells = isinstance(setup.micro, HalfSpaceModel) and setup.scene.output.contact not in without
+    if setup.scene.output.figures == "all" and not cells:
+        yield (
+            "output.figures = 'all': no block.png is drawn, for no pressures of cells are known; "
+            "micro.model = 'half-space' has them, with laws where output.contact = 'last'"
+        )
     if setup.has_block:
         yield from block_warnings(setup)
     if setup.decision is not None and setup.decision.warning:

@@ -234,6 +234,10 @@ class MicroSection(Section):
 class OutputSection(Section):
     """What is written beside the tables of results.
 
+    ``figures``: ``"all"`` adds a picture of the rough block in three dimensions, with its contacts
+    and the stresses below them (``block.png``, about a second), where pressures of cells are known:
+    with half-space contacts, and with laws where ``contact`` is written.
+
     ``fields``: the load steps whose displacements, stresses and contact pressures are written for
     ParaView: ``"last"`` (or true), ``"all"``, or a list of their numbers.
 
@@ -246,7 +250,7 @@ class OutputSection(Section):
     none with laws. "none" leaves out the interfacial stiffness as well.
     """
 
-    figures: Flag = True
+    figures: Flag | Literal["all"] = True
     report: Flag = True
     fields: (
         Flag
