@@ -1,9 +1,12 @@
-"""Linear elastic materials, and the contact modulus of two bodies."""
+"""Linear elastic materials, the contact modulus of two bodies, and equivalent stresses."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
 
 from geometry.errors import InputError
 
@@ -84,3 +87,10 @@ class MaterialPair:
         if self.second is not None:
             compliance += self.second.surface_compliance
         return 1.0 / compliance
+
+
+def von_mises(stress: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return von Mises' equivalent of stresses, shape (..., 3, 3) [MPa]."""
+    trace = np.trace(stress, axis1=-2, axis2=-1)
+    deviator = stress - trace[..., None, None] * np.eye(3) / 3.0
+    return np.sqrt(1.5 * np.square(deviator).sum(axis=(-2, -1)))

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.collective import on_root
+from geometry.materials import von_mises
 from macro import compat
 from macro.block import Block
 from macro.contact.law_interface import Interface
@@ -130,10 +131,9 @@ def _of_block(block: Block, displacement: Any) -> list[Any]:
     stress = fem.Function(compat.scalar_space(mesh, 0, "DG", shape=(3, 3)), name="stress")
     equivalent = fem.Function(compat.scalar_space(mesh, 0, "DG"), name="von_Mises")
     values = cell_stresses(block, displacement)
-    deviator = values - np.trace(values, axis1=1, axis2=2)[:, None, None] * np.eye(3) / 3.0
     rows = compat.cell_nodes(equivalent.function_space)[:, 0]
     stress.x.array.reshape(-1, 9)[rows] = values.reshape(-1, 9)
-    equivalent.x.array[rows] = np.sqrt(1.5 * np.square(deviator).sum(axis=(1, 2)))
+    equivalent.x.array[rows] = von_mises(values)
     return [shown, stress, equivalent]
 
 

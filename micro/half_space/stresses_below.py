@@ -80,9 +80,3 @@ def stresses_below(
         for (i, j), line in parts.items():
             at[:, i, j] = at[:, j, i] = fft.irfft(line, n=padded[0])[: grid[0]]
     return found
-
-
-def von_mises(stress: Array) -> Array:
-    """Return von Mises' equivalent of stresses, shape (..., 3, 3)."""
-    deviator = stress - np.trace(stress, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) / 3.0
-    return np.sqrt(1.5 * np.square(deviator).sum(axis=(-2, -1)))

@@ -13,7 +13,8 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from geometry import Surface
-from micro.half_space.stresses_below import stresses_below, von_mises
+from geometry.materials import von_mises
+from micro.half_space.stresses_below import stresses_below
 
 Array = NDArray[np.float64]
 

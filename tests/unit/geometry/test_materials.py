@@ -2,9 +2,11 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from geometry import InputError, Material, MaterialPair
+from geometry.materials import von_mises
 
 RESIN = Material(young_modulus=4000.0, poisson_ratio=0.15)
 STEEL = Material(young_modulus=200e3, poisson_ratio=0.3)
@@ -38,3 +40,14 @@ def test_both_bodies_count_alike():
     pair, turned = MaterialPair(first=RESIN, second=STEEL), MaterialPair(first=STEEL, second=RESIN)
     assert pair.contact_modulus == pytest.approx(turned.contact_modulus)
     assert MaterialPair(first=RESIN).contact_modulus == RESIN.contact_modulus
+
+
+def test_von_mises_of_uniaxial_stress_and_of_shear():
+    uniaxial, shear = np.zeros((2, 3, 3))
+    uniaxial[2, 2] = -3.0
+    shear[0, 1] = shear[1, 0] = 2.0
+    np.testing.assert_allclose(
+        von_mises(np.stack([uniaxial, shear, np.eye(3)])),
+        [3.0, 2.0 * np.sqrt(3.0), 0.0],
+        atol=1e-15,
+    )

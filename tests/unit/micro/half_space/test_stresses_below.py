@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from micro.half_space.stresses_below import stresses_below, von_mises
+from micro.half_space.stresses_below import stresses_below
 
 NU = 0.3
 
@@ -81,14 +81,3 @@ def test_a_force_on_one_cell_is_boussinesqs():
         # ten cells deep only the copies of the force are seen
         np.testing.assert_allclose(found[near, i, j], closed[near], atol=3e-4 * scale)
         np.testing.assert_array_equal(found[:, i, j], found[:, j, i])
-
-
-def test_von_mises_of_uniaxial_stress_and_of_shear():
-    uniaxial, shear = np.zeros((2, 3, 3))
-    uniaxial[2, 2] = -3.0
-    shear[0, 1] = shear[1, 0] = 2.0
-    np.testing.assert_allclose(
-        von_mises(np.stack([uniaxial, shear, np.eye(3)])),
-        [3.0, 2.0 * np.sqrt(3.0), 0.0],
-        atol=1e-15,
-    )

@@ -1,0 +1,123 @@
+"""Fields of chosen load steps: which are written, and what loads the block."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from geometry import InputError
+from multiscale import Run, Scene, make_setup
+
+h5py = pytest.importorskip("h5py")
+
+PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
+SMALL = ["surface.grid=[64, 64]", "block.cells=[8, 8, 5]", "load.steps=3", "output.check=none"]
+CONTACTS = ["coupling.kind=concurrent", "micro.model=half-space"]
+COUPLINGS = {
+    "half-space": CONTACTS,
+    "asperities": ["coupling.kind=concurrent"],
+    "islands": ["coupling.kind=concurrent", "micro.model=islands"],
+    "laws on the mesh": ["coupling.newton=full"],
+    "laws, condensed": ["coupling.newton=condensed"],
+    "free plane": ["coupling.kind=consistent", "micro.model=half-space", "load.tilt=free"],
+    "reference": ["coupling.kind=reference", "reference.cells=[12, 12, 4]"],
+}
+
+
+def scene(*more):
+    return Scene.load(PAPER, [*SMALL, *more])
+
+
+def fields(path):
+    """Return what a file holds, by field and load step."""
+    with h5py.File(path.with_suffix(".h5")) as file:
+        return {
+            (name, int(step)): values[...]
+            for name, group in file["Function"].items()
+            for step, values in group.items()
+        }
+
+
+def written(tmp_path, *more):
+    """Run a scene; return it and its fields."""
+    run = Run(scene(*more))
+    list(run.load_steps())
+    run.write_fields(tmp_path / "fields.xdmf")
+    return run, fields(tmp_path / "fields.xdmf")
+
+
+@pytest.mark.parametrize("coupling", COUPLINGS.values(), ids=COUPLINGS)
+def test_every_coupling_with_a_body_has_fields_of_every_step(tmp_path, coupling):
+    run, found = written(tmp_path, *coupling, "output.fields=all")
+    names = "displacement", "stress", "von_Mises", "pressure"
+    assert set(found) == {(name, step) for name in names for step in (1, 2, 3)}
+    for step in run.steps:
+        lowest = found["displacement", step.step][:, 2].min()
+        assert -step.approach_mm < lowest < 0.0
+        pressure, stress = found["pressure", step.step], found["stress", step.step]
+        if coupling[0].endswith("reference"):
+            assert pressure.max() > 0.0
+            continue
+        # pressures of 8 × 8 facets on 1 mm² carry the whole force
+        force = pressure.sum() / 64
+        assert force == pytest.approx(step.force_N, rel=1e-6)
+        # every layer carries it too; the middles of clamped cells are a few percent off
+        assert -stress[:, 8].sum() / 320 == pytest.approx(step.force_N, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("asked", "steps"), [("true", {3}), ("last", {3}), ("[1, 2]", {1, 2}), ("all", {1, 2, 3})]
+)
+def test_fields_are_kept_of_the_steps_that_are_named_alone(asked, steps):
+    run = Run(scene(*CONTACTS, f"output.fields={asked}"))
+    list(run.load_steps())
+    assert set(run.fields.kept) == steps
+
+
+def test_nothing_is_kept_that_no_field_is_written_of():
+    for more in (CONTACTS, ["coupling.kind=analytic", "output.fields=all"]):
+        run = Run(scene(*more))
+        list(run.load_steps())
+        assert not run.fields.kept
+
+
+def test_contacts_load_the_face_where_they_are(tmp_path):
+    run, found = written(tmp_path, *CONTACTS, "output.fields=last")
+    (record,) = run.contacts
+    blocks = record.pressure_MPa.reshape(8, 8, 8, 8).mean(axis=(1, 3))
+    assert np.count_nonzero(blocks) < 20  # not the means of 4 × 4 patches
+    shown = np.sort(found["pressure", 3].ravel())[-64:]
+    np.testing.assert_allclose(shown, np.sort(blocks.ravel()), atol=1e-9 * blocks.max())
+
+
+@pytest.mark.parametrize("name", ["half-space", "laws on the mesh", "laws, condensed", "reference"])
+def test_a_resumed_run_writes_the_fields_of_a_whole_one(tmp_path, name):
+    more = (*COUPLINGS[name], "output.fields=[1, 3]")
+    first = Run(scene(*more))
+    steps = first.load_steps()
+    next(steps)
+    next(steps)
+    again = Run(scene(*more))
+    again.resume(first.steps, first.position, first.state(), first.law_bytes, first.contacts)
+    list(again.load_steps())
+    assert set(again.fields.kept) == {3}
+    (tmp_path / "again").mkdir()
+    again.write_fields(tmp_path / "again" / "fields.xdmf")
+    _, whole = written(tmp_path, *more)
+    found = fields(tmp_path / "again" / "fields.xdmf")
+    assert set(found) == set(whole)
+    for key, values in whole.items():
+        # equilibria are found to 1e-9 of the load
+        np.testing.assert_allclose(found[key], values, atol=1e-7 * np.abs(values).max())
+
+
+def test_load_steps_that_will_not_be_are_refused():
+    text = r"output.fields = \[1, 4\]: there are fewer load steps .allowed: numbers up to 3"
+    with pytest.raises(InputError, match=text):
+        make_setup(scene(*CONTACTS, "output.fields=[1, 4]"))
+
+
+@pytest.mark.parametrize("asked", ["[]", "[0]", "3", "[true]", "first", "[1.5]"])
+def test_what_names_no_load_steps_is_refused(asked):
+    with pytest.raises(InputError, match=r"output.fields = .* does not name load steps .allowed: "):
+        scene(f"output.fields={asked}")
