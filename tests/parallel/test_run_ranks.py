@@ -3,6 +3,7 @@
 import csv
 from functools import cache
 
+import h5py
 import numpy as np
 import pytest
 from on_ranks import RANKS
@@ -224,3 +225,34 @@ def test_bug_on_one_rank_ends_all(mpirun, tmp_path):
     done = mpirun(2, "-c", code, timeout=60)
     assert done.returncode != 0
     assert "RuntimeError: one rank" in done.stderr
+
+
+def sorted_fields(folder):
+    """Return the last fields, in an order of nodes and cells that no division changes."""
+    with h5py.File(folder / "fields.h5") as file:
+        ((places, cells),) = [
+            (mesh["geometry"][...], mesh["topology"][...]) for mesh in file["Mesh"].values()
+        ]
+        middles = places[cells].mean(axis=1)
+        orders = [np.lexsort(points.round(9).T) for points in (places, middles)]
+        functions = {name: group["3"][...] for name, group in file["Function"].items()}
+    assert set(functions) == {"displacement", "stress", "von_Mises", "pressure"}
+    order = {len(places): orders[0], len(middles): orders[1]}
+    return {name: values[order[len(values)]] for name, values in functions.items()}
+
+
+@pytest.mark.parametrize("ranks", RANKS)
+def test_fields_of_any_number_of_ranks(mpirun, tmp_path, ranks):
+    scene = (
+        "coupling.kind=concurrent", "micro.model=half-space", "block.cells=[8, 8, 5]",
+        "output.fields=[1, 3]",
+    )  # fmt: skip
+    found = []
+    for count in (1, ranks):
+        out = tmp_path / str(count)
+        done = mpirun(count, "-m", "patchlaw", "run", PAPER, "--out", out, "--set", *SMALL, *scene)
+        assert done.returncode == 0, done.stderr
+        found.append(sorted_fields(out))
+    for name, values in found[0].items():
+        # the linear solver goes to 1e-10 of the load
+        np.testing.assert_allclose(found[1][name], values, atol=1e-7 * np.abs(values).max())
