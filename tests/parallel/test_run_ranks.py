@@ -65,6 +65,8 @@ NUMBERS = (
     "contacts",
     "force_error_N",
     "approach_error_mm",
+    "peak_pressure_MPa",
+    "stiffness_N_per_mm",
 )
 
 
