@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.collections import EllipseCollection
-from matplotlib.colors import Normalize
+from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -14,12 +15,14 @@ from multiscale.figures.style import COLOURS, new_figure
 
 Array = NDArray[np.float64]
 
-_PRESSURES, _GAPS = "magma_r", "cividis_r"
-_CLOSED = "#d1495b"
-"""Colour of the contact on the map of gaps."""
+_PRESSURES = ListedColormap(colormaps["magma_r"](np.linspace(0.2, 1.0, 256)))
+_GAPS = colormaps["cividis_r"].copy()
+_GAPS.set_bad("#d1495b")
+_SHOWN = 0.99
+"""Part of the pressures within the colour scale; few cells carry the largest ones."""
 _PER_DECADE = 8
 """Bars of the histogram per factor of ten in the area."""
-_MOST_POINTS = 1024
+_MOST_POINTS = 420
 """Cells a side of a map that is drawn; of more, the largest pressure of a block is shown."""
 
 
@@ -53,9 +56,10 @@ def contact_figure(record: Any) -> Figure:
 def _draw_pressures(figure: Figure, axes: Any, record: Any) -> None:
     pressure = np.asarray(record.pressure_MPa)
     shown = np.ma.masked_less_equal(pressure, 0.0)
-    scale = Normalize(0.0, float(pressure.max()) or 1.0)
+    top = float(np.quantile(shown.compressed(), _SHOWN)) if shown.count() else 1.0
+    scale = Normalize(0.0, top)
     image = _draw_field(axes, record, shown, _PRESSURES, scale, largest=True)
-    figure.colorbar(image, ax=axes, label="contact pressure [MPa]")
+    figure.colorbar(image, ax=axes, label="contact pressure [MPa]", extend="max")
     axes.set_title(f"pressure, at most {pressure.max():.4g} MPa")
 
 
@@ -65,18 +69,15 @@ def _draw_gaps(figure: Figure, axes: Any, record: Any) -> None:
     shown = np.ma.masked_where(closed, gap)
     top = float(shown.max()) if not closed.all() else 1.0
     image = _draw_field(axes, record, shown, _GAPS, Normalize(0.0, top), largest=False)
-    image.cmap.set_bad(_CLOSED)
     figure.colorbar(image, ax=axes, label="gap [µm]")
     axes.set_title("gap; contact in red")
 
 
 def _draw_field(
-    axes: Any, record: Any, values: Any, colours: str, scale: Any, *, largest: bool
+    axes: Any, record: Any, values: Any, colours: Any, scale: Any, *, largest: bool
 ) -> Any:
     """Draw a field of cells as an image, one of nodes as triangles between them."""
-    from matplotlib import colormaps
-
-    look: dict[str, Any] = {"cmap": colormaps[colours].copy(), "norm": scale}
+    look: dict[str, Any] = {"cmap": colours, "norm": scale}
     if values.ndim == 2:
         width, depth = record.lengths_mm
         shown = _coarsened(values, largest=largest)
