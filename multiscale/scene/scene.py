@@ -162,7 +162,7 @@ def _first_problem(error: ValidationError, model: type[BaseModel]) -> InputError
     if problem["type"] == "extra_forbidden":
         return _unknown_key(path, model)
     # of a key with several types pydantic names the type, and has a problem for each
-    key = ".".join(part for part in path if "[" not in part) or None
+    key = ".".join(part for part in path if "[" not in part and part != "bool") or None
     if problem["type"] == "missing":
         return InputError("is required and missing", key=key)
     if problem["type"] == "model_type":

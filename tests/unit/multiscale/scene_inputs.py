@@ -140,8 +140,8 @@ KEYS = {
     "load.steps": st.one_of(st.integers(1, 9), extreme),
     "load.tilt": tilts,
     "load.force_change": ratios,
-    "output.figures": st.booleans(),
-    "output.fields": st.booleans(),
+    "output.figures": st.sampled_from([True, False, "all"]),
+    "output.fields": st.sampled_from([True, False, "last", "all", [1]]),
 }
 strange = st.sampled_from([*KEYS, "surface", "surface.spectrum", "block", "x", "bloc.y.z", ""])
 

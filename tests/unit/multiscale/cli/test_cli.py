@@ -104,6 +104,7 @@ def test_files_of_an_earlier_scene_do_not_stay(capsys, tmp_path):
             ["coupling.kind=analytic", "output.fields=true"],
             "output.fields: there is no block, and no fields are written; the analytic coupling",
         ),
+        (["output.figures=all"], "output.figures = 'all': no block.png is drawn, for no pressures"),
     ],
 )
 def test_plan_says_what_is_doubtful(capsys, overrides, text):
@@ -203,12 +204,13 @@ def test_laws_of_a_coupling_without_laws_are_refused(capsys, tmp_path, kind):
 
 def test_concurrent_run_from_scene_to_fields(capsys, tmp_path):
     extra = ["coupling.kind=concurrent", "load.approach=['6 um', '3 um']", "output.fields=true"]
-    words = ("run", PAPER, "--out", str(tmp_path), "--set", *SMALL, *extra, "output.report=false")
+    extra += ["micro.model=half-space", "output.figures=all", "output.report=false"]
+    words = ("run", PAPER, "--out", str(tmp_path), "--set", *SMALL, *extra)
     code, shown, err = call(capsys, *words)
     assert (code, err) == (0, "")
     assert "no laws" in " ".join(shown.split())
     names = {path.name for path in tmp_path.iterdir()}
-    assert {"history.csv", "fields.xdmf", "fields.h5"} <= names
+    assert {"history.csv", "block.png", "fields.xdmf", "fields.h5"} <= names
     assert "laws.h5" not in names
     with (tmp_path / "history.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
