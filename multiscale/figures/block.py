@@ -32,7 +32,7 @@ _RELIEF = 0.12
 def block_figure(
     surface: Surface, pressure: Array, poisson_ratio: float, *, title: str = ""
 ) -> Figure:
-    """Draw a rough surface with its contacts, cut through the largest pressure.
+    """Draw a rough surface with its contacts, cut along the row of cells that carries most.
 
     The stresses on the cut are those of a half-space under the pressures.
 
@@ -61,7 +61,7 @@ def block_figure(
     figure.text(0.03, 0.95, title, fontsize=10)
     times = view.exaggeration
     drawn = "to scale" if times == 1.0 else f"heights exaggerated {times:g} times"
-    said = f"cut through the largest pressure, stresses of a half-space; undeformed, {drawn}"
+    said = f"cut along the row that carries most, half-space stresses; undeformed, {drawn}"
     figure.text(0.03, 0.905, said, fontsize=8, color="0.35")
     return figure
 
@@ -81,7 +81,7 @@ class BlockView:
         height = _blocks(surface.heights - surface.mean_height, steps).mean(axis=(1, 3))
         largest = _blocks(pressure, steps).max(axis=(1, 3))
         loads = _blocks(pressure, steps).mean(axis=(1, 3))
-        row = int(largest.max(axis=0).argmax())
+        row = int(loads.sum(axis=0).argmax())
         # what lies behind the cut is shown: the larger part, from the other side if need be
         self.turned = row >= largest.shape[1] / 2
         if self.turned:
@@ -172,7 +172,7 @@ class BlockView:
             ((lx, ly, low), (lx, ly, self.relief[-1, -1])),
         ):
             axes.plot(*self.seen(*np.transpose(ends)), **line)
-        tick = 0.02 * float(min(self.size))
+        tick = 0.01 * float(sum(self.size))
         out_x, out_y = (0.0, -tick, 0.0), (tick, 0.0, 0.0)
         spots = MaxNLocator(5).tick_values
         for value in (v for v in spots(0, lx) if 0 <= v <= lx):
@@ -187,7 +187,7 @@ class BlockView:
         for at, text, turn, ha in (
             ((0.5 * lx, front - 7 * tick, low), "x [µm]", -12, "center"),
             ((lx + 7 * tick, 0.5 * (front + ly), low), "y [µm]", 45, "center"),
-            ((-6 * tick, front, 0.5 * low), "depth [µm]", 90, "center"),
+            ((-5.5 * tick, front, 0.5 * low), "depth [µm]", 90, "center"),
         ):
             px, py = self.seen(*at)
             axes.text(px, py, text, fontsize=8, rotation=turn, ha=ha, va="center")

@@ -20,8 +20,8 @@ def pressed(grid, *cells):
 
 
 @pytest.mark.parametrize(("column", "turned"), [(5, False), (33, True)])
-def test_the_cut_goes_through_the_largest_pressure_and_the_larger_part_is_shown(column, turned):
-    pressure = pressed((48, 40), (10, column), (30, column))
+def test_the_cut_goes_along_the_most_loaded_row_and_the_larger_part_is_shown(column, turned):
+    pressure = pressed((48, 40), (10, column), (30, column), (12, 20))
     view = BlockView(rough(), pressure, 0.3)
     assert view.turned == turned
     assert view.pressure[:, 0].max() == 301.0
