@@ -16,14 +16,16 @@ from typing import Any
 from geometry.errors import InputError, NotConverged
 from geometry.meshes.families import suggested_fine
 from micro import MODEL_NAMES
-from multiscale.comparison.configuration import (
+from multiscale.comparison.configuration import OWN, Configuration
+from multiscale.comparison.scene_content import (
+    FITTED,
+    LOW_HEIGHTS,
     LOW_HEIGHTS_SCALE,
-    OWN,
-    Configuration,
     Content,
     Grid,
     coarser_grids,
     content_of,
+    name_of,
     pressure_grid,
     scaled,
 )
@@ -31,12 +33,6 @@ from multiscale.planning.costs import Machine, predicted_cost
 from multiscale.planning.problem_setup import make_setup
 from multiscale.scene.scene import Scene
 from multiscale.setup.surface_and_block import LAW_BLOCK_CELLS, make_surface, patch_grid
-
-SMALL_SLOPES = ", small slopes"
-"""End of the name of a configuration that differs from another by neglecting finite slopes."""
-
-LOW_HEIGHTS = f", heights × {LOW_HEIGHTS_SCALE:g}"
-"""End of the name of that reference; the rest is the name of the one with true heights."""
 
 LAW_HEIGHTS = 128
 """Heights along a side, at most, of half-spaces behind laws of several numbers of patches."""
@@ -51,7 +47,6 @@ REFERENCE_MESHES = ((1, 2.0), (1, 1.0), (2, 1.0), (3, 1.0), (3, 0.5**0.5))
 """Numbers of meshes of references, and their edges relative to those that fit the contacts."""
 
 _HALF_SPACE: Content = {"model": "half-space"}
-_FITTED: Content = {"model": "elliptic", "curvature": "contact", "border": "include"}
 
 
 def configurations(scene: Scene, ranks: int = 1) -> tuple[Configuration, ...]:
@@ -116,7 +111,7 @@ class _Catalogue:
         own: dict[str, Any] = {"patches": self._patches, "cells": self._own_cells}
         made = self._proposal(self._base["coupling"], accuracy=self._accuracy, **own)
         yield replace(made, name=f"{OWN}: {made.name}")
-        for micro in (*({"model": name} for name in MODEL_NAMES), _FITTED):
+        for micro in (*({"model": name} for name in MODEL_NAMES), FITTED):
             if micro != _HALF_SPACE:
                 yield self._proposal({"kind": "analytic"}, micro)
         for kind in ("analytic", "concurrent"):
@@ -143,7 +138,7 @@ class _Catalogue:
             content["patches"] = {"grid": list(patches)}
         if cells is not None:
             content["block"] = content["block"] | {"cells": list(cells)}
-        return Configuration(name=_name_of(content), content=content)
+        return Configuration(name=name_of(content), content=content)
 
     def _half_spaces(self, coupling: Content, **grids: Grid) -> Iterator[Configuration]:
         """Yield half-spaces on every grid, and one of them without finite slopes."""
@@ -199,28 +194,6 @@ class _Catalogue:
         return suggested_fine(make_surface(self._scene), loads.largest, tilt=loads.tilt)
 
 
-def _name_of(content: Content) -> str:
-    """Return the name of a scene among its configurations."""
-    micro, reference, surface = (content[name] for name in ("micro", "reference", "surface"))
-    kind, model, cells = content["coupling"]["kind"], micro["model"], content["block"].get("cells")
-    if kind == "reference":
-        meshes, fine = reference["meshes"], reference.get("fine")
-        name = f"reference, {meshes} mesh{'es' * (meshes > 1)}"
-        return f"{name}, {1e3 * fine:.3g} µm" if fine else name
-    name = kind
-    if kind in ("isolated", "consistent"):
-        name += f", {_times(content['patches']['grid'])} patches"
-    name += f", {model}" + ", fitted" * (micro == _FITTED)
-    if model == "half-space":
-        name += f" {_times(surface['grid'])}"
-    name += f", {_times(cells)} elements" if cells else ""
-    return name + SMALL_SLOPES * (micro.get("finite_slopes") is False)
-
-
 def _carries(cells: tuple[int, ...], patches: Grid) -> bool:
     """Tell whether enough elements lie under every patch."""
     return all(c >= CELLS_PER_PATCH * n for c, n in zip(cells[:2], patches, strict=True))
-
-
-def _times(counts: Sequence[int]) -> str:
-    return " × ".join(map(str, counts))
