@@ -58,6 +58,7 @@ def reference_shapes(
     cells: tuple[int, int, int] | None = None,
     grading: float = 8.0,
     element: str | None = None,
+    radius: float | None = None,
 ) -> tuple[Shape, ...]:
     """Return blocks to mesh, coarse to fine, all of whose sizes fall together.
 
@@ -76,6 +77,7 @@ def reference_shapes(
         cells: Hexahedra of the finest mesh along x, y and over the height.
         grading: Height of the bottom layer of hexahedra relative to the top layer.
         element: ``P1`` or ``P2`` (default) tetrahedra; ``Q1`` (default) or ``Q2`` hexahedra.
+        radius: The `contact_radius` at this approach where it is known [mm].
 
     Raises:
         InputError: When a value is out of its range, hexahedra come without their number, or they
@@ -92,7 +94,7 @@ def reference_shapes(
         raise InputError(
             "these cells are unknown", value=mesh, allowed=", ".join(map(repr, get_args(Cells)))
         )
-    radius = contact_radius(surface, approach, tilt=tilt)
+    radius = radius or contact_radius(surface, approach, tilt=tilt)
     smallest = radius / EDGES if fine is None else fine
     if not 0.0 < smallest < math.inf:
         raise InputError("the finest edge length is out of range", value=fine, allowed="> 0 mm")
@@ -142,9 +144,14 @@ def places_in_reach(
         for length in surface.lengths
     )
     lattice = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-    grid = np.vstack([lattice, surface.highest_point])
-    depth = depth_below_plane(surface, grid[:, 0], grid[:, 1], approach, tilt)
-    return grid[depth >= min(0.0, float(depth.max()))]
+    top = np.array([surface.highest_point])
+    depth = np.concatenate(
+        [
+            depth_below_plane(surface, x[:, None], y[None, :], approach, tilt).ravel(),
+            depth_below_plane(surface, top[:, 0], top[:, 1], approach, tilt),
+        ]
+    )
+    return np.vstack([lattice, top])[depth >= min(0.0, float(depth.max()))]
 
 
 def depth_below_plane(

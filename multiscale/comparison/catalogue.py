@@ -8,6 +8,7 @@ their results over the patches that pressures are compared on (`pressure_grid`).
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -29,9 +30,10 @@ from multiscale.comparison.scene_content import (
     pressure_grid,
     scaled,
 )
-from multiscale.planning.costs import Machine, predicted_cost
+from multiscale.planning.costs import predicted_cost
 from multiscale.planning.problem_setup import make_setup
 from multiscale.scene.scene import Scene
+from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.surface_and_block import LAW_BLOCK_CELLS, make_surface, patch_grid
 
 LAW_HEIGHTS = 128
@@ -59,25 +61,31 @@ def configurations(scene: Scene, ranks: int = 1) -> tuple[Configuration, ...]:
     Raises:
         InputError: When the surface cannot be read.
     """
-    machine = Machine()
     found: dict[str, Configuration] = {}
+    setups: dict[str, ProblemSetup] = {}
     # The scene itself comes first: an equal configuration does not replace its name.
     for proposal in _Catalogue(scene).proposals():
-        one = _allowed(proposal, machine)
+        one = _allowed(proposal, setups)
         if one is not None:
             one = replace(one, ranks=1 if one.kind == "analytic" else ranks)
             found.setdefault(one.key, one)
     return tuple(sorted(found.values(), key=lambda one: one.cost))
 
 
-def _allowed(proposal: Configuration, machine: Machine) -> Configuration | None:
+def _allowed(proposal: Configuration, setups: dict[str, ProblemSetup]) -> Configuration | None:
     """Return a configuration with all its keys and its cost; None when its scene is refused.
 
     A reference that does not fit into the memory stays, with the reason.
+
+    Args:
+        proposal: The configuration without its cost.
+        setups: A problem that was set up for each surface so far, to which others are added.
     """
-    cost, refusal = float("inf"), ""
+    cost, refusal, surface = float("inf"), "", json.dumps(proposal.content["surface"])
     try:
-        cost = predicted_cost(make_setup(proposal.scene), machine).total
+        setup = make_setup(proposal.scene, like=setups.get(surface))
+        cost = predicted_cost(setup).total
+        setups.setdefault(surface, setup)
     except (InputError, NotConverged) as error:
         if proposal.kind != "reference" or "GB of memory" not in str(error):
             return None

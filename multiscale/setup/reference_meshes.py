@@ -116,6 +116,7 @@ def reference_meshes(
             share = float((plane.at(surface.x[:, None], surface.y) > depth).mean())
             least = 3.0 * BYTES_PER_UNKNOWN[1] * surface.area * share / fine / fine
             check_memory(scene, nodes, [_request(scene, "the reference", shared=least)])
+        radius = contact_radius(surface, approach, tilt=tilt)
         shapes = reference_shapes(
             surface,
             largest,
@@ -127,8 +128,8 @@ def reference_meshes(
             cells=reference.cells,
             grading=block.grading,
             element=block.element if block.element[0] == ("Q" if hexahedral else "P") else None,
+            radius=radius if prescribed else None,
         )
-        radius = contact_radius(surface, approach, tilt=tilt)
     sizes = np.array([characteristic_size(shape) for shape in shapes])
     meshes = ReferenceMeshes(
         shapes=shapes,
