@@ -32,12 +32,12 @@ from multiscale.planning.auto_keys import (
 )
 from multiscale.planning.mesh_accuracy import MeshError, measured_mesh_error
 from multiscale.scene.scene import Scene
+from multiscale.setup.memory import check_memory
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import reference_meshes
 from multiscale.setup.surface_and_block import (
     block_material,
     check_load,
-    check_memory,
     check_patches,
     make_shape,
     make_surface,

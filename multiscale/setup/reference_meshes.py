@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from geometry import BlockShape, InputError, RefinedShape, RigidPlane, Surface
-from geometry.meshes.families import Shape, characteristic_size, contact_radius, reference_shapes
+from geometry.meshes.expected_contact import contact_radius
+from geometry.meshes.families import Shape, characteristic_size, reference_shapes
 from multiscale.machine import ClusterNodes, MemoryRequest
 from multiscale.scene.scene import Scene
-from multiscale.setup.surface_and_block import check_memory, located
+from multiscale.setup.memory import check_memory
+from multiscale.setup.surface_and_block import located
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,8 @@ from geometry import (
     suggested_fine,
     synthesise,
 )
-from geometry.meshes.families import EDGES, contact_radius
+from geometry.meshes.expected_contact import contact_radius
+from geometry.meshes.families import EDGES
 
 ROUGH = synthesise(
     Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1),

@@ -11,12 +11,8 @@ from geometry import BlockShape
 from micro import HalfSpaceModel
 from multiscale import Run, Scene, make_setup
 from multiscale.loading.stepper import LoadHistory
-from multiscale.planning.costs import (
-    ROWS,
-    Machine,
-    predicted_cost,
-    step_count,
-)
+from multiscale.planning.costs import ROWS, predicted_cost, step_count
+from multiscale.planning.machine_speed import Machine
 from multiscale.setup.reference_meshes import mesh_unknowns
 
 
