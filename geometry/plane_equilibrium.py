@@ -27,19 +27,19 @@ Array = NDArray[np.float64]
 T = TypeVar("T")
 
 TOLERANCE = 1e-10
-"""What force and moments may miss, relative to the force and to that times half the diagonal."""
+"""Largest residual of force and moments, over the force and over that times half the diagonal."""
 
 UNSUPPORTED = 1e-11
 """Stiffness against a motion of the plane, relative to the largest, that counts as none."""
 
 _AIM = 1e-13
-"""What force and moments miss where the rounding of displacements allows it."""
+"""The same that is aimed at, as far as the rounding of displacements allows it."""
 _CLEAR = 1e-6
 """Force, relative to the largest so far, below which the plane may be about to lift off."""
 _FIRST, _FARTHEST = 1e-6, 1e3
-"""First trial of a motion that nothing resists and the last, in halves of the diagonal."""
+"""First and farthest trial of a motion that no contact resists, in halves of the diagonal."""
 _ROUNDING = 64.0 * float(np.finfo(float).eps)
-"""Step, relative to the motions of the plane, that is only rounding."""
+"""Step that counts as rounding, relative to the motions of the plane."""
 _MOST_STEPS, _MOST_RETREATS = 100, 6
 
 
@@ -85,8 +85,8 @@ def find_equilibrium(
         control: What is prescribed.
         start: Approach and slopes to start from, with those that are prescribed, shape (3,).
         half: Half the diagonal of the interface [mm].
-        aim: What force and moments should miss at most, relative to the force and to that times
-            ``half``; `TOLERANCE` will do where no step brings them closer.
+        aim: Residual of force and moments to aim at, relative to the force and to that times
+            ``half``; `TOLERANCE` is accepted where no step brings them closer.
         nearly: Whether stiffnesses are inexact; the last step corrects them then (BFGS).
         first_touch: Approach of first touch under the slopes of the start [mm], where contacts
             may refuse to be pressed farther than their model can bear: steps are shortened then,

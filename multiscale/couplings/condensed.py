@@ -31,7 +31,9 @@ _PAST_TOUCH = 0.02  # of the largest approach: distance beyond touch when a plan
 
 
 class CondensedCoupling:
-    """The block is linear: under patchwise laws it is its compliance, and a load step is dense.
+    """Patch laws on the compliance of the block's patches; a load step is a small dense system.
+
+    The block is linear, so that its compliance says all that patchwise laws need to know of it.
 
     Args:
         table: The laws.
