@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import NotConverged
-from geometry.rigid_plane import Control, motion_units
+from geometry.rigid_plane import Control, motion_units, plane_failure
 from geometry.slope_search import slope_search
 
 Array = NDArray[np.float64]
@@ -208,22 +208,6 @@ class _FreeMotions(Generic[T]):
         longest = self._half / float(np.abs(step).max())
         share = slope_search(slope_after, float(now.residual @ step), min(1.0, longest))
         return (0.0, None) if share is None else (share, found)
-
-
-def plane_failure(control: Control, reason: str, iterations: int = 0) -> NotConverged:
-    """Return the error of a plane that finds no equilibrium."""
-    remedies = {
-        "NO_CONTACT": "no patch can be touched",
-        "NO_SUPPORT": "no further patch can be touched that would hold the plane: prescribe its "
-        "tilt (load.tilt) or take more patches (patches.grid)",
-    }
-    usual = "take more load steps (load.steps) or prescribe the tilt (load.tilt)"
-    return NotConverged(
-        f"the equilibrium of the plane at {control}",
-        reason=reason,
-        iterations=iterations,
-        remedy=remedies.get(reason, usual),
-    )
 
 
 def _direction(

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, NotConverged, PatchGrid
-from geometry.plane_equilibrium import UNSUPPORTED, plane_failure
+from geometry.plane_equilibrium import UNSUPPORTED
+from geometry.rigid_plane import plane_failure
 from multiscale.couplings.law_couplings import ROUNDING, beyond_law
 from multiscale.couplings.loaded_patches import TOLERANCE, DenseState, LoadedPatches
 from multiscale.laws.interpolation import LawPoint
