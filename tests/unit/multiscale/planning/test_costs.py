@@ -69,7 +69,7 @@ def test_a_load_step_is_one_solution(solved, load, kind):
     assert solved == {64**2: step_count(run.scene.loading.load_history)}
 
 
-@pytest.mark.parametrize("kind", ["consistent", "isolated"])
+@pytest.mark.parametrize("kind", [pytest.param("consistent", marks=pytest.mark.long), "isolated"])
 def test_rows_of_laws_are_as_many_as_predicted(solved, kind):
     run = Run(scene(kind))
     solved.clear()
