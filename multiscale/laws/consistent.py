@@ -25,17 +25,18 @@ Displacements = Callable[[Array], Array]
 """From pressures of N patches at m load steps to their mean displacements, [MPa] to [mm]."""
 
 _SMALL_LOAD = 1e-6
-"""Share of the largest force under which a plane that is free to turn is nearly at first touch. By
-Hertz it has then come a ten thousandth of its way."""
+"""Force, relative to the largest, at which a plane that is free to turn is taken to be at first
+touch. By Hertz it has then come a ten thousandth of its way."""
 
 _RESERVE = 0.02
-"""Rows beyond the largest load, relative to the way from first touch, for load steps that lie
-between rows."""
+"""Way that rows go beyond the largest load, relative to the way from first touch to it, so that
+every load step lies between two rows."""
 
 _POINTWISE_RESERVE = 0.5
-"""The same of laws that hold at points. Where a patch is displaced less than in its mean, closures
-are larger than those of any row. On eight scenes of the paper's recipe (1 to 64 patches, level and
-tilted, on a cube and a column) seven left their laws with 0.02, two with 0.25 and none with 0.5."""
+"""The same for laws that are evaluated at points. Where a point is displaced less than its patch in
+the mean, its closure is larger than those of all rows. On eight scenes of the paper's recipe (1 to
+64 patches, level and tilted, on a cube and a column) seven left their laws with 0.02, two with 0.25
+and none with 0.5."""
 
 _ROWS_TOGETHER = 2
 """Rows that one rank solves in sequence, each starting from the one before: results then do not

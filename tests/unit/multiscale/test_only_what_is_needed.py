@@ -16,7 +16,8 @@ from micro import AsperityModel, HalfSpaceModel
 from multiscale import Run, Scene, make_setup
 from multiscale.cli.command_line import main
 from multiscale.output.results import write_results
-from multiscale.planning.costs import THIS_MACHINE, Machine, predicted_cost
+from multiscale.planning.costs import predicted_cost
+from multiscale.planning.machine_speed import THIS_MACHINE, Machine
 from multiscale.results.contact_record import ContactRecord
 
 FINITE_ELEMENTS = ("dolfinx", "petsc4py", "macro", "gmsh")

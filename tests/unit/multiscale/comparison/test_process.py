@@ -10,9 +10,10 @@ import pytest
 
 from geometry.errors import InputError, NotConverged
 from multiscale.comparison.catalogue import configurations
-from multiscale.comparison.compare import launch_process, run_all
+from multiscale.comparison.compare import run_all
 from multiscale.comparison.configuration import RunResult, read_result, write_result
-from multiscale.comparison.process import check_launchable, run_here
+from multiscale.comparison.launch import check_launchable, launch_process
+from multiscale.comparison.process import run_here
 from multiscale.run import Run, run
 from multiscale.scene.scene import Scene
 

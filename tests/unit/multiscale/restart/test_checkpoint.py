@@ -41,7 +41,8 @@ COUPLINGS = {
     | {"coupling": {"kind": "isolated", "newton": "condensed"}}
     | {"load": {"approach": "8 um", "steps": 2, "force_change": 0.4}},
     "consistent laws": CUBE
-    | {"micro": {"model": "half-space"}, "coupling": {"kind": "consistent"}},
+    | {"surface": {"grid": [32, 32]}, "micro": {"model": "half-space"}}
+    | {"coupling": {"kind": "consistent", "table_tolerance": 0.01}},
     "concurrent": CUBE
     | {"surface": {"grid": [72, 72]}, "coupling": {"kind": "concurrent"}}
     | {"micro": {"model": "half-space"}},
