@@ -36,7 +36,11 @@ def parsed(page):
 
 def report(text, **changes):
     history = SimpleNamespace(
-        table=lambda: ([text], [[text]]), seconds={text: 1.0}, notes=[text], reference=None
+        table=lambda: ([text], [[text]]),
+        seconds={text: 1.0},
+        notes=[text],
+        reference=None,
+        contact=None,
     )
     step = SimpleNamespace(step=2, errors=((text, 0.25), (text, 0.5)), force_N=3.0)
     content = {
