@@ -189,9 +189,28 @@ def _parser() -> argparse.ArgumentParser:
         made.set_defaults(function=function)
         return made
 
+    _add_init(command("init", "init.write_scene", "Write a scene for a surface, with comments."))
     _add_runs(command)
     _add_descriptions(command)
     return top
+
+
+def _add_init(init: argparse.ArgumentParser) -> None:
+    """Add what the command takes that writes a scene."""
+    path: dict[str, Any] = {"type": Path}
+    init.add_argument("surface", nargs="?", help="a measured map; a spectrum without it", **path)
+    load = init.add_mutually_exclusive_group()
+    load.add_argument("--force", help="such as '100 N'; by default one that suits the surface")
+    load.add_argument("--approach", help="such as '2 um', instead of a force")
+    init.add_argument("--young-modulus", metavar="E", help="of the block; by default 210 GPa")
+    init.add_argument("--poisson-ratio", metavar="NU", help="of the block; by default 0.3")
+    sides: dict[str, Any] = {"nargs": 2, "metavar": ("LX", "LY")}
+    init.add_argument("--lengths", help="sides of the map, where its file lacks them", **sides)
+    init.add_argument("--height-unit", metavar="UNIT", help="of heights, where the file lacks it")
+    init.add_argument("--channel", help="name or number of a channel of the file")
+    where = "the scene to write; by default SURFACE.toml, here"
+    init.add_argument("--out", metavar="FILE", help=where, **path)
+    init.add_argument("--overwrite", action="store_true", help="replace a file that is there")
 
 
 def _add_runs(command: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
@@ -239,6 +258,9 @@ def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser
     surface = "Describe and draw the surface of a scene."
     _add_scene(command("surface", "describe.describe_surface", surface))
     command("schema", "describe.print_schema", "Print the JSON Schema of scene files.")
+    keys = command("help", "describe.explain_keys", "Explain the sections and keys of a scene.")
+    topic = "a section or a key, such as load or load.force; all sections by default"
+    keys.add_argument("topic", nargs="?", metavar="KEY", help=topic)
     checks = "Check versions, MPI, threads, form compiler and memory; solve a small block."
     doctor = command("doctor", "doctor.examine_machine", checks)
     doctor.add_argument("--json", action="store_true", help="results as JSON, for scripts")

@@ -42,23 +42,29 @@ class Scene(Section):
     """A complete scene. Lengths in mm, pressures in MPa.
 
     The section ``[load]`` is the attribute `loading`, because `Scene.load` reads a file.
-
-    ``accuracy`` is the allowed relative error of the force. The keys ``surface.grid``,
-    ``micro.model``, ``coupling.kind``, ``patches.grid`` and, under laws on a mesh, ``block.cells``
-    may be ``"auto"``: they get the values that are predicted to keep the accuracy at the least
-    cost. With an accuracy this holds also for those that are not stated. Without an accuracy,
-    ``"auto"`` means 2 %.
     """
 
     accuracy: Annotated[Number, Field(gt=0, lt=0.5)] | None = None
+    """Allowed relative error of the force. Keys that are ``"auto"`` or, with an accuracy, not
+    stated (``surface.grid``, ``micro.model``, ``coupling.kind``, ``patches.grid`` and, under laws
+    on a mesh, ``block.cells``) get the values that are predicted to keep it at the least cost.
+    Without it, ``auto`` means 2 %."""
     surface: SurfaceSection
+    """The rough surface."""
     block: BlockSection
+    """The elastic block below it."""
     patches: PatchesSection = PatchesSection()
+    """The partition of the interface."""
     micro: MicroSection = MicroSection()
+    """How contacts are solved."""
     coupling: CouplingSection = CouplingSection()
+    """How contacts and block are put together."""
     reference: ReferenceSection = ReferenceSection()
+    """The meshes of ``coupling.kind = "reference"``."""
     loading: Annotated[LoadSection, Field(alias="load")]
+    """The motion of the rigid plane, or the force on it."""
     output: OutputSection = OutputSection()
+    """What is written beside the tables of results."""
     _source: Path | None = None
     _data: dict[str, Any] = PrivateAttr(default_factory=dict)
 
@@ -128,6 +134,11 @@ class Scene(Section):
         for key, value in changes.items():
             data = changed(data, key, value)
         return Scene.from_dict(data, self._source)
+
+    @property
+    def written(self) -> dict[str, Any]:
+        """What was written, as nested dictionaries, before units were read."""
+        return self._data
 
     @property
     def name(self) -> str:
