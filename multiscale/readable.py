@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+Observer = Callable[[str, int, int], None]
+"""Told what a run is at: a phase, or parts of one, how many are done, and of how many at most; 0 of
+0 where they are not counted."""
+
 _PREFIXES = {
     "mm": (("m", 1e3), ("mm", 1.0), ("µm", 1e-3), ("nm", 1e-6)),
     "N": (("MN", 1e6), ("kN", 1e3), ("N", 1.0), ("mN", 1e-3), ("µN", 1e-6)),

@@ -276,5 +276,8 @@ def _add_scene(command: argparse.ArgumentParser, *, folder: str = "", ending: st
     where = f"folder of the results (default: results/SCENE{ending}, by the file's name)"
     command.add_argument("--out", type=Path, metavar="DIR", help=folder or where)
     keys: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
+    if not ending:  # the folders of comparisons and sweeps hold many scenes
+        other = "replace the results of another scene in this folder"
+        command.add_argument("--overwrite", action="store_true", help=other)
     changes = "change keys of the scene, such as load.approach='4 um'"
     command.add_argument("--set", metavar="KEY=VALUE", help=changes, **keys)

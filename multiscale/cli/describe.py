@@ -14,7 +14,7 @@ from geometry.collective import on_root
 from geometry.errors import InputError
 from geometry.statistics import roughness
 from multiscale.cli.execution import scene_and_folder
-from multiscale.couplings.assembly import load_finite_elements
+from multiscale.couplings.assembly import check_has_laws, load_finite_elements
 from multiscale.laws.law_table import write_laws
 from multiscale.machine import cluster_nodes, large_object_comm
 from multiscale.output import terminal
@@ -23,7 +23,7 @@ from multiscale.planning import plan
 from multiscale.planning.block_plan import memory_warnings
 from multiscale.planning.costs import predicted_cost
 from multiscale.planning.problem_setup import make_setup
-from multiscale.restart.results_folder import locked
+from multiscale.restart.results_folder import locked, refuse_other_results
 from multiscale.run import Run
 from multiscale.scene.keys import Key, scene_keys
 from multiscale.scene.scene import Scene
@@ -63,9 +63,14 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
     """
     scene, folder = scene_and_folder(choice, comm)
     with locked(folder, comm):
+        if not choice.overwrite:
+            on_root(comm, lambda: refuse_other_results(folder, scene))
+        check_has_laws(scene)
         run = Run(scene, comm)
         terminal.show_plan(comm, run.setup)
-        table = run.make_laws()
+        with terminal.following(comm) as (begun, _):
+            run.observe = terminal.counting(begun)
+            table = run.make_laws()
 
         def write() -> list[Path]:
             from multiscale.output.figures import law_figure
@@ -88,6 +93,8 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
     """
     scene, folder = scene_and_folder(choice, comm)
     with locked(folder, comm):
+        if not choice.overwrite:
+            on_root(comm, lambda: refuse_other_results(folder, scene))
         setup = _setup(scene, comm)
         terminal.show_pairs(comm, _surface_facts(setup), setup.surface.notes)
 

@@ -23,6 +23,7 @@ from multiscale.comparison.configuration import Configuration, RunResult, read_r
 from multiscale.comparison.process import check_launchable
 from multiscale.planning.auto_keys import auto_keys, provisional, resolved_sections, with_resolved
 from multiscale.planning.problem_setup import make_setup
+from multiscale.readable import duration
 from multiscale.restart.interruption import ENDING
 from multiscale.scene.scene import Scene
 from multiscale.storage import write_json
@@ -166,8 +167,8 @@ def run_all(
         elif one.refusal:
             yield RunResult(configuration=one, status="refused", message=one.refusal), False
         elif left is not None and one.cost > left:
-            rest = f"{left:.2g} s" if left > 0.0 else "nothing"
-            why = f"it is predicted to take {one.cost:.2g} s, and the budget leaves {rest}"
+            rest = duration(left) if left > 0.0 else "nothing"
+            why = f"it is predicted to take {duration(one.cost)}, and the budget leaves {rest}"
             yield RunResult(configuration=one, status="not started", message=why), False
         else:
             if begin is not None:
@@ -202,7 +203,7 @@ def launch_process(
         return replace(result, start_s=result.start_s + spent)
     result = RunResult(configuration=configuration, status="failed", exit_code=code)
     if code is None:
-        why = f"ended after {spent:.1f} s, which was what the budget left"
+        why = f"ended after {duration(spent)}, which was what the budget left"
         return replace(result, status="over budget", message=why, start_s=spent)
     lines = [line for line in text.splitlines() if line.strip(" -")]  # mpirun ends by a rule
     why = lines[-1] if lines else f"its process ended with exit code {code}"

@@ -109,6 +109,7 @@ def _setup(scene: Scene, nodes: ClusterNodes, known: Any = None) -> ProblemSetup
     seconds = {"surface": made - began}
     if scene.coupling.kind == "reference":
         plane = _estimated_plane(scene, surface)
+        seconds["load estimate"] = time.perf_counter() - made
         meshes = reference_meshes(scene, surface, plane, nodes)
         return setup(micro=None, plane_at_largest_load=plane, meshes=meshes, seconds=seconds)
     choice = None
@@ -126,11 +127,13 @@ def _setup(scene: Scene, nodes: ClusterNodes, known: Any = None) -> ProblemSetup
             allowed="half-space, islands",
             file=scene.file,
         )
+    chosen = time.perf_counter()
     if isinstance(model, HalfSpaceModel) and scene.coupling.kind in ("analytic", "concurrent"):
         plane = _estimated_plane(scene, surface)  # its load steps need no plane ahead of them
     else:
         coupling = ContactCoupling(model, patches, patch_means(surface, patches))
         plane = plane_at_largest_load(scene.loading.load_history, coupling, surface)
+    seconds["load estimate"] = time.perf_counter() - chosen
     return setup(micro=model, plane_at_largest_load=plane, choice=choice, seconds=seconds)
 
 

@@ -79,7 +79,8 @@ def test_files_of_an_earlier_scene_do_not_stay(capsys, tmp_path):
     words = ("run", PAPER, "--out", str(tmp_path), "--set", *SMALL, "output.figures=false")
     assert call(capsys, *words, "output.fields=true")[0] == 0
     assert {"laws.h5", "fields.xdmf", "fields.h5"} <= {path.name for path in tmp_path.iterdir()}
-    assert call(capsys, *words, "coupling.kind=analytic", "output.report=false")[0] == 0
+    others = ("coupling.kind=analytic", "output.report=false", "--overwrite")
+    assert call(capsys, *words, *others)[0] == 0
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {"history.csv", "patches.csv", "provenance.json"}
 
@@ -273,6 +274,7 @@ def test_border_and_curvature_come_closer_to_the_half_space(capsys, tmp_path):
         name = "half-space" if model == "half-space" else "elliptic"
         extra = ["coupling.kind=analytic", f"micro.model={name}", "output.figures=false"]
         words = ("run", PAPER, "--out", str(tmp_path), "--set", "load.steps=1", *extra, *options)
+        words = (*words, "--overwrite")
         assert call(capsys, *words)[0] == 0
         with (tmp_path / "history.csv").open(encoding="utf-8") as file:
             forces[model] = float(next(csv.DictReader(file))["force_N"])
