@@ -22,7 +22,7 @@ def duration(seconds: float) -> str:
         seconds: The time [s].
     """
     if seconds < 59.95:
-        return f"{seconds:.1f} s" if seconds >= 9.995 else f"{seconds:.2g} s"
+        return f"{seconds:.{3 if seconds >= 9.95 else 2}g} s"
     minutes, rest = divmod(round(seconds), 60)
     if minutes < 60:
         return f"{minutes} min {rest} s" if rest else f"{minutes} min"

@@ -68,7 +68,7 @@ def _write(choice: argparse.Namespace) -> tuple[Path, list[str]]:
             "exists already", key="--out", value=str(path), allowed="another file, or --overwrite"
         )
     loaded = choice.force is not None or choice.approach is not None
-    scene, surface, remarks = _with_surface(_given(choice, path), path, loaded)
+    scene, surface, remarks = _with_surface(_given(choice), loaded)
     height = quantity(scene.block.height_under(surface.lengths), "mm", digits=6)
     scene = scene.with_({"block.height": height.replace("µ", "u")})
     if not loaded:
@@ -81,15 +81,18 @@ def _write(choice: argparse.Namespace) -> tuple[Path, list[str]]:
     if choice.young_modulus is None:
         remarks.append("The block is of steel: write your constants in the section block.")
     about = f"Made by patchlaw init. To run it: patchlaw run {path}; on a key: patchlaw help KEY"
-    write_text(path, scene_text(scene.written, [about, *remarks]))
+    data = scene.written
+    if choice.surface is not None:  # relative paths start in the folder of the scene
+        data = changed(data, "surface.file", os.path.relpath(choice.surface, path.parent))
+    write_text(path, scene_text(data, [about, *remarks]))
     return path, remarks
 
 
-def _given(choice: argparse.Namespace, path: Path) -> dict[str, Any]:
+def _given(choice: argparse.Namespace) -> dict[str, Any]:
     """Return the sections of the new scene, as far as the command line says them."""
     source: dict[str, Any] = dict(SYNTHESISED)
     if choice.surface is not None:
-        source = {"file": os.path.relpath(choice.surface, path.parent), "detrend": "plane"}
+        source = {"file": str(choice.surface), "detrend": "plane"}
     data: dict[str, Any] = {**START, "surface": source}
     if choice.lengths:
         data = changed(data, "surface.lengths", choice.lengths)
@@ -99,14 +102,12 @@ def _given(choice: argparse.Namespace, path: Path) -> dict[str, Any]:
     return data
 
 
-def _with_surface(
-    data: dict[str, Any], path: Path, loaded: bool
-) -> tuple[Scene, Surface, list[str]]:
+def _with_surface(data: dict[str, Any], loaded: bool) -> tuple[Scene, Surface, list[str]]:
     """Return the scene with what its map needs done, its surface, and what was found.
 
     A scene without a load gets one that stands for that to come.
     """
-    scene = Scene.from_dict(data if loaded else changed(data, "load.force", "1 N"), path)
+    scene = Scene.from_dict(data if loaded else changed(data, "load.force", "1 N"))
     if scene.surface.file is None:
         surface = make_surface(scene)
         return scene, surface, findings(surface)

@@ -37,8 +37,7 @@ def report_html(run: Run, pictures: Mapping[str, bytes]) -> str:
     return filled(
         "output/report.jinja",
         title=f"patchlaw: {run.scene.name}",
-        headline=_headline(history),
-        inputs=plan.inputs_statement(run.setup),
+        headline=f"{_headline(history)} {plan.inputs_statement(run.setup)}.",
         warnings=list(plan.warnings(run.setup)),
         statements=list(plan.statements(run.setup)),
         history=history,

@@ -18,12 +18,13 @@ class CouplingSection(Section):
     kind: Literal["isolated", "consistent", "concurrent", "analytic", "reference", "auto"] = (
         "consistent"
     )
-    """``concurrent`` solves the whole surface on the block at every load step, without laws;
-    ``consistent`` takes all patch laws from such solutions, under the tilt of the load;
-    ``isolated`` takes every patch's law from what lies in it alone (Waddad et al. 2016);
-    ``analytic`` is the micro model alone on a half-space; ``reference`` meshes the rough surface
-    itself, see the section reference; ``auto`` is concurrent or consistent, whichever keeps the
-    scene's accuracy at less cost."""
+    """How the force is found: ``concurrent`` solves the whole surface on the block at every load
+    step, without laws; ``consistent`` takes all patch laws from such solutions, under the tilt of
+    the load (where the plane is free, under the tilt that it takes at each approach); ``isolated``
+    takes every patch's law from what lies in it alone (Waddad et al. 2016); ``analytic`` is the
+    micro model alone on a half-space; ``reference`` meshes the rough surface itself, see the
+    section reference; ``auto`` is concurrent or consistent, whichever keeps the scene's accuracy at
+    less cost."""
     compliance: Literal["auto", "finite-element", "decomposed"] = "auto"
     """Compliance of the block under its patches: ``finite-element`` takes it from a mesh with a
     flat top; ``decomposed`` adds few smooth modes of the finite body to the exact half-space. Auto
@@ -96,8 +97,8 @@ class ReferenceSection(Section):
     method: Literal["active-set", "augmented-lagrangian"] = "active-set"
     """How contact is found, see `macro.UnilateralContactProblem`."""
     mesh: Literal["auto", "hexahedra", "tetrahedra"] = "auto"
-    """``tetrahedra`` are small only where contact can occur, ``hexahedra`` are as many as ``cells``
-    says. Auto is tetrahedra, unless ``cells`` is stated."""
+    """Cells: ``tetrahedra`` are small only where contact can occur, ``hexahedra`` are as many as
+    ``cells`` says. Auto is tetrahedra, unless ``cells`` is stated."""
     meshes: Annotated[int, Field(ge=1, le=3, strict=True)] = 2
     """Number of meshes of falling size that take the same loads. Their results are extrapolated;
     one mesh alone has no error bar."""

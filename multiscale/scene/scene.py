@@ -6,6 +6,7 @@ import difflib
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -38,6 +39,17 @@ _EXCLUSIVE = {
 """Keys that one key replaces, as a section may have only one of them."""
 
 
+@dataclass(frozen=True, slots=True)
+class Written:
+    """What was written of a scene, which takes no part when scenes are compared.
+
+    Args:
+        data: The sections, before units were read.
+    """
+
+    data: dict[str, Any] = field(default_factory=dict, compare=False)
+
+
 class Scene(Section):
     """A complete scene. Lengths in mm, pressures in MPa.
 
@@ -66,6 +78,7 @@ class Scene(Section):
     output: OutputSection = OutputSection()
     """What is written beside the tables of results."""
     _source: Path | None = None
+    _written: Written = Written()
 
     @model_validator(mode="after")
     def _continues_periodically(self) -> Self:
@@ -114,7 +127,7 @@ class Scene(Section):
             scene = cls.model_validate(data)
         except ValidationError as error:
             raise _first_problem(error, cls).located(file=str(source) if source else None) from None
-        scene._source = source
+        scene._source, scene._written = source, Written(data)
         return scene
 
     def with_(self, changes: Mapping[str, Any]) -> Scene:
@@ -129,15 +142,17 @@ class Scene(Section):
         Raises:
             InputError: When a key is none, or the scene would be wrong.
         """
-        data = self.model_dump(by_alias=True, exclude_unset=True)
+        data, written = self.model_dump(by_alias=True, exclude_unset=True), self.written
         for key, value in changes.items():
-            data = changed(data, key, value)
-        return Scene.from_dict(data, self._source)
+            data, written = changed(data, key, value), changed(written, key, value)
+        scene = Scene.from_dict(data, self._source)
+        scene._written = Written(written)
+        return scene
 
     @property
     def written(self) -> dict[str, Any]:
         """What was written, as nested dictionaries, before units were read."""
-        return self._data
+        return self._written.data
 
     @property
     def name(self) -> str:
