@@ -21,7 +21,8 @@ from multiscale.scene.new_scene import (
     scene_text,
     sensible_force,
 )
-from multiscale.scene.scene import Scene, changed, overridden
+from multiscale.scene.scene import Scene
+from multiscale.scene.scene_file import changed, overridden
 from multiscale.setup.surface_and_block import block_material, make_surface
 from multiscale.storage import write_text
 

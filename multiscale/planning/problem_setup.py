@@ -119,14 +119,7 @@ def _setup(scene: Scene, nodes: ClusterNodes, known: Any = None) -> ProblemSetup
     model = choice.model if choice else stated_model(scene, surface)
     if isinstance(known, list) and isinstance(model, HalfSpaceModel):
         model = model.resampled((int(known[0]), int(known[1])))
-    if not math.isfinite(model.first_touch):
-        raise InputError(
-            "the surface has no summit that could carry load",
-            key="micro.model",
-            value=scene.micro.model,
-            allowed="half-space, islands",
-            file=scene.file,
-        )
+    _refuse_without_summits(scene, model)
     chosen = time.perf_counter()
     if isinstance(model, HalfSpaceModel) and scene.coupling.kind in ("analytic", "concurrent"):
         plane = _estimated_plane(scene, surface)  # its load steps need no plane ahead of them
@@ -135,6 +128,17 @@ def _setup(scene: Scene, nodes: ClusterNodes, known: Any = None) -> ProblemSetup
         plane = plane_at_largest_load(scene.loading.load_history, coupling, surface)
     seconds["load estimate"] = time.perf_counter() - chosen
     return setup(micro=model, plane_at_largest_load=plane, choice=choice, seconds=seconds)
+
+
+def _refuse_without_summits(scene: Scene, model: MicroModel) -> None:
+    if not math.isfinite(model.first_touch):
+        raise InputError(
+            "the surface has no summit that could carry load",
+            key="micro.model",
+            value=scene.micro.model,
+            allowed="half-space, islands",
+            file=scene.file,
+        )
 
 
 def stated_model(scene: Scene, surface: Surface) -> MicroModel:
