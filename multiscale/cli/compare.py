@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from geometry.errors import InputError, NotConverged
-from multiscale.cli.command_line import COMPARE_ENDING
 from multiscale.cli.execution import scene_and_folder
+from multiscale.cli.words import COMPARE_ENDING
 from multiscale.comparison import errors
 from multiscale.comparison.compare import Launch, compare
 from multiscale.comparison.comparison import Comparison

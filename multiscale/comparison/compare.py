@@ -19,6 +19,7 @@ from multiscale.comparison.configuration import Configuration, RunResult, read_r
 from multiscale.comparison.launch import check_launchable, launch_process
 from multiscale.planning.auto_keys import auto_keys, provisional, resolved_sections, with_resolved
 from multiscale.planning.problem_setup import make_setup
+from multiscale.readable import duration
 from multiscale.scene.scene import Scene
 from multiscale.storage import write_json
 
@@ -155,8 +156,8 @@ def run_all(
         elif one.refusal:
             yield RunResult(configuration=one, status="refused", message=one.refusal), False
         elif left is not None and one.cost > left:
-            rest = f"{left:.2g} s" if left > 0.0 else "nothing"
-            why = f"it is predicted to take {one.cost:.2g} s, and the budget leaves {rest}"
+            rest = duration(left) if left > 0.0 else "nothing"
+            why = f"it is predicted to take {duration(one.cost)}, and the budget leaves {rest}"
             yield RunResult(configuration=one, status="not started", message=why), False
         else:
             if begin is not None:

@@ -17,6 +17,7 @@ from typing import Any, BinaryIO
 
 from geometry.errors import InputError
 from multiscale.comparison.configuration import Configuration, RunResult, read_result, write_result
+from multiscale.readable import duration
 from multiscale.restart.interruption import ENDING
 
 MPI_JOB = ("OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_SIZE", "PMI_RANK", "SLURM_STEP_TASKS_PER_NODE")
@@ -78,7 +79,7 @@ def launch_process(
         return replace(result, start_s=result.start_s + spent)
     result = RunResult(configuration=configuration, status="failed", exit_code=code)
     if code is None:
-        why = f"ended after {spent:.1f} s, which was what the budget left"
+        why = f"ended after {duration(spent)}, which was what the budget left"
         return replace(result, status="over budget", message=why, start_s=spent)
     lines = [line for line in text.splitlines() if line.strip(" -")]  # mpirun ends by a rule
     why = lines[-1] if lines else f"its process ended with exit code {code}"

@@ -115,7 +115,7 @@ def run_here(configuration: Configuration, comm: Any = None) -> RunResult:
         return result
     return replace(
         result,
-        phases=dict(run.seconds),
+        phases=run.times,
         unknowns=run.unknowns,
         curves=_curves(run.history(), configuration.scale),
         finite_slopes=configuration.kind == "reference" or run.setup.finite_slopes,

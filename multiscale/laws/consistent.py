@@ -19,6 +19,7 @@ from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.refinement import MOST_ROWS, refined
 from multiscale.laws.rows import PlanePath, SolvedRows
+from multiscale.readable import Observer
 
 Array = NDArray[np.float64]
 Displacements = Callable[[Array], Array]
@@ -55,6 +56,7 @@ def consistent_laws(
     tolerance: float = 1e-3,
     most_rows: int = MOST_ROWS,
     comm: Any = None,
+    observe: Observer | None = None,
 ) -> LawTable:
     """Tabulate the laws of all patches of one surface that is pressed as a whole.
 
@@ -76,6 +78,7 @@ def consistent_laws(
         most_rows: Rows that are solved at most.
         comm: MPI communicator, whose ranks share the rows. The table does not depend on their
             number.
+        observe: Called as rows are solved.
 
     Returns:
         All laws, on every rank.
@@ -94,6 +97,7 @@ def consistent_laws(
         displacements=displacements or (lambda pressures: pressures @ compliance.T),
         tilt=largest.tilt,
         comm=comm,
+        observe=(lambda rows: observe("rows of laws", rows, most_rows)) if observe else None,
     )
     first, end, tilt = on_root(comm, lambda: whole.range_up_to(largest))
     end += (_POINTWISE_RESERVE if pointwise else _RESERVE) * max(end - first, 0.0)
@@ -137,6 +141,7 @@ class WholeSurface:
         displacements: C p of the macro model, collective.
         tilt: Slopes of the plane; None lets it turn.
         comm: MPI communicator, whose ranks share the rows; None for this process alone.
+        observe: Called with the number of rows that are solved.
     """
 
     model: MicroModel
@@ -145,6 +150,7 @@ class WholeSurface:
     displacements: Displacements
     tilt: tuple[float, float] | None = (0.0, 0.0)
     comm: Any = None
+    observe: Callable[[int], None] | None = None
     _solved: dict[float, tuple[Response, RigidPlane]] = field(default_factory=dict, init=False)
 
     def range_up_to(self, largest: Control) -> tuple[float, float, tuple[float, float]]:
@@ -235,8 +241,13 @@ class WholeSurface:
                 found.append((pressed.response, pressed.plane))
             return found
 
+        def solved(done: int) -> None:
+            if self.observe is not None:
+                self.observe(len(self._solved) + min(count * done, len(approaches)))
+
         before = -(-len(self._solved) // count)  # parts of earlier calls: the next rank continues
-        return [row for rows in shared(self.comm, len(parts), solve, before) for row in rows]
+        found = shared(self.comm, len(parts), solve, before, solved)
+        return [row for rows in found for row in rows]
 
     def _press(self, control: Control, start: Any) -> Pressed:
         return self.model.press(

@@ -115,6 +115,7 @@ def _setup(
     seconds = {"surface": made - began}
     if scene.coupling.kind == "reference":
         plane = _estimated_plane(scene, surface)
+        seconds["load estimate"] = time.perf_counter() - made
         meshes = reference_meshes(scene, surface, plane, nodes)
         return setup(micro=None, plane_at_largest_load=plane, meshes=meshes, seconds=seconds)
     choice = None
@@ -124,6 +125,18 @@ def _setup(
     model = choice.model if choice else stated_model(scene, surface)
     if isinstance(known, list) and isinstance(model, HalfSpaceModel):
         model = model.resampled((int(known[0]), int(known[1])))
+    _refuse_without_summits(scene, model)
+    chosen = time.perf_counter()
+    if isinstance(model, HalfSpaceModel) and scene.coupling.kind in ("analytic", "concurrent"):
+        plane = _estimated_plane(scene, surface)  # its load steps need no plane ahead of them
+    else:
+        coupling = ContactCoupling(model, patches, patch_means(surface, patches))
+        plane = plane_at_largest_load(scene.loading.load_history, coupling, surface)
+    seconds["load estimate"] = time.perf_counter() - chosen
+    return setup(micro=model, plane_at_largest_load=plane, choice=choice, seconds=seconds)
+
+
+def _refuse_without_summits(scene: Scene, model: MicroModel) -> None:
     if not math.isfinite(model.first_touch):
         raise InputError(
             "the surface has no summit that could carry load",
@@ -132,12 +145,6 @@ def _setup(
             allowed="half-space, islands",
             file=scene.file,
         )
-    if isinstance(model, HalfSpaceModel) and scene.coupling.kind in ("analytic", "concurrent"):
-        plane = _estimated_plane(scene, surface)  # its load steps need no plane ahead of them
-    else:
-        coupling = ContactCoupling(model, patches, patch_means(surface, patches))
-        plane = plane_at_largest_load(scene.loading.load_history, coupling, surface)
-    return setup(micro=model, plane_at_largest_load=plane, choice=choice, seconds=seconds)
 
 
 def stated_model(scene: Scene, surface: Surface) -> MicroModel:

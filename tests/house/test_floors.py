@@ -45,7 +45,7 @@ FLOORS = {
         "compliance fields",
     ],
     "multiscale": [
-        "figures installation machine storage",
+        "figures installation machine readable storage",
         "doctor laws loading",
         "compiled_forms results scene",
         "setup",
