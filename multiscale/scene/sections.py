@@ -211,7 +211,7 @@ class MicroSection(Section):
         "islands",
         "half-space",
         "auto",
-    ] = "elliptic"
+    ] = "half-space"
     tolerance: Annotated[Number, Field(gt=0, lt=0.5)] | None = None
     solver: Literal["active-set", "truncated-newton"] = "active-set"
     curvature: Literal["summit", "contact"] = "summit"
