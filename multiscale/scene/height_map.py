@@ -49,5 +49,7 @@ def _height_map(value: Any) -> Any:
 HeightsOfArray = Annotated[
     HeightMap | None,
     PlainValidator(_height_map),
-    PlainSerializer(lambda heights: heights and heights.digest, return_type=str | None),
+    PlainSerializer(
+        lambda heights: heights and heights.digest, return_type=str | None, when_used="json"
+    ),
 ]

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, Field, PrivateAttr, ValidationError, model_validator
+from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from geometry.errors import InputError
 from multiscale.scene.coupling_sections import CouplingSection, LoadSection, ReferenceSection
@@ -60,7 +60,6 @@ class Scene(Section):
     loading: Annotated[LoadSection, Field(alias="load")]
     output: OutputSection = OutputSection()
     _source: Path | None = None
-    _data: dict[str, Any] = PrivateAttr(default_factory=dict)
 
     @model_validator(mode="after")
     def _continues_periodically(self) -> Self:
@@ -109,7 +108,7 @@ class Scene(Section):
             scene = cls.model_validate(data)
         except ValidationError as error:
             raise _first_problem(error, cls).located(file=str(source) if source else None) from None
-        scene._source, scene._data = source, data
+        scene._source = source
         return scene
 
     def with_(self, changes: Mapping[str, Any]) -> Scene:
@@ -124,7 +123,7 @@ class Scene(Section):
         Raises:
             InputError: When a key is none, or the scene would be wrong.
         """
-        data = self._data
+        data = self.model_dump(by_alias=True, exclude_unset=True)
         for key, value in changes.items():
             data = changed(data, key, value)
         return Scene.from_dict(data, self._source)

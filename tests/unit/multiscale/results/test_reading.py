@@ -1,0 +1,76 @@
+"""A history read back from its folder is the one that was written."""
+
+import numpy as np
+import pytest
+
+from geometry.errors import InputError
+from multiscale import read_history, run
+from multiscale.cli.command_line import main
+from multiscale.results.history import COLUMNS
+from multiscale.scene.scene import Scene
+
+SCENE = """
+[surface]
+spectrum = { hurst = 0.95, waves = [2, 5], rms_slope = 0.215, seed = 1 }
+grid = [16, 16]
+lengths = ["1 mm", "1 mm"]
+[block]
+young_modulus = "4 GPa"
+poisson_ratio = 0.15
+[patches]
+grid = [2, 4]
+[micro]
+model = "half-space"
+[coupling]
+kind = "analytic"
+[load]
+approach = "8 um"
+steps = 2
+tilt = [1e-3, 0.0]
+[output]
+figures = false
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    file = tmp_path / "scene.toml"
+    file.write_text(SCENE)
+    assert main(["run", str(file), "--out", str(tmp_path / "out")]) == 0
+    return tmp_path / "out"
+
+
+def test_history_is_the_one_that_was_written(folder, tmp_path):
+    found, made = read_history(folder), run(Scene.load(tmp_path / "scene.toml"))
+    for column in COLUMNS:
+        if column.name != "wall_s":
+            np.testing.assert_array_equal(getattr(found, column.name), getattr(made, column.name))
+    np.testing.assert_array_equal(found.patch_pressure_MPa, made.patch_pressure_MPa)
+    np.testing.assert_array_equal(found.closure_mm, made.closure_mm)
+    assert found.patches == made.patches
+    assert found.notes == made.notes
+    assert read_history(str(folder)).seconds.keys() == found.seconds.keys()
+
+
+@pytest.mark.parametrize("name", ["history.csv", "patches.csv", "provenance.json"])
+def test_a_missing_file_is_named(folder, name):
+    (folder / name).unlink()
+    with pytest.raises(InputError, match=name):
+        read_history(folder)
+
+
+def test_tables_that_do_not_fit_are_no_result(folder):
+    lines = (folder / "patches.csv").read_text().splitlines()
+    (folder / "patches.csv").write_text("\n".join(lines[:-1]))
+    with pytest.raises(InputError, match="is not the result of a run"):
+        read_history(folder)
+
+
+def test_curves_are_drawn_with_their_label(folder):
+    figure = read_history(folder).plot("mine")
+    force, area, gap = figure.axes
+    assert force.lines[0].get_label() == "mine"
+    found = read_history(folder)
+    np.testing.assert_allclose(force.lines[0].get_ydata()[1:], found.mean_pressure_MPa)
+    np.testing.assert_allclose(area.lines[0].get_ydata()[1:], 100 * found.contact_area_fraction)
+    np.testing.assert_allclose(gap.lines[0].get_xdata(), 1e3 * found.mean_separation_mm)
