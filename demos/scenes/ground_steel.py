@@ -14,7 +14,7 @@ import numpy as np
 COUNT, PIXEL = 192, 2.5  # heights along a side, their distance [µm]
 HURST, LONGEST, LAY = 0.8, 60.0, 8.0  # below LONGEST across the lay [µm] waves are self-affine
 RMS_HEIGHT, NOISE = 0.25, 0.005  # of the roughness and of the instrument [µm]
-TILT = (1.8e-3, -0.7e-3)  # slopes along x and y
+TILT = (6e-3, -2e-3)  # slopes along x and y
 GAPS, SPIKES = 12, 5  # places without heights, specks of dust
 
 HEADER = f"""Heights in um at cell centres of a square grid of {PIXEL} um; row = x, column = y

@@ -112,7 +112,8 @@ def draw_pressures(
     if patches.count <= MOST_NUMBERED_PATCHES:
         dark = 0.55 * max(top or values.max(), 1e-300)
         for (x, y), value in zip(scale * patches.centres, pressure, strict=True):
-            text = f"{value:.2g}" if value > 0 else "open"
+            number = f"{value:.2g}" if value < 100.0 else f"{value:.0f}"
+            text = number if value > 0.0 else "open"
             colour = "white" if value > dark else "black"
             axes.text(x, y, text, ha="center", va="center", color=colour)
     axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]", aspect="equal")

@@ -45,7 +45,8 @@ def block_statement(setup: ProblemSetup) -> str:
             f"{margin if shape.margin else ''}"
         )
     return (
-        f"{text}, {lx:g} × {ly:g} mm and {shape.height:g} mm high, {setup.scene.block.sides} sides"
+        f"{text}, {lx:g} × {ly:g} mm and {shape.height:g} mm high, "
+        f"{setup.scene.block.sides} sides, contact modulus {setup.model.contact_modulus:.6g} MPa"
     )
 
 

@@ -10,9 +10,7 @@ from multiscale.couplings.assembly import newton_choice
 from multiscale.planning.auto_keys import heights_per_wave
 from multiscale.planning.block_plan import block_statement, block_warnings
 from multiscale.planning.costs import Cost
-from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
-from multiscale.setup.surface_and_block import block_material
 
 _INTERACTING = ("elliptic", "circular")
 
@@ -30,7 +28,6 @@ def statements(setup: ProblemSetup, cost: Cost | None = None) -> Iterator[tuple[
     yield "coupling", _coupling(setup)
     if setup.has_block:
         yield "block", block_statement(setup)
-    yield "material", _material(setup.scene)
     if setup.uses_laws:
         choice = newton_choice(setup)
         way = "condensed to the patches" if choice.condensed else "full, on the mesh"
@@ -154,16 +151,6 @@ def _coupling(setup: ProblemSetup) -> str:
     return (
         f"{coupling.kind}: {grid}, {laws} get a law, {patches.count - laws} stay open; {made}; "
         f"{coupling.interface} closure"
-    )
-
-
-def _material(scene: Scene) -> str:
-    """State the elastic constants; a bare number is seen with the unit that it was taken in."""
-    material = block_material(scene)
-    size = material.young_modulus
-    return (
-        f"E = {f'{size:g} MPa' if size < 1e3 else f'{1e-3 * size:g} GPa'}, "
-        f"ν = {material.poisson_ratio:g}, contact modulus {material.contact_modulus:.6g} MPa"
     )
 
 

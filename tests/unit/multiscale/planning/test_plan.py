@@ -1,7 +1,8 @@
-"""The plan says what was taken by default: material, proportions of the block, micro model."""
+"""The plan says what was taken by default: micro model, proportions of the block."""
 
 import pytest
 
+from micro import HalfSpaceModel
 from multiscale.planning.plan import statements, warnings
 from multiscale.planning.problem_setup import make_setup
 from multiscale.scene.scene import Scene
@@ -26,14 +27,10 @@ def setup_of(lengths=(1.0, 1.0), kind="concurrent", **block):
     )
 
 
-@pytest.mark.parametrize("kind", ["analytic", "concurrent", "isolated"])
-@pytest.mark.parametrize(
-    ("given", "stated"), [("210 GPa", "E = 210 GPa"), (210, "E = 210 MPa"), (4e3, "E = 4 GPa")]
-)
-def test_the_material_is_stated_with_the_unit_that_was_taken(kind, given, stated):
-    said = dict(statements(setup_of(kind=kind, young_modulus=given)))
-    assert said["material"].startswith(f"{stated}, ν = 0.3, contact modulus ")
-    assert said["micro model"] == "half-space"
+def test_the_micro_model_is_half_space_when_not_given():
+    setup = setup_of()
+    assert isinstance(setup.micro, HalfSpaceModel)
+    assert dict(statements(setup))["micro model"] == "half-space"
 
 
 @pytest.mark.parametrize("size", [0.02, 0.1, 5.0, 50.0])
