@@ -63,14 +63,14 @@ def test_notebooks_show_the_table(history):
 
 def test_data_frame_has_the_columns_of_the_file(history, monkeypatch):
     pandas = ModuleType("pandas")
-    pandas.DataFrame = lambda records, columns: (records, columns)
+    pandas.DataFrame = lambda records: records
     monkeypatch.setitem(sys.modules, "pandas", pandas)
-    records, columns = history.to_dataframe()
-    assert columns == [column.name for column in COLUMNS]
+    records = history.to_dataframe()
+    assert list(records[0]) == [column.name for column in COLUMNS]
     assert [record["force_N"] for record in records] == [0.5, 1.0]
 
 
 def test_data_frame_without_pandas_says_what_to_install(history, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(ImportError, match=r"needs pandas \(pip install pandas\); History.records"):
+    with pytest.raises(ImportError, match=r"needs pandas \(Debian: apt install .*`records`"):
         history.to_dataframe()
