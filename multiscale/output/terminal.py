@@ -149,7 +149,7 @@ def progress(
 
 
 def _summary(step: LoadStep) -> str:
-    return f"{1e3 * step.approach_mm:.3g} µm, {step.force_N:.6g} N"
+    return f"{1e3 * step.approach_mm:.3g} µm, {step.force_N:.4g} N"
 
 
 @contextmanager
