@@ -232,6 +232,19 @@ class PlaneLevers:
         return values if self.comm is None else self.comm.allreduce(values)
 
 
+def normal_stiffness(stiffness: Array, *, turns: bool) -> float:
+    """Return the derivative dF/dδ of the force by the approach [N/mm].
+
+    Args:
+        stiffness: Derivative of force and first moments by approach and slopes, shape (3, 3).
+        turns: Whether the plane turns without moment; otherwise its slopes stay.
+    """
+    if not turns:
+        return float(stiffness[0, 0])
+    slopes = np.linalg.lstsq(stiffness[1:, 1:], stiffness[1:, 0], rcond=1e-12)[0]
+    return float(stiffness[0, 0] - stiffness[0, 1:] @ slopes)
+
+
 def motion_units(half: float) -> Array:
     """Return approach and slopes by which an interface's corner moves 1 mm, shape (3,).
 

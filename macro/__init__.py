@@ -17,7 +17,11 @@ from macro.contact.law_interface import (
     patch_compliance_matrix,
 )
 from macro.contact.law_problem import LawContactProblem, LawContactState
-from macro.contact.unilateral_problem import UnilateralContactProblem, UnilateralContactState
+from macro.contact.unilateral_problem import (
+    UnilateralContactProblem,
+    UnilateralContactState,
+    nodal_contact,
+)
 from macro.fields import write_fields, write_rough_fields
 from macro.mesh.block import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
 from macro.mesh.rough_surface import MeshQuality, rough_block_mesh
@@ -40,6 +44,7 @@ __all__ = [
     "block_mesh",
     "displacements_under",
     "face_compliance",
+    "nodal_contact",
     "patch_compliance_matrix",
     "rough_block_mesh",
     "write_fields",

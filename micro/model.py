@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from geometry import Asperities, Control, Partition, PatchGrid, Surface, patch_means
 from geometry.errors import InputError
 from geometry.rigid_plane import RigidPlane
+from micro.contact_detail import ContactDetail
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -104,6 +105,29 @@ class MicroModel(Protocol):
             NotConverged: When the contact conditions or the prescribed loads cannot be met.
         """
 
+    def stiffness(self, state: Any, *, turns: bool) -> tuple[float | None, int]:
+        """Return the interfacial stiffness, the derivative dF/dδ of the force by the approach.
+
+        Args:
+            state: `Pressed.state` of this model.
+            turns: Whether the plane turns without moment; otherwise its slopes stay.
+
+        Returns:
+            The stiffness [N/mm], None where no linear solution gives it, and the iterations.
+        """
+
+
+class SolvedContact(Protocol):
+    """The contact that a micro model found."""
+
+    @property
+    def peak_pressure(self) -> float:
+        """Largest contact pressure [MPa]; 0 without contact."""
+
+    @property
+    def detail(self) -> ContactDetail:
+        """The spots of the contact and, where they are known, its fields."""
+
 
 class Pressed(NamedTuple):
     """The result of one load step.
@@ -112,11 +136,13 @@ class Pressed(NamedTuple):
         response: The response, of one row.
         plane: The plane in equilibrium.
         start: Initial guess of the same model for a load step nearby.
+        state: The contact.
     """
 
     response: Response
     plane: RigidPlane
     start: Any
+    state: SolvedContact
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

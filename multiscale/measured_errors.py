@@ -49,8 +49,6 @@ _SECOND_ORDER, _ON_BODY = 0.1, 0.1
 the body instead of on a half-space, where free sides cut contacts."""
 _RESIDUAL = 1e-6
 """Residual of the contact problems here, whose forces are then right to 1e-5 and better."""
-_APPROACH_STEP = 0.01
-"""Step of the approach for the stiffness, relative to the largest interference."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -181,13 +179,7 @@ class _Problems:
     def stiffness(self) -> float:
         """Return the change of the force with the approach, without finite slopes [N/mm]."""
         grid = self._half if min(self._half) >= _FEWEST_CELLS else self._grid
-        state, approach = self._state(grid, 0), self._control.approach or 0.0
-        step = _APPROACH_STEP * float(state.interference.max())
-        if not (state.force > 0.0 and step > 0.0):
-            return 0.0
-        back = replace(self._control, approach=approach - step)
-        less = self._model(grid, 0).equilibrium(back, start=state)
-        return (state.force - less.force) / step
+        return self._model(grid, 0).stiffness(self._state(grid, 0), turns=False)[0]
 
     def _force(self, grid: tuple[int, int], order: int) -> float:
         return self._state(grid, order).force

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from geometry import NotConverged
 from geometry.collective import on_root
 from micro import HalfSpaceModel, MicroModel
+from multiscale.contact_recorder import ContactRecorder
 from multiscale.couplings import assembly
 from multiscale.couplings.contact import OnBody, contact_model, on_body
 from multiscale.couplings.law_couplings import EmbeddedCoupling
@@ -24,6 +25,7 @@ from multiscale.machine import cluster_nodes, large_object_comm
 from multiscale.measured_errors import checked, error_notes
 from multiscale.planning.auto_keys import resolved_sections
 from multiscale.planning.problem_setup import make_setup
+from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
@@ -69,6 +71,7 @@ class Run:
         nodes, large = cluster_nodes(comm), large_object_comm(comm)
         self.setup: ProblemSetup = on_root(large, lambda: make_setup(scene, resolved, nodes))
         self.scene, self.seconds = self.setup.scene, dict(self.setup.seconds)
+        self._recorder = ContactRecorder(self.setup, self._model_on_body, comm)
 
     def make_body(self) -> OnBody | None:
         """Make what puts the half-space model on its body, once; None for other micro models."""
@@ -82,6 +85,10 @@ class Run:
         body = None if self.scene.coupling.kind == "isolated" else self.make_body()
         with self.phase("block"):
             return contact_model(self.setup, self.comm, body)
+
+    def _model_on_body(self) -> MicroModel:
+        """Return the micro model on the body, of isolated laws too where it is half-space."""
+        return contact_model(self.setup, self.comm, self.make_body())
 
     def make_laws(self) -> LawTable:
         """Tabulate the laws of all patches, once."""
@@ -110,12 +117,39 @@ class Run:
         Raises:
             NotConverged: When a step fails for good; `history` holds those before it.
         """
-        stepper = LoadStepper(self.make_coupling(), self.scene.loading.load_history, self.position)
+        coupling = self.make_coupling()
+        stepper = LoadStepper(coupling, self.scene.loading.load_history, self.position)
         with self.phase("load steps"):
             for step in stepper:
                 self.position = stepper.position
+                with self.phase("contact"):
+                    step = self._recorder.with_stiffness(step, coupling)
                 self.steps.append(self._checked(step))
+                self.make_contact(last=self.finished)
                 yield self.steps[-1]
+
+    def make_contact(self, *, last: bool = True) -> None:
+        """Record the contact of the last load step if the scene asks for it, once.
+
+        Args:
+            last: Whether no load step follows.
+
+        Note:
+            Collective.
+        """
+        if not self.steps:
+            return
+        with self.phase("contact"):
+            try:
+                self.steps[-1] = self._recorder.record(self.steps[-1], last=last)
+            except NotConverged as error:
+                step = self.steps[-1].step
+                self._notes.append(f"contact of load step {step} not found: {error}")
+
+    @property
+    def contacts(self) -> tuple[ContactRecord, ...]:
+        """Contacts of the load steps so far whose contact the scene asks for."""
+        return tuple(self._recorder.records)
 
     def _checked(self, step: LoadStep) -> LoadStep:
         """Return a load step with its errors, where they are to be measured."""
@@ -149,7 +183,12 @@ class Run:
         return self.coupling.state() if isinstance(self.coupling, Restorable) else self._start
 
     def resume(
-        self, steps: Sequence[LoadStep], position: LoadPosition, state: Arrays, laws: bytes
+        self,
+        steps: Sequence[LoadStep],
+        position: LoadPosition,
+        state: Arrays,
+        laws: bytes,
+        contacts: Sequence[ContactRecord] = (),
     ) -> None:
         """Continue after load steps of the same scene; call it before anything is made.
 
@@ -158,8 +197,10 @@ class Run:
             position: Position in the load history after them.
             state: What `state` returned then.
             laws: What `law_bytes` was then.
+            contacts: What `contacts` was then.
         """
         self.steps, self.position, self._start = list(steps), position, state
+        self._recorder.resume(contacts)
         self._notes += [f"resumed after load step {len(steps)}; phase times are those since then"]
         if laws:
             self.table = read_laws(BytesIO(laws))
@@ -178,12 +219,14 @@ class Run:
         """Return the load steps accepted so far, with times and notes."""
         steps, record, mesh_notes = assembly.with_mesh_errors(self.coupling, self.steps)
         notes = [*assembly.approximation_notes(self.setup, self.table, self.steps), *self._notes]
+        notes += self._recorder.notes
         return History(
             steps=steps,
             patches=self.setup.patches,
             seconds=dict(self.seconds),
             notes=(*notes, *error_notes(self.steps, self.given.accuracy), *mesh_notes),
             reference=record,
+            contact_records=self.contacts,
         )
 
     @property

@@ -117,6 +117,15 @@ class TopNodes:
         everywhere = self._block.function(owned).x.array
         return [everywhere[axis::3].copy() for axis in range(len(values))]
 
+    def pressure(self, nodal_force: Array) -> Array:
+        """Return the pressures of this rank's nodes, 0 where they have no area, (n,) [MPa].
+
+        Args:
+            nodal_force: Their contact forces, shape (n,) [N].
+        """
+        some = self.area > _NO_AREA * self._thirds
+        return np.divide(nodal_force, self.area, out=np.zeros(len(self.area)), where=some)
+
     def patch_sums(self, values: Array) -> Array:
         """Return the sums of nodal values over every patch, shape (N,), on every rank."""
         return self._sum(self._shares.T @ values)
@@ -133,11 +142,14 @@ class TopNodes:
             means[empty] = self._sum(nearest.T @ values) / self._sum(nearest.sum(axis=0))
         return means
 
-    def regions(self, touching: NDArray[np.bool_]) -> int:
-        """Count the regions of nodes in contact that facets connect, over all ranks.
+    def regions(self, touching: NDArray[np.bool_]) -> tuple[Index, int]:
+        """Find the regions of nodes in contact that facets connect, over all ranks.
 
         Args:
             touching: Whether this rank's nodes are in contact, shape (n,).
+
+        Returns:
+            The region 0 … m − 1 of each of this rank's nodes, −1 outside, shape (n,), and m.
         """
         (flags,) = self.with_ghosts(touching.astype(float))
         linked = flags[self.facets] > 0.5
@@ -147,11 +159,15 @@ class TopNodes:
         pairs = np.stack([np.broadcast_to(hub[:, None], nodes.shape)[linked], nodes[linked]])
         pairs = np.concatenate(self._block.mesh.comm.allgather(pairs), axis=1)
         names, ends = np.unique(pairs, return_inverse=True)
+        found = np.full(len(self.dofs), -1, dtype=np.intp)
         if not len(names):
-            return 0
+            return found, 0
         shape = (len(names), len(names))
         graph = coo_array((np.ones(pairs.shape[1]), tuple(ends.reshape(2, -1))), shape=shape)
-        return int(connected_components(graph, directed=False)[0])
+        count, region = connected_components(graph, directed=False)
+        own = self._numbers(self.dofs[touching] // 3)
+        found[touching] = region[np.searchsorted(names, own)]
+        return found, int(count)
 
     @cached_property
     def _empty(self) -> tuple[NDArray[np.bool_], csr_array]:

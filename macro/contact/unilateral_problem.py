@@ -6,7 +6,7 @@ Theory: section 12 of ``demos/theory.md``.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from mpi4py import MPI
@@ -54,6 +54,9 @@ class UnilateralContactState:
         active_sets: Active sets that were solved for.
         linear_iterations: Iterations of the linear solver.
         reason: Why the iteration stopped.
+        gap: Gaps of this rank's nodes of the top, shape (n,) [mm].
+        region: Regions 0 … m − 1 of contact that they are in, −1 outside, shape (n,).
+        peak_pressure: Largest nodal pressure [MPa].
     """
 
     approach: float
@@ -74,6 +77,9 @@ class UnilateralContactState:
     active_sets: int
     linear_iterations: int
     reason: str
+    gap: Array
+    region: NDArray[np.intp]
+    peak_pressure: float
 
 
 class UnilateralContactProblem:
@@ -148,6 +154,47 @@ class UnilateralContactProblem:
         return state
 
 
+class NodalContact(NamedTuple):
+    """Contact of all nodes of the top, the same on every rank.
+
+    Attributes:
+        x: Abscissae of the n nodes, shape (n,) [mm].
+        y: Their ordinates [mm].
+        force: Their contact forces [N].
+        area: Their tributary areas [mm²].
+        pressure: Their contact pressures [MPa]; 0 at the vertices of quadratic triangles, which
+            have no area.
+        gap: Their gaps [mm].
+        region: Regions 0 … m − 1 of contact that they are in; −1 outside.
+    """
+
+    x: Array
+    y: Array
+    force: Array
+    area: Array
+    pressure: Array
+    gap: Array
+    region: NDArray[np.intp]
+
+
+def nodal_contact(problem: UnilateralContactProblem, state: UnilateralContactState) -> NodalContact:
+    """Gather the contact of all nodes of the top, in the order of their places.
+
+    Args:
+        problem: The contact problem.
+        state: One of its states.
+
+    Note:
+        Collective.
+    """
+    top, force = problem.top, np.maximum(state.nodal_force, 0.0)
+    own = (top.x, top.y, force, top.area, top.pressure(force), state.gap, state.region)
+    parts = problem.block.mesh.comm.allgather(own)
+    columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    order = np.lexsort((columns[1], columns[0]))
+    return NodalContact(*(column[order] for column in columns))
+
+
 def _state(
     block: Block, top: TopNodes, plane: PlaneOverNodes, found: ContactSolution
 ) -> UnilateralContactState:
@@ -161,6 +208,8 @@ def _state(
     nodal_force, touching = np.maximum(found.nodal_force, 0.0), found.touching
     area = np.where(touching, top.area, 0.0)
     weight = np.stack([top.area, top.area * gap, area, touching], axis=1)
+    region, contacts = top.regions(touching)
+    pressure = float(top.pressure(nodal_force).max(initial=0.0))
     whole, volume, contact, nodes = block.mesh.comm.allreduce(weight.sum(axis=0), op=MPI.SUM)
     return UnilateralContactState(
         approach=float(found.plane[0]),
@@ -173,7 +222,7 @@ def _state(
         contact_area=float(contact),
         contact_area_fine=top.covered_area(touching, nodal_force, np.maximum(gap, 0.0)),
         nodes=round(nodes),
-        contacts=top.regions(touching),
+        contacts=contacts,
         mean_separation=float(volume / whole),
         patch_force=top.patch_sums(found.nodal_force),
         patch_area=top.patch_sums(area),
@@ -181,4 +230,7 @@ def _state(
         active_sets=found.active_sets,
         linear_iterations=found.linear_iterations,
         reason=found.reason,
+        gap=gap,
+        region=region,
+        peak_pressure=block.mesh.comm.allreduce(pressure, op=MPI.MAX),
     )

@@ -185,6 +185,21 @@ class AsperityContacts:
             coupling += among.by(among) * rate
         return contact_stiffness(lever[active], rate, coupling)
 
+    def tangent(self, indentation: Array) -> Array:
+        """Return the derivative of the loads on a rigid plane by its motions, shape (3, 3).
+
+        Args:
+            indentation: Indentations of the contacts in equilibrium, shape (n,) [mm].
+        """
+        active = np.flatnonzero(indentation > 0.0)
+        lever = self._peaks.lever[active]
+        rate = 1.5 * self.hertz.force[active] * np.sqrt(indentation[active])
+        if not self.kind.interacting and self.body is None:
+            return np.asarray(lever.T @ (rate[:, None] * lever))
+        caused = self.pairs.subset(active).evaluate(indentation[active])
+        own = np.linalg.solve(np.eye(len(active)) + caused.derivative, lever)
+        return np.asarray(lever.T @ (rate[:, None] * own))
+
     def equilibrium(self, control: Control, start: Equilibrium | None = None) -> Equilibrium:
         """Solve the contacts, and the motions of the plane that are free.
 

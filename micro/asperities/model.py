@@ -15,6 +15,7 @@ import numpy as np
 
 from geometry import Asperities, Control, PatchGrid
 from geometry.errors import InputError
+from geometry.rigid_plane import normal_stiffness
 from micro.asperities.contacts import SOLVERS, AsperityContacts, Equilibrium, ModelKind
 from micro.interaction.contact_model import ContactModel, ContactState
 from micro.interaction.patch_sums import EllipticContacts
@@ -154,6 +155,11 @@ class AsperityModel(SummitModel):
         """Solve for contacts and plane; see `ContactModel.equilibrium`."""
         found = self.contacts.equilibrium(control, start)
         return self.state_of(self.contacts, found, self.asperities)
+
+    def stiffness(self, state: ContactState, *, turns: bool) -> tuple[float, int]:
+        """Return dF/dδ by the tangent of the contacts; see `MicroModel.stiffness`."""
+        indentation = state.start.solution.indentation
+        return normal_stiffness(self.contacts.tangent(indentation), turns=turns), 1
 
     def extrapolated(
         self, last: Equilibrium | None, before: Equilibrium | None

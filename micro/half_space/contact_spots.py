@@ -11,6 +11,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from geometry import Partition
+from micro.contact_detail import peaks_of
 
 Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
@@ -75,9 +76,7 @@ def find_contacts(pressure: Array, spacing: tuple[float, float], *, periodic: bo
     which, load = owner[cells] - 1, pressure.ravel()[cells]
     cell = np.float64(spacing[0] * spacing[1])
     share = true_area(pressure > 0.0, periodic=periodic)
-    rising = np.argsort(load, kind="stable")
-    top = np.zeros(count, np.intp)
-    top[which[rising]] = cells[rising]  # the last, largest one stays
+    top = cells[peaks_of(which, load, count)]
     middle = np.stack(np.unravel_index(top, pressure.shape), axis=1) + 0.5
     return Contacts(
         labels=labels.astype(np.int64),

@@ -238,7 +238,11 @@ class HalfSpaceModel:
         state = self._contact.equilibrium(control, *(start or (None, None)))
         rows = [state.row(patches, means)]
         response = Response.of(rows, self.name, self.contact_modulus, patches)
-        return Pressed(response, state.plane, (state.pressure, state.plane))
+        return Pressed(response, state.plane, (state.pressure, state.plane), state)
+
+    def stiffness(self, state: HalfSpaceState, *, turns: bool) -> tuple[float, int]:
+        """Return dF/dδ of a solution with one more linear one; see `MicroModel.stiffness`."""
+        return self._contact.stiffness(state, turns=turns)
 
     @cached_property
     def _contact(self) -> PlaneContact:

@@ -19,9 +19,12 @@ from micro.compliance.grid_compliance import Compliance
 from micro.contact.problem import ContactPressures, ContactProblem
 from micro.contact.rigid_motions import Motions
 from micro.contact.slope_iteration import solve_contact
+from micro.contact.tangent import approach_stiffness
+from micro.contact_detail import ContactDetail
 from micro.half_space.contact_spots import Contacts, find_contacts
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 LEVEL = (0.0, 0.0)
 
@@ -65,20 +68,9 @@ class PlaneContact:
         interference = self.interference(RigidPlane.moved(surface, motion))
         if self.compliance.periodic:
             _check_periodic(control, float(interference.mean()))
-        lx, ly = surface.lengths
-        unit = motion_units(0.5 * float(np.hypot(lx, ly)))
-        x, y = (surface.x - 0.5 * lx) * unit[1], (surface.y - 0.5 * ly) * unit[2]
-        cell = surface.spacing[0] * surface.spacing[1]
-        problem = ContactProblem(
-            compliance=self.compliance,
-            spacing=surface.spacing,
-            interference=interference,
-            motions=Motions.of_plane(x, y, control.free, control.loads / (modulus * cell)),
-            tolerance=self.tolerance,
-            upper=self.upper / modulus,
-        )
+        problem = self._problem(interference, control.free, control.loads)
         found = solve_contact(problem, self._start(start, near))
-        motion[control.free] = found.motion * unit[control.free]
+        motion[control.free] = found.motion * self._units[control.free]
         return HalfSpaceState(
             contact=self,
             plane=RigidPlane.moved(surface, motion),
@@ -99,6 +91,44 @@ class PlaneContact:
         surface = self.surface
         below = self.reference_height - surface.heights
         return np.asarray(plane.at(surface.x[:, None], surface.y) - below)
+
+    def stiffness(self, state: HalfSpaceState, *, turns: bool) -> tuple[float, int]:
+        """Return the interfacial stiffness dF/dδ [N/mm], and the products of the compliance.
+
+        Args:
+            state: A solution.
+            turns: Whether the plane turns without moment; otherwise its slopes stay.
+        """
+        free, modulus = np.array([False, turns, turns]), self.compliance.modulus
+        problem = self._problem(state.interference, free, np.zeros(3))
+        rate, products = approach_stiffness(problem, state.pressure / modulus)
+        return rate * modulus * float(np.prod(self.surface.spacing)), products
+
+    @property
+    def _units(self) -> Array:
+        """Motions of the plane, approach and slopes, that move its corners by 1 mm, shape (3,)."""
+        return motion_units(0.5 * float(np.hypot(*self.surface.lengths)))
+
+    def _problem(self, interference: Array, free: Flags, loads: Array) -> ContactProblem:
+        """Return the contact problem of a plane.
+
+        Args:
+            interference: Overlap at zero free motions, shape (nx, ny) [mm].
+            free: Which of approach and slopes are free, shape (3,).
+            loads: Force and first moments, shape (3,) [N, N mm]; those of free motions count.
+        """
+        surface, modulus, unit = self.surface, self.compliance.modulus, self._units
+        lx, ly = surface.lengths
+        x, y = (surface.x - 0.5 * lx) * unit[1], (surface.y - 0.5 * ly) * unit[2]
+        cell = surface.spacing[0] * surface.spacing[1]
+        return ContactProblem(
+            compliance=self.compliance,
+            spacing=surface.spacing,
+            interference=interference,
+            motions=Motions.of_plane(x, y, free, loads / (modulus * cell)),
+            tolerance=self.tolerance,
+            upper=self.upper / modulus,
+        )
 
     def _first_touch(self, control: Control, near: RigidPlane | None) -> Control:
         """Return the approach at which a plane without force, tilted as one near, first touches."""
@@ -150,6 +180,26 @@ class HalfSpaceState:
     def force(self) -> float:
         """Normal force [N]."""
         return float(self.pressure.sum()) * self.spacing[0] * self.spacing[1]
+
+    @property
+    def peak_pressure(self) -> float:
+        """Largest pressure of a cell [MPa]."""
+        return float(self.pressure.max())
+
+    @property
+    def detail(self) -> ContactDetail:
+        """The spots, and pressures and gaps of all cells."""
+        spots, surface = self.contacts, self.contact.surface
+        return ContactDetail(
+            place=spots.peak,
+            area=spots.area,
+            force=spots.force,
+            peak_pressure=spots.peak_pressure,
+            x=surface.x,
+            y=surface.y,
+            pressure=self.pressure,
+            gap=self.gap,
+        )
 
     @property
     def in_contact(self) -> NDArray[np.bool_]:

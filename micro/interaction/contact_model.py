@@ -19,6 +19,7 @@ from geometry import Asperities, Control, Partition, Surface
 from geometry.rigid_plane import RigidPlane
 from micro.closed_forms.hertz import checked_modulus
 from micro.compliance.body_modes import BodyModes
+from micro.contact_detail import ContactDetail
 from micro.interaction.hertz_pairs import BodyPoints
 from micro.interaction.patch_sums import EllipticContacts, patch_displacements, patch_loads
 from micro.model import Pressed, Response, checked_approaches, checked_patches
@@ -51,6 +52,28 @@ class ContactState(NamedTuple):
     overlapping_contacts: int
     start: Any
     shape: Any = None
+
+    @property
+    def touching(self) -> ContactState:
+        """The same without the contacts that carry no force."""
+        index = np.flatnonzero(self.contacts.force > 0.0)
+        return self._replace(contacts=self.contacts.subset(index), summits=self.summits[index])
+
+    @property
+    def peak_pressure(self) -> float:
+        """Largest pressure of a contact [MPa]."""
+        return float(self.detail.peak_pressure.max(initial=0.0))
+
+    @property
+    def detail(self) -> ContactDetail:
+        """The contacts as spots, with Hertz's pressures; fields are not known."""
+        spots = self.touching.contacts
+        return ContactDetail(
+            place=spots.position,
+            area=spots.area,
+            force=spots.force,
+            peak_pressure=1.5 * spots.force / spots.area,
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -165,7 +188,14 @@ class ContactModel(ABC):
         state = self.equilibrium(control, start)
         rows = [self._row(state, patches, means)]
         response = Response.of(rows, self.name, self.contact_modulus, patches)
-        return Pressed(response, state.plane, state.start)
+        return Pressed(response, state.plane, state.start, state)
+
+    def stiffness(self, state: ContactState, *, turns: bool) -> tuple[float | None, int]:
+        """Return dF/dδ, which is not known here; see `MicroModel.stiffness`.
+
+        The shapes of contacts that are fitted to the load change with it, too.
+        """
+        return None, 0
 
     def extrapolated(self, last: Any, before: Any) -> Any:
         """Return what to start from after the last solution and the one before it.
@@ -182,10 +212,8 @@ class ContactModel(ABC):
         By `patch_loads` a contact that straddles borders is shared among patches. As a contact it
         counts for the patch that holds its summit. The paper assigns it whole.
         """
-        touching = np.flatnonzero(state.contacts.force > 0.0)
-        contacts = state.contacts.subset(touching)
-        state = state._replace(contacts=contacts, summits=state.summits[touching])
-        plane, force = state.plane, contacts.force
+        state = state.touching
+        plane, contacts, force = state.plane, state.contacts, state.contacts.force
         displacement = patch_displacements(patches, contacts, self.contact_modulus)
         if self.body is not None:
             points = BodyPoints.at(self.body, contacts.x, contacts.y)

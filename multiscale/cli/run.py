@@ -64,6 +64,7 @@ def _run(
     failure = _make_load_steps(run, checkpoints, interruption)
     if run.steps:
         checkpoints.write_pending()  # writing results may fail
+        run.make_contact()
         terminal.show_history(comm, run.history())
         files = write_results(folder, run, options=options)
         if run.scene.output.fields:

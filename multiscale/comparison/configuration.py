@@ -43,7 +43,13 @@ FEWEST_HEIGHTS = 32
 HEIGHTS_PER_WAVE = 3
 """Heights per shortest wave of the spectrum, at least, of coarser versions."""
 
-_NO_OUTPUT: Content = {"figures": False, "report": False, "fields": False, "check": "none"}
+_NO_OUTPUT: Content = {
+    "figures": False,
+    "report": False,
+    "fields": False,
+    "check": "none",
+    "contact": "none",
+}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from geometry import Control, NotConverged, PatchGrid
 from geometry.plane_equilibrium import UNSUPPORTED, plane_failure
+from geometry.rigid_plane import normal_stiffness
 from multiscale.couplings.law_couplings import ROUNDING, beyond_law
 from multiscale.couplings.loaded_patches import TOLERANCE, DenseState, LoadedPatches
 from multiscale.laws.interpolation import LawPoint
@@ -43,6 +44,7 @@ class CondensedCoupling:
         self._table, self._laws = table, PatchLaws(table.laws)
         self._compliance = compliance
         self._last: DenseState | None = None
+        self._control = Control(approach=0.0)
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `Coupling.press`."""
@@ -55,7 +57,7 @@ class CondensedCoupling:
                 f"mm (allowed: up to {end[worst]:.6g} mm)"
             )
             raise beyond_law(control, problem, self._table)
-        self._last = state
+        self._last, self._control = state, control
         return LoadStep.of_patches(
             patches,
             plane=state.plane,
@@ -67,6 +69,13 @@ class CondensedCoupling:
             contacts=state.point.contacts,
             newton_iterations=state.iterations,
         )
+
+    def stiffness(self) -> tuple[float | None, int]:
+        """Return dF/dδ at the latest load step, and its linear solutions; see `HasStiffness`."""
+        if self._last is None:
+            return None, 0
+        problem = LoadedPatches(self._laws, self._compliance, self._table.patches, self._control)
+        return normal_stiffness(problem.stiffness(self._last), turns=self._control.tilt is None), 1
 
     def state(self) -> Arrays:
         """Return the latest equilibrium; see `Restorable`."""

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from geometry import Control, PatchGrid
 from geometry.collective import on_root
 from micro import START_KINDS, FiniteSlopes, HalfSpaceModel, MicroModel
+from micro.contact_detail import ContactDetail
+from micro.model import SolvedContact
 from multiscale.couplings.body import scene_body
 from multiscale.loading.load_step import LoadStep
 from multiscale.setup.problem import ProblemSetup
@@ -48,6 +50,9 @@ class ContactCoupling:
         patches: Partition that the results are summed over; it does not change the solution.
         mean_heights: Mean height of each patch, shape (N,) [mm].
         comm: MPI communicator (mpi4py) or None.
+
+    Attributes:
+        latest: The contact at the latest load step; on rank 0 alone.
     """
 
     def __init__(
@@ -56,14 +61,17 @@ class ContactCoupling:
         self._model, self._patches, self._mean_heights = model, patches, mean_heights
         self._comm = comm
         self._start: Any = None
+        self._turns = False
+        self.latest: SolvedContact | None = None
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `Coupling.press`."""
 
         def solve() -> LoadStep:
-            response, plane, self._start = self._model.press(
+            response, plane, self._start, self.latest = self._model.press(
                 control, patches=self._patches, mean_heights=self._mean_heights, start=self._start
             )
+            self._turns = control.tilt is None
             return LoadStep.of_patches(
                 self._patches,
                 plane=(plane.approach, *plane.tilt),
@@ -75,9 +83,18 @@ class ContactCoupling:
                 contacts=response.contacts,
                 newton_iterations=int(response.iterations[0]),
                 warnings=response.warnings,
+                peak_pressure_MPa=self.latest.peak_pressure,
             )
 
         return on_root(self._comm, solve)
+
+    def stiffness(self) -> tuple[float | None, int]:
+        """Return dF/dδ at the latest load step, and its iterations; see `HasStiffness`."""
+        return on_root(self._comm, lambda: self._model.stiffness(self.latest, turns=self._turns))
+
+    def detail(self, latest: Any) -> ContactDetail:
+        """Return the contact of a load step in detail; see `HasContact`."""
+        return on_root(self._comm, lambda: latest.detail)
 
     def state(self) -> Arrays:
         """Return the latest solution; see `Restorable`. It is whole on rank 0 alone."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from geometry import Control, InputError, NotConverged, RigidPlane
 from multiscale.couplings.body import Displacements
+from multiscale.laws.interpolation import LawPoint
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaws
 from multiscale.loading.load_step import LoadStep
@@ -141,6 +142,7 @@ class FreePlaneCoupling:
             raise ValueError("the laws were made under a plane of given tilt")
         self._table, self._path, self._laws = table, table.path, PatchLaws(table.laws)
         self._displacements = displacements
+        self._approach: float | None = None
 
     def press(self, control: Control) -> LoadStep:
         """Find the equilibrium of one load step; see `Coupling.press`.
@@ -157,7 +159,7 @@ class FreePlaneCoupling:
             problem = f"the plane at an approach of {approach:.6g} mm (allowed: up to {end:.6g} mm)"
             raise beyond_law(control, problem, self._table)
         tx, ty, *moment = map(float, path.at(approach))
-        point = self._laws.along(np.full(patches.count, approach))
+        point = self._along(approach)
         local = RigidPlane.above(patches, approach, (tx, ty)).means(patches)
         closure = local - self._displacements(point.pressure[None])[0]
         residual = np.abs(np.where(point.pressure > 0.0, closure - point.closure, 0.0)).max()
@@ -170,6 +172,7 @@ class FreePlaneCoupling:
                 remedy=f"their closures miss {residual:.1%} of the approach: make the laws for "
                 "this block and mesh",
             )
+        self._approach = approach
         return LoadStep.of_patches(
             patches,
             plane=(approach, tx, ty),
@@ -182,9 +185,18 @@ class FreePlaneCoupling:
             newton_iterations=evaluations,
         )
 
+    def stiffness(self) -> tuple[float | None, int]:
+        """Return dF/dδ at the latest load step, from the laws alone; see `HasStiffness`."""
+        if self._approach is None:
+            return None, 0
+        rates = self._along(self._approach).dpressure
+        return self._table.patches.area * float(rates.sum()), 0
+
     def _force(self, approach: float) -> float:
-        everywhere = np.full(self._table.patches.count, approach)
-        return self._table.patches.area * float(self._laws.along(everywhere).pressure.sum())
+        return self._table.patches.area * float(self._along(approach).pressure.sum())
+
+    def _along(self, approach: float) -> LawPoint:
+        return self._laws.along(np.full(self._table.patches.count, approach))
 
 
 def beyond_law(

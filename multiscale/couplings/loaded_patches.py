@@ -124,6 +124,12 @@ class LoadedPatches:
         """Return the derivative of closure + displacement over the local approaches."""
         return Tangent.of(state.point, self.compliance)
 
+    def stiffness(self, state: DenseState) -> Array:
+        """Return the derivative of force and moments by the plane's motions, shape (3, 3)."""
+        lever = self.levers.matrix
+        loads = self.area * lever.T * state.point.dpressure
+        return np.asarray(loads @ self.tangent(state).solve(lever))
+
     def load_residual(self, state: DenseState) -> Array:
         """Return prescribed less present loads along the plane's free motions [N]."""
         return ((self.control.loads - state.load) * self.levers.unit)[self.control.free]

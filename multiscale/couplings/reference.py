@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control
+from micro.contact_detail import ContactDetail, peaks_of
 from multiscale.loading.load_step import LoadStep
 from multiscale.results.reference_record import ReferenceRecord, reference_record
 from multiscale.setup.problem import ProblemSetup
@@ -22,6 +23,9 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import Block, MeshQuality, UnilateralContactProblem, UnilateralContactState
 
 Array = NDArray[np.float64]
+
+_NO_AREA = 1e-9
+"""Area of a node, relative to the largest, that counts as none."""
 
 
 class ReferenceCoupling:
@@ -90,9 +94,35 @@ class ReferenceCoupling:
             linear_iterations=sum(state.linear_iterations for state in states),
             reason=finest.reason,
             imbalance=(finest.force - finest.reaction) / finest.force if finest.force else 0.0,
+            peak_pressure_MPa=finest.peak_pressure,
             meshes=tuple(
                 (state.approach, state.force, state.contact_area_fine / nominal) for state in states
             ),
+        )
+
+    def detail(self, latest: UnilateralContactState) -> ContactDetail:
+        """Return the contact of a load step in detail; see `HasContact`.
+
+        The area of a spot is that of its nodes times the area with its border in the facets over
+        that of all nodes, so that the areas of all spots add up to the load step's.
+        """
+        from macro import nodal_contact
+
+        nodes = nodal_contact(self.finest, latest)
+        touching = np.flatnonzero(nodes.region >= 0)
+        region, count = nodes.region[touching], latest.contacts
+        share = latest.contact_area_fine / latest.contact_area if latest.contact_area else 0.0
+        top = touching[peaks_of(region, nodes.pressure[touching], count)]
+        some = nodes.area > _NO_AREA * nodes.area.max()
+        return ContactDetail(
+            place=np.stack([nodes.x[top], nodes.y[top]], axis=1),
+            area=share * np.bincount(region, nodes.area[touching], minlength=count),
+            force=np.bincount(region, nodes.force[touching], minlength=count).astype(np.float64),
+            peak_pressure=nodes.pressure[top],
+            x=nodes.x[some],
+            y=nodes.y[some],
+            pressure=nodes.pressure[some],
+            gap=nodes.gap[some],
         )
 
     def state(self) -> Arrays:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from geometry import Control, PatchGrid
 from geometry.collective import on_root, shared
-from micro import MicroModel, Response, RigidPlane, influence_matrix
+from micro import MicroModel, Pressed, Response, RigidPlane, influence_matrix
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.refinement import MOST_ROWS, refined
@@ -154,12 +154,13 @@ class WholeSurface:
         """
         free, force, end, start = largest.tilt is None, 0.0, largest, None
         if free or largest.approach is None:
-            response, plane, start = self._press(largest, start)
+            pressed = self._press(largest, start)
+            plane, start = pressed.plane, pressed.start
             end = Control(approach=plane.approach, tilt=plane.tilt)
-            force = float(response.force[0])
+            force = float(pressed.response.force[0])
         # the tilt of a free plane without force is not determined
         touch = Control(force=_SMALL_LOAD * force if free else 0.0, tilt=largest.tilt)
-        first, last = self._press(touch, start)[1].approach, float(end.approach or 0.0)
+        first, last = self._press(touch, start).plane.approach, float(end.approach or 0.0)
         if touch.force:
             first -= _SMALL_LOAD ** (2 / 3) * (last - first)
         return first, last, end.tilt or (0.0, 0.0)
@@ -228,14 +229,15 @@ class WholeSurface:
             found, start = [], None
             for approach in parts[part]:
                 control = Control(approach=float(approach), tilt=self.tilt)
-                response, plane, start = self._press(control, start)
-                found.append((response, plane))
+                pressed = self._press(control, start)
+                start = pressed.start
+                found.append((pressed.response, pressed.plane))
             return found
 
         before = -(-len(self._solved) // count)  # parts of earlier calls: the next rank continues
         return [row for rows in shared(self.comm, len(parts), solve, before) for row in rows]
 
-    def _press(self, control: Control, start: Any) -> tuple[Response, RigidPlane, Any]:
+    def _press(self, control: Control, start: Any) -> Pressed:
         return self.model.press(
             control, patches=self.patches, mean_heights=self.mean_heights, start=start
         )

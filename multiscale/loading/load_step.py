@@ -60,6 +60,10 @@ class LoadStep:
             not measured.
         approach_error_mm: Error bound of the approach [mm]; 0 where it is prescribed, None where
             it was not measured.
+        peak_pressure_MPa: Largest contact pressure [MPa]; None where it is not known.
+        stiffness_N_per_mm: Interfacial stiffness, the derivative dF/dδ of the force by the
+            approach, under fixed slopes or, where the plane turns, without moment [N/mm]; None
+            where it was not found.
         errors: Causes of the error, and how much each may change the force at this approach [N];
             empty where they were not measured.
     """
@@ -83,6 +87,8 @@ class LoadStep:
     meshes: tuple[tuple[float, float, float], ...] = ()
     force_error_N: float | None = None
     approach_error_mm: float | None = None
+    peak_pressure_MPa: float | None = None
+    stiffness_N_per_mm: float | None = None
     errors: tuple[tuple[str, float], ...] = ()
 
     @classmethod
@@ -137,13 +143,14 @@ class LoadStep:
         """
         mx, my = self.moment_N_mm
         patches = replace(self.patches, pressure_MPa=ratio * self.patches.pressure_MPa)
-        force_error = self.force_error_N
+        names = "force_error_N", "peak_pressure_MPa", "stiffness_N_per_mm"
+        known = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
         return replace(
             self,
             force_N=ratio * self.force_N,
             mean_pressure_MPa=ratio * self.mean_pressure_MPa,
             moment_N_mm=(ratio * mx, ratio * my),
-            force_error_N=None if force_error is None else ratio * force_error,
+            **{name: ratio * value for name, value in known.items()},
             errors=tuple((cause, ratio * error) for cause, error in self.errors),
             meshes=tuple((approach, ratio * force, area) for approach, force, area in self.meshes),
             patches=patches,

@@ -5,11 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 
 from geometry import Control, NotConverged
+from micro.contact_detail import ContactDetail
 from multiscale.loading.load_step import LoadStep
 from multiscale.storage import Arrays
 
@@ -51,6 +52,42 @@ class Restorable(Protocol):
 
         Args:
             state: What `state` returned.
+
+        Note:
+            Collective.
+        """
+
+
+@runtime_checkable
+class HasStiffness(Protocol):
+    """A coupling that knows the derivative of the force at its latest load step."""
+
+    def stiffness(self) -> tuple[float | None, int]:
+        """Return the interfacial stiffness dF/dδ, and the linear iterations that it took.
+
+        The slopes of the plane stay or, where it turns, its moments stay zero.
+
+        Returns:
+            The stiffness [N/mm]; None where no linear solution gives it.
+
+        Note:
+            Collective.
+        """
+
+
+@runtime_checkable
+class HasContact(Protocol):
+    """A coupling that solves the contact itself."""
+
+    @property
+    def latest(self) -> Any:
+        """The contact at the latest load step, as `detail` takes it."""
+
+    def detail(self, latest: Any) -> ContactDetail:
+        """Return the spots and fields of a contact, the same on every rank.
+
+        Args:
+            latest: What `latest` was after a load step.
 
         Note:
             Collective.

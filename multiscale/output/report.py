@@ -14,6 +14,7 @@ from typing import Any
 from pydantic_core import to_jsonable_python
 
 from multiscale.couplings.reference import ReferenceCoupling
+from multiscale.loading.load_step import LoadStep
 from multiscale.machine import peak_memory
 from multiscale.planning import plan
 from multiscale.results.history import History, with_error
@@ -55,8 +56,18 @@ def _headline(history: History) -> str:
     return (
         f"At an approach of {approach} µm the plane carries {force} N "
         f"({last.mean_pressure_MPa:.4g} MPa) on {last.contacts} contacts covering "
-        f"{100 * last.contact_area_fraction:.3g} % of the nominal area.{error}"
+        f"{100 * last.contact_area_fraction:.3g} % of the nominal area{_peak(last)}.{error}"
     )
+
+
+def _peak(step: LoadStep) -> str:
+    """Say the largest pressure and the stiffness of a load step, as far as they are known."""
+    text = ""
+    if step.peak_pressure_MPa:
+        text += f", with pressures up to {step.peak_pressure_MPa:.4g} MPa"
+    if step.stiffness_N_per_mm:
+        text += f"; its interfacial stiffness is {step.stiffness_N_per_mm:.4g} N/mm"
+    return text
 
 
 def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
@@ -100,6 +111,7 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "decision": setup.decision and {**asdict(setup.decision), "kept": setup.decision.kept},
         "steps": len(history),
         "finished": run.finished,
+        "contacts": [{"step": record.step, "spots": len(record.spots)} for record in run.contacts],
         "reasons": sorted({step.reason for step in history}),
         "notes": list(history.notes),
         "versions": _versions(),

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from geometry.collective import on_root, shared
 from multiscale.laws.law_table import write_laws
 from multiscale.output.report import provenance, report_html
+from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
 from multiscale.results.history import COLUMNS, PATCH_COLUMNS, History
 from multiscale.run import Run
 from multiscale.storage import (
+    checksummed,
     remove,
     write_bytes,
     write_csv,
@@ -26,10 +29,13 @@ if TYPE_CHECKING:
 
 FILES = (
     "history.csv", "patches.csv", "reference.csv", "laws.h5", "provenance.json", "report.html",
-    "surface.png", "curves.png", "pressures.png", "laws.png", "fields.xdmf", "fields.h5",
-    "fields.bp",
+    "contacts.csv", "contact.h5", "surface.png", "curves.png", "pressures.png", "contact.png",
+    "laws.png", "fields.xdmf", "fields.h5", "fields.bp",
 )  # fmt: skip
 """All files that a run may write."""
+
+_COMPRESSION = 1
+"""Level of gzip for maps: most of a map of pressures is zero."""
 
 DOTS_PER_INCH = 130
 """Resolution of the figures."""
@@ -51,7 +57,8 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
     """
     pictures: dict[str, bytes] = {}
     if run.scene.output.figures and run.steps:
-        names = ["surface", "curves", "pressures", *["laws"] * (run.table is not None)]
+        names = ["surface", "curves", "pressures"]
+        names += ["contact"] * bool(run.contacts) + ["laws"] * (run.table is not None)
         with run.phase("output"):
             drawn = shared(run.comm, len(names), lambda index: png(_figure(run, names[index])))
         pictures = dict(zip(names, drawn, strict=True))
@@ -63,7 +70,7 @@ def _write(folder: Path, run: Run, pictures: dict[str, bytes], options: list[str
         with written(folder / name):
             remove(folder / name)
     history, table = run.history(), run.table
-    files = write_tables(folder, history)
+    files = write_tables(folder, history) + write_contacts(folder, run.contacts)
     if table is not None:
         files.append(write_whole(folder / "laws.h5", lambda path: write_laws(path, table)))
     files += [write_bytes(folder / f"{name}.png", image) for name, image in pictures.items()]
@@ -96,6 +103,35 @@ def write_tables(folder: Path, history: History) -> list[Path]:
     return files
 
 
+def write_contacts(folder: Path, contacts: Sequence[ContactRecord]) -> list[Path]:
+    """Write ``contacts.csv`` and, where fields are known, ``contact.h5``, with a group a load step.
+
+    Args:
+        folder: Folder of the results; made when missing.
+        contacts: The contacts, nothing is written without any.
+
+    Returns:
+        The files written.
+    """
+    if not contacts:
+        return []
+    header = ("step", "spot", *SPOT_COLUMNS)
+    rows = (row for record in contacts for row in record.rows())
+    files = [write_csv(folder / "contacts.csv", header, rows)]
+
+    def fill(file: Any) -> None:
+        file.attrs["units"] = "mm, N, MPa"
+        for record in contacts:
+            group = file.create_group(f"step_{record.step}")
+            group.attrs.update(approach_mm=record.approach_mm, force_N=record.force_N)
+            for name in FIELDS:
+                group.create_dataset(name, data=getattr(record, name), compression=_COMPRESSION)
+
+    if contacts[0].pressure_MPa is not None:
+        files.append(write_bytes(folder / "contact.h5", checksummed(fill)))
+    return files
+
+
 def png(figure: Figure) -> bytes:
     """Return a matplotlib figure as a PNG image."""
     content = BytesIO()
@@ -118,6 +154,8 @@ def _figure(run: Run, name: str) -> Figure:
         return figures.surface_figure(setup.surface, summits, setup.patches)
     if name == "curves":
         return run.history().plot(run.scene.coupling.kind)
+    if name == "contact":
+        return run.contacts[-1].plot()
     if name == "pressures":
         return figures.pressure_figure(run.history())
     assert run.table is not None

@@ -17,6 +17,7 @@ from geometry.collective import on_root
 from geometry.errors import InputError, NotWritten
 from multiscale.loading.load_step import LoadStep, PatchState
 from multiscale.loading.stepper import LoadPosition
+from multiscale.results.contact_record import ContactRecord
 from multiscale.run import Run
 from multiscale.storage import (
     Arrays,
@@ -29,7 +30,7 @@ from multiscale.storage import (
     write_bytes,
 )
 
-FORMAT = "patchlaw checkpoint 4"
+FORMAT = "patchlaw checkpoint 5"
 FILE_NAME = "checkpoint.h5"
 
 LEAST_INTERVAL = 1.0
@@ -53,6 +54,7 @@ class Checkpoint:
         steps: The accepted load steps.
         position: Where the load history has come to.
         state: What the coupling's next load step starts from.
+        contacts: The contacts recorded so far.
     """
 
     scene: dict[str, Any]
@@ -62,6 +64,7 @@ class Checkpoint:
     steps: tuple[LoadStep, ...] = ()
     position: LoadPosition
     state: Arrays
+    contacts: tuple[ContactRecord, ...] = ()
 
 
 def checkpoint_of(run: Run, state: Arrays) -> Checkpoint:
@@ -79,6 +82,7 @@ def checkpoint_of(run: Run, state: Arrays) -> Checkpoint:
         steps=tuple(run.steps),
         position=run.position,
         state=state,
+        contacts=run.contacts,
     )
 
 
@@ -100,6 +104,7 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> Path:
         np.frombuffer(checkpoint.laws, np.uint8),
         [np.array([getattr(step.patches, name) for step in steps]) for name in _PATCH_COLUMNS],
         checkpoint.position,
+        checkpoint.contacts,
     )
 
     def fill(file: Any) -> None:
@@ -143,7 +148,7 @@ def _read(path: Path) -> Checkpoint:
             {name: stored_numbers(item) for name, item in file.get(group, {}).items()}
             for group in ("run", "state")
         )
-    text, laws, patches, position = unpacked(run, (LoadPosition,))
+    text, laws, patches, position, contacts = unpacked(run, (LoadPosition, ContactRecord))
     facts = json.loads(text)
     steps = [
         LoadStep(
@@ -153,7 +158,12 @@ def _read(path: Path) -> Checkpoint:
         for row, *columns in zip(facts.pop("steps"), *patches, strict=True)
     ]
     return Checkpoint(
-        **facts, laws=laws.tobytes(), steps=tuple(steps), position=position, state=state
+        **facts,
+        laws=laws.tobytes(),
+        steps=tuple(steps),
+        position=position,
+        state=state,
+        contacts=contacts,
     )
 
 

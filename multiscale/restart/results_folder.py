@@ -148,7 +148,7 @@ def go_on(run: Run, found: Checkpoint, folder: Path) -> None:
         InputError: When the heights have changed.
     """
     _refuse_changed_heights(folder, run, found.heights)
-    run.resume(found.steps, found.position, found.state, found.laws)
+    run.resume(found.steps, found.position, found.state, found.laws, found.contacts)
 
 
 def is_finished(folder: Path, run: Run) -> bool:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from geometry.patches import PatchGrid
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
+from multiscale.results.contact_record import ContactRecord
 from multiscale.results.html_page import Table, table_html
 from multiscale.results.reference_record import ReferenceRecord
 
@@ -91,6 +92,7 @@ class History:
         seconds: Wall time of each phase of the run [s].
         notes: Remarks of the run on its own approximations.
         reference: Results of all meshes of a reference; None with other couplings.
+        contact_records: The contacts of those load steps that the scene asks for.
     """
 
     step = Column("Number of the load step, from 1", heading="step")
@@ -122,12 +124,15 @@ class History:
     moment_y_N_mm = Column("First moment Σ P (y − yc) of the forces P", "N mm")
     force_error_N = Column("Error of the force; 0 where it is prescribed", "N")
     approach_error_mm = Column("Error of the approach; 0 where it is prescribed", "mm")
+    peak_pressure_MPa = Column("Largest contact pressure", "MPa")
+    stiffness_N_per_mm = Column("Interfacial stiffness dF/dδ, force over approach", "N/mm")
 
     steps: tuple[LoadStep, ...]
     patches: PatchGrid
     seconds: dict[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     reference: ReferenceRecord | None = None
+    contact_records: tuple[ContactRecord, ...] = ()
 
     def __len__(self) -> int:
         return len(self.steps)
@@ -144,6 +149,11 @@ class History:
     def closure_mm(self) -> Array:
         """Mean closure of each patch at each step, shape (steps, N) [mm]."""
         return np.array([step.patches.closure_mm for step in self.steps])
+
+    @property
+    def contact(self) -> ContactRecord | None:
+        """The contact recorded last, spots and maps; None where none was asked for."""
+        return self.contact_records[-1] if self.contact_records else None
 
     def records(self) -> list[dict[str, Any]]:
         """Return the rows of ``history.csv``, each as a dictionary by column."""

@@ -236,9 +236,15 @@ class OutputSection(Section):
 
     ``check``: the load steps whose errors are measured by solving further contact problems, where
     the micro model is ``half-space``.
+
+    ``contact``: the load steps whose contact is written, with a row for every spot and, where the
+    model has cells or nodes, maps of pressure and gap. With laws the contact problem that they
+    stand for is then solved, once for each of these steps; "auto" is "last" without laws and writes
+    none with laws. "none" leaves out the interfacial stiffness as well.
     """
 
     figures: Flag = True
     report: Flag = True
     fields: Flag = False
     check: Literal["last", "none", "all"] = "last"
+    contact: Literal["auto", "last", "all", "none"] = "auto"

@@ -28,7 +28,7 @@ FLOORS = {
         "asperities meshes plane_equilibrium",
     ],
     "micro": [
-        "closed_forms",
+        "closed_forms contact_detail",
         "compliance model",
         "contact interaction",
         "half_space islands",
@@ -50,7 +50,7 @@ FLOORS = {
         "compiled_forms results scene",
         "setup",
         "couplings",
-        "measured_errors",
+        "contact_recorder measured_errors",
         "planning",
         "run",
         "output restart",

@@ -66,7 +66,7 @@ def regions(patterns):
     block = Block(mesh, Material(young_modulus=1.0, poisson_ratio=0.3))
     top = TopNodes(block, PatchGrid(grid=(1, 1), lengths=(8.0, 7.0)))
     at = np.rint(top.x).astype(int), np.rint(top.y).astype(int)
-    return [top.regions(pattern[at]) for pattern in patterns]
+    return [top.regions(pattern[at])[1] for pattern in patterns]
 
 
 if __name__ == "__main__":

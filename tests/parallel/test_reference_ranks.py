@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from on_ranks import RANKS
 
+from multiscale.results.contact_record import SPOT_COLUMNS
+
 PAPER = "demos/scenes/paper.toml"
 SMALL = [
     "coupling.kind=reference", "surface.spectrum.waves=[1, 3]", "surface.grid=[32, 32]",
@@ -22,6 +24,7 @@ SCENES = {
 }  # fmt: skip
 HISTORY = (
     "approach_mm", "force_N", "contact_area_fraction", "mean_separation_mm", "contacts", "tilt_x",
+    "peak_pressure_MPa",
 )  # fmt: skip
 REFERENCE = ("approach_mm", "force_N", "contact_area_fraction", "force_N_mesh_1")
 PATCHES = ("closure_mm", "pressure_MPa", "contact_area_fraction")
@@ -48,7 +51,8 @@ def test_same_numbers_on_any_number_of_ranks(mpirun, root, tmp_path, scene, rank
         results.append([
             table(out / f"{name}.csv", columns)
             for name, columns in (
-                ("history", HISTORY), ("reference", REFERENCE), ("patches", PATCHES)
+                ("history", HISTORY), ("reference", REFERENCE), ("patches", PATCHES),
+                ("contacts", SPOT_COLUMNS),
             )
         ])  # fmt: skip
         assert (out / "fields.xdmf").exists() == ("output.fields=true" in scene)

@@ -8,6 +8,7 @@ import pytest
 from on_ranks import RANKS
 
 from multiscale.cli import main
+from multiscale.results.contact_record import SPOT_COLUMNS
 
 PAPER = "demos/scenes/paper.toml"
 SMALL = ["surface.grid=[64, 64]", "load.steps=3", "output.figures=false", "output.report=false"]
@@ -52,7 +53,9 @@ SCENES = {
         "accuracy=0.05", "surface.grid=auto", "coupling.kind=auto", "micro.model=auto",
         "output.check=all",
     ],
-    "laws of the half-space": ["block.cells=[8, 8, 5]", "micro.model=half-space"],
+    "laws of the half-space, contact on request": [
+        "block.cells=[8, 8, 5]", "micro.model=half-space", "output.contact=all",
+    ],
 }  # fmt: skip
 NUMBERS = (
     "approach_mm",
@@ -65,6 +68,8 @@ NUMBERS = (
     "contacts",
     "force_error_N",
     "approach_error_mm",
+    "peak_pressure_MPa",
+    "stiffness_N_per_mm",
 )
 
 
@@ -77,7 +82,9 @@ def table(path, names):
 def numbers(out):
     """Return the columns of a run's tables that are compared."""
     patches = ("closure_mm", "pressure_MPa", "contact_area_fraction")
-    return table(out / "history.csv", NUMBERS), table(out / "patches.csv", patches)
+    tables = [table(out / "history.csv", NUMBERS), table(out / "patches.csv", patches)]
+    spots = out / "contacts.csv"
+    return [*tables, table(spots, SPOT_COLUMNS)] if spots.exists() else tables
 
 
 @pytest.fixture(scope="module")
@@ -124,7 +131,7 @@ def test_ranks_draw_the_figures_of_one(mpirun, tmp_path):
         done = mpirun(ranks, "-m", "patchlaw", "run", PAPER, "--out", out, "--set", *SMALL, *scene)
         assert done.returncode == 0, done.stderr
         drawn.append({path.name: path.read_bytes() for path in out.glob("*.png")})
-    assert set(drawn[0]) == {"surface.png", "curves.png", "pressures.png"}
+    assert set(drawn[0]) == {"surface.png", "curves.png", "pressures.png", "contact.png"}
     assert drawn[0] == drawn[1]
 
 

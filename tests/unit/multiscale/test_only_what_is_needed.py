@@ -17,6 +17,7 @@ from multiscale import Run, Scene, make_setup
 from multiscale.cli.command_line import main
 from multiscale.output.results import write_results
 from multiscale.planning.costs import THIS_MACHINE, Machine, predicted_cost
+from multiscale.results.contact_record import ContactRecord
 
 FINITE_ELEMENTS = ("dolfinx", "petsc4py", "macro", "gmsh")
 PICTURES = ("matplotlib",)
@@ -76,11 +77,28 @@ def never(*given, **options):
 
 def test_only_the_force_curve(monkeypatch, tmp_path):
     monkeypatch.setattr(Run, "last_field", never)
-    run = Run(Scene.from_dict(data("concurrent", block=data()["block"] | {"cells": [4, 4, 4]})))
+    monkeypatch.setattr(HalfSpaceModel, "stiffness", never)
+    block, output = data()["block"] | {"cells": [4, 4, 4]}, data()["output"] | {"contact": "none"}
+    run = Run(Scene.from_dict(data("concurrent", block=block, output=output)))
     assert len(list(run.load_steps())) == 2
     names = {path.name for path in write_results(tmp_path, run, options=[])}
     assert names == {"history.csv", "patches.csv", "provenance.json"}
     assert "output" not in run.seconds  # no figure was drawn
+
+
+def test_a_contact_is_worked_out_for_the_last_load_step_alone(monkeypatch):
+    made, steps = [], []
+    of = ContactRecord.of
+    monkeypatch.setattr(ContactRecord, "of", lambda *given: made.append(given) or of(*given))
+    stiffness = HalfSpaceModel.stiffness
+    monkeypatch.setattr(
+        HalfSpaceModel, "stiffness",
+        lambda *given, **other: steps.append(given) or stiffness(*given, **other),
+    )  # fmt: skip
+    run = Run(Scene.from_dict(data()))
+    list(run.load_steps())
+    assert len(made) == 1
+    assert len(steps) == 2
 
 
 @pytest.mark.parametrize("kind", ["analytic", "isolated", "consistent", "concurrent"])

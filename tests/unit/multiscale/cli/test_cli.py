@@ -66,6 +66,7 @@ def test_run_writes_everything(capsys, tmp_path):
 def test_nothing_unasked_is_written(capsys, tmp_path):
     out = tmp_path / "out"
     extra = ["coupling.kind=analytic", "output.figures=false", "output.report=false"]
+    extra.append("output.contact=none")
     code, _, _ = call(capsys, "run", PAPER, "--out", str(out), "--set", *SMALL, *extra)
     assert code == 0
     assert {path.name for path in out.iterdir()} == {
@@ -79,7 +80,8 @@ def test_files_of_an_earlier_scene_do_not_stay(capsys, tmp_path):
     words = ("run", PAPER, "--out", str(tmp_path), "--set", *SMALL, "output.figures=false")
     assert call(capsys, *words, "output.fields=true")[0] == 0
     assert {"laws.h5", "fields.xdmf", "fields.h5"} <= {path.name for path in tmp_path.iterdir()}
-    assert call(capsys, *words, "coupling.kind=analytic", "output.report=false")[0] == 0
+    bare = ("coupling.kind=analytic", "output.report=false", "output.contact=none")
+    assert call(capsys, *words, *bare)[0] == 0
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {"history.csv", "patches.csv", "provenance.json"}
 

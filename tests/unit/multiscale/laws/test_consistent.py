@@ -110,7 +110,9 @@ def test_any_macro_model_finds_the_rows_again(surface, macro, tilt):
     assert table.made_by["tilt"] == ("free" if tilt is None else f"{tilt[0]:g}, {tilt[1]:g}")
     for force in (0.2, 0.7, 1.3, 2.0):
         control = Control(force=force, tilt=tilt)
-        whole, plane, start = model.press(control, patches=patches, mean_heights=means, start=start)
+        whole, plane, start, _ = model.press(
+            control, patches=patches, mean_heights=means, start=start
+        )
         step = coupling.press(control)
         assert step.force_N == pytest.approx(force, rel=1e-9)
         # the tables' tolerance of the force, of which the approach takes two thirds (Hertz)

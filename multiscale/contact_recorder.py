@@ -1,0 +1,111 @@
+"""Records the contact of the load steps that a scene asks for, and their interfacial stiffness."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+from geometry import Control
+from micro import MicroModel
+from multiscale.couplings.contact import ContactCoupling
+from multiscale.loading.load_step import LoadStep
+from multiscale.loading.stepper import Coupling, HasContact, HasStiffness
+from multiscale.results.contact_record import ContactRecord
+from multiscale.setup.problem import ProblemSetup
+
+
+class ContactRecorder:
+    """Records contacts as the scene's ``output.contact`` says.
+
+    Args:
+        setup: The problem set up from the scene.
+        make_model: Makes its micro model on the body; called where laws stand for the contact.
+        comm: MPI communicator; None for this process alone.
+
+    Attributes:
+        records: The contacts so far, the same on every rank.
+    """
+
+    def __init__(
+        self, setup: ProblemSetup, make_model: Callable[[], MicroModel], comm: Any
+    ) -> None:
+        self._setup, self._make_model, self._comm = setup, make_model, comm
+        self._asked = setup.scene.output.contact
+        self.records: list[ContactRecord] = []
+        self._latest: tuple[HasContact, Any, int] | None = None
+
+    def resume(self, records: Sequence[ContactRecord]) -> None:
+        """Continue after contacts that were recorded before."""
+        self.records = list(records)
+
+    def with_stiffness(self, step: LoadStep, coupling: Coupling) -> LoadStep:
+        """Return a load step with its interfacial stiffness, where that is known.
+
+        Args:
+            step: A load step just accepted.
+            coupling: What found it; its contact is kept for `record`.
+
+        Note:
+            Collective.
+        """
+        if self._asked == "none":
+            return step
+        if isinstance(coupling, HasContact):
+            self._latest = coupling, coupling.latest, step.step
+        if not isinstance(coupling, HasStiffness):
+            return step
+        found, spent = coupling.stiffness()
+        iterations = step.linear_iterations + spent
+        return replace(step, stiffness_N_per_mm=found, linear_iterations=iterations)
+
+    def record(self, step: LoadStep, *, last: bool) -> LoadStep:
+        """Record the contact of a load step if it is requested and not yet recorded.
+
+        With laws the contact problem that they stand for is solved under the step's plane.
+
+        Args:
+            step: The load step accepted last.
+            last: Whether no other follows.
+
+        Returns:
+            The load step, with the largest pressure of the contact.
+
+        Raises:
+            NotConverged: When the contact problem cannot be solved.
+
+        Note:
+            Collective.
+        """
+        laws = self._setup.uses_laws
+        asked = "none" if laws and self._asked == "auto" else self._asked
+        known = any(record.step == step.step for record in self.records)
+        if asked == "none" or known or not (last or asked == "all"):
+            return step
+        if laws:
+            step = self._solved(step)
+        if self._latest is not None and self._latest[2] == step.step:
+            coupling, latest, _ = self._latest
+            lengths = self._setup.surface.lengths
+            self.records.append(ContactRecord.of(coupling.detail(latest), step, lengths))
+        return step
+
+    @property
+    def notes(self) -> list[str]:
+        """What a report says of contacts that laws stand for."""
+        if not (self._setup.uses_laws and self.records):
+            return []
+        last = self.records[-1]
+        return [
+            f"contact of load step {last.step}: the contact problem behind the laws, solved under "
+            f"the plane of the step, with a force of {last.force_N:.5g} N"
+        ]
+
+    def _solved(self, step: LoadStep) -> LoadStep:
+        """Solve the contact problem under the plane of a load step of laws."""
+        setup = self._setup
+        model = self._make_model()
+        coupling = ContactCoupling(model, setup.patches, setup.mean_heights, self._comm)
+        found = coupling.press(Control(approach=step.approach_mm, tilt=step.tilt))
+        self._latest = coupling, coupling.latest, step.step
+        return replace(step, peak_pressure_MPa=found.peak_pressure_MPa)

@@ -1,0 +1,111 @@
+"""The contact at one load step: a row for every spot, and maps of pressure and gap."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from micro.contact_detail import ContactDetail
+from multiscale.loading.load_step import LoadStep
+
+Array = NDArray[np.float64]
+
+SPOT_COLUMNS = ("x_mm", "y_mm", "area_mm2", "force_N", "peak_pressure_MPa")
+"""Columns of ``contacts.csv`` behind the load step and the number of the spot."""
+
+FIELDS = ("x_mm", "y_mm", "pressure_MPa", "gap_mm")
+"""Datasets of a load step in ``contact.h5``."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ContactRecord:
+    """The contact of all m spots at one load step, the largest force first.
+
+    Attributes:
+        step: Number of the load step.
+        approach_mm: Approach of the plane [mm].
+        force_N: Force of all spots [N].
+        lengths_mm: Sides of the surface [mm].
+        spots: A row for each spot, see `SPOT_COLUMNS`: the place of its largest pressure, its real
+            contact area, its force and that pressure, shape (m, 5).
+        x_mm: Abscissae of the nx × ny cells, shape (nx,), or of the n nodes of a reference, shape
+            (n,) [mm]; None where only the spots are known.
+        y_mm: Their ordinates, shape (ny,) or (n,) [mm].
+        pressure_MPa: Contact pressures, shape (nx, ny) or (n,) [MPa].
+        gap_mm: Gaps between the plane and the deformed surface, shape (nx, ny) or (n,) [mm].
+    """
+
+    step: int
+    approach_mm: float
+    force_N: float
+    lengths_mm: tuple[float, float]
+    spots: Array
+    x_mm: Array | None = None
+    y_mm: Array | None = None
+    pressure_MPa: Array | None = None
+    gap_mm: Array | None = None
+
+    @classmethod
+    def of(
+        cls, detail: ContactDetail, step: LoadStep, lengths: tuple[float, float]
+    ) -> ContactRecord:
+        """Return the record of a load step.
+
+        Args:
+            detail: The contact.
+            step: The load step.
+            lengths: Sides of the surface [mm].
+        """
+        columns = detail.place.T, (detail.area, detail.force, detail.peak_pressure)
+        spots = np.concatenate(columns).T
+        order = np.lexsort((spots[:, 1], spots[:, 0], -spots[:, 3]))
+        return cls(
+            step=step.step,
+            approach_mm=step.approach_mm,
+            force_N=float(detail.force.sum()),
+            lengths_mm=(float(lengths[0]), float(lengths[1])),
+            spots=np.ascontiguousarray(spots[order]),
+            x_mm=detail.x,
+            y_mm=detail.y,
+            pressure_MPa=detail.pressure,
+            gap_mm=detail.gap,
+        )
+
+    @property
+    def place_mm(self) -> Array:
+        """Place of the largest pressure of each spot, shape (m, 2) [mm]."""
+        return self.spots[:, :2]
+
+    @property
+    def area_mm2(self) -> Array:
+        """Real contact area of each spot, shape (m,) [mm²]."""
+        return self.spots[:, 2]
+
+    @property
+    def spot_force_N(self) -> Array:
+        """Force of each spot, shape (m,) [N]."""
+        return self.spots[:, 3]
+
+    @property
+    def peak_pressure_MPa(self) -> Array:
+        """Largest pressure of each spot, shape (m,) [MPa]."""
+        return self.spots[:, 4]
+
+    def rows(self) -> Iterator[tuple]:
+        """Yield the rows of ``contacts.csv``."""
+        for number, spot in enumerate(self.spots.tolist(), 1):
+            yield (self.step, number, *spot)
+
+    def plot(self) -> Any:
+        """Draw pressures, gaps and the sizes of the spots.
+
+        Returns:
+            A matplotlib figure; a notebook shows it.
+        """
+        from multiscale.figures.contact import contact_figure  # loads matplotlib
+
+        return contact_figure(self)

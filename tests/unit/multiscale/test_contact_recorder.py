@@ -1,0 +1,192 @@
+"""The contact of load steps: recorded as asked, written, kept over a resume, the same in all."""
+
+import csv
+import json
+from functools import cache
+from html import unescape
+
+import h5py
+import numpy as np
+import pytest
+
+from geometry import Control
+from multiscale import Run, Scene, run
+from multiscale.output.results import write_results
+from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
+from multiscale.results.contact_record import SPOT_COLUMNS
+from multiscale.storage import verified
+
+SPECTRUM = {"hurst": 0.95, "waves": [2, 6], "rms_slope": 0.2, "seed": 1}
+
+
+def scene(kind="analytic", model="half-space", contact="auto", **sections):
+    data = {
+        "surface": {"spectrum": SPECTRUM, "grid": [32, 32], "lengths": [1.0, 1.0]},
+        "block": {"young_modulus": 4000.0, "poisson_ratio": 0.15},
+        "patches": {"grid": [2, 2]},
+        "micro": {"model": model},
+        "coupling": {"kind": kind},
+        "load": {"approach": 0.008, "steps": 2},
+        "output": {"check": "none", "contact": contact, "figures": False},
+    }
+    return Scene.from_dict(data | sections)
+
+
+@cache
+def ran(*given):
+    return run(scene(*given))
+
+
+@pytest.mark.parametrize(
+    ("kind", "model", "fields"),
+    [
+        ("analytic", "half-space", True),
+        ("analytic", "elliptic", False),
+        ("concurrent", "half-space", True),
+        ("concurrent", "islands", False),
+        ("reference", "half-space", True),
+    ],
+)
+def test_last_contact_is_recorded(kind, model, fields):
+    history = ran(kind, model)
+    contact, last = history.contact, history.steps[-1]
+    assert [record.step for record in history.contact_records] == [2]
+    assert contact.spot_force_N.sum() == pytest.approx(last.force_N, rel=1e-10)
+    assert contact.area_mm2.sum() == pytest.approx(last.contact_area_fraction, rel=1e-10)
+    assert len(contact.spots) == last.contacts
+    assert (np.diff(contact.spot_force_N) <= 0.0).all()
+    assert contact.peak_pressure_MPa.max() == last.peak_pressure_MPa
+    assert (contact.pressure_MPa is not None) == fields
+    if fields and kind != "reference":  # cells are equal there
+        assert contact.gap_mm.mean() == pytest.approx(last.mean_separation_mm, rel=1e-9)
+        assert contact.pressure_MPa.mean() == pytest.approx(last.mean_pressure_MPa, rel=1e-9)
+
+
+def test_reference_has_the_peak_and_the_gap_of_the_contact_problem():
+    meshed, solved = (ran(kind, "half-space") for kind in ("reference", "concurrent"))
+    # a coarse mesh of one contact: the force itself differs by 3 %
+    one, other = (history.peak_pressure_MPa[-1] for history in (meshed, solved))
+    assert one == pytest.approx(other, rel=0.15)
+    assert meshed.contact.gap_mm.min() >= -1e-9
+    assert np.isnan(meshed.stiffness_N_per_mm).all()
+
+
+def test_all_contacts_are_recorded_and_none_without_asking():
+    assert [record.step for record in run(scene(contact="all")).contact_records] == [1, 2]
+    bare = run(scene(contact="none"))
+    assert bare.contact is None
+    assert np.isnan(bare.stiffness_N_per_mm).all()
+    assert (bare.peak_pressure_MPa > 0.0).all()
+    assert (bare.linear_iterations == 0).all()
+
+
+def test_contact_behind_laws_is_solved_on_request_alone():
+    quiet, asked = run(scene("consistent")), run(scene("consistent", contact="all"))
+    assert quiet.contact is None
+    assert np.isnan(quiet.peak_pressure_MPa).all()
+    concurrent = run(scene("concurrent", contact="all"))
+    np.testing.assert_array_equal(quiet.force_N, asked.force_N)
+    for mine, its in zip(asked.contact_records, concurrent.contact_records, strict=True):
+        # rows of the laws start the solutions elsewhere, to the same residual of 1e-10
+        np.testing.assert_allclose(mine.spots, its.spots, rtol=1e-7)
+    np.testing.assert_allclose(asked.peak_pressure_MPa, concurrent.peak_pressure_MPa, rtol=1e-7)
+    assert any("contact problem behind the laws" in note for note in asked.notes)
+
+
+@pytest.mark.parametrize("kind", ["consistent", "isolated"])
+@pytest.mark.parametrize("tilt", [(0.001, 0.0), "free"])
+def test_stiffness_of_laws_is_the_derivative_of_their_force(kind, tilt):
+    load = {"approach": 0.008, "steps": 1, "tilt": tilt}
+    whole = Run(scene(kind, load=load, coupling={"kind": kind, "newton": "condensed"}))
+    (step,) = whole.load_steps()
+    tilt = None if tilt == "free" else tilt
+    near = 1e-7
+    ahead, back = (
+        whole.coupling.press(Control(approach=0.008 + change, tilt=tilt)).force_N
+        for change in (near, -near)
+    )
+    # forces are right to 1e-12 of 1 N and laws smooth: second differences are below 1e-6
+    assert step.stiffness_N_per_mm == pytest.approx((ahead - back) / (2.0 * near), rel=1e-5)
+
+
+def test_files_hold_the_contacts(tmp_path):
+    whole = Run(scene(contact="all"))
+    list(whole.load_steps())
+    names = [path.name for path in write_results(tmp_path, whole, options=[])]
+    assert {"contacts.csv", "contact.h5"} <= set(names)
+    with (tmp_path / "contacts.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == ["step", "spot", *SPOT_COLUMNS]
+    with h5py.File(verified(tmp_path / "contact.h5"), "r") as file:
+        for record in whole.contacts:
+            written = [[float(row[name]) for name in SPOT_COLUMNS]
+                       for row in rows if int(row["step"]) == record.step]  # fmt: skip
+            np.testing.assert_array_equal(written, record.spots)
+            group = file[f"step_{record.step}"]
+            np.testing.assert_array_equal(group["pressure_MPa"], record.pressure_MPa)
+            np.testing.assert_array_equal(group["gap_mm"], record.gap_mm)
+            np.testing.assert_array_equal(group["x_mm"], record.x_mm)
+    provenance = json.loads((tmp_path / "provenance.json").read_text())
+    assert provenance["contacts"] == [
+        {"step": record.step, "spots": len(record.spots)} for record in whole.contacts
+    ]
+    text = unescape((tmp_path / "report.html").read_text())
+    assert f"pressures up to {whole.steps[-1].peak_pressure_MPa:.4g} MPa" in text
+    quiet = Run(scene(contact="none"))
+    list(quiet.load_steps())
+    write_results(tmp_path, quiet, options=[])
+    assert not (tmp_path / "contacts.csv").exists()
+    assert not (tmp_path / "contact.h5").exists()
+
+
+def test_asperities_write_spots_without_maps(tmp_path):
+    whole = Run(scene(model="elliptic"))
+    list(whole.load_steps())
+    names = [path.name for path in write_results(tmp_path, whole, options=[])]
+    assert "contacts.csv" in names
+    assert "contact.h5" not in names
+
+
+def test_contacts_survive_a_checkpoint(tmp_path):
+    whole = Run(scene("concurrent", contact="all"))
+    path = tmp_path / "c.h5"
+    for step in whole.load_steps():
+        if step.step == 1:
+            write_checkpoint(path, checkpoint_of(whole, whole.state()))
+    kept = read_checkpoint(path)
+    again = Run(whole.given)
+    again.resume(kept.steps, kept.position, kept.state, kept.laws, kept.contacts)
+    list(again.load_steps())
+    for one, other in zip(again.contacts, whole.contacts, strict=True):
+        assert one.step == other.step
+        np.testing.assert_array_equal(one.spots, other.spots)
+        np.testing.assert_array_equal(one.gap_mm, other.gap_mm)
+    names = "peak_pressure_MPa", "stiffness_N_per_mm"
+    for name in names:
+        np.testing.assert_array_equal(
+            getattr(again.history(), name), getattr(whole.history(), name)
+        )
+
+
+def test_run_that_stops_early_shows_its_last_contact():
+    whole = Run(scene())
+    next(whole.load_steps())
+    assert whole.contacts == ()
+    whole.make_contact()
+    whole.make_contact()  # once only
+    assert [record.step for record in whole.contacts] == [1]
+
+
+@pytest.mark.parametrize("model", ["half-space", "elliptic"])
+def test_figure_shows_pressures_gaps_and_sizes(model):
+    figure = run(scene(model=model)).contact.plot()
+    titles = [axes.get_title() for axes in figure.axes]
+    assert "sizes of the spots" in titles
+    assert ("gap; contact in red" in titles) == (model == "half-space")
+
+
+def test_modulus_scales_pressure_and_stiffness():
+    step = run(scene()).steps[-1].with_modulus(3.0)
+    stiffer = run(scene(block={"young_modulus": 12000.0, "poisson_ratio": 0.15})).steps[-1]
+    assert step.peak_pressure_MPa == pytest.approx(stiffer.peak_pressure_MPa, rel=1e-9)
+    assert step.stiffness_N_per_mm == pytest.approx(stiffer.stiffness_N_per_mm, rel=1e-6)
