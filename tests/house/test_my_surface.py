@@ -72,6 +72,15 @@ def test_numbers_of_the_page_are_those_of_its_commands(said):
     assert f"falls from {most} to {least} µm" in " ".join(PAGE.split())
 
 
+def test_contacts_are_as_many_and_as_loaded_as_the_page_says(said, place):
+    results = place / "results" / "my_surface"
+    rows = (results / "contacts.csv").read_text(encoding="utf-8").splitlines()
+    assert f"of the {len(rows) - 1} spots" in PAGE
+    peak = max(float(row.split(",")[-1]) for row in rows[1:])
+    assert f"{1e-3 * peak:.1f} GPa at most" in PAGE
+    assert (results / "contact.png").is_file()
+
+
 def test_python_of_the_page_runs_where_its_commands_ran(said, place):
     (example,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     done = subprocess.run(
