@@ -1,7 +1,7 @@
 """Geometry of rough contact.
 
 A spectrum or a file yields a surface. From the surface follow its statistics, its asperities and
-its means over patches. A rigid plane presses on it, as a load step prescribes. Materials tell the
+its means over patches. A rigid plane presses on it, as a load step prescribes. Materials give the
 contact modulus, and block shapes the mesh of the body under the surface.
 """
 
@@ -10,12 +10,8 @@ from geometry.errors import InputError, NotConverged, PatchlawError
 from geometry.files.reading import read_surface
 from geometry.materials import Material, MaterialPair
 from geometry.meshes.block import BlockShape, misalignment
-from geometry.meshes.families import (
-    characteristic_size,
-    places_in_reach,
-    reference_shapes,
-    suggested_fine,
-)
+from geometry.meshes.expected_contact import places_in_reach
+from geometry.meshes.families import characteristic_size, reference_shapes, suggested_fine
 from geometry.meshes.refined_block import RefinedShape
 from geometry.patches import Partition, PatchGrid, UnevenPartition, overlaps, patch_means
 from geometry.rigid_plane import Control, RigidPlane

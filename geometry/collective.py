@@ -62,7 +62,13 @@ def together(comm: Any, work: Callable[[], T]) -> T:
     return result  # type: ignore[return-value]
 
 
-def shared(comm: Any, count: int, work: Callable[[int], T], first: int = 0) -> list[T]:
+def shared(
+    comm: Any,
+    count: int,
+    work: Callable[[int], T],
+    first: int = 0,
+    observe: Callable[[int], None] | None = None,
+) -> list[T]:
     """Do tasks of a list in turn on all ranks: the first on one, the second on the next.
 
     Args:
@@ -70,6 +76,8 @@ def shared(comm: Any, count: int, work: Callable[[int], T], first: int = 0) -> l
         count: Number of tasks.
         work: Does the task of an index; must not communicate itself.
         first: Rank that takes the first task, modulo the number of ranks.
+        observe: Called on every rank after each task of its own, with the number of tasks that all
+            ranks have done by then if they are equally quick.
 
     Returns:
         The results of all tasks in their order, on every rank.
@@ -82,7 +90,14 @@ def shared(comm: Any, count: int, work: Callable[[int], T], first: int = 0) -> l
     """
     rank, size = (0, 1) if comm is None else (comm.rank, comm.size)
     own = range((rank - first) % size, count, size)
-    mine = together(comm, lambda: [work(index) for index in own])
+
+    def done(turn: int, index: int) -> T:
+        result = work(index)
+        if observe is not None:
+            observe(min(size * (turn + 1), count))
+        return result
+
+    mine = together(comm, lambda: [done(turn, index) for turn, index in enumerate(own)])
     gathered = [mine] if size == 1 else comm.allgather(mine)
     return [gathered[(index + first) % size][index // size] for index in range(count)]
 

@@ -71,8 +71,8 @@ class Interpolant:
     def __call__(self, x: ArrayLike, y: ArrayLike, *, dx: int = 0, dy: int = 0) -> Array:
         """Evaluate the spline or one of its derivatives.
 
-        On the lattice of rising abscissae (n, 1) and ordinates (1, m) that takes a tenth of the
-        time of n m points.
+        On a lattice, given by rising abscissae (n, 1) and ordinates (1, m), this takes a tenth of
+        the time that it takes at n m scattered points.
 
         Args:
             x: Abscissae [mm]; broadcast against ``y``.

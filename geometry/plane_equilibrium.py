@@ -7,7 +7,7 @@ slope of the energy along it has fallen, which always ends. Against a motion tha
 resists the plane goes on until one does.
 
 Source:
-    Nocedal & Wright 2006, ch. 3 (line search) and 6 (BFGS), doi 10.1007/978-0-387-40065-5.
+    Nocedal & Wright 2006, ch. 6 (BFGS), doi 10.1007/978-0-387-40065-5.
 """
 
 from __future__ import annotations
@@ -20,28 +20,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import NotConverged
-from geometry.rigid_plane import Control, motion_units
+from geometry.rigid_plane import Control, motion_units, plane_failure
+from geometry.slope_search import slope_search
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
 
 TOLERANCE = 1e-10
-"""What force and moments may miss, relative to the force and to that times half the diagonal."""
+"""Largest residual of force and moments, over the force and over that times half the diagonal."""
 
 UNSUPPORTED = 1e-11
 """Stiffness against a motion of the plane, relative to the largest, that counts as none."""
 
 _AIM = 1e-13
-"""What force and moments miss where the rounding of displacements allows it."""
-_DECREASE = 0.9
-"""Share of the energy's slope that may remain after a step."""
+"""The same that is aimed at, as far as the rounding of displacements allows it."""
 _CLEAR = 1e-6
 """Force, relative to the largest so far, below which the plane may be about to lift off."""
 _FIRST, _FARTHEST = 1e-6, 1e3
-"""First trial of a motion that nothing resists and the last, in halves of the diagonal."""
+"""First and farthest trial of a motion that no contact resists, in halves of the diagonal."""
 _ROUNDING = 64.0 * float(np.finfo(float).eps)
-"""Step, relative to the motions of the plane, that is only rounding."""
-_MOST_STEPS, _MOST_TRIALS, _MOST_RETREATS = 100, 100, 6
+"""Step that counts as rounding, relative to the motions of the plane."""
+_MOST_STEPS, _MOST_RETREATS = 100, 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -86,8 +85,8 @@ def find_equilibrium(
         control: What is prescribed.
         start: Approach and slopes to start from, with those that are prescribed, shape (3,).
         half: Half the diagonal of the interface [mm].
-        aim: What force and moments should miss at most, relative to the force and to that times
-            ``half``; `TOLERANCE` will do where no step brings them closer.
+        aim: Residual of force and moments to aim at, relative to the force and to that times
+            ``half``; `TOLERANCE` is accepted where no step brings them closer.
         nearly: Whether stiffnesses are inexact; the last step corrects them then (BFGS).
         first_touch: Approach of first touch under the slopes of the start [mm], where contacts
             may refuse to be pressed farther than their model can bear: steps are shortened then,
@@ -209,45 +208,6 @@ class _FreeMotions(Generic[T]):
         longest = self._half / float(np.abs(step).max())
         share = slope_search(slope_after, float(now.residual @ step), min(1.0, longest))
         return (0.0, None) if share is None else (share, found)
-
-
-def slope_search(slope_after: Callable[[float], float], slope: float, share: float) -> float | None:
-    """Shorten or lengthen a step until the slope of a convex function along it has fallen.
-
-    Args:
-        slope_after: Returns the slope along the step after a share of it; infinite where the
-            share is to be shortened anyway. The share that is returned was evaluated last.
-        slope: Slope before the step, negative.
-        share: Share of the step to try first.
-
-    Returns:
-        A share after which the size of the slope is at most 0.9 times that before; None when
-        there is none to rounding.
-    """
-    low, high = 0.0, np.inf
-    for _ in range(_MOST_TRIALS):
-        left = slope_after(share)
-        if abs(left) <= _DECREASE * abs(slope):
-            return share
-        low, high = (share, high) if left < 0.0 else (low, share)
-        share = 3.0 * share if high == np.inf else 0.5 * (low + high)
-    return None
-
-
-def plane_failure(control: Control, reason: str, iterations: int = 0) -> NotConverged:
-    """Return the error of a plane that finds no equilibrium."""
-    remedies = {
-        "NO_CONTACT": "no patch can be touched",
-        "NO_SUPPORT": "no further patch can be touched that would hold the plane: prescribe its "
-        "tilt (load.tilt) or take more patches (patches.grid)",
-    }
-    usual = "take more load steps (load.steps) or prescribe the tilt (load.tilt)"
-    return NotConverged(
-        f"the equilibrium of the plane at {control}",
-        reason=reason,
-        iterations=iterations,
-        remedy=remedies.get(reason, usual),
-    )
 
 
 def _direction(

@@ -14,7 +14,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry.errors import InputError
+from geometry.errors import InputError, NotConverged
 from geometry.patches import Partition
 
 Array = NDArray[np.float64]
@@ -252,6 +252,22 @@ def motion_units(half: float) -> Array:
         half: Half the diagonal of the interface [mm].
     """
     return np.array([1.0, 1.0 / half, 1.0 / half])
+
+
+def plane_failure(control: Control, reason: str, iterations: int = 0) -> NotConverged:
+    """Return the error of a plane that finds no equilibrium."""
+    remedies = {
+        "NO_CONTACT": "no patch can be touched",
+        "NO_SUPPORT": "no further patch can be touched that would hold the plane: prescribe its "
+        "tilt (load.tilt) or take more patches (patches.grid)",
+    }
+    usual = "take more load steps (load.steps) or prescribe the tilt (load.tilt)"
+    return NotConverged(
+        f"the equilibrium of the plane at {control}",
+        reason=reason,
+        iterations=iterations,
+        remedy=remedies.get(reason, usual),
+    )
 
 
 def _check_approach(approach: float) -> None:

@@ -20,24 +20,10 @@ from typing import Any
 import threadpoolctl
 
 from geometry.errors import InputError, PatchlawError
-from multiscale.installation import removal, shadows
+from multiscale.installation import removal, shadows, versions
 from multiscale.machine import control_group_memory, detached_processes
 
 _SEVERITY = {"ok": 0, "warning": 1, "fail": 2}
-_OLDEST = {
-    "numpy": (1, 24),
-    "scipy": (1, 10),
-    "dolfinx": (0, 5),
-    "petsc4py": (3, 18),
-    "mpi4py": (3, 1),
-    "h5py": (3, 7),
-    "gmsh": (4, 8),
-    "pydantic": (2, 7),
-    "jinja2": (3, 1),
-    "matplotlib": (3, 6),
-}
-"""The oldest release of every package that patchlaw is tested with."""
-
 _LAUNCHERS = {"Open MPI": "Open MPI", "HYDRA": "MPICH", "MPICH": "MPICH", "Intel": "Intel"}
 """Words by which launchers of MPI are known, and those by which the libraries of each are."""
 _LEAST_MEMORY = 1e9  # per rank, below which a warning is given [B]
@@ -124,22 +110,12 @@ def packages(comm: Any, load: Callable[[str], Any] = importlib.import_module) ->
         comm: MPI communicator, or None.
         load: Imports a package by its name.
     """
-    found, wrong = [f"python {platform.python_version()}"], {}
-    for name, oldest in _OLDEST.items():
-        try:
-            version = str(getattr(load(name), "__version__", "?"))
-        except ImportError as error:
-            wrong[name] = f"{name}: {error}"
-            continue
-        found.append(f"{name} {version}")
-        numbers = re.match(r"(\d+)\.(\d+)", version)
-        if numbers and tuple(map(int, numbers.groups())) < oldest:
-            wrong[name] = f"{name} {version} is older than {'.'.join(map(str, oldest))}"
+    found, wrong = versions(load)
     if shadowing := shadows():
         text = "; ".join([*map(str, shadowing), *wrong.values()])
         return CheckResult("fail" if wrong else "warning", text, removal(shadowing))
     if not wrong:
-        return CheckResult("ok", ", ".join(found))
+        return CheckResult("ok", ", ".join([f"python {platform.python_version()}", *found]))
     state = "warning" if set(wrong) == {"matplotlib"} else "fail"  # it draws figures alone
     return CheckResult(state, "; ".join(wrong.values()), "take Debian 12 or newer, run ./setup.sh")
 

@@ -1,14 +1,30 @@
-"""Finds packages that shadow those of the distribution, which compiled parts were built against."""
+"""Checks packages: their versions, and which shadow those that compiled parts were built with."""
 
 from __future__ import annotations
 
 import os
+import re
 import sys
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from typing import Any
+
+_OLDEST = {
+    "numpy": (1, 24),
+    "scipy": (1, 10),
+    "dolfinx": (0, 5),
+    "petsc4py": (3, 18),
+    "mpi4py": (3, 1),
+    "h5py": (3, 7),
+    "gmsh": (4, 8),
+    "pydantic": (2, 7),
+    "jinja2": (3, 1),
+    "matplotlib": (3, 6),
+}
+"""The oldest release of every package that patchlaw is tested with."""
 
 _SHARED = ("numpy", "scipy", "h5py", "mpi4py", "petsc4py")
 """Packages that dolfinx and each other's compiled parts share."""
@@ -37,6 +53,30 @@ class Shadow:
             f"{self.name}{here} in {self.place} shadows the distribution's{there} in {self.below}, "
             "which dolfinx and others are built against"
         )
+
+
+def versions(load: Callable[[str], Any] = import_module) -> tuple[list[str], dict[str, str]]:
+    """Import every package and compare its version with the oldest that is tested.
+
+    Args:
+        load: Imports a package by its name.
+
+    Returns:
+        The packages with their versions; and by name what is wrong with those that are missing or
+        too old.
+    """
+    found, wrong = [], {}
+    for name, oldest in _OLDEST.items():
+        try:
+            version = str(getattr(load(name), "__version__", "?"))
+        except ImportError as error:
+            wrong[name] = f"{name}: {error}"
+            continue
+        found.append(f"{name} {version}")
+        numbers = re.match(r"(\d+)\.(\d+)", version)
+        if numbers and tuple(map(int, numbers.groups())) < oldest:
+            wrong[name] = f"{name} {version} is older than {'.'.join(map(str, oldest))}"
+    return found, wrong
 
 
 def shadows(path: Sequence[str] | None = None) -> list[Shadow]:

@@ -25,6 +25,7 @@ from multiscale.machine import cluster_nodes, large_object_comm
 from multiscale.measured_errors import checked, error_notes
 from multiscale.planning.auto_keys import resolved_sections
 from multiscale.planning.problem_setup import make_setup
+from multiscale.readable import Observer
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
 from multiscale.scene.scene import Scene
@@ -46,6 +47,7 @@ class Run:
         resolved: Values of the scene's auto keys when the run began; see `resolved_sections`.
 
     Attributes:
+        observe: Called with what the run is at, once it is set.
         given: The scene as the user wrote it.
         setup: The problem set up from it: surface, summits, patches, micro model.
         scene: The scene with values for its auto keys.
@@ -59,7 +61,9 @@ class Run:
     def __init__(
         self, scene: Scene, comm: Any = None, resolved: Mapping[str, Any] | None = None
     ) -> None:
+        self._began = time.perf_counter()
         self.given, self.comm = scene, comm
+        self.observe: Observer | None = None
         self.steps: list[LoadStep] = []
         self.position = LoadPosition()
         self.table: LawTable | None = None
@@ -72,6 +76,7 @@ class Run:
         self.setup: ProblemSetup = on_root(large, lambda: make_setup(scene, resolved, nodes))
         self.scene, self.seconds = self.setup.scene, dict(self.setup.seconds)
         self._recorder = ContactRecorder(self.setup, self._model_on_body, comm)
+        self._until = time.perf_counter()
 
     def make_body(self) -> OnBody | None:
         """Make what puts the half-space model on its body, once; None for other micro models."""
@@ -95,7 +100,7 @@ class Run:
         if self.table is None:
             model = self.make_model()
             with self.phase("laws"):
-                self.table = assembly.make_table(self.setup, model, self.comm)
+                self.table = assembly.make_table(self.setup, model, self.comm, self.observe)
         return self.table
 
     def make_coupling(self) -> Coupling:
@@ -165,6 +170,12 @@ class Run:
                 return step
 
     @property
+    def times(self) -> dict[str, float]:
+        """Wall time of each phase that ended, and of all else until then as ``other`` [s]."""
+        rest = self._until - self._began - sum(self.seconds.values())
+        return {**self.seconds, "other": max(rest, 0.0)}
+
+    @property
     def finished(self) -> bool:
         """Whether the load history has come to its end."""
         return self.position.is_at_end(self.scene.loading.load_history)
@@ -223,7 +234,7 @@ class Run:
         return History(
             steps=steps,
             patches=self.setup.patches,
-            seconds=dict(self.seconds),
+            seconds=self.times,
             notes=(*notes, *error_notes(self.steps, self.given.accuracy), *mesh_notes),
             reference=record,
             contact_records=self.contacts,
@@ -262,11 +273,14 @@ class Run:
         Args:
             name: Its name in `seconds`.
         """
+        if self.observe is not None:
+            self.observe(name, 0, 0)
         start = time.perf_counter() - sum(self.seconds.values())
         try:
             yield
         finally:
-            spent = time.perf_counter() - sum(self.seconds.values()) - start
+            self._until = time.perf_counter()
+            spent = self._until - sum(self.seconds.values()) - start
             self.seconds[name] = self.seconds.get(name, 0.0) + spent
 
 

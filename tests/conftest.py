@@ -11,19 +11,10 @@ import pytest
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
+from mpi_environment import MPI_ENVIRONMENT
 
 # a test computes what it tests, and leaves nothing in the home of who runs it
 os.environ["PATCHLAW_CACHE"] = "off"
-
-MPI_ENVIRONMENT = {
-    "OMP_NUM_THREADS": "1",
-    # containers run tests as root, and with fewer cores than ranks
-    "OMPI_ALLOW_RUN_AS_ROOT": "1",
-    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-    "OMPI_MCA_rmaps_base_oversubscribe": "1",
-    "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
-    "OMPI_MCA_btl": "^tcp",
-}
 
 
 @pytest.fixture(scope="session")

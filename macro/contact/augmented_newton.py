@@ -13,8 +13,8 @@ from petsc4py import PETSc
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
-from geometry.plane_equilibrium import slope_search
 from geometry.rigid_plane import Control
+from geometry.slope_search import slope_search
 from macro import compat
 from macro.contact.equilibrium import Equilibrium
 from macro.contact.face_nodes import TopNodes

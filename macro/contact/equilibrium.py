@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.collective import together
-from geometry.plane_equilibrium import UNSUPPORTED, PlaneResponse, find_equilibrium, plane_failure
-from geometry.rigid_plane import Control, PlaneLevers
+from geometry.plane_equilibrium import UNSUPPORTED, PlaneResponse, find_equilibrium
+from geometry.rigid_plane import Control, PlaneLevers, plane_failure
 from macro.contact.law_interface import ContactLaw, Interface, Sampling
 from macro.linear_solvers.options import WeakContext
 

@@ -51,7 +51,7 @@ class PlaneOverNodes:
         self.levers = PlaneLevers.at(x, y, lengths, comm=comm)
 
     def placed(self, control: Control, plane: Array) -> Array:
-        """Return where the plane is, as far as that is prescribed, and elsewhere the start.
+        """Return the plane with its prescribed motions, and with its free ones as at the start.
 
         Without any force the plane just touches the top.
 

@@ -55,7 +55,7 @@ _SMALLEST, _SMALLEST_STRESS, _LARGEST = 1e-8, 1e-11, 40.0
 def side_compliance(poisson_ratio: float, x: Array, wave_number: float) -> Array:
     """Return normal displacements at distances x from the edge by line loads at distances x.
 
-    They are what is there of the side alone, for E* = 1.
+    Only what the side adds to the half-space is returned, for E* = 1.
 
     Args:
         poisson_ratio: ν.
@@ -75,7 +75,7 @@ def side_compliance(poisson_ratio: float, x: Array, wave_number: float) -> Array
 def side_stresses(poisson_ratio: float, x: Array, wave_number: float) -> Array:
     """Return stresses at distances x from the edge by line loads at distances x.
 
-    They are what is there of the side alone.
+    Only what the side adds to those of the half-space is returned.
 
     Args:
         poisson_ratio: ν.

@@ -35,14 +35,16 @@ _FEW = 6
 hardly touch (1e-5 … 1e-3 of the largest force) the slowest took 9 times the products of the level
 plane; it took 74 times when this waited until a step failed. With 12 the median doubles."""
 _CONSTRAINED_WEIGHT = 1e-8
-"""Weight of cells that touch without pressure in the body's motions, of the largest pressure."""
+"""Weight of a cell that touches without pressure, where free motions are found from the gaps,
+relative to the largest pressure."""
 _NOISE = 1e-12
-"""Changes of a pressure at a bound that are rounding, of the largest pressure: loads that must stay
-as they are may leave a cell none."""
+"""Change of a pressure at a bound, relative to the largest pressure, that counts as rounding: where
+the prescribed loads allow a cell no change, rounding remains."""
 _ROUNDING = 4.0 * float(np.finfo(float).eps)
-"""Accuracy of the gaps of a plane free to turn, of its largest distance."""
+"""Rounding of the gaps under a plane that is free to turn, relative to its largest distance."""
 _FORCING = (0.2, 0.01)
-"""Parts of the present error that a step leaves of the gaps, in a new set and in the same set."""
+"""Gaps at which the conjugate gradients of a step end, relative to the present residual: in a set
+of cells that has changed, and in the same set as before."""
 
 
 class ActiveSet:

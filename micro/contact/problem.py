@@ -133,9 +133,10 @@ class ContactProblem:
         return self.motions.scaled_to_loads(pressure, self.upper) if found is None else found
 
     def first_at_bounds(self, pressure: Array, change: Array) -> tuple[Indices, float]:
-        """Return which cells a change drives out of the bounds first, and the part it may do.
+        """Return the cells that meet their bounds first along a change, and its share up to there.
 
-        Of cells that are at their bound already, it is the half that is driven most.
+        Cells that the change would drive out of a bound which they are at already come first, with
+        a share of 0: the half of them that it changes most.
 
         Args:
             pressure: Pressures / E* of some cells, within the bounds, shape (n,).

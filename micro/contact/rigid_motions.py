@@ -32,12 +32,13 @@ _LONGEST = 1.5
 _FARTHEST = 60.0
 """Largest exponent; loads that need more cannot be met by pressures on these cells."""
 _AT_BOUND = 1e-13
-"""Share of the bound: pressures no further below it lie on it."""
+"""Pressures below the upper bound by no more than this share of it count as lying on it."""
 _DECREASE = 0.9
-"""Share of its first slope that the function may have beyond its lowest point."""
+"""Slope along a step, relative to that before it, that a step may have where it went beyond the
+lowest point of the convex function."""
 _ROUNDING, _ENOUGH = 1e-14, 1e-12
-"""What pressures may miss of the loads, relative to what they could do on the longest lever: aim,
-and what will do where steps gain no more."""
+"""Residual of the loads, relative to those that all pressures would have on the longest lever: the
+one that is aimed at, and the one that is accepted where steps gain no more."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -152,7 +152,7 @@ def nested_start(problem: ContactProblem) -> Array:
 
 
 def refined(field: Array, factors: Sequence[int]) -> Array:
-    """Repeat cells."""
+    """Return the value of every coarse cell on each of the finer cells that it covers."""
     return np.repeat(np.repeat(field, factors[0], axis=0), factors[1], axis=1)
 
 

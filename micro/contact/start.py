@@ -1,7 +1,7 @@
 """Pressures that a search for the contact can start from: within their bounds, with their loads.
 
-A body that may turn about a given point is not pressed by any load. It stands clear of the surface,
-or some cells hold it: a linear programme tells which.
+Where the approach is prescribed and the tilt is free, no load presses the body. Either it turns
+until it is clear of the surface, or some cells hold it: a linear programme tells which.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ _EVEN_SHARES = 0.0, *np.logspace(-3.0, 6.0, 10)
 """Shares of uniform pressure that are added, one after the other, until a start meets the loads."""
 _MOST_CONDITIONS = 500
 _MOST_MOTION = 100.0
-"""Bound of the motions, relative to the largest interference; it counts while cells are few."""
+"""Bound of the motions, relative to the largest interference. It keeps the programme finite while
+it has the conditions of few cells only."""
 _ROUNDING = 1e-13
 
 

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq, linprog
 
 from geometry import Control
-from geometry.plane_equilibrium import PlaneResponse, find_equilibrium, plane_failure
-from geometry.rigid_plane import PlaneLevers, RigidPlane
+from geometry.plane_equilibrium import PlaneResponse, find_equilibrium
+from geometry.rigid_plane import PlaneLevers, RigidPlane, plane_failure
 
 Array = NDArray[np.float64]
 T = TypeVar("T")

@@ -10,20 +10,13 @@ import argparse
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 from types import FrameType
-from typing import Any, NoReturn
+from typing import Any
 
-from multiscale.comparison import AGAINST
+from multiscale.cli.words import UsageError, command_parser
 from multiscale.output.streams import sturdy_streams
-
-SWEEP_ENDING = "-sweep"
-"""What the results folder of a sweep is called after the scene's name."""
-
-COMPARE_ENDING = "-compare"
-"""What the results folder of a comparison is called after the scene's name."""
 
 _INTERRUPTED = 130  # exit code after SIGINT, as shells have it
 _WRONG_INPUT = 2  # and of what is installed; errors with exit codes need numpy
@@ -39,15 +32,6 @@ class Ended(KeyboardInterrupt):
     def __init__(self, number: int) -> None:
         super().__init__(number)
         self.exit_code = 128 + number
-
-
-class UsageError(Exception):
-    """The words of the command line are not understood."""
-
-
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        raise UsageError(f"{message} (see: {self.prog} --help)")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -88,7 +72,7 @@ def _run(words: list[str]) -> int:
     cut = words.index("--") if "--" in words else len(words)
     choice: argparse.Namespace | str
     try:
-        choice = _parser().parse_args(words[:cut])
+        choice = command_parser().parse_args(words[:cut])
     except UsageError as error:  # for rank 0 to say, which is known once MPI has started
         choice = str(error)
     from multiscale.installation import works_together
@@ -98,22 +82,6 @@ def _run(words: list[str]) -> int:
     from multiscale.cli.execution import execute
 
     return execute(choice, words[cut + 1 :])
-
-
-class _ShowVersions(argparse.Action):
-    """Prints the versions of patchlaw and of dolfinx, which is not loaded for it."""
-
-    def __call__(self, *given: Any) -> NoReturn:
-        from importlib import metadata  # takes longer than all else that --help needs
-
-        found = []
-        for name, distribution in (("patchlaw", "patchlaw"), ("dolfinx", "fenics-dolfinx")):
-            try:
-                found.append(f"{name} {metadata.version(distribution)}")
-            except metadata.PackageNotFoundError:
-                found.append(f"{name} not installed")
-        print(", ".join(found))
-        raise SystemExit(0)
 
 
 @contextmanager
@@ -137,122 +105,3 @@ def signals_raise() -> Iterator[None]:
 
 def _raise(number: int, frame: FrameType | None) -> None:
     raise Ended(number)
-
-
-def wall_time(text: str) -> float:
-    """Return a wall time in seconds.
-
-    Args:
-        text: A quantity such as ``"55m"`` or ``"2 h"``.
-
-    Raises:
-        argparse.ArgumentTypeError: When the text is no time, or not greater than zero.
-    """
-    from multiscale.scene.quantities import parse_duration
-
-    try:
-        return parse_duration(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(f"{text!r}: {error}") from None
-
-
-def sweep_part(text: str) -> tuple[int, int]:
-    """Return the part of a sweep that a text ``K/N`` names.
-
-    Args:
-        text: Number of the part, from 1, and number of parts.
-
-    Raises:
-        argparse.ArgumentTypeError: When the text is nothing of this kind.
-    """
-    which, _, parts = text.partition("/")
-    if which.isdecimal() and parts.isdecimal() and 1 <= int(which) <= int(parts):
-        return int(which), int(parts)
-    raise argparse.ArgumentTypeError(f"{text!r} is no part of a sweep; it is K/N, such as 2/8")
-
-
-_TIME: dict[str, Any] = {"type": wall_time, "metavar": "TIME"}
-
-
-def _parser() -> argparse.ArgumentParser:
-    """Return the parser of the command line; `function` says where the code of a command is."""
-    top = _Parser(
-        prog="patchlaw",
-        description="Multiscale contact of rough surfaces.",
-        epilog="PETSc options follow after --, such as: patchlaw run scene.toml -- -ksp_monitor",
-    )
-    top.add_argument("--version", action=_ShowVersions, nargs=0, help="show versions and exit")
-    commands = top.add_subparsers(required=True, metavar="COMMAND", parser_class=_Parser)
-
-    def command(name: str, function: str, summary: str) -> argparse.ArgumentParser:
-        made = commands.add_parser(name, help=summary, description=summary)
-        made.set_defaults(function=function)
-        return made
-
-    _add_runs(command)
-    _add_descriptions(command)
-    return top
-
-
-def _add_runs(command: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
-    """Add the commands that run scenes."""
-    run = command("run", "run.run_scene", "Run a scene; write history, laws, figures and report.")
-    run.add_argument("--resume", action="store_true", help="go on with an interrupted run")
-    run.add_argument("--max-time", help="stop cleanly before this wall time is over", **_TIME)
-    _add_scene(run)
-    compare = command(
-        "compare",
-        "compare.compare_scene",
-        "Run a scene in every sensible configuration; draw error against time.",
-    )
-    _add_scene(compare, ending=COMPARE_ENDING)
-    against = f"compare with {', '.join(AGAINST)}; by default the best that is reached"
-    compare.add_argument("--against", metavar="KIND", choices=AGAINST, help=against)
-    budget = "wall time for all configurations, such as 5min; by default any"
-    compare.add_argument("--budget", help=budget, **_TIME)
-    ranks = "processes of each configuration, under mpirun"
-    compare.add_argument("--ranks", type=int, default=1, metavar="N", help=ranks)
-    sweep = command(
-        "sweep",
-        "sweep.sweep_scene",
-        "Run a scene for many values of its keys; write all load steps, means and bands.",
-    )
-    _add_scene(sweep, ending=SWEEP_ENDING)
-    values = (
-        "values of a key, such as surface.spectrum.seed=0..19 or "
-        "block.young_modulus='1 GPa, 4 GPa'; several keys make all combinations"
-    )
-    sweep.add_argument("--vary", action="append", required=True, metavar="KEY=VALUES", help=values)
-    part = "run the K-th of N parts of the cases; by default the task of a Slurm array"
-    sweep.add_argument("--part", metavar="K/N", type=sweep_part, help=part)
-    anew = "begin anew where another sweep's results are"
-    sweep.add_argument("--overwrite", action="store_true", help=anew)
-
-
-def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
-    """Add the commands that run no scene."""
-    plan = "Say what a run would do, and why; run nothing expensive."
-    unused = "accepted so that the words of a run can be reused: a plan writes nothing"
-    _add_scene(command("plan", "describe.plan_scene", plan), folder=unused)
-    laws = "Tabulate the patch laws of a scene; write and draw them."
-    _add_scene(command("laws", "describe.tabulate_laws", laws))
-    surface = "Describe and draw the surface of a scene."
-    _add_scene(command("surface", "describe.describe_surface", surface))
-    command("schema", "describe.print_schema", "Print the JSON Schema of scene files.")
-    checks = "Check versions, MPI, threads, form compiler and memory; solve a small block."
-    doctor = command("doctor", "doctor.examine_machine", checks)
-    doctor.add_argument("--json", action="store_true", help="results as JSON, for scripts")
-    forms = "Compile all finite element forms now, so that later runs need no compiler."
-    names: dict[str, Any] = {"nargs": "+", "default": [], "metavar": "NAME"}
-    warm = command("warm", "doctor.compile_ahead", forms)
-    warm.add_argument("--element", help="Q1, Q2, P1, P2; all by default", **names)
-
-
-def _add_scene(command: argparse.ArgumentParser, *, folder: str = "", ending: str = "") -> None:
-    """Add what every command on a scene takes: the file, the results folder, changes of keys."""
-    command.add_argument("scene", type=Path, help="scene file (TOML)")
-    where = f"folder of the results (default: results/SCENE{ending}, by the file's name)"
-    command.add_argument("--out", type=Path, metavar="DIR", help=folder or where)
-    keys: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
-    changes = "change keys of the scene, such as load.approach='4 um'"
-    command.add_argument("--set", metavar="KEY=VALUE", help=changes, **keys)

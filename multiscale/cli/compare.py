@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from geometry.errors import InputError, NotConverged
-from multiscale.cli.command_line import COMPARE_ENDING
 from multiscale.cli.execution import scene_and_folder
+from multiscale.cli.words import COMPARE_ENDING
 from multiscale.comparison import errors
 from multiscale.comparison.compare import Launch, compare
 from multiscale.comparison.comparison import Comparison
 from multiscale.comparison.configuration import RunResult
-from multiscale.comparison.process import check_launchable
+from multiscale.comparison.launch import check_launchable
 from multiscale.output import terminal
 from multiscale.output.results import png
 from multiscale.restart.results_folder import locked
@@ -104,14 +104,15 @@ def write_comparison(folder: Path, comparison: Comparison) -> list[Path]:
 
 def _pictures(comparison: Comparison) -> dict[str, bytes]:
     """Return the figures as PNG images by name; matplotlib is loaded only here."""
-    from multiscale.comparison import figures
+    from multiscale.comparison.error_over_time import pareto_figure
+    from multiscale.comparison.figures import curves_figure, maps_figure
 
     drawn = {}
     if comparison.measure is not None:
-        drawn["pareto"] = figures.pareto_figure(comparison)
+        drawn["pareto"] = pareto_figure(comparison)
     if any(row.steps for row in comparison.rows):
-        drawn["curves"] = figures.curves_figure(comparison)
-        drawn["pressures"] = figures.maps_figure(comparison)
+        drawn["curves"] = curves_figure(comparison)
+        drawn["pressures"] = maps_figure(comparison)
     return {name: png(figure) for name, figure in drawn.items()}
 
 

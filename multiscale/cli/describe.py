@@ -1,17 +1,20 @@
-"""The commands that describe a scene without running it: plan, laws, surface, schema."""
+"""The commands that describe a scene without running it: plan, laws, surface, schema, help."""
 
 from __future__ import annotations
 
 import argparse
+import difflib
 import json
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from geometry.collective import on_root
+from geometry.errors import InputError
 from geometry.statistics import roughness
 from multiscale.cli.execution import scene_and_folder
-from multiscale.couplings.assembly import load_finite_elements
+from multiscale.couplings.assembly import check_has_laws, load_finite_elements
 from multiscale.laws.law_table import write_laws
 from multiscale.machine import cluster_nodes, large_object_comm
 from multiscale.output import terminal
@@ -20,8 +23,9 @@ from multiscale.planning import plan
 from multiscale.planning.block_plan import memory_warnings
 from multiscale.planning.costs import predicted_cost
 from multiscale.planning.problem_setup import make_setup
-from multiscale.restart.results_folder import locked
+from multiscale.restart.results_folder import locked, refuse_other_results
 from multiscale.run import Run
+from multiscale.scene.keys import Key, scene_keys
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
 from multiscale.storage import write_whole
@@ -59,9 +63,14 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
     """
     scene, folder = scene_and_folder(choice, comm)
     with locked(folder, comm):
+        if not choice.overwrite:
+            on_root(comm, lambda: refuse_other_results(folder, scene))
+        check_has_laws(scene)
         run = Run(scene, comm)
         terminal.show_plan(comm, run.setup)
-        table = run.make_laws()
+        with terminal.following(comm) as (begun, _):
+            run.observe = terminal.counting(begun)
+            table = run.make_laws()
 
         def write() -> list[Path]:
             from multiscale.output.figures import law_figure
@@ -84,6 +93,8 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
     """
     scene, folder = scene_and_folder(choice, comm)
     with locked(folder, comm):
+        if not choice.overwrite:
+            on_root(comm, lambda: refuse_other_results(folder, scene))
         setup = _setup(scene, comm)
         terminal.show_pairs(comm, _surface_facts(setup), setup.surface.notes)
 
@@ -121,3 +132,37 @@ def print_schema(choice: argparse.Namespace, options: list[str], comm: Any) -> N
     """
     if terminal.speaks(comm):
         print(json.dumps(Scene.model_json_schema(by_alias=True), indent=2))
+
+
+def explain_keys(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
+    """Explain the sections of a scene, the keys of one, or one key.
+
+    Args:
+        choice: Parsed words of the command line.
+        options: PETSc options given by the user.
+        comm: MPI communicator; None for a process on its own.
+    """
+    terminal.show_pairs(comm, list(_explained(choice.topic)))
+
+
+def _explained(topic: str | None) -> Iterator[tuple[str, str]]:
+    """Yield keys, each with what it means and may be."""
+    keys = scene_keys()
+    if topic is None:
+        yield from ((key.name, key.meaning) for key in keys.values() if "." not in key.name)
+        yield "more", "patchlaw help load, patchlaw help load.force"
+        return
+    found = [key for key in keys.values() if f".{key.name}".endswith(f".{topic}")]
+    if not found:
+        close = difflib.get_close_matches(topic, keys, n=1)
+        hint = f"; did you mean '{close[0]}'?" if close else ""
+        sections = ", ".join(key.name for key in keys.values() if key.is_section)
+        raise InputError(f"is no key of a scene{hint}", key="KEY", value=topic, allowed=sections)
+    for key in found:
+        yield key.name, key.meaning if key.is_section else _on_key(key)
+        inner = (one for one in keys.values() if one.name.rpartition(".")[0] == key.name)
+        yield from ((one.name, one.meaning if one.is_section else _on_key(one)) for one in inner)
+
+
+def _on_key(key: Key) -> str:
+    return f"{key.meaning}\nvalues: {key.values}\ndefault: {key.default}"

@@ -13,7 +13,13 @@ from multiscale.output.field_files import write_fields
 from multiscale.output.results import write_results
 from multiscale.restart.checkpoint import Checkpoint, CheckpointWriter
 from multiscale.restart.interruption import Interruption, Stopped
-from multiscale.restart.results_folder import find_checkpoint, go_on, is_finished, locked
+from multiscale.restart.results_folder import (
+    find_checkpoint,
+    go_on,
+    is_finished,
+    locked,
+    refuse_other_results,
+)
 from multiscale.run import Run
 
 
@@ -29,7 +35,11 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
         scene, folder = scene_and_folder(choice, comm)
         with locked(folder, comm) as lock:
             found = on_root(comm, lambda: find_checkpoint(folder, scene)) if choice.resume else None
-            run = Run(scene, comm, None if found is None else found.resolved)
+            if found is None and not choice.overwrite:
+                on_root(comm, lambda: refuse_other_results(folder, scene))
+            with terminal.following(comm) as (begun, _):
+                begun("setting up the problem")
+                run = Run(scene, comm, None if found is None else found.resolved)
             with CheckpointWriter(folder, run, lock.hold) as checkpoints:
                 if _announce(choice.resume, found, run, checkpoints):
                     _run(run, checkpoints, interruption, options)
@@ -69,7 +79,7 @@ def _run(
         files = write_results(folder, run, options=options)
         if run.scene.output.fields:
             files += write_fields(folder, run)
-        terminal.show_times(comm, run.seconds)
+        terminal.show_times(comm, run.times)
         terminal.show_files(comm, files)
     if failure is not None:
         raise failure
@@ -81,7 +91,7 @@ def _make_load_steps(
 ) -> PatchlawError | None:
     """Make the load steps with their checkpoints; return what ended them early, on all ranks."""
     load_history = run.scene.loading.load_history
-    with terminal.progress(run.comm, load_history, len(run.steps)) as advance:
+    with terminal.progress(run.comm, load_history, len(run.steps)) as (advance, run.observe):
         try:
             if run.setup.uses_laws:
                 run.make_laws()

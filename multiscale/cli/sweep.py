@@ -10,8 +10,8 @@ from typing import Any
 
 from geometry.collective import on_root
 from geometry.errors import InputError, NotConverged
-from multiscale.cli.command_line import SWEEP_ENDING
 from multiscale.cli.execution import scene_and_folder
+from multiscale.cli.words import SWEEP_ENDING
 from multiscale.output import terminal
 from multiscale.output.results import write_figure
 from multiscale.restart.results_folder import locked

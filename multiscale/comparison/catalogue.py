@@ -8,6 +8,7 @@ their results over the patches that pressures are compared on (`pressure_grid`).
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -16,27 +17,24 @@ from typing import Any
 from geometry.errors import InputError, NotConverged
 from geometry.meshes.families import suggested_fine
 from micro import MODEL_NAMES
-from multiscale.comparison.configuration import (
+from multiscale.comparison.configuration import OWN, Configuration
+from multiscale.comparison.scene_content import (
+    FITTED,
+    LOW_HEIGHTS,
     LOW_HEIGHTS_SCALE,
-    OWN,
-    Configuration,
     Content,
     Grid,
     coarser_grids,
     content_of,
+    name_of,
     pressure_grid,
     scaled,
 )
-from multiscale.planning.costs import Machine, predicted_cost
+from multiscale.planning.costs import predicted_cost
 from multiscale.planning.problem_setup import make_setup
 from multiscale.scene.scene import Scene
+from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.surface_and_block import LAW_BLOCK_CELLS, make_surface, patch_grid
-
-SMALL_SLOPES = ", small slopes"
-"""End of the name of a configuration that differs from another by neglecting finite slopes."""
-
-LOW_HEIGHTS = f", heights × {LOW_HEIGHTS_SCALE:g}"
-"""End of the name of that reference; the rest is the name of the one with true heights."""
 
 LAW_HEIGHTS = 128
 """Heights along a side, at most, of half-spaces behind laws of several numbers of patches."""
@@ -51,7 +49,6 @@ REFERENCE_MESHES = ((1, 2.0), (1, 1.0), (2, 1.0), (3, 1.0), (3, 0.5**0.5))
 """Numbers of meshes of references, and their edges relative to those that fit the contacts."""
 
 _HALF_SPACE: Content = {"model": "half-space"}
-_FITTED: Content = {"model": "elliptic", "curvature": "contact", "border": "include"}
 
 
 def configurations(scene: Scene, ranks: int = 1) -> tuple[Configuration, ...]:
@@ -64,25 +61,31 @@ def configurations(scene: Scene, ranks: int = 1) -> tuple[Configuration, ...]:
     Raises:
         InputError: When the surface cannot be read.
     """
-    machine = Machine()
     found: dict[str, Configuration] = {}
+    setups: dict[str, ProblemSetup] = {}
     # The scene itself comes first: an equal configuration does not replace its name.
     for proposal in _Catalogue(scene).proposals():
-        one = _allowed(proposal, machine)
+        one = _allowed(proposal, setups)
         if one is not None:
             one = replace(one, ranks=1 if one.kind == "analytic" else ranks)
             found.setdefault(one.key, one)
     return tuple(sorted(found.values(), key=lambda one: one.cost))
 
 
-def _allowed(proposal: Configuration, machine: Machine) -> Configuration | None:
+def _allowed(proposal: Configuration, setups: dict[str, ProblemSetup]) -> Configuration | None:
     """Return a configuration with all its keys and its cost; None when its scene is refused.
 
     A reference that does not fit into the memory stays, with the reason.
+
+    Args:
+        proposal: The configuration without its cost.
+        setups: A problem that was set up for each surface so far, to which others are added.
     """
-    cost, refusal = float("inf"), ""
+    cost, refusal, surface = float("inf"), "", json.dumps(proposal.content["surface"])
     try:
-        cost = predicted_cost(make_setup(proposal.scene), machine).total
+        setup = make_setup(proposal.scene, like=setups.get(surface))
+        cost = predicted_cost(setup).total
+        setups.setdefault(surface, setup)
     except (InputError, NotConverged) as error:
         if proposal.kind != "reference" or "GB of memory" not in str(error):
             return None
@@ -116,7 +119,7 @@ class _Catalogue:
         own: dict[str, Any] = {"patches": self._patches, "cells": self._own_cells}
         made = self._proposal(self._base["coupling"], accuracy=self._accuracy, **own)
         yield replace(made, name=f"{OWN}: {made.name}")
-        for micro in (*({"model": name} for name in MODEL_NAMES), _FITTED):
+        for micro in (*({"model": name} for name in MODEL_NAMES), FITTED):
             if micro != _HALF_SPACE:
                 yield self._proposal({"kind": "analytic"}, micro)
         for kind in ("analytic", "concurrent"):
@@ -143,7 +146,7 @@ class _Catalogue:
             content["patches"] = {"grid": list(patches)}
         if cells is not None:
             content["block"] = content["block"] | {"cells": list(cells)}
-        return Configuration(name=_name_of(content), content=content)
+        return Configuration(name=name_of(content), content=content)
 
     def _half_spaces(self, coupling: Content, **grids: Grid) -> Iterator[Configuration]:
         """Yield half-spaces on every grid, and one of them without finite slopes."""
@@ -199,28 +202,6 @@ class _Catalogue:
         return suggested_fine(make_surface(self._scene), loads.largest, tilt=loads.tilt)
 
 
-def _name_of(content: Content) -> str:
-    """Return the name of a scene among its configurations."""
-    micro, reference, surface = (content[name] for name in ("micro", "reference", "surface"))
-    kind, model, cells = content["coupling"]["kind"], micro["model"], content["block"].get("cells")
-    if kind == "reference":
-        meshes, fine = reference["meshes"], reference.get("fine")
-        name = f"reference, {meshes} mesh{'es' * (meshes > 1)}"
-        return f"{name}, {1e3 * fine:.3g} µm" if fine else name
-    name = kind
-    if kind in ("isolated", "consistent"):
-        name += f", {_times(content['patches']['grid'])} patches"
-    name += f", {model}" + ", fitted" * (micro == _FITTED)
-    if model == "half-space":
-        name += f" {_times(surface['grid'])}"
-    name += f", {_times(cells)} elements" if cells else ""
-    return name + SMALL_SLOPES * (micro.get("finite_slopes") is False)
-
-
 def _carries(cells: tuple[int, ...], patches: Grid) -> bool:
     """Tell whether enough elements lie under every patch."""
     return all(c >= CELLS_PER_PATCH * n for c, n in zip(cells[:2], patches, strict=True))
-
-
-def _times(counts: Sequence[int]) -> str:
-    return " × ".join(map(str, counts))

@@ -3,27 +3,23 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, BinaryIO, TypeAlias
+from typing import Any, TypeAlias
 
 from geometry.errors import InputError
 from multiscale.comparison import AGAINST
 from multiscale.comparison.catalogue import configurations
 from multiscale.comparison.comparison import Comparison, compared
 from multiscale.comparison.configuration import Configuration, RunResult, read_result, write_result
-from multiscale.comparison.process import check_launchable
+from multiscale.comparison.launch import check_launchable, launch_process
 from multiscale.planning.auto_keys import auto_keys, provisional, resolved_sections, with_resolved
 from multiscale.planning.problem_setup import make_setup
-from multiscale.restart.interruption import ENDING
+from multiscale.readable import duration
 from multiscale.scene.scene import Scene
 from multiscale.storage import write_json
 
@@ -33,14 +29,8 @@ Launch: TypeAlias = Callable[[Configuration, float | None], RunResult]
 AUTO_VALUES = "auto_values.json"
 """File of the values that were chosen for the scene's keys that are ``auto``."""
 
-TIME_TO_END = 5.0
-"""Time that a process has between SIGTERM and SIGKILL [s]."""
-
 REPEATABLE = ("done", "refused", "not converged")
 """How runs end that would end in the same way again."""
-
-PROGRAM = (sys.executable, "-m", "multiscale.comparison.process")
-"""Words that start the program of a process."""
 
 
 def compare(
@@ -166,8 +156,8 @@ def run_all(
         elif one.refusal:
             yield RunResult(configuration=one, status="refused", message=one.refusal), False
         elif left is not None and one.cost > left:
-            rest = f"{left:.2g} s" if left > 0.0 else "nothing"
-            why = f"it is predicted to take {one.cost:.2g} s, and the budget leaves {rest}"
+            rest = duration(left) if left > 0.0 else "nothing"
+            why = f"it is predicted to take {duration(one.cost)}, and the budget leaves {rest}"
             yield RunResult(configuration=one, status="not started", message=why), False
         else:
             if begin is not None:
@@ -175,67 +165,3 @@ def run_all(
             result = launch(one, left)
             write_result(path, result)
             yield result, False
-
-
-def launch_process(
-    configuration: Configuration, seconds: float | None, program: Sequence[str] = PROGRAM
-) -> RunResult:
-    """Run a configuration in a new process, or under ``mpirun``.
-
-    Args:
-        configuration: The configuration.
-        seconds: Wall time after which the process is ended [s]; None for any.
-        program: Words that start the program; it is given the name of a file with the
-            configuration, which it replaces by the result.
-    """
-    start, ranks = time.monotonic(), configuration.ranks
-    mpirun = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
-    with tempfile.TemporaryDirectory(prefix="patchlaw-compare-") as name:
-        file, errors = Path(name) / "result", Path(name) / "errors"
-        write_result(file, RunResult(configuration=configuration, status="not started"))
-        with errors.open("wb") as stream:
-            code = _exit_code([*mpirun, *program, str(file)], stream, seconds)
-        spent = time.monotonic() - start
-        result = read_result(file)
-        text = errors.read_text(encoding="utf-8", errors="replace")
-    if code is not None and result is not None and result.status != "not started":
-        return replace(result, start_s=result.start_s + spent)
-    result = RunResult(configuration=configuration, status="failed", exit_code=code)
-    if code is None:
-        why = f"ended after {spent:.1f} s, which was what the budget left"
-        return replace(result, status="over budget", message=why, start_s=spent)
-    lines = [line for line in text.splitlines() if line.strip(" -")]  # mpirun ends by a rule
-    why = lines[-1] if lines else f"its process ended with exit code {code}"
-    return replace(result, message=why)
-
-
-def _exit_code(command: list[str], errors: BinaryIO, seconds: float | None) -> int | None:
-    """Run a command in a group of processes of its own; None when its time is over.
-
-    The group ends with this function, however it ends. Signals that end this process are blocked
-    until the new one is known, so that it cannot be left behind.
-    """
-    # os.environ is without variables that MPI has set for this process
-    environment, process = os.environ | {"PATCHLAW_CACHE": "off"}, None
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
-    try:
-        process = subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=errors,
-            env=environment,
-            start_new_session=True,
-            preexec_fn=lambda: signal.pthread_sigmask(signal.SIG_SETMASK, mask),
-        )
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        return process.wait(seconds)
-    except subprocess.TimeoutExpired:
-        return None
-    finally:
-        for sign in (signal.SIGTERM, signal.SIGKILL):
-            if process is not None and process.poll() is None:
-                with suppress(ProcessLookupError, subprocess.TimeoutExpired):
-                    os.killpg(process.pid, sign)
-                    process.wait(TIME_TO_END)
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ import numpy as np
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from multiscale.comparison import AGAINST
-from multiscale.comparison.configuration import RunResult, pressure_grid
+from multiscale.comparison.configuration import RunResult
 from multiscale.comparison.errors import (
     ErrorBreakdown,
     ErrorCauses,
@@ -21,6 +20,8 @@ from multiscale.comparison.errors import (
     error_measures,
     uncertainty,
 )
+from multiscale.comparison.measure import ranked, refinements
+from multiscale.comparison.scene_content import pressure_grid
 from multiscale.scene.scene import Scene
 
 BUSY = 0.7
@@ -208,55 +209,6 @@ def compared(scene: Scene, results: Sequence[RunResult], against: str | None = N
         return found
     exact = f"{measure.name} has no error bar of its own: it is taken as exact"
     return replace(found, warnings=(*found.warnings, exact))
-
-
-def ranked(results: Sequence[RunResult], against: str) -> list[RunResult]:
-    """Return the finished results that could be the measure, the best first.
-
-    One mesh alone has no error bar, and is no measure.
-
-    Args:
-        results: All results.
-        against: Kind of the measure.
-    """
-    ended = [one for one in results if one.kind == AGAINST[against] and one.status == "done"]
-    fitting = [
-        one
-        for one in ended
-        if one.steps and one.configuration.scale == 1.0 and one.model in ("", "half-space")
-    ]
-    found = sorted(fitting, key=_fineness, reverse=True)
-    return [] if against == "reference" and found and _fineness(found[0])[0] < 2 else found
-
-
-def _fineness(result: RunResult) -> tuple[float, ...]:
-    """Return what makes a result better than another of its kind: the first that differs.
-
-    These are the number of meshes, the edges of the finest in a contact, finite slopes, heights.
-    """
-    one = result.configuration
-    reference = one.content["reference"] if one.kind == "reference" else {}
-    meshes, edges = reference.get("meshes", 0), reference.get("fine", 0.0)
-    return meshes, -edges, result.finite_slopes, math.prod(one.heights)
-
-
-def refinements(best_first: Sequence[RunResult]) -> Iterator[tuple[RunResult, RunResult]]:
-    """Yield, for edges and for heights, the finest pair of results that differ by nothing else.
-
-    Numbers of meshes are no refinement: the finest of the meshes is the same.
-
-    Args:
-        best_first: Finished results of one kind, the best first.
-
-    Yields:
-        The coarser and the finer result.
-    """
-    for refined in (1, 3):  # places of edges and heights in `_fineness`
-        for fine, coarse in combinations(best_first, 2):
-            pairs = enumerate(zip(_fineness(fine), _fineness(coarse), strict=True))
-            if [place for place, (one, other) in pairs if one != other] == [refined]:
-                yield coarse, fine
-                break
 
 
 def _warnings(rows: Sequence[Row], against: str | None, chosen: str | None) -> Iterator[str]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,8 @@ from pydantic import PlainSerializer, PlainValidator, TypeAdapter
 
 from geometry.errors import PatchlawError
 from geometry.patches import PatchGrid
+from multiscale.comparison.scene_content import Content, Grid
 from multiscale.scene.scene import Scene
-from multiscale.setup.surface_and_block import patch_grid
 from multiscale.storage import write_bytes
 
 Array = Annotated[
@@ -26,30 +26,10 @@ Array = Annotated[
     PlainSerializer(np.ndarray.tolist),
 ]
 """An array of numbers, which JSON holds as lists."""
-Content: TypeAlias = dict[str, Any]
-Grid: TypeAlias = tuple[int, int]
-"""Heights or patches along x and y."""
 Status = Literal["done", "not converged", "refused", "failed", "over budget", "not started"]
 
 OWN = "the scene as it is"
 """Beginning of the name of the configuration that runs the scene as its file states it."""
-
-LOW_HEIGHTS_SCALE = 0.1
-"""Heights and load of a reference with small slopes, relative to those of the scene."""
-
-FEWEST_HEIGHTS = 32
-"""Heights along a side, at least, of coarser versions of a surface."""
-
-HEIGHTS_PER_WAVE = 3
-"""Heights per shortest wave of the spectrum, at least, of coarser versions."""
-
-_NO_OUTPUT: Content = {
-    "figures": False,
-    "report": False,
-    "fields": False,
-    "check": "none",
-    "contact": "none",
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -242,52 +222,3 @@ def read_result(path: Path) -> RunResult | None:
 
 def _checksum(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
-
-
-def pressure_grid(scene: Scene) -> Grid:
-    """Return the patches that pressures are compared on: the scene's, divided to at least 4 × 4."""
-    nx, ny = (count * -(-4 // count) for count in patch_grid(scene))
-    return nx, ny
-
-
-def content_of(scene: Scene) -> Content:
-    """Return a scene as it would stand in a file, without output and without halved load steps."""
-    content = scene.model_dump(by_alias=True, mode="json", exclude_none=True)
-    if scene.surface_path is not None:
-        content["surface"]["file"] = str(scene.surface_path.resolve())
-    content["load"].pop("force_change", None)
-    return content | {"output": _NO_OUTPUT}
-
-
-def scaled(content: Content) -> Content:
-    """Return a scene with heights, made from a spectrum, and load scaled together.
-
-    As slopes become small, the force and all lengths normal to the surface scale alike (Hertz).
-    What remains between the scaled scene and the scene itself is the effect of finite slopes.
-    """
-    surface, load, scale = content["surface"], content["load"], LOW_HEIGHTS_SCALE
-    powers = {"rms_slope": 1, "rms_height": 1, "s0": 2}
-    spectrum = {
-        key: value * scale ** powers[key] if key in powers else value
-        for key, value in surface["spectrum"].items()
-    }
-    motion = {  # approach, force and a prescribed tilt are the lists
-        key: [scale * number for number in value] if isinstance(value, list) else value
-        for key, value in load.items()
-    }
-    return content | {"surface": surface | {"spectrum": spectrum}, "load": motion}
-
-
-def coarser_grids(heights: Grid, scene: Scene) -> list[Grid]:
-    """Return the grids that the surface can be made on, the coarsest first and its own last.
-
-    Heights from a file have their own grid only.
-    """
-    grids, spectrum = [heights], scene.surface.spectrum
-    if spectrum is None:
-        return grids
-    bands = (spectrum.waves_x or spectrum.waves, spectrum.waves_y or spectrum.waves)
-    least = [max(FEWEST_HEIGHTS, HEIGHTS_PER_WAVE * band[1]) for band in bands if band]
-    while all(n % 2 == 0 and n // 2 >= few for n, few in zip(grids[0], least, strict=True)):
-        grids.insert(0, (grids[0][0] // 2, grids[0][1] // 2))
-    return grids

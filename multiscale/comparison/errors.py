@@ -41,8 +41,8 @@ from typing import Any
 import numpy as np
 
 from geometry.patches import PatchGrid, interval_overlaps
-from multiscale.comparison.catalogue import LOW_HEIGHTS, SMALL_SLOPES
 from multiscale.comparison.configuration import Array, Curves, RunResult
+from multiscale.comparison.scene_content import LOW_HEIGHTS, SMALL_SLOPES
 
 ZERO = 1e-9
 """A force or an area below this share of the largest counts as zero: nothing is relative to it."""

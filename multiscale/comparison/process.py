@@ -1,9 +1,7 @@
-"""The process that a configuration is run in: whether it can be launched, and its program."""
+"""The program of the process that a configuration is run in."""
 
 from __future__ import annotations
 
-import os
-import shutil
 import sys
 import time
 from contextlib import suppress
@@ -14,16 +12,16 @@ from typing import Any
 import numpy as np
 
 from geometry.collective import on_root
-from geometry.errors import InputError, PatchlawError
+from geometry.errors import PatchlawError
 from multiscale.comparison.configuration import (
     Configuration,
     Curves,
     RunResult,
     Status,
-    content_of,
     read_result,
     write_result,
 )
+from multiscale.comparison.scene_content import content_of
 from multiscale.machine import peak_memory, world
 from multiscale.results.history import History
 from multiscale.run import Run
@@ -31,33 +29,6 @@ from multiscale.scene.scene import Scene
 
 STATUS_OF_EXIT: dict[int, Status] = {0: "done", 2: "refused", 3: "not converged"}
 """Status by exit code of the process; every other exit code means ``failed``."""
-
-MPI_JOB = ("OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_SIZE", "PMI_RANK", "SLURM_STEP_TASKS_PER_NODE")
-"""Environment variables that exist inside an MPI job only."""
-
-
-def check_launchable(ranks: int, comm: Any = None) -> None:
-    """Check that processes can be launched.
-
-    Args:
-        ranks: Number of processes of one configuration.
-        comm: MPI communicator of this process, or None.
-
-    Raises:
-        InputError: Inside an MPI job, or when more than one rank is wanted and there is no
-            ``mpirun``.
-    """
-    if (comm is not None and comm.size > 1) or any(name in os.environ for name in MPI_JOB):
-        raise InputError(
-            "configurations run in processes of their own, which cannot be launched in an MPI job",
-            key="--ranks",
-            value=ranks,
-            allowed="patchlaw compare SCENE --ranks N, or compare(scene, ranks=N), without mpirun",
-        )
-    if ranks < 1:
-        raise InputError("is no number of processes", key="--ranks", value=ranks, allowed="≥ 1")
-    if ranks > 1 and shutil.which("mpirun") is None:
-        raise InputError("there is no mpirun", key="--ranks", value=ranks, allowed="1")
 
 
 def main(path: Path) -> int:
@@ -144,7 +115,7 @@ def run_here(configuration: Configuration, comm: Any = None) -> RunResult:
         return result
     return replace(
         result,
-        phases=dict(run.seconds),
+        phases=run.times,
         unknowns=run.unknowns,
         curves=_curves(run.history(), configuration.scale),
         finite_slopes=configuration.kind == "reference" or run.setup.finite_slopes,

@@ -21,6 +21,7 @@ from multiscale.laws.isolated import isolated_laws
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling
+from multiscale.readable import Observer
 from multiscale.results.history import range_notes
 from multiscale.results.reference_record import ReferenceRecord
 from multiscale.scene.scene import Scene
@@ -100,13 +101,36 @@ def newton_choice(setup: ProblemSetup, table: LawTable | None = None) -> NewtonC
     )
 
 
-def make_table(setup: ProblemSetup, model: MicroModel, comm: Any) -> LawTable:
+def check_has_laws(scene: Scene) -> None:
+    """Refuse a coupling without laws; which one ``auto`` becomes is not known beforehand.
+
+    Args:
+        scene: The scene.
+
+    Raises:
+        InputError: When the coupling has no laws.
+    """
+    kind = scene.coupling.kind
+    if kind not in ("isolated", "consistent", "auto"):
+        raise InputError(
+            "has no laws",
+            key="coupling.kind",
+            value=kind,
+            allowed="isolated, consistent",
+            file=scene.file,
+        )
+
+
+def make_table(
+    setup: ProblemSetup, model: MicroModel, comm: Any, observe: Observer | None = None
+) -> LawTable:
     """Tabulate the laws of all patches, each alone or all from the whole surface on its block.
 
     Args:
         setup: The problem set up from the scene.
         model: Its micro model on the body, see `contact_model`.
         comm: MPI communicator; None for this process alone.
+        observe: Called as rows or laws are made.
 
     Raises:
         InputError: When the coupling has no laws.
@@ -115,20 +139,14 @@ def make_table(setup: ProblemSetup, model: MicroModel, comm: Any) -> LawTable:
     Note:
         Collective.
     """
+    check_has_laws(setup.scene)
     kind = setup.scene.coupling.kind
-    if not setup.uses_laws:
-        raise InputError(
-            "has no laws",
-            key="coupling.kind",
-            value=kind,
-            allowed="isolated, consistent",
-            file=setup.scene.file,
-        )
     common: dict[str, Any] = {
         "mean_heights": setup.mean_heights,
         "tolerance": setup.table_tolerance,
         "most_rows": setup.table_rows,
         "comm": comm,
+        "observe": observe,
     }
     if kind == "isolated":
         ends, love = setup.largest_closures, setup.scene.coupling.love

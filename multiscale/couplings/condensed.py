@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, NotConverged, PatchGrid
-from geometry.plane_equilibrium import UNSUPPORTED, plane_failure
-from geometry.rigid_plane import normal_stiffness
+from geometry.plane_equilibrium import UNSUPPORTED
+from geometry.rigid_plane import normal_stiffness, plane_failure
 from multiscale.couplings.law_couplings import ROUNDING, beyond_law
 from multiscale.couplings.loaded_patches import TOLERANCE, DenseState, LoadedPatches
 from multiscale.laws.interpolation import LawPoint
@@ -32,7 +32,9 @@ _PAST_TOUCH = 0.02  # of the largest approach: distance beyond touch when a plan
 
 
 class CondensedCoupling:
-    """The block is linear: under patchwise laws it is its compliance, and a load step is dense.
+    """Patch laws on the compliance of the block's patches; a load step is a small dense system.
+
+    The block is linear, so that its compliance says all that patchwise laws need to know of it.
 
     Args:
         table: The laws.

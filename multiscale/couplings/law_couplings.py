@@ -123,10 +123,10 @@ class EmbeddedCoupling:
 class FreePlaneCoupling:
     """Consistent laws under a plane without moment.
 
-    It is the contacts that balance such a plane, not the mean pressures of patches at their
-    centres: laws of few large patches do not determine how it turns, and a single law not at all.
-    Therefore it turns as it did in the rows of the laws, and the macro model that the laws were
-    made for is in equilibrium with their pressures there.
+    The moment of the contacts decides how such a plane turns. Mean pressures of few large patches
+    do not tell that moment, and a single law knows nothing of it. Therefore the plane turns as it
+    did in the rows of the laws, where the macro model that the laws were made for is in equilibrium
+    with their pressures.
 
     Args:
         table: The laws, with the path of the plane.

@@ -19,23 +19,25 @@ from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.refinement import MOST_ROWS, refined
 from multiscale.laws.rows import PlanePath, SolvedRows
+from multiscale.readable import Observer
 
 Array = NDArray[np.float64]
 Displacements = Callable[[Array], Array]
 """From pressures of N patches at m load steps to their mean displacements, [MPa] to [mm]."""
 
 _SMALL_LOAD = 1e-6
-"""Share of the largest force under which a plane that is free to turn is nearly at first touch. By
-Hertz it has then come a ten thousandth of its way."""
+"""Force, relative to the largest, at which a plane that is free to turn is taken to be at first
+touch. By Hertz it has then come a ten thousandth of its way."""
 
 _RESERVE = 0.02
-"""Rows beyond the largest load, relative to the way from first touch, for load steps that lie
-between rows."""
+"""Way that rows go beyond the largest load, relative to the way from first touch to it, so that
+every load step lies between two rows."""
 
 _POINTWISE_RESERVE = 0.5
-"""The same of laws that hold at points. Where a patch is displaced less than in its mean, closures
-are larger than those of any row. On eight scenes of the paper's recipe (1 to 64 patches, level and
-tilted, on a cube and a column) seven left their laws with 0.02, two with 0.25 and none with 0.5."""
+"""The same for laws that are evaluated at points. Where a point is displaced less than its patch in
+the mean, its closure is larger than those of all rows. On eight scenes of the paper's recipe (1 to
+64 patches, level and tilted, on a cube and a column) seven left their laws with 0.02, two with 0.25
+and none with 0.5."""
 
 _ROWS_TOGETHER = 2
 """Rows that one rank solves in sequence, each starting from the one before: results then do not
@@ -54,6 +56,7 @@ def consistent_laws(
     tolerance: float = 1e-3,
     most_rows: int = MOST_ROWS,
     comm: Any = None,
+    observe: Observer | None = None,
 ) -> LawTable:
     """Tabulate the laws of all patches of one surface that is pressed as a whole.
 
@@ -75,6 +78,7 @@ def consistent_laws(
         most_rows: Rows that are solved at most.
         comm: MPI communicator, whose ranks share the rows. The table does not depend on their
             number.
+        observe: Called as rows are solved.
 
     Returns:
         All laws, on every rank.
@@ -93,6 +97,7 @@ def consistent_laws(
         displacements=displacements or (lambda pressures: pressures @ compliance.T),
         tilt=largest.tilt,
         comm=comm,
+        observe=(lambda rows: observe("rows of laws", rows, most_rows)) if observe else None,
     )
     first, end, tilt = on_root(comm, lambda: whole.range_up_to(largest))
     end += (_POINTWISE_RESERVE if pointwise else _RESERVE) * max(end - first, 0.0)
@@ -136,6 +141,7 @@ class WholeSurface:
         displacements: C p of the macro model, collective.
         tilt: Slopes of the plane; None lets it turn.
         comm: MPI communicator, whose ranks share the rows; None for this process alone.
+        observe: Called with the number of rows that are solved.
     """
 
     model: MicroModel
@@ -144,6 +150,7 @@ class WholeSurface:
     displacements: Displacements
     tilt: tuple[float, float] | None = (0.0, 0.0)
     comm: Any = None
+    observe: Callable[[int], None] | None = None
     _solved: dict[float, tuple[Response, RigidPlane]] = field(default_factory=dict, init=False)
 
     def range_up_to(self, largest: Control) -> tuple[float, float, tuple[float, float]]:
@@ -234,8 +241,13 @@ class WholeSurface:
                 found.append((pressed.response, pressed.plane))
             return found
 
+        def solved(done: int) -> None:
+            if self.observe is not None:
+                self.observe(len(self._solved) + min(count * done, len(approaches)))
+
         before = -(-len(self._solved) // count)  # parts of earlier calls: the next rank continues
-        return [row for rows in shared(self.comm, len(parts), solve, before) for row in rows]
+        found = shared(self.comm, len(parts), solve, before, solved)
+        return [row for rows in found for row in rows]
 
     def _press(self, control: Control, start: Any) -> Pressed:
         return self.model.press(

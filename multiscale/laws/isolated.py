@@ -19,6 +19,7 @@ from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.refinement import MOST_ROWS, refined
 from multiscale.laws.rows import SolvedRows
+from multiscale.readable import Observer
 
 Array = NDArray[np.float64]
 
@@ -140,6 +141,7 @@ def isolated_laws(
     tolerance: float = 1e-3,
     most_rows: int = MOST_ROWS,
     comm: Any = None,
+    observe: Observer | None = None,
 ) -> LawTable:
     """Tabulate the isolated laws of all patches.
 
@@ -153,6 +155,7 @@ def isolated_laws(
         most_rows: Rows that are solved at most for one law.
         comm: MPI communicator; its ranks share the patches. A patch is solved alone, so that its
             law does not depend on the number of ranks.
+        observe: Called as laws are made.
 
     Returns:
         All laws, on every rank.
@@ -174,7 +177,9 @@ def isolated_laws(
         )
         return isolated.law(float(closure_ends[index]), tolerance, most_rows)
 
-    made = shared(comm, patches.count, make)
+    count = patches.count
+    watch = (lambda done: observe("laws of patches", done, count)) if observe else None
+    made = shared(comm, count, make, observe=watch)
     laws = tuple(made[task] for task in np.argsort(order))
     return LawTable(
         patches=patches,

@@ -24,7 +24,7 @@ from multiscale.storage import checksummed, stored_numbers, verified
 Array = NDArray[np.float64]
 
 PATCH_FACTOR = 20.0
-"""Tolerance of a patch's pressure over that of the force."""
+"""Tolerance of a patch's pressure, relative to the tolerance of the force."""
 
 _REPORTED_REPAIR = 1e-6  # smaller repairs are rounding and the tolerance of the micro model
 

@@ -1,12 +1,14 @@
 """Adds rows to patch laws where they are needed most, until the error between rows is small enough.
 
-The whole surface is solved at the middle of an interval between two rows. The laws without the new
-row, pressed on the half-space by a plane at that approach, differ from the solution by what is
-computed here to first order: errors of pressure and of closure both count, by their effect on a
-load step. Halving an interval leaves less than half of its error, also at a kink where a contact
-begins or two join, and half of it is recorded. Elsewhere between rows it may be more: on random
-surfaces of 256² cells, in 1 to 256 patches, the force erred by up to 1.7 times and a patch's
-pressure by up to 3 times the largest recorded.
+The contact problem is solved at the middle of an interval between two rows, which gives a new row.
+The laws made without it would give another load step there: on the half-space, under a plane at the
+same approach. The difference is computed to first order. It counts the errors of pressure and of
+closure alike, by their effect on a load step.
+
+Halving an interval leaves less than half of its error, also at a kink where a contact begins or two
+join, and half of it is recorded. Elsewhere between rows it may be more: on random surfaces of 256²
+cells, in 1 to 256 patches, the force erred by up to 1.7 times and a patch's pressure by up to 3
+times the largest recorded.
 
 Theory: demos/theory.md, section 10.
 """
@@ -41,7 +43,8 @@ _ERROR_OF_HALVES = 0.5  # of an interval's error
 class Errors:
     """Errors of the laws of N patches in an interval between two rows; infinite when unknown.
 
-    Loads of less than three hundredths of that at the end of the table count as this much.
+    A load below 3 % of the load at the end of the table counts as 3 % of it, so that small loads
+    near first touch do not take all rows.
 
     Attributes:
         force: Error of the force over the force.
@@ -66,7 +69,7 @@ class Errors:
             after: The laws with it.
             row: The row of all patches.
             compliance: Compliance of the patches of the half-space, shape (N, N) [mm/MPa].
-            least: Mean pressure that smaller ones count as [MPa].
+            least: Least mean pressure that errors are relative to [MPa].
         """
         guess = before.along(row.approach)
         wrong = guess.pressure - row.pressure

@@ -6,9 +6,10 @@ import os
 import platform
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict
 from datetime import UTC, datetime
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from pydantic_core import to_jsonable_python
@@ -37,7 +38,7 @@ def report_html(run: Run, pictures: Mapping[str, bytes]) -> str:
     return filled(
         "output/report.jinja",
         title=f"patchlaw: {run.scene.name}",
-        headline=_headline(history),
+        headline=f"{_headline(history)} {plan.inputs_statement(run.setup)}.",
         warnings=list(plan.warnings(run.setup)),
         statements=list(plan.statements(run.setup)),
         history=history,
@@ -150,5 +151,12 @@ def _micro_model(setup: ProblemSetup) -> dict[str, Any] | None:
 def _versions() -> dict[str, str]:
     """Return the versions of Python and of the libraries that took part."""
     loaded = {name: sys.modules[name] for name in LIBRARIES if name in sys.modules}
-    found = {name: getattr(module, "__version__", "unknown") for name, module in loaded.items()}
+    found = {name: _version(name, module) for name, module in loaded.items()}
     return {"python": platform.python_version(), **found}
+
+
+def _version(name: str, module: Any) -> str:
+    """Return the version of a library, whose attribute some packagings leave out."""
+    with suppress(PackageNotFoundError):
+        return str(getattr(module, "__version__", None) or version(name))
+    return str(getattr(getattr(module, "version", None), "version", "unknown"))

@@ -62,7 +62,8 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
         with run.phase("output"):
             drawn = shared(run.comm, len(names), lambda index: png(_figure(run, names[index])))
         pictures = dict(zip(names, drawn, strict=True))
-    return on_root(run.comm, lambda: _write(folder, run, pictures, options))
+    with run.phase("writing"):
+        return on_root(run.comm, lambda: _write(folder, run, pictures, options))
 
 
 def _write(folder: Path, run: Run, pictures: dict[str, bytes], options: list[str]) -> list[Path]:

@@ -18,6 +18,7 @@ from multiscale.loading.stepper import LoadHistory
 from multiscale.machine import peak_memory
 from multiscale.planning import plan
 from multiscale.planning.costs import Cost
+from multiscale.readable import Observer, duration, quantity
 from multiscale.results.history import History
 from multiscale.setup.problem import ProblemSetup
 
@@ -117,16 +118,39 @@ def show_times(comm: Any, seconds: Mapping[str, float]) -> None:
         comm: MPI communicator, or None.
         seconds: Wall time of the phases [s].
     """
-    phases = ", ".join(f"{phase} {spent:.2f} s" for phase, spent in seconds.items())
-    text = f"took: {phases}; memory {peak_memory() / 1e6:.0f} MB"
+    total = duration(sum(seconds.values()))
+    phases = ", ".join(f"{phase} {duration(spent)}" for phase, spent in seconds.items())
+    text = f"took {total}: {phases}; memory {peak_memory() / 1e6:.0f} MB"
     _console(comm, least_width=TABLE_WIDTH).print(text, markup=False)
+
+
+def counting(show: Callable[[str], None]) -> Observer:
+    """Return an observer of a run that shows what it is at, as a text.
+
+    Args:
+        show: Takes the text.
+    """
+    return lambda what, done, most: show(f"{what}: {done} of at most {most}" if most else what)
+
+
+def _tenths(comm: Any) -> Observer:
+    """Return an observer that prints a line when a tenth more of something is done."""
+    shown: dict[str, int] = {}
+
+    def observe(what: str, done: int, most: int) -> None:
+        tenth = 10 * done // most if most else 0
+        if most and tenth > shown.get(what, 0):
+            shown[what] = tenth
+            say(comm, f"{what}: {done} of at most {most}")
+
+    return observe
 
 
 @contextmanager
 def progress(
     comm: Any, load_history: LoadHistory, done: int = 0
-) -> Iterator[Callable[[LoadStep], None]]:
-    """Show the progress of load steps: by a bar, or under ``mpirun`` by a line for each.
+) -> Iterator[tuple[Callable[[LoadStep], None], Observer]]:
+    """Show the progress of a run: by a bar, or under ``mpirun`` by lines.
 
     Args:
         comm: MPI communicator, or None.
@@ -134,22 +158,28 @@ def progress(
         done: Number of load steps that were accepted before.
 
     Yields:
-        The function to call with every load step.
+        The functions to call with every load step, and with what the run is at before and beside.
     """
     # Halved load steps make the total unknown.
     steps = None if load_history.force_change else load_history.count
     if comm is not None:
         total = "" if steps is None else f"/{steps}"
-        yield lambda step: say(comm, f"load step {step.step}{total}: {_summary(step)}")
+        yield (
+            lambda step: say(comm, f"load step {step.step}{total}: {_summary(step)}"),
+            _tenths(comm),
+        )
         return
     columns = ("[bold]load steps", BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, "{task.description}") as bar:
-        task = bar.add_task("preparing laws and block", total=steps, completed=done)
-        yield lambda step: bar.update(task, advance=1, description=_summary(step))
+        task = bar.add_task("", total=steps, completed=done)
+        yield (
+            lambda step: bar.update(task, advance=1, description=_summary(step)),
+            counting(lambda text: bar.update(task, description=text)),
+        )
 
 
 def _summary(step: LoadStep) -> str:
-    return f"{1e3 * step.approach_mm:.3g} µm, {step.force_N:.4g} N"
+    return f"{quantity(step.approach_mm, 'mm', 3)}, {quantity(step.force_N, 'N')}"
 
 
 @contextmanager
@@ -163,6 +193,9 @@ def following(comm: Any) -> Iterator[tuple[Callable[[str], None], Callable[[str]
         The functions to call with the part that begins, and with a line on the part that ended.
     """
     console = _console(comm)
+    if comm is not None:  # mpirun passes a terminal on that takes no moving lines
+        yield lambda text: None, lambda text: console.print(escape(text))
+        return
     with console.status("") as status:
         yield (
             lambda text: status.update(escape(text)),

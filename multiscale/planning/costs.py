@@ -9,13 +9,7 @@ from __future__ import annotations
 
 import math
 import sys
-import timeit
 from dataclasses import dataclass
-from functools import cached_property
-
-import numpy as np
-from scipy import fft
-from scipy.sparse import diags
 
 from geometry.meshes.block import BlockShape
 from micro import HalfSpaceModel, ScaledModel
@@ -23,13 +17,10 @@ from micro.choice.models import contact_box_share, solution_seconds
 from multiscale.couplings.assembly import CYCLES_PER_PATCH, full_cycles, newton_choice
 from multiscale.loading.stepper import LoadHistory
 from multiscale.machine import MemoryRequest, peak_memory
+from multiscale.planning.machine_speed import THIS_MACHINE, Machine
+from multiscale.setup.memory import memory_requests
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import ReferenceMeshes, mesh_unknowns, reference_requests
-from multiscale.setup.surface_and_block import memory_requests
-
-_TRANSFORM, _PRODUCT, _REPETITIONS = 0.51e-3, 2.8e-3, 30
-"""Times of the two benchmarks of `Machine` where all other times were measured [s], and how often
-they are repeated. The shortest time counts, so that other programs hardly matter."""
 
 # contact problems
 ROWS = {"cells": 56, "summits": 70}
@@ -99,32 +90,6 @@ class Cost:
     def total(self) -> float:
         """Time of all phases [s]."""
         return sum(self.seconds.values())
-
-
-class Machine:
-    """How many times longer work takes here than on the machine where it was measured.
-
-    Both ratios are measured when they are first needed and then kept.
-    """
-
-    @cached_property
-    def arrays(self) -> float:
-        """Ratio for numpy, from a real transform of 384 × 384 points."""
-        points: np.ndarray = np.ones((384, 384))
-        times = timeit.repeat(lambda: fft.rfft2(points), number=1, repeat=_REPETITIONS)
-        return min(times) / _TRANSFORM
-
-    @cached_property
-    def sparse(self) -> float:
-        """Ratio for sparse products, from a matrix of 2.4 million entries times a vector."""
-        order, bands = 60_000, 40
-        vector, ones = np.ones(order), np.ones((bands, order))
-        matrix = diags(ones, range(bands), shape=(order, order), format="csr")
-        return min(timeit.repeat(lambda: matrix @ vector, number=1, repeat=_REPETITIONS)) / _PRODUCT
-
-
-THIS_MACHINE = Machine()
-"""The machine that runs this process."""
 
 
 def predicted_cost(setup: ProblemSetup, machine: Machine = THIS_MACHINE) -> Cost:

@@ -10,6 +10,8 @@ from multiscale.couplings.assembly import newton_choice
 from multiscale.planning.auto_keys import heights_per_wave
 from multiscale.planning.block_plan import block_statement, block_warnings
 from multiscale.planning.costs import Cost
+from multiscale.readable import duration, quantity
+from multiscale.scene.keys import bare_quantities
 from multiscale.setup.problem import ProblemSetup
 
 _INTERACTING = ("elliptic", "circular")
@@ -22,6 +24,7 @@ def statements(setup: ProblemSetup, cost: Cost | None = None) -> Iterator[tuple[
         setup: The problem.
         cost: What the run is predicted to take; None leaves it out.
     """
+    yield "inputs", inputs_statement(setup)
     yield "surface", surface_statement(setup)
     yield "contact", _contact(setup)
     yield "micro model", _model(setup)
@@ -36,9 +39,11 @@ def statements(setup: ProblemSetup, cost: Cost | None = None) -> Iterator[tuple[
     if setup.decision is not None:
         yield "choice", setup.decision.sentence
     if cost is not None:
-        phases = ", ".join(f"{phase} {seconds:.2g}" for phase, seconds in cost.seconds.items())
+        phases = ", ".join(
+            f"{phase} {duration(seconds)}" for phase, seconds in cost.seconds.items()
+        )
         memory = f"{cost.memory / 1e6:.0f} MB"
-        yield "cost", f"about {cost.total:.2g} s on one core ({phases}) and {memory}"
+        yield "cost", f"about {duration(cost.total)} on one core ({phases}) and {memory}"
     yield "error", _error(setup)
 
 
@@ -49,6 +54,8 @@ def warnings(setup: ProblemSetup) -> Iterator[str]:
         setup: The problem.
     """
     yield from setup.surface.notes
+    if bare := list(bare_quantities(setup.scene)):
+        yield f"numbers without a unit: {', '.join(bare)}"
     excess = setup.surface.highest - setup.surface.heights.max()
     if excess > 0.1 * setup.largest_interference:
         x, y = setup.surface.highest_point
@@ -76,6 +83,21 @@ def warnings(setup: ProblemSetup) -> Iterator[str]:
         yield from block_warnings(setup)
     if setup.decision is not None and setup.decision.warning:
         yield setup.decision.warning
+
+
+def inputs_statement(setup: ProblemSetup) -> str:
+    """Say the elastic constants and the dimensions that a run takes.
+
+    Args:
+        setup: The problem.
+    """
+    block, (lx, ly) = setup.scene.block, (quantity(side, "mm") for side in setup.surface.lengths)
+    height = quantity(setup.shape.height, "mm")
+    solid = f"a block {height} high" if setup.has_block else "a half-space"
+    return (
+        f"E = {quantity(block.young_modulus, 'MPa')}, ν = {block.poisson_ratio:g}; a surface "
+        f"of {lx} × {ly} on {solid}"
+    )
 
 
 def surface_statement(setup: ProblemSetup) -> str:
@@ -157,9 +179,9 @@ def _coupling(setup: ProblemSetup) -> str:
 def _load(setup: ProblemSetup) -> str:
     load_history = setup.scene.loading.load_history
     forced = load_history.quantity == "force"
-    scale, unit, quantity = (1.0, "N", "a force") if forced else (1e3, "µm", "an approach")
-    way = ", ".join(f"{scale * point:g} {unit}" for point in load_history.points)
-    text = f"{load_history.count} steps to {quantity} of {way}"
+    unit, what = ("N", "a force") if forced else ("mm", "an approach")
+    way = ", ".join(quantity(point, unit, 6) for point in load_history.points)
+    text = f"{load_history.count} steps to {what} of {way}"
     if load_history.force_change is not None:
         text += f", halved where the force changes by more than {load_history.force_change:.3g}"
     if load_history.tilt is None:

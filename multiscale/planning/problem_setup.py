@@ -32,12 +32,12 @@ from multiscale.planning.auto_keys import (
 )
 from multiscale.planning.mesh_accuracy import MeshError, measured_mesh_error
 from multiscale.scene.scene import Scene
+from multiscale.setup.memory import check_memory
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import reference_meshes
 from multiscale.setup.surface_and_block import (
     block_material,
     check_load,
-    check_memory,
     check_patches,
     make_shape,
     make_surface,
@@ -56,6 +56,7 @@ def make_setup(
     resolved: Mapping[str, Any] | None = None,
     nodes: ClusterNodes | None = None,
     *,
+    like: ProblemSetup | None = None,
     mesh_error: MeshError = measured_mesh_error,
 ) -> ProblemSetup:
     """Set up the problem of a scene: make the surface, resolve auto values, check that all fits.
@@ -64,6 +65,7 @@ def make_setup(
         scene: The scene.
         resolved: What auto values became when the run began; see `resolved_sections`.
         nodes: The nodes of the run; None for this process alone.
+        like: A problem that was set up before and has the same surface, which is taken from it.
         mesh_error: Measures the relative error of a reference's meshes at the largest load.
 
     Raises:
@@ -78,10 +80,12 @@ def make_setup(
         return replace(found, seconds={"surface": 0.0, "choice": time.perf_counter() - began})
     if "patches.grid" in auto:
         start = with_value(start, "patches.grid", map_grid(make_surface(start)))
-    return _setup(start, nodes, known.get("micro"))
+    return _setup(start, nodes, known.get("micro"), like)
 
 
-def _setup(scene: Scene, nodes: ClusterNodes, known: Any = None) -> ProblemSetup:
+def _setup(
+    scene: Scene, nodes: ClusterNodes, known: Any = None, like: ProblemSetup | None = None
+) -> ProblemSetup:
     """Set up the problem of a scene of which the micro model alone may have an auto value.
 
     Args:
@@ -89,10 +93,11 @@ def _setup(scene: Scene, nodes: ClusterNodes, known: Any = None) -> ProblemSetup
         nodes: The nodes of the run.
         known: What the micro model became when the run began, a label or cells; None when that is
             not known.
+        like: As in `make_setup`.
     """
     began = time.perf_counter()
     check_memory(scene, nodes)
-    surface = make_surface(scene)
+    surface = like.surface if like else make_surface(scene)
     check_patches(scene, surface)
     check_load(scene, surface)
     patches = PatchGrid(grid=patch_grid(scene), lengths=surface.lengths)
@@ -100,7 +105,8 @@ def _setup(scene: Scene, nodes: ClusterNodes, known: Any = None) -> ProblemSetup
         ProblemSetup,
         scene=scene,
         surface=surface,
-        asperities=find_asperities(surface, periodic=False),  # the block's sides are free
+        # the block's sides are free
+        asperities=like.asperities if like else find_asperities(surface, periodic=False),
         patches=patches,
         mean_heights=patch_means(surface, patches),
         shape=make_shape(scene, surface),
@@ -109,6 +115,7 @@ def _setup(scene: Scene, nodes: ClusterNodes, known: Any = None) -> ProblemSetup
     seconds = {"surface": made - began}
     if scene.coupling.kind == "reference":
         plane = _estimated_plane(scene, surface)
+        seconds["load estimate"] = time.perf_counter() - made
         meshes = reference_meshes(scene, surface, plane, nodes)
         return setup(micro=None, plane_at_largest_load=plane, meshes=meshes, seconds=seconds)
     choice = None
@@ -118,6 +125,18 @@ def _setup(scene: Scene, nodes: ClusterNodes, known: Any = None) -> ProblemSetup
     model = choice.model if choice else stated_model(scene, surface)
     if isinstance(known, list) and isinstance(model, HalfSpaceModel):
         model = model.resampled((int(known[0]), int(known[1])))
+    _refuse_without_summits(scene, model)
+    chosen = time.perf_counter()
+    if isinstance(model, HalfSpaceModel) and scene.coupling.kind in ("analytic", "concurrent"):
+        plane = _estimated_plane(scene, surface)  # its load steps need no plane ahead of them
+    else:
+        coupling = ContactCoupling(model, patches, patch_means(surface, patches))
+        plane = plane_at_largest_load(scene.loading.load_history, coupling, surface)
+    seconds["load estimate"] = time.perf_counter() - chosen
+    return setup(micro=model, plane_at_largest_load=plane, choice=choice, seconds=seconds)
+
+
+def _refuse_without_summits(scene: Scene, model: MicroModel) -> None:
     if not math.isfinite(model.first_touch):
         raise InputError(
             "the surface has no summit that could carry load",
@@ -126,12 +145,6 @@ def _setup(scene: Scene, nodes: ClusterNodes, known: Any = None) -> ProblemSetup
             allowed="half-space, islands",
             file=scene.file,
         )
-    if isinstance(model, HalfSpaceModel) and scene.coupling.kind in ("analytic", "concurrent"):
-        plane = _estimated_plane(scene, surface)  # its load steps need no plane ahead of them
-    else:
-        coupling = ContactCoupling(model, patches, patch_means(surface, patches))
-        plane = plane_at_largest_load(scene.loading.load_history, coupling, surface)
-    return setup(micro=model, plane_at_largest_load=plane, choice=choice, seconds=seconds)
 
 
 def stated_model(scene: Scene, surface: Surface) -> MicroModel:

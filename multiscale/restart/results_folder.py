@@ -16,11 +16,13 @@ from geometry.collective import on_root
 from geometry.errors import InputError
 from multiscale.restart.checkpoint import FILE_NAME, Checkpoint, read_checkpoint
 from multiscale.run import Run
+from multiscale.scene.keys import dotted
 from multiscale.scene.scene import Scene
 
 _NAME = ".lock"
 _ATTEMPTS = 10  # while others make and remove the folder
 _PATIENCE = 0.2  # for another run that is just ending [s]
+_MOST_SHOWN = 3  # keys that differ between two scenes
 _NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS)
 
 
@@ -180,22 +182,57 @@ def _refuse_changed_heights(folder: Path, run: Run, heights: str) -> None:
 
 def _refuse_changed_keys(folder: Path, now: Scene, then: dict[str, Any]) -> None:
     """Refuse to go on with a scene in which a key has changed that can matter."""
-    old, new = dict(_dotted(then)), dict(_dotted(now.model_dump(by_alias=True, mode="json")))
+    for key, new, old in _changes(now, then):
+        raise InputError(
+            f"is not what the run in {folder} began with; restore it, or run without --resume and "
+            "with --overwrite to begin anew",
+            key=key,
+            value=new,
+            allowed=repr(old),
+        )
+
+
+def refuse_other_results(folder: Path, scene: Scene) -> None:
+    """Refuse to replace the results of another scene, finished or not.
+
+    Args:
+        folder: The folder.
+        scene: The scene whose results are to be written.
+
+    Raises:
+        InputError: When the folder holds results of another scene; names the first keys that
+            differ. Results of the same scene, and what is not understood, may be replaced.
+    """
+    then = _scene_of_results(folder)
+    known = dict(dotted(then))  # a key that an earlier version did not have is no difference
+    differing = [change for change in _changes(scene, then) if change[0] in known]
+    if differing:
+        shown = ", ".join(f"{key} was {old!r}" for key, _, old in differing[:_MOST_SHOWN])
+        more = f" and {len(differing) - _MOST_SHOWN} more" * (len(differing) > _MOST_SHOWN)
+        raise InputError(
+            f"holds results of another scene, where {shown}{more}",
+            key="--out",
+            value=str(folder),
+            allowed="another folder, or --overwrite",
+        )
+
+
+def _scene_of_results(folder: Path) -> dict[str, Any]:
+    """Return the scene, as given, whose results a folder holds; nothing where it has none."""
+    try:
+        path = folder / "provenance.json"
+        if path.is_file():
+            found = json.loads(path.read_text(encoding="utf-8"))["scene_given"]
+            return found if isinstance(found, dict) else {}
+        path = folder / FILE_NAME
+        return read_checkpoint(path).scene if path.exists() else {}
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return {}  # InputError is a ValueError
+
+
+def _changes(now: Scene, then: dict[str, Any]) -> Iterator[tuple[str, Any, Any]]:
+    """Yield the keys that have changed and can matter, with their present and former values."""
+    old, new = dict(dotted(then)), dict(dotted(now.model_dump(by_alias=True, mode="json")))
     for key in dict.fromkeys((*new, *old)):
         if not key.startswith("output.") and old.get(key) != new.get(key):
-            raise InputError(
-                f"is not what the run in {folder} began with; restore it, or run without "
-                "--resume to begin anew",
-                key=key,
-                value=new.get(key),
-                allowed=repr(old.get(key)),
-            )
-
-
-def _dotted(scene: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the keys of nested dictionaries, dotted, with their values."""
-    for name, value in scene.items():
-        if isinstance(value, dict):
-            yield from _dotted(value, f"{prefix}{name}.")
-        else:
-            yield f"{prefix}{name}", value
+            yield key, new.get(key), old.get(key)

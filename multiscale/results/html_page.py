@@ -8,6 +8,8 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from multiscale.readable import duration
+
 if TYPE_CHECKING:
     from jinja2 import Environment
 
@@ -47,4 +49,5 @@ def _templates() -> Environment:
         lstrip_blocks=True,
     )
     templates.filters["base64"] = lambda content: b64encode(content).decode()
+    templates.filters["duration"] = duration
     return templates

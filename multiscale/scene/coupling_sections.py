@@ -13,37 +13,34 @@ from multiscale.scene.sections import Cells, Number, Section
 
 
 class CouplingSection(Section):
-    """How micro and macro model are put together.
-
-    ``kind``: ``isolated`` takes every patch's law from what lies in it alone (Waddad et al. 2016);
-    ``consistent`` takes all laws from the whole surface in contact on the block under the tilt of
-    the load (where the plane is free, under the tilt that it takes at each approach);
-    ``concurrent`` solves the whole surface on the block at every load step, without laws;
-    ``analytic`` is the micro model alone on a half-space; ``reference`` meshes the rough surface
-    itself and has no micro model, see `ReferenceSection`; ``auto`` is concurrent or consistent,
-    whichever keeps the scene's accuracy at less cost.
-
-    ``compliance`` of the block under its patches: ``finite-element`` takes it from a mesh with a
-    flat top; ``decomposed`` adds few smooth modes of the finite body to the exact half-space. By
-    default it is decomposed, except for isolated laws and for laws at points.
-
-    ``newton``: ``condensed`` solves for the patches alone, with a compliance computed once;
-    ``full`` solves for all displacements of the mesh. By default what is predicted to cost less.
-
-    ``love``: which displacement under its own pressure is subtracted from an isolated patch, the
-    ``mean`` one or that at its ``centre``. ``interface``: the closure is a mean over each patch, or
-    taken at each point. ``table_tolerance``: interpolation error of the laws, relative to the
-    force; by default 1e-4, and 5e-4 with micro models that resolve the cells of the surface.
-    """
+    """How micro and macro model are put together."""
 
     kind: Literal["isolated", "consistent", "concurrent", "analytic", "reference", "auto"] = (
         "consistent"
     )
+    """How the force is found: ``concurrent`` solves the whole surface on the block at every load
+    step, without laws; ``consistent`` takes all patch laws from such solutions, under the tilt of
+    the load (where the plane is free, under the tilt that it takes at each approach); ``isolated``
+    takes every patch's law from what lies in it alone (Waddad et al. 2016); ``analytic`` is the
+    micro model alone on a half-space; ``reference`` meshes the rough surface itself, see the
+    section reference; ``auto`` is concurrent or consistent, whichever keeps the scene's accuracy at
+    less cost."""
     compliance: Literal["auto", "finite-element", "decomposed"] = "auto"
+    """Compliance of the block under its patches: ``finite-element`` takes it from a mesh with a
+    flat top; ``decomposed`` adds few smooth modes of the finite body to the exact half-space. Auto
+    is decomposed, except for isolated laws and for laws at points."""
     newton: Literal["auto", "condensed", "full"] = "auto"
+    """How laws find the load steps: ``condensed`` solves for the patches alone, with a compliance
+    computed once; ``full`` for all displacements of the mesh. Auto is what is predicted to cost
+    less."""
     love: Literal["mean", "centre"] = "mean"
+    """Displacement under its own pressure that is subtracted from an isolated patch: the mean one,
+    or that at its centre."""
     interface: Literal["patchwise", "pointwise"] = "patchwise"
+    """Whether the closure of a law is a mean over each patch, or taken at each point."""
     table_tolerance: Annotated[Number, Field(gt=0, lt=0.1)] | None = None
+    """Interpolation error of the laws, relative to the force; 1e-4 when not given, and 5e-4 with
+    micro models that resolve the cells of the surface."""
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
@@ -95,22 +92,22 @@ class CouplingSection(Section):
 
 
 class ReferenceSection(Section):
-    """The meshed rough surface of ``coupling.kind = "reference"``; other couplings ignore it.
-
-    ``method``: how contact is found, see `macro.UnilateralContactProblem`. ``mesh``: ``tetrahedra``
-    are small only where contact can occur, ``hexahedra`` are as many as ``cells`` says; by default
-    tetrahedra, unless ``cells`` is stated. ``meshes``: number of meshes of falling size that take
-    the same loads; their results are extrapolated, and one mesh alone has no error bar. ``fine``:
-    edge length of the finest tetrahedra where contact can occur, by default from the surface and
-    the load. ``cells``: hexahedra of the finest mesh; their element and grading are those of
-    ``[block]``.
-    """
+    """The meshed rough surface of ``coupling.kind = "reference"``; other couplings ignore it."""
 
     method: Literal["active-set", "augmented-lagrangian"] = "active-set"
+    """How contact is found, see `macro.UnilateralContactProblem`."""
     mesh: Literal["auto", "hexahedra", "tetrahedra"] = "auto"
+    """Cells: ``tetrahedra`` are small only where contact can occur, ``hexahedra`` are as many as
+    ``cells`` says. Auto is tetrahedra, unless ``cells`` is stated."""
     meshes: Annotated[int, Field(ge=1, le=3, strict=True)] = 2
+    """Number of meshes of falling size that take the same loads. Their results are extrapolated;
+    one mesh alone has no error bar."""
     fine: Annotated[Length, Field(gt=0)] | None = None
+    """Edge length of the finest tetrahedra where contact can occur; from surface and load when not
+    given."""
     cells: Cells | None = None
+    """Hexahedra of the finest mesh along x, y and z; their element and grading are those of the
+    block."""
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
@@ -136,19 +133,21 @@ class ReferenceSection(Section):
 
 
 class LoadSection(Section):
-    """The motion of the rigid plane: turning points of its approach, or of the force on it.
-
-    ``steps`` load steps lead to every turning point. ``tilt``: slopes of the approach along x and y
-    about the middle of the interface; ``"free"`` lets the plane turn until the pressures have no
-    moment. ``force_change``: the largest change of the force in one step, relative to the largest
-    force so far; a step that exceeds it is halved.
-    """
+    """The motion of the rigid plane: turning points of its approach, or of the force on it."""
 
     approach: Approaches | None = None
+    """Approach of the rigid plane, counted from first touch, or a list of turning points. Exactly
+    one of ``approach`` and ``force`` is given."""
     force: Forces | None = None
+    """Force on the rigid plane, or a list of turning points."""
     steps: Annotated[int, Field(ge=1, le=1_000_000, strict=True)] = 8
+    """Load steps to every turning point."""
     tilt: Tilt = (0.0, 0.0)
+    """Slopes of the approach along x and y about the middle of the interface; ``free`` lets the
+    plane turn until the pressures have no moment."""
     force_change: Annotated[Number, Field(ge=1e-3, lt=1)] | None = None
+    """Largest change of the force in one step, relative to the largest force so far; a step that
+    exceeds it is halved. When not given no step is halved."""
 
     @model_validator(mode="after")
     def _one_load(self) -> Self:

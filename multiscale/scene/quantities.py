@@ -158,6 +158,7 @@ def _schema(unit: str, *, several: bool = False) -> WithJsonSchema:
     one = {
         "anyOf": [{"type": "number"}, {"type": "string"}],
         "description": f"string with a unit, or a bare number in {_named(unit)}",
+        "unit": unit,
         "examples": [_UNITS[unit].example.strip('"')],
     }
     listed = {"anyOf": [one, {"type": "array", "items": one, "minItems": 1}]}

@@ -1,11 +1,10 @@
-"""The scene: everything a run needs to know, read from TOML and checked before anything runs."""
+"""The scene: everything a run needs to know, checked before anything runs."""
 
 from __future__ import annotations
 
 import difflib
-import re
-import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -13,6 +12,7 @@ from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from geometry.errors import InputError
 from multiscale.scene.coupling_sections import CouplingSection, LoadSection, ReferenceSection
+from multiscale.scene.scene_file import changed, overridden, read_scene_file
 from multiscale.scene.sections import (
     BlockSection,
     MicroSection,
@@ -23,43 +23,47 @@ from multiscale.scene.sections import (
     SurfaceSection,
 )
 
-MOST_BYTES = 64 * 1024
-"""Size of the largest scene file [B]; a scene with every key takes 2 kB."""
 
-_OF_NUMBER = re.compile(r"[0-9]\.[0-9]+(?!\.)")
-_DEEPEST = 100  # sections within sections
-_EXCLUSIVE = {
-    "approach": ("force",),
-    "force": ("approach",),
-    "file": ("spectrum", "heights"),
-    "spectrum": ("file", "heights"),
-    "heights": ("file", "spectrum"),
-}
-"""Keys that one key replaces, as a section may have only one of them."""
+@dataclass(frozen=True, slots=True)
+class Written:
+    """What was written of a scene, which takes no part when scenes are compared.
+
+    Args:
+        data: The sections, before units were read.
+    """
+
+    data: dict[str, Any] = field(default_factory=dict, compare=False)
 
 
 class Scene(Section):
     """A complete scene. Lengths in mm, pressures in MPa.
 
     The section ``[load]`` is the attribute `loading`, because `Scene.load` reads a file.
-
-    ``accuracy`` is the allowed relative error of the force. The keys ``surface.grid``,
-    ``micro.model``, ``coupling.kind``, ``patches.grid`` and, under laws on a mesh, ``block.cells``
-    may be ``"auto"``: they get the values that are predicted to keep the accuracy at the least
-    cost. With an accuracy this holds also for those that are not stated. Without an accuracy,
-    ``"auto"`` means 2 %.
     """
 
     accuracy: Annotated[Number, Field(gt=0, lt=0.5)] | None = None
+    """Allowed relative error of the force. Keys that are ``"auto"`` or, with an accuracy, not
+    stated (``surface.grid``, ``micro.model``, ``coupling.kind``, ``patches.grid`` and, under laws
+    on a mesh, ``block.cells``) get the values that are predicted to keep it at the least cost.
+    Without it, ``auto`` means 2 %."""
     surface: SurfaceSection
+    """The rough surface."""
     block: BlockSection
+    """The elastic block below it."""
     patches: PatchesSection = PatchesSection()
+    """The partition of the interface."""
     micro: MicroSection = MicroSection()
+    """How contacts are solved."""
     coupling: CouplingSection = CouplingSection()
+    """How contacts and block are put together."""
     reference: ReferenceSection = ReferenceSection()
+    """The meshes of ``coupling.kind = "reference"``."""
     loading: Annotated[LoadSection, Field(alias="load")]
+    """The motion of the rigid plane, or the force on it."""
     output: OutputSection = OutputSection()
+    """What is written beside the tables of results."""
     _source: Path | None = None
+    _written: Written = Written()
 
     @model_validator(mode="after")
     def _continues_periodically(self) -> Self:
@@ -108,7 +112,7 @@ class Scene(Section):
             scene = cls.model_validate(data)
         except ValidationError as error:
             raise _first_problem(error, cls).located(file=str(source) if source else None) from None
-        scene._source = source
+        scene._source, scene._written = source, Written(data)
         return scene
 
     def with_(self, changes: Mapping[str, Any]) -> Scene:
@@ -123,10 +127,17 @@ class Scene(Section):
         Raises:
             InputError: When a key is none, or the scene would be wrong.
         """
-        data = self.model_dump(by_alias=True, exclude_unset=True)
+        data, written = self.model_dump(by_alias=True, exclude_unset=True), self.written
         for key, value in changes.items():
-            data = changed(data, key, value)
-        return Scene.from_dict(data, self._source)
+            data, written = changed(data, key, value), changed(written, key, value)
+        scene = Scene.from_dict(data, self._source)
+        scene._written = Written(written)
+        return scene
+
+    @property
+    def written(self) -> dict[str, Any]:
+        """What was written, as nested dictionaries, before units were read."""
+        return self._written.data
 
     @property
     def name(self) -> str:
@@ -191,106 +202,3 @@ def _known_keys(model: Any, sections: list[str]) -> list[str]:
         options = getattr(annotation, "__args__", (annotation,))
         model = next(option for option in options if hasattr(option, "model_fields"))
     return [field.alias or name for name, field in model.model_fields.items()]
-
-
-def read_scene_file(path: Path) -> dict[str, Any]:
-    """Return what a scene file says, unchecked.
-
-    Args:
-        path: TOML file in UTF-8.
-
-    Raises:
-        InputError: When it is no regular file, cannot be read, is too large or no TOML.
-    """
-    content = _content(path)
-    try:
-        return parsed(content.decode("utf-8-sig"))  # some editors put a mark before the text
-    except UnicodeDecodeError as error:
-        problem = f"is not UTF-8 text: {error}"
-    except ValueError as error:
-        problem = f"is not valid TOML: {error}"
-    raise InputError(problem, file=str(path))
-
-
-def _content(path: Path) -> bytes:
-    """Return the bytes of a regular file, which has an end, if a scene can be that large."""
-    try:
-        if path.exists() and not path.is_file():
-            raise ValueError("it is not a regular file")
-        with path.open("rb") as file:
-            content = file.read(MOST_BYTES + 1)
-        if len(content) > MOST_BYTES:
-            raise ValueError(f"it is larger than any scene (allowed: {MOST_BYTES} bytes)")
-    except (OSError, ValueError) as error:  # ValueError: also a zero byte in the name
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"cannot be read: {reason}", file=str(path)) from None
-    return content
-
-
-def overridden(data: dict[str, Any], text: str) -> dict[str, Any]:
-    """Return what a scene file says, with one key set from the command line.
-
-    Args:
-        data: The sections; they stay what they are.
-        text: ``key=value``; a value is TOML, or else a plain string.
-
-    Raises:
-        InputError: When it is no override, or a section in its key is none.
-    """
-    key, equals, value = (part.strip() for part in text.partition("="))
-    if not equals or not key or key.count(".") >= _DEEPEST:
-        raise InputError("is not an override", value=text, allowed="--set key=value")
-    return changed(data, key, _overriding(value))
-
-
-def changed(data: dict[str, Any], key: str, value: Any) -> dict[str, Any]:
-    """Return nested dictionaries with one key set, without the keys that it excludes.
-
-    Args:
-        data: The dictionaries; they stay what they are.
-        key: The dotted key.
-        value: Its value.
-
-    Raises:
-        InputError: When a section in the key is none.
-    """
-    first, _, rest = key.partition(".")
-    if not rest:
-        excluded = _EXCLUSIVE.get(first, ())
-        return {name: old for name, old in data.items() if name not in excluded} | {first: value}
-    section = data.get(first, {})
-    if not isinstance(section, dict):
-        raise InputError(f"'{first}' is not a section", key=key, value=value)
-    return data | {first: changed(section, rest, value)}
-
-
-def _overriding(text: str) -> Any:
-    try:
-        found = parsed(f"value = {text}")
-    except ValueError:
-        return text
-    return found["value"] if found.keys() == {"value"} else text
-
-
-def parsed(text: str) -> dict[str, Any]:
-    """Return a TOML text as nested dictionaries.
-
-    Args:
-        text: The text.
-
-    Raises:
-        ValueError: When it is no TOML, or nested deeper than anything sensible.
-    """
-    if any(_dots(line) > _DEEPEST for line in text.split("\n")):
-        raise ValueError("a line with more dots than any scene has")  # they take hours to parse
-    try:
-        return tomllib.loads(text)
-    except RecursionError:
-        raise ValueError("it is nested too deeply") from None
-
-
-def _dots(line: str) -> int:
-    """Count the dots of a line that may part keys, not those of numbers or comments."""
-    if line.lstrip().startswith("#"):
-        return 0
-    return line.count(".") - len(_OF_NUMBER.findall(line))

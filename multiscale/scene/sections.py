@@ -23,32 +23,44 @@ Count = Annotated[int, Field(ge=1, le=1_000_000_000, strict=True)]
 
 
 class Section(BaseModel):
-    """A section of a scene: unknown keys are refused."""
+    """A section of a scene: unknown keys are refused, and the text below a key describes it."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
+    )
 
 
 Flag = Annotated[bool, Field(strict=True)]
 PositiveLength = Annotated[Length, Field(gt=0)]
-Pair = Annotated[tuple[Count, Count], Field(description="x, y")]
-Cells = Annotated[tuple[Count, Count, Count], Field(description="cells in x, y, z")]
+Pair = tuple[Count, Count]
+Cells = tuple[Count, Count, Count]
 Heights = Annotated[int, Field(ge=4, le=1_000_000_000, strict=True)]
 """Number of heights along a side; fewer than four have no cubic interpolant."""
 
-Band = Annotated[tuple[Number, Number], Field(description="lower, upper number of waves per side")]
+Band = tuple[Number, Number]
 
 
 class SpectrumSection(Section):
-    """A synthesised self-affine surface; see `geometry.Spectrum` for the meaning of each key."""
+    """A synthesised self-affine surface, see `geometry.Spectrum`."""
 
     hurst: Annotated[Number, Field(gt=0, le=1)]
+    """Hurst exponent of the self-affine roughness, between 0 and 1; 0.8 and more are usual."""
     waves: Band | None = None
+    """Smallest and largest number of waves along the side x, of a spectrum that is the same in all
+    directions. Either this, or ``waves_x`` and ``waves_y``."""
     waves_x: Band | None = None
+    """Smallest and largest number of waves along x, of an anisotropic spectrum."""
     waves_y: Band | None = None
+    """Smallest and largest number of waves along y, of an anisotropic spectrum."""
     rms_slope: Annotated[Slope, Field(gt=0)] | None = None
+    """Rms gradient of the surface. It is scaled by exactly one of ``rms_slope``, ``rms_height`` and
+    ``s0``."""
     rms_height: PositiveLength | None = None
+    """Rms height, instead of ``rms_slope``."""
     s0: Annotated[SpectralAmplitude, Field(gt=0)] | None = None
+    """Amplitude of the spectrum, instead of ``rms_slope``."""
     seed: Annotated[int, Field(ge=0, le=LARGEST_SEED, strict=True)] = 0
+    """Number that the random phases follow from; the same number makes the same surface."""
 
     @model_validator(mode="after")
     def _makes_a_spectrum(self) -> Self:
@@ -60,62 +72,68 @@ class SpectrumSection(Section):
         return Spectrum(**self.model_dump())
 
 
-Interval = Annotated[tuple[Length, Length], Field(description="from, to")]
+Interval = tuple[Length, Length]
 
 
 class CropSection(Section):
     """The rectangle of a map that is kept, rounded to whole cells; all of an axis not given."""
 
     x: Interval | None = None
+    """Where the kept part begins and ends along x; all of it when not given."""
     y: Interval | None = None
+    """Where the kept part begins and ends along y; all of it when not given."""
 
 
 class FilterSection(Section):
     """Cut-off wavelengths of the areal Gaussian filter, ISO 16610-61.
 
-    Waves shorter than ``short`` (S-filter) and longer than ``long`` (L-filter) are removed; half of
-    the amplitude passes at a cut-off.
+    Half of the amplitude passes at a cut-off.
     """
 
     short: PositiveLength | None = None
+    """S-filter: waves shorter than this are removed."""
     long: PositiveLength | None = None
+    """L-filter: waves longer than this are removed."""
 
 
 class SurfaceSection(Section):
     """Exactly one source of heights, the rectangle it covers, and what is done to the map.
 
-    From Python, ``heights`` may be an array with index [ix, iy], in mm or in ``height_unit``.
-
-    Of a file: ``height_unit`` is the unit of its heights where the file does not state one, mm when
-    not given; ``channel`` the name or number of a channel, counted from 0.
-
-    ``grid`` is what a spectrum is sampled on, or what the file must have, ``lengths`` its sides,
-    needed where the file does not state them.
-
-    A map is prepared in this order: ``crop``; ``missing``, heights that are not a number are
-    refused, or filled by the smoothest membrane between the others, see `geometry.missing.filled`;
-    ``outliers``, spikes are removed and filled; ``detrend``, its form is removed; ``filter``;
-    ``resample``, the numbers of heights on a new grid.
-
-    ``periodic``: whether surface and contact continue over the borders, on a half-space.
+    A map is prepared in this order: ``crop``, ``missing``, ``outliers``, ``detrend``, ``filter``,
+    ``resample``.
     """
 
     spectrum: SpectrumSection | None = None
+    """Recipe of a synthesised surface; it needs ``grid`` and ``lengths``."""
     file: str | None = None
+    """File of a measured map: .npy, text, .xyz, or an instrument's format. A relative path starts
+    in the folder of the scene."""
     heights: SkipJsonSchema[HeightsOfArray] = None
+    """From Python: an array with index [ix, iy], in mm or in ``height_unit``."""
     height_unit: str | None = None
+    """Unit of the heights of a file that does not state one; mm when not given."""
     channel: str | Annotated[int, Field(ge=0, strict=True)] | None = None
-    grid: Annotated[tuple[Heights, Heights], Field(description="heights in x, y")] | Auto | None = (
-        None
-    )
+    """Name or number, counted from 0, of the channel of a file that has several."""
+    grid: tuple[Heights, Heights] | Auto | None = None
+    """Numbers of heights along x and y: what a spectrum is sampled on, or what a file must have."""
     lengths: tuple[PositiveLength, PositiveLength] | None = None
+    """Sides of the surface along x and y; needed where a file does not state them."""
     crop: CropSection = CropSection()
+    """The rectangle that is kept, before anything else is done to a map."""
     missing: Literal["refuse", "fill"] = "refuse"
+    """What happens to heights that are not a number: ``refuse`` them, or ``fill`` them by the
+    smoothest membrane between the others."""
     outliers: Literal["keep", "remove"] = "keep"
+    """Whether spikes are kept, or removed and filled."""
     detrend: Literal["none", "mean", "plane", "quadratic"] = "none"
+    """Form that is removed from a map: its mean, its mean plane, or its mean quadratic form."""
     filter: FilterSection = FilterSection()
+    """Cut-off wavelengths of a Gaussian filter, applied after the form is removed."""
     resample: tuple[Heights, Heights] | None = None
+    """Numbers of heights along x and y of a new grid, which a map is brought to at last."""
     periodic: Flag = False
+    """Whether surface and contact continue over the borders; half-space contacts with
+    ``coupling.kind = "analytic"`` alone."""
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
@@ -165,23 +183,31 @@ class SurfaceSection(Section):
 class BlockSection(Section):
     """The elastic block below the surface, pressed by a rigid plane.
 
-    Its ``height`` is the shorter side of the surface when not given.
-
     ``cells`` and the keys after it describe the mesh of the block with a flat top. That mesh is
     made where patch laws need it (``coupling.compliance = "finite-element"``) and for fields
     (``output.fields``); nothing else depends on it.
     """
 
     height: PositiveLength | None = None
+    """Height of the block; the shorter side of the surface when not given."""
     young_modulus: Annotated[Pressure, Field(gt=0)]
+    """Young's modulus of the block."""
     poisson_ratio: Annotated[Number, Field(gt=-1, lt=0.5)]
+    """Poisson's ratio of the block."""
     sides: Literal["free", "roller"] = "free"
+    """Whether the four sides of the block are free, or held by rollers that let them slide."""
     cells: Cells | Auto | None = None
+    """Cells of the block's mesh along x, y and z; as many as its use needs when not given."""
     element: Literal["Q1", "Q2", "P1", "P2"] = "Q1"
-    grading: Annotated[Number, Field(ge=1, le=1e6, description="bottom to top layer height")] = 1.0
-    margin: Annotated[Length, Field(ge=0, description="block beyond the interface")] = 0.0
+    """Element of the block's mesh: hexahedra Q or tetrahedra P, linear or quadratic."""
+    grading: Annotated[Number, Field(ge=1, le=1e6)] = 1.0
+    """Height of the lowest layer of cells over that of the highest."""
+    margin: Annotated[Length, Field(ge=0)] = 0.0
+    """Width of the block beyond the rough interface, on all four sides."""
     margin_cells: Count = 8
+    """Cells of the mesh across the margin."""
     margin_grading: Annotated[Number, Field(ge=1, le=1e6)] = 8.0
+    """Width of the outermost cells of the margin over that of the innermost."""
 
     def height_under(self, lengths: tuple[float, float]) -> float:
         """Return the height of the block under a surface of given sides [mm]."""
@@ -192,16 +218,12 @@ class PatchesSection(Section):
     """The partition of the interface."""
 
     grid: Pair | Auto = (4, 4)
+    """Numbers of patches along x and y. Laws belong to patches; other couplings gather their
+    results by them."""
 
 
 class MicroSection(Section):
-    """The micro model of the rough surface.
-
-    ``model = "auto"`` takes the cheapest model whose expected error of the force is below
-    ``tolerance`` at the largest load and at half of it, and measures that error at one load. By
-    default the tolerance is the share of the scene's accuracy that is left for the micro model, or
-    2 %. It holds for the micro model of the whole surface, not for what isolated laws leave out.
-    """
+    """The micro model of the rough surface."""
 
     model: Literal[
         "elliptic",
@@ -212,11 +234,22 @@ class MicroSection(Section):
         "half-space",
         "auto",
     ] = "half-space"
+    """How contacts are solved: ``half-space`` cell by cell; as elliptic or circular summits, with
+    interaction or ``-independent`` of each other (Waddad et al. 2016); as ``islands``; ``auto``
+    takes the cheapest that keeps ``tolerance``."""
     tolerance: Annotated[Number, Field(gt=0, lt=0.5)] | None = None
+    """Relative error of the force that ``model = "auto"`` may have, at the largest load and at half
+    of it. It holds for the whole surface, not for what isolated laws leave out. When not given it
+    is what the scene's accuracy leaves to the micro model, or 2 %."""
     solver: Literal["active-set", "truncated-newton"] = "active-set"
+    """Solver of interacting summits."""
     curvature: Literal["summit", "contact"] = "summit"
+    """Whether a summit's curvature is taken at its top, or over the size of its contact."""
     finite_slopes: Flag | None = None
+    """Whether the slopes of the roughness, where they are not small, count to second order. When
+    not given they do with half-space contacts, unless laws are isolated."""
     border: Literal["ignore", "include"] = "ignore"
+    """Whether maxima on the surface's border carry load."""
 
     @model_validator(mode="after")
     def _chooses_or_states(self) -> Self:
@@ -232,19 +265,19 @@ class MicroSection(Section):
 
 
 class OutputSection(Section):
-    """What is written beside the tables of results.
-
-    ``check``: the load steps whose errors are measured by solving further contact problems, where
-    the micro model is ``half-space``.
-
-    ``contact``: the load steps whose contact is written, with a row for every spot and, where the
-    model has cells or nodes, maps of pressure and gap. With laws the contact problem that they
-    stand for is then solved, once for each of these steps; "auto" is "last" without laws and writes
-    none with laws. "none" leaves out the interfacial stiffness as well.
-    """
+    """What is written beside the tables of results."""
 
     figures: Flag = True
+    """Whether figures are drawn, as PNG files and in the report."""
     report: Flag = True
+    """Whether report.html is written."""
     fields: Flag = False
+    """Whether displacements and stresses of the block are written for ParaView."""
     check: Literal["last", "none", "all"] = "last"
+    """Load steps whose errors are measured by solving further contact problems, where the micro
+    model is ``half-space``."""
     contact: Literal["auto", "last", "all", "none"] = "auto"
+    """Load steps whose contact is written, with a row for every spot and, where the model has cells
+    or nodes, maps of pressure and gap. With laws the contact problem that they stand for is then
+    solved, once for each of these steps. "auto" is "last" without laws and "none" with laws. "none"
+    leaves out the interfacial stiffness as well."""

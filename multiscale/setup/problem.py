@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from geometry import Asperities, BlockShape, PatchGrid, RigidPlane, Surface
 from micro import AsperityModel, Choice, HalfSpaceModel, MicroModel, ScaledModel
 from multiscale.laws.refinement import MOST_ROWS
+from multiscale.readable import duration
 from multiscale.scene.scene import Scene
 from multiscale.setup.reference_meshes import ReferenceMeshes
 
@@ -41,7 +42,7 @@ class Alternative:
     @property
     def text(self) -> str:
         """The alternative in words."""
-        return f"{self.label}, in about {self.seconds:.2g} s"
+        return f"{self.label}, in about {duration(self.seconds)}"
 
 
 @dataclass(frozen=True, kw_only=True)

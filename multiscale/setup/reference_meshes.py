@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from geometry import BlockShape, InputError, RefinedShape, RigidPlane, Surface
-from geometry.meshes.families import Shape, characteristic_size, contact_radius, reference_shapes
+from geometry.meshes.expected_contact import contact_radius
+from geometry.meshes.families import Shape, characteristic_size, reference_shapes
 from multiscale.machine import ClusterNodes, MemoryRequest
 from multiscale.scene.scene import Scene
-from multiscale.setup.surface_and_block import check_memory, located
+from multiscale.setup.memory import check_memory
+from multiscale.setup.surface_and_block import located
 
 Array = NDArray[np.float64]
 
@@ -116,6 +118,7 @@ def reference_meshes(
             share = float((plane.at(surface.x[:, None], surface.y) > depth).mean())
             least = 3.0 * BYTES_PER_UNKNOWN[1] * surface.area * share / fine / fine
             check_memory(scene, nodes, [_request(scene, "the reference", shared=least)])
+        radius = contact_radius(surface, approach, tilt=tilt)
         shapes = reference_shapes(
             surface,
             largest,
@@ -127,8 +130,8 @@ def reference_meshes(
             cells=reference.cells,
             grading=block.grading,
             element=block.element if block.element[0] == ("Q" if hexahedral else "P") else None,
+            radius=radius if prescribed else None,
         )
-        radius = contact_radius(surface, approach, tilt=tilt)
     sizes = np.array([characteristic_size(shape) for shape in shapes])
     meshes = ReferenceMeshes(
         shapes=shapes,

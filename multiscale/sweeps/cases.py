@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from geometry.errors import InputError
-from multiscale.scene.scene import Scene, parsed
+from multiscale.scene.scene import Scene
+from multiscale.scene.scene_file import parsed
 
 MOST_CASES = 1_000_000
 """Most cases of a sweep; a longer list is a slip of the pen, and would fill the memory."""

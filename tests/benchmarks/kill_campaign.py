@@ -19,7 +19,7 @@ def main():
     parser.add_argument("--seed", type=int, default=0)
     choice = parser.parse_args()
     os.environ["PATCHLAW_CACHE"] = "off"
-    from conftest import MPI_ENVIRONMENT
+    from mpi_environment import MPI_ENVIRONMENT
 
     runs = Runs(ROOT, MPI_ENVIRONMENT)
     for scene in SCENES:

@@ -19,7 +19,7 @@ FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 # folders and flat modules from the ground up: each imports only from lines above its own
 FLOORS = {
     "geometry": [
-        "blocked_spline collective errors legendre_modes",
+        "blocked_spline collective errors legendre_modes slope_search",
         "checks interpolant materials missing",
         "filters spectrum surface",
         "patches statistics summits synthesis",
@@ -45,7 +45,7 @@ FLOORS = {
         "compliance fields",
     ],
     "multiscale": [
-        "figures installation machine storage",
+        "figures installation machine readable storage",
         "doctor laws loading",
         "compiled_forms results scene",
         "setup",

@@ -6,10 +6,10 @@ import pytest
 
 
 def test_doctor_tells_ranks_and_hosts_once(mpirun):
-    done = mpirun(3, "-m", "patchlaw", "doctor", "--json", timeout=100)
+    done = mpirun(2, "-m", "patchlaw", "doctor", "--json", timeout=100)
     assert done.returncode == 0, done.stderr
     findings = {found["topic"]: found for found in json.loads(done.stdout)}
-    assert findings["ranks"]["text"].startswith("3: 3 on ")
+    assert findings["ranks"]["text"].startswith("2: 2 on ")
     assert findings["test solve"]["state"] == "ok"
 
 

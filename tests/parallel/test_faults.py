@@ -8,8 +8,8 @@ import sys
 import time
 
 import pytest
-from conftest import MPI_ENVIRONMENT
 from killed_runs import largest_difference, members
+from mpi_environment import MPI_ENVIRONMENT
 
 SCRIPT = "tests/parallel/fault_script.py"
 WORDS = (

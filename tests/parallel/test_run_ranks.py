@@ -11,7 +11,7 @@ from multiscale.cli import main
 from multiscale.results.contact_record import SPOT_COLUMNS
 
 PAPER = "demos/scenes/paper.toml"
-SMALL = ["surface.grid=[64, 64]", "load.steps=3", "output.figures=false", "output.report=false"]
+SMALL = ["surface.grid=[64, 64]", "load.steps=2", "output.figures=false", "output.report=false"]
 SCENES = {
     "cube, patchwise": ["block.cells=[8, 8, 5]", "patches.grid=[4, 2]"],
     "cube, pointwise": [
@@ -43,7 +43,7 @@ SCENES = {
     ],
     "concurrent, free to turn under a force": [
         "coupling.kind=concurrent", "micro.model=half-space", "micro.finite_slopes=true",
-        "block.height=0.3 mm", "load={force='1 N', steps=3, tilt='free'}", "output.check=all",
+        "block.height=0.3 mm", "load={force='1 N', steps=2, tilt='free'}",
     ],
     "concurrent, islands": ["coupling.kind=concurrent", "micro.model=islands"],
     "concurrent, asperities": [
@@ -55,6 +55,7 @@ SCENES = {
     ],
     "laws of the half-space, contact on request": [
         "block.cells=[8, 8, 5]", "micro.model=half-space", "output.contact=all",
+        "patches.grid=[3, 2]",
     ],
 }  # fmt: skip
 NUMBERS = (
@@ -103,6 +104,7 @@ def alone(root, tmp_path_factory):
 
 LONG = {
     "cells for an accuracy",
+    "cube, patchwise",  # as the wide block
     "concurrent, asperities",
     "concurrent, islands",
     "consistent, decomposed, free to turn",

@@ -10,7 +10,7 @@ from micro.closed_forms.love import love_mutual
 
 
 @cache
-def patch_displacements(element, n, *, width, grid=(1, 1), interface=(1.0, 1.0), fineness=1):
+def patch_displacements(element, n, *, width, grid, interface, fineness):
     """Return E*/p times the patches' mean displacements under pressure p on the first patch."""
     block = block_of(
         element=element,
@@ -26,6 +26,12 @@ def patch_displacements(element, n, *, width, grid=(1, 1), interface=(1.0, 1.0),
     load = patches.load(np.eye(patches.patches.count)[0])
     load.array[:] = block.solve(load).x.array[: block.owned_dofs]
     return patches.patch_displacements(load) * block.material.contact_modulus
+
+
+def on_a_block(element, n, *, width, grid=(1, 1), interface=(1.0, 1.0), fineness=1):
+    """Return the same, one patch on a square by default; solved for once."""
+    options = {"width": width, "grid": grid, "interface": interface, "fineness": fineness}
+    return patch_displacements(element, n, **options)
 
 
 def half_space_displacements(patches):
@@ -46,10 +52,7 @@ def test_large_block_tends_to_love(grid, sides):
     block = block_of(interface=sides, cells=(2, 2, 1))
     exact = half_space_displacements(interface_of(block, grid).patches)
     computed = extrapolated(
-        *(
-            patch_displacements("Q2", 4, width=width, grid=grid, interface=sides)
-            for width in (2.0, 4.0)
-        )
+        *(on_a_block("Q2", 4, width=width, grid=grid, interface=sides) for width in (2.0, 4.0))
     )
     # two to four quadratic elements across a patch: 1-2 % of the largest, 0.5 % at twice as many
     np.testing.assert_allclose(computed, exact, atol=0.025 * exact[0])
@@ -57,7 +60,7 @@ def test_large_block_tends_to_love(grid, sides):
 
 def test_distance_to_love_halves_when_the_block_doubles():
     exact = half_space_displacements(interface_of(block_of(cells=(1, 1, 1)), (1, 1)).patches)
-    small, large = (patch_displacements("Q2", 4, width=width) for width in (2.0, 4.0))
+    small, large = (on_a_block("Q2", 4, width=width) for width in (2.0, 4.0))
     # the leading term is inverse to the width; the mesh adds 1 % of the displacement to both
     assert (exact - small) / (exact - large) == pytest.approx(2.0, abs=0.2)
 
@@ -67,7 +70,7 @@ def test_distance_to_love_halves_with_the_mesh():
     coarse, fine = (
         abs(
             extrapolated(
-                *(patch_displacements("Q1", 4 * k, width=width, fineness=k) for width in (2.0, 4.0))
+                *(on_a_block("Q1", 4 * k, width=width, fineness=k) for width in (2.0, 4.0))
             )
             - exact
         )

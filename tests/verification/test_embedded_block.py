@@ -125,7 +125,7 @@ def test_pointwise_laws_reach_to_the_corners_of_tilted_patches():
     assert step.force_N > 1.0
 
 
-@pytest.mark.parametrize("grid", [(4, 4), (4, 2)])
+@pytest.mark.parametrize("grid", [pytest.param((4, 4), marks=pytest.mark.long), (4, 2)])
 def test_consistent_laws_go_as_far_as_points_of_patches_ask(grid):
     """Where a patch sinks less than in its mean, closures are larger than in any of its rows."""
     small = ["surface.grid=[64, 64]", "micro.model=half-space", "load.steps=1"]

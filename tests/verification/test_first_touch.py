@@ -48,7 +48,7 @@ def test_forces_rise_from_nothing(kind, model):
 
 
 @pytest.mark.parametrize("model", list(models()), ids=named)
-@pytest.mark.parametrize("patches", [(1, 1), (4, 4), (3, 5)])
+@pytest.mark.parametrize("patches", [(1, 1), pytest.param((4, 4), marks=pytest.mark.long), (3, 5)])
 def test_nothing_touches_before_first_touch(model, patches):
     """Neither the whole surface nor a patch of it alone, which rises no higher than the whole."""
     for seed in range(3):

@@ -9,7 +9,7 @@ from micro import MODELS, AsperityModel, ScaledModel
 APPROACHES = np.linspace(0.5e-3, 52e-3, 52)
 
 
-@pytest.mark.parametrize("seed", [1, 8])
+@pytest.mark.parametrize("seed", [1, pytest.param(8, marks=pytest.mark.long)])
 @pytest.mark.parametrize("kind", MODELS)
 @pytest.mark.parametrize("scaled", [False, True], ids=["summit", "contact"])
 def test_force_never_falls(seed, kind, scaled):

@@ -84,7 +84,10 @@ def test_active_sets_meet_the_conditions(case, options):
     assert 0.0 < states[0].force < states[1].force
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[pytest.mark.long] * (name == "nu 0.49")) for name in CASES],
+)
 def test_points_converge_where_nodes_do(name):
     """The wide spectrum on quadratic facets; on coarse linear ones summits between points hide."""
     kind = "tetrahedra" if name == "wide spectrum" else "hexahedra"

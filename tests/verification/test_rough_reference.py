@@ -94,6 +94,7 @@ def test_family_extrapolates_to_the_half_space_with_order_three(sphere, expected
     assert abs(fine - (coarse - fine) / 7.0) < 1e-3
 
 
+@pytest.mark.long  # as in a low block, see test_finite_slopes_block
 def test_finite_slopes_soften_the_rough_block_as_estimated():
     """Meshes alike but for their heights, 1 and a tenth: the mesh's own error cancels."""
     spectrum = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=2)

@@ -46,7 +46,7 @@ def errors(band, kind, options):
     return np.swapaxes(found, 0, 1)
 
 
-@pytest.mark.parametrize("band", SETS)
+@pytest.mark.parametrize("band", ["set 1", pytest.param("set 2", marks=pytest.mark.long)])
 def test_both_options_repair_the_elliptic_model(band):
     force, area = errors(band, "elliptic", ALL[-1])
     # Measured on 20 surfaces: 1 to 2.3 % (6 %) in force, 2 to 7 % in area; the oracle's 128² cells

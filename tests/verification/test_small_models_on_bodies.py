@@ -31,7 +31,10 @@ BLOCKS = {"cube": (1.0, 6), "pancake": (0.1, 12), "column": (10.0, 6)}
 """Heights [mm] and modes along a side."""
 
 
-@pytest.fixture(scope="module", params=BLOCKS)
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=[pytest.mark.long] * (name == "column")) for name in BLOCKS],
+)
 def bodies(request):
     """The body of the small models, and the half-space model on the same block."""
     height, modes = BLOCKS[request.param]

@@ -4,6 +4,8 @@ Borders of patches run through the middle of cells here, and the rectangles that
 gathered on are finer than what the islands are sampled with.
 """
 
+from itertools import product
+
 import numpy as np
 import pytest
 from hard_cases import KINDS, coarse_tables, from_file, history
@@ -39,8 +41,13 @@ def pressed(folder, heights, kind, model, turned=False):
     return step.force_N, step.contact_area_fraction, pressure
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(
+    ("kind", "model"),
+    [
+        pytest.param(*pair, marks=[pytest.mark.long] * (pair == ("isolated", "islands")))
+        for pair in product(KINDS, MODELS)
+    ],
+)
 def test_mirrored_and_turned_surfaces(kind, model, heights, tmp_path):
     force, area, pressure = pressed(tmp_path, heights, kind, model)
     assert np.count_nonzero(pressure) > 1

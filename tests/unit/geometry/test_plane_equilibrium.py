@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from geometry import Control, NotConverged
-from geometry.plane_equilibrium import PlaneResponse, find_equilibrium, slope_search
+from geometry.plane_equilibrium import PlaneResponse, find_equilibrium
 from geometry.rigid_plane import PlaneLevers
 
 
@@ -133,10 +133,3 @@ def test_inexact_stiffness_is_corrected_by_the_last_step(known):
     _, found = find_equilibrium(respond, control, start, 1.0, aim=1e-9, nearly=True)
     np.testing.assert_allclose(found, SHARES, rtol=1e-8)
     assert len(calls) <= 12
-
-
-def test_slope_search_lengthens_and_shortens():
-    assert slope_search(lambda share: share - 2.5, -2.5, 1.0) == 1.0
-    assert slope_search(lambda share: share - 20.0, -20.0, 1.0) == 3.0
-    assert slope_search(lambda share: 40.0 * share - 1.0, -1.0, 1.0) <= 1.9 / 40.0
-    assert slope_search(lambda share: -1.0, -1.0, 1.0) is None

@@ -8,10 +8,12 @@ from scene_inputs import KEYS, odd_text
 
 from multiscale.cli.command_line import main
 
-COMMANDS = ("run", "run", "plan", "compare", "laws", "surface", "schema", "doctor", "warm")
+COMMANDS = (
+    "run", "run", "plan", "compare", "laws", "surface", "schema", "doctor", "warm", "init", "help",
+)  # fmt: skip
 SCENE = "SCENE"  # stands for the scene file
 GOOD = (
-    "--out out", "--out out/deeper", "--set output.figures=false", "--resume",
+    "--out out", "--out out/deeper", "--set output.figures=false", "--resume", "--overwrite",
     "--set load.steps=1 micro.model=islands", "--set load.tilt=free",
     "--set coupling.kind=isolated block.cells=[4,4,3]",
     "--set output.report=false load.force=0.1",

@@ -12,7 +12,7 @@ from multiscale.cli.command_line import main
 
 SCENE = "demos/scenes/paper.toml"
 SMALL = [
-    "surface.grid=[64, 64]", "block.cells=[4, 4, 2]", "patches.grid=[2, 2]", "load.steps=1",
+    "surface.grid=[32, 32]", "block.cells=[4, 4, 2]", "patches.grid=[2, 2]", "load.steps=1",
     "output.figures=false", "output.fields=true",
 ]  # fmt: skip
 COUPLINGS = {
@@ -63,9 +63,9 @@ def test_runs_need_no_compiler_afterwards(warmed, tmp_path, scene):
 
 
 def test_processes_that_want_the_same_forms_at_once_do_not_harm_each_other(tmp_path):
-    begun = [begin(tmp_path, "warm", "--element", "Q1") for _ in range(3)]
+    begun = [begin(tmp_path, "warm", "--element", "Q1") for _ in range(2)]
     ended = [end(process) for process in begun]
-    assert [done.returncode for done in ended] == [0, 0, 0], [done.stderr for done in ended]
+    assert [done.returncode for done in ended] == [0, 0], [done.stderr for done in ended]
     assert len({done.stdout for done in ended}) == 1  # as many forms for all
     assert not list((tmp_path / "fenics").glob("*.tmp*"))
 

@@ -21,7 +21,7 @@ from multiscale.machine import (
     memory_of_this_node,
 )
 from multiscale.planning.block_plan import memory_warnings
-from multiscale.setup.surface_and_block import check_memory, memory_requests
+from multiscale.setup.memory import check_memory, memory_requests
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 LARGE = ("block.cells=[500, 500, 200]",)  # 5·10⁷ cells, 250 GB

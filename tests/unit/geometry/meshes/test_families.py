@@ -1,17 +1,26 @@
-"""Radius of a typical contact against Hertz', and where there is none."""
+"""Families of meshes: sizes that fall together, and contacts that they resolve."""
 
 import numpy as np
 import pytest
 
-from geometry import InputError, Spectrum, Surface, suggested_fine, synthesise
-from geometry.meshes.families import contact_radius
+from geometry import (
+    BlockShape,
+    InputError,
+    Spectrum,
+    Surface,
+    characteristic_size,
+    reference_shapes,
+    suggested_fine,
+    synthesise,
+)
+from geometry.meshes.expected_contact import contact_radius
+from geometry.meshes.families import EDGES
 
 ROUGH = synthesise(
     Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1),
     grid=(128, 128),
     lengths=(1.0, 1.0),
 )
-FLAT = Surface(heights=np.zeros((16, 16)), lengths=(1.0, 0.6))
 RADIUS = 0.8
 
 
@@ -20,34 +29,78 @@ def sphere(n=129):
     return Surface(heights=-(x[:, None] ** 2 + x**2) / (2.0 * RADIUS), lengths=(1.0, 1.0))
 
 
-@pytest.mark.parametrize("approach", [2e-3, 8e-3])
-def test_radius_is_that_of_hertz(approach):
-    # distances from pixels of 1/258 outside: a sixth of a pixel, three times, in 0.04 and 0.08
-    assert contact_radius(sphere(), approach) == pytest.approx(np.sqrt(RADIUS * approach), rel=0.04)
+def family(**changes):
+    content = {"surface": ROUGH, "approach": 8e-3, "height": 1.0, "count": 3}
+    return reference_shapes(**(content | changes))
 
 
-def test_radius_under_a_tilted_plane():
-    tilt = (0.1, -0.05)
-    # −r²/2R + t·r has its highest point R t²/2 above the middle
-    depth = 2e-3 + 0.5 * RADIUS * np.dot(tilt, tilt)
-    found = contact_radius(sphere(), 2e-3, tilt=tilt)
-    assert found == pytest.approx(np.sqrt(RADIUS * depth), rel=0.04)
+def test_plane_apart_has_one_place():
+    assert len(family(approach=-1e-3, count=1)[0].places) == 1
 
 
-def test_merging_contacts_do_not_coarsen_the_mesh():
-    x, y = (ROUGH.x[:, None], ROUGH.y[None, :])
-    crowd = Surface(heights=0.01 * np.cos(8 * np.pi * x) * np.cos(8 * np.pi * y), lengths=(1, 1))
-    assert contact_radius(crowd, 0.019) == pytest.approx(contact_radius(crowd, 0.012), rel=1e-3)
-    assert contact_radius(crowd, 0.012) < 0.125 / 4  # a quarter of the distance of the summits
-    assert contact_radius(crowd, 1e-4) < contact_radius(crowd, 1e-3) < contact_radius(crowd, 0.012)
+def test_sizes_of_tetrahedra_fall_together():
+    shapes = family()
+    sizes = np.array([characteristic_size(shape) for shape in shapes])
+    np.testing.assert_allclose(sizes[:-1] / sizes[1:], np.sqrt(2.0), rtol=1e-12)
+    assert sizes[-1] == suggested_fine(ROUGH, 8e-3) == contact_radius(ROUGH, 8e-3) / EDGES
+    for values in ([s.coarse for s in shapes], [s.growth for s in shapes]):
+        np.testing.assert_allclose(np.array(values) / sizes, values[0] / sizes[0], rtol=1e-12)
+    assert {shape.element for shape in shapes} == {"P2"}
 
 
-def test_surfaces_without_summits():
-    assert contact_radius(FLAT, 1e-3) == 0.3  # contact of all of it
-    assert contact_radius(ROUGH, -1e-3) == ROUGH.spacing[0]
+def test_two_meshes_span_what_three_do():
+    two, three = family(count=2), family(count=3)
+    assert [shape.fine for shape in two] == pytest.approx([three[0].fine, three[2].fine])
+    assert family(count=1)[0].fine == two[1].fine
 
 
-@pytest.mark.parametrize("edges", [0.0, -1.0, np.inf])
-def test_impossible_numbers_of_edges_are_refused(edges):
-    with pytest.raises(InputError, match="edges along a contact's radius"):
-        suggested_fine(ROUGH, 8e-3, edges=edges)
+def test_stated_edges_are_kept():
+    shapes = family(fine=0.02, count=2, element="P1", height=0.5)
+    assert [shape.fine for shape in shapes] == [0.04, 0.02]
+    assert [shape.element for shape in shapes] == ["P1", "P1"]
+    assert [shape.height for shape in shapes] == [0.5, 0.5]
+    assert suggested_fine(ROUGH, 8e-3, edges=6.0) == 0.5 * suggested_fine(ROUGH, 8e-3, edges=3.0)
+
+
+def test_places_follow_the_tilt():
+    (shape,) = family(surface=sphere(), approach=2e-3, tilt=(0.2, 0.0), count=1, fine=0.01)
+    radius = np.sqrt(2.0 * RADIUS * (2e-3 + 0.5 * RADIUS * 0.2**2))
+    away = np.hypot(shape.places[:, 0] - 0.5 - RADIUS * 0.2, shape.places[:, 1] - 0.5)
+    assert away.max() == pytest.approx(radius, abs=0.01)  # a lattice of 0.01
+
+
+def test_hexahedra_are_halved_in_all_directions():
+    shapes = family(mesh="hexahedra", cells=(64, 48, 16), grading=4.0, count=3)
+    assert [shape.cells for shape in shapes] == [(32, 24, 8), (45, 34, 11), (64, 48, 16)]
+    assert all(isinstance(shape, BlockShape) and shape.grading == 4.0 for shape in shapes)
+    sizes = [characteristic_size(shape) for shape in shapes]
+    assert sizes[0] / sizes[2] == pytest.approx(2.0, rel=0.05)  # layers that grow a bit faster
+    cube = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(8, 8, 8))
+    assert characteristic_size(cube) == pytest.approx(0.125)
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"count": 0}, "a family has at least one mesh"),
+        ({"count": 2.0}, "a family has at least one mesh"),
+        ({"count": True}, "a family has at least one mesh"),
+        ({"mesh": "prisms"}, "these cells are unknown"),
+        ({"mesh": "hexahedra"}, "hexahedra need their number"),
+        ({"mesh": "hexahedra", "cells": (4, 4, 4), "element": "P2"}, "not an element of hexahedra"),
+        ({"mesh": "hexahedra", "cells": (8, 8, 1)}, r"^\(8, 8, 1\): too few hexahedra for 3 "),
+        (
+            {"mesh": "hexahedra", "cells": (3, 3, 3)},
+            "for 3 meshes that differ along x, y and z",
+        ),
+        ({"element": "Q1"}, "element is unknown"),
+        ({"fine": 0.0}, "finest edge length is out of range"),
+        ({"fine": np.nan}, "finest edge length is out of range"),
+        ({"height": 0.0}, "must be positive"),
+        ({"approach": np.nan}, "the approach must be finite"),
+        ({"tilt": (np.inf, 0.0)}, "the tilt must be two finite slopes"),
+    ],
+)
+def test_impossible_families_are_refused(changes, text):
+    with pytest.raises(InputError, match=text):
+        family(**changes)

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from geometry.patches import PatchGrid
-from multiscale.comparison.catalogue import SMALL_SLOPES, configurations
+from multiscale.comparison.catalogue import configurations
 from multiscale.comparison.compare import resolved_scene
-from multiscale.comparison.comparison import ranked, refinements
-from multiscale.comparison.configuration import Curves, RunResult, pressure_grid
+from multiscale.comparison.configuration import Curves, RunResult
+from multiscale.comparison.measure import ranked, refinements
+from multiscale.comparison.scene_content import SMALL_SLOPES, pressure_grid
 from multiscale.planning.auto_keys import auto_keys
 from multiscale.scene.scene import Scene
 from multiscale.setup.surface_and_block import LAW_BLOCK_CELLS

@@ -11,11 +11,12 @@ import pytest
 from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
 from multiscale import compare
-from multiscale.cli.command_line import main, wall_time
+from multiscale.cli.command_line import main
 from multiscale.cli.compare import compare_scene
-from multiscale.comparison.catalogue import SMALL_SLOPES
+from multiscale.cli.words import wall_time
 from multiscale.comparison.configuration import Curves, RunResult
 from multiscale.comparison.process import run_here
+from multiscale.comparison.scene_content import SMALL_SLOPES
 from multiscale.run import run
 from multiscale.scene.scene import Scene
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from geometry.patches import PatchGrid
-from multiscale.comparison.catalogue import LOW_HEIGHTS, SMALL_SLOPES
 from multiscale.comparison.configuration import Configuration, Curves, RunResult
 from multiscale.comparison.errors import ErrorCauses
+from multiscale.comparison.scene_content import LOW_HEIGHTS, SMALL_SLOPES
 
 ROUNDING = 1e-12  # sums of five doubles of order one
 DIFFERENCE = 1e-11  # differences of such sums

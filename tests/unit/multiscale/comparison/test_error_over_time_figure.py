@@ -7,8 +7,8 @@ from matplotlib.text import Text
 from geometry.patches import PatchGrid
 from multiscale.comparison.comparison import Comparison, Row
 from multiscale.comparison.configuration import Configuration, Curves
+from multiscale.comparison.error_over_time import pareto_figure
 from multiscale.comparison.errors import ErrorMeasures
-from multiscale.comparison.figures import pareto_figure
 
 PATCHES = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
 CURVES = ("approach", "force", "area", "separation", "approach_error", "force_error", "area_error")

@@ -5,12 +5,7 @@ from compared_inputs import asked, compared
 from hypothesis import HealthCheck, given, settings
 from scene_inputs import BASE, toml
 
-from multiscale.comparison.configuration import (
-    Configuration,
-    RunResult,
-    read_result,
-    write_result,
-)
+from multiscale.comparison.configuration import Configuration, RunResult, read_result, write_result
 
 few = settings(
     derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)

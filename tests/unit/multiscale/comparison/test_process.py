@@ -10,9 +10,10 @@ import pytest
 
 from geometry.errors import InputError, NotConverged
 from multiscale.comparison.catalogue import configurations
-from multiscale.comparison.compare import launch_process, run_all
+from multiscale.comparison.compare import run_all
 from multiscale.comparison.configuration import RunResult, read_result, write_result
-from multiscale.comparison.process import check_launchable, run_here
+from multiscale.comparison.launch import check_launchable, launch_process
+from multiscale.comparison.process import run_here
 from multiscale.run import Run, run
 from multiscale.scene.scene import Scene
 
@@ -79,7 +80,7 @@ def test_configurations_beyond_the_budget_are_left_out_with_a_word(some, tmp_pat
     found = fake.results([some[0], dear, some[2]], tmp_path, budget=60.0)
     assert fake.run == [some[0].name, some[2].name]
     assert found[1][0].status == "not started"
-    told = "it is predicted to take 7e+02 s, and the budget leaves 59 s"
+    told = "it is predicted to take 11 min 40 s, and the budget leaves 59 s"
     assert found[1][0].message == told
     # nothing is kept of it: with more time it is run
     assert fake.all([dear], tmp_path) == [(dear.name, "done", False)]

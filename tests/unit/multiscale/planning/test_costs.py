@@ -11,12 +11,8 @@ from geometry import BlockShape
 from micro import HalfSpaceModel
 from multiscale import Run, Scene, make_setup
 from multiscale.loading.stepper import LoadHistory
-from multiscale.planning.costs import (
-    ROWS,
-    Machine,
-    predicted_cost,
-    step_count,
-)
+from multiscale.planning.costs import ROWS, predicted_cost, step_count
+from multiscale.planning.machine_speed import Machine
 from multiscale.setup.reference_meshes import mesh_unknowns
 
 
@@ -73,7 +69,7 @@ def test_a_load_step_is_one_solution(solved, load, kind):
     assert solved == {64**2: step_count(run.scene.loading.load_history)}
 
 
-@pytest.mark.parametrize("kind", ["consistent", "isolated"])
+@pytest.mark.parametrize("kind", [pytest.param("consistent", marks=pytest.mark.long), "isolated"])
 def test_rows_of_laws_are_as_many_as_predicted(solved, kind):
     run = Run(scene(kind))
     solved.clear()

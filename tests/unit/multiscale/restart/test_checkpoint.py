@@ -41,7 +41,8 @@ COUPLINGS = {
     | {"coupling": {"kind": "isolated", "newton": "condensed"}}
     | {"load": {"approach": "8 um", "steps": 2, "force_change": 0.4}},
     "consistent laws": CUBE
-    | {"micro": {"model": "half-space"}, "coupling": {"kind": "consistent"}},
+    | {"surface": {"grid": [32, 32]}, "micro": {"model": "half-space"}}
+    | {"coupling": {"kind": "consistent", "table_tolerance": 0.01}},
     "concurrent": CUBE
     | {"surface": {"grid": [72, 72]}, "coupling": {"kind": "concurrent"}}
     | {"micro": {"model": "half-space"}},
@@ -322,7 +323,10 @@ def test_finished_run_is_done(capsys, tmp_path):
     assert main(words) == 0
     assert "this run is finished" in capsys.readouterr().out
     assert (tmp_path / "out" / "history.csv").stat().st_mtime_ns == before
-    assert main([*words, "load.approach=4 um"]) == 0  # of another scene: made
+    other = [*words, "load.approach=4 um"]
+    assert main(other) == 2  # of another scene: not lost
+    assert "load.approach was [0.008]" in capsys.readouterr().err
+    assert main([*other, "--overwrite"]) == 0
     assert "nothing to resume in" in capsys.readouterr().out
 
 

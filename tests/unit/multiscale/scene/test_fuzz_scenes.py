@@ -12,7 +12,8 @@ from scene_inputs import BASE, KEYS, damaged, odd_text, planned, put, ran, scene
 from geometry.errors import InputError
 from multiscale.machine import ClusterNodes
 from multiscale.planning.problem_setup import make_setup
-from multiscale.scene.scene import MOST_BYTES, Scene, parsed
+from multiscale.scene.scene import Scene
+from multiscale.scene.scene_file import MOST_BYTES, parsed
 
 few = settings(
     derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)

@@ -11,7 +11,8 @@ import pytest
 
 from geometry.errors import InputError
 from multiscale.planning.problem_setup import make_setup
-from multiscale.scene.scene import Scene, read_scene_file
+from multiscale.scene.scene import Scene
+from multiscale.scene.scene_file import read_scene_file
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 

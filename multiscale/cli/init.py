@@ -1,0 +1,131 @@
+"""The command ``patchlaw init``: a scene with comments, for a measured surface or a spectrum."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+from typing import Any
+
+from geometry.collective import on_root
+from geometry.errors import InputError
+from geometry.surface import Surface
+from multiscale.machine import refuse_detached_processes
+from multiscale.output import terminal
+from multiscale.readable import quantity
+from multiscale.scene.new_scene import (
+    CONTACT_AREA,
+    START,
+    SYNTHESISED,
+    findings,
+    scene_text,
+    sensible_force,
+)
+from multiscale.scene.scene import Scene
+from multiscale.scene.scene_file import changed, overridden
+from multiscale.setup.surface_and_block import block_material, make_surface
+from multiscale.storage import write_text
+
+_KEYS = {
+    "force": "load.force",
+    "approach": "load.approach",
+    "young_modulus": "block.young_modulus",
+    "poisson_ratio": "block.poisson_ratio",
+    "height_unit": "surface.height_unit",
+    "channel": "surface.channel",
+}
+"""Keys of a scene that words of the command line set."""
+
+
+def write_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
+    """Write a scene that runs at once, with comments that explain it.
+
+    Args:
+        choice: Parsed words of the command line.
+        options: PETSc options given by the user.
+        comm: MPI communicator; None for a process on its own.
+    """
+    refuse_detached_processes()
+    path, remarks = on_root(comm, lambda: _write(choice))
+    for remark in remarks:
+        terminal.say(comm, remark)
+    terminal.say(comm, f"wrote {path}; to run it: patchlaw run {path}")
+
+
+def _write(choice: argparse.Namespace) -> tuple[Path, list[str]]:
+    """Write the scene; return its path, and what was found and chosen."""
+    path = choice.out or Path(choice.surface.stem if choice.surface else "scene").with_suffix(
+        ".toml"
+    )
+    if choice.surface and choice.surface.suffix == ".toml":
+        raise InputError(
+            "is a scene, not a surface",
+            key="SURFACE",
+            value=str(choice.surface),
+            allowed="a measured map; the scene to write is --out",
+        )
+    if os.path.lexists(path) and not choice.overwrite:
+        raise InputError(
+            "exists already", key="--out", value=str(path), allowed="another file, or --overwrite"
+        )
+    loaded = choice.force is not None or choice.approach is not None
+    scene, surface, remarks = _with_surface(_given(choice), loaded)
+    height = quantity(scene.block.height_under(surface.lengths), "mm", digits=6)
+    scene = scene.with_({"block.height": height.replace("µ", "u")})
+    if not loaded:
+        force = sensible_force(surface, block_material(scene))
+        scene = scene.with_({"load.force": force})
+        remarks.append(
+            f"The force of {force} is a start: about {100 * CONTACT_AREA:g} % of the surface will "
+            "touch."
+        )
+    if choice.young_modulus is None:
+        remarks.append("The block is of steel: write your constants in the section block.")
+    about = f"Made by patchlaw init. To run it: patchlaw run {path}; on a key: patchlaw help KEY"
+    data = scene.written
+    if choice.surface is not None:  # relative paths start in the folder of the scene
+        data = changed(data, "surface.file", os.path.relpath(choice.surface, path.parent))
+    write_text(path, scene_text(data, [about, *remarks]))
+    return path, remarks
+
+
+def _given(choice: argparse.Namespace) -> dict[str, Any]:
+    """Return the sections of the new scene, as far as the command line says them."""
+    source: dict[str, Any] = dict(SYNTHESISED)
+    if choice.surface is not None:
+        source = {"file": str(choice.surface), "detrend": "plane"}
+    data: dict[str, Any] = {**START, "surface": source}
+    if choice.lengths:
+        data = changed(data, "surface.lengths", choice.lengths)
+    for word, key in _KEYS.items():
+        if (text := getattr(choice, word)) is not None:
+            data = overridden(data, f"{key}={text}")
+    return data
+
+
+def _with_surface(data: dict[str, Any], loaded: bool) -> tuple[Scene, Surface, list[str]]:
+    """Return the scene with what its map needs done, its surface, and what was found.
+
+    A scene without a load gets one that stands for that to come.
+    """
+    scene = Scene.from_dict(data if loaded else changed(data, "load.force", "1 N"))
+    if scene.surface.file is None:
+        surface = make_surface(scene)
+        return scene, surface, findings(surface)
+    remarks, raw = [], _without_gaps(scene.with_({"surface.detrend": "none"}))
+    if raw is None:
+        remarks = ["Heights are missing: missing = 'fill' closes the gaps by a membrane."]
+        scene = scene.with_({"surface.missing": "fill"})
+        raw = make_surface(scene.with_({"surface.detrend": "none"}))
+    surface = make_surface(scene)
+    remarks += [f"As it was: {note}." for note in raw.notes if note not in surface.notes]
+    return scene, surface, [*findings(surface), *remarks]
+
+
+def _without_gaps(scene: Scene) -> Surface | None:
+    """Return the surface of a scene, or None where heights are missing in its map."""
+    try:
+        return make_surface(scene)
+    except InputError:
+        make_surface(scene.with_({"surface.missing": "fill"}))  # raises what else is wrong
+        return None

@@ -1,0 +1,188 @@
+"""The words of the command line: commands, their arguments and options.
+
+Nothing but the standard library is imported here, so that ``--help`` takes a tenth of a second.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NoReturn
+
+from multiscale.comparison import AGAINST
+
+SWEEP_ENDING = "-sweep"
+"""What the results folder of a sweep is called after the scene's name."""
+
+COMPARE_ENDING = "-compare"
+"""What the results folder of a comparison is called after the scene's name."""
+
+
+class UsageError(Exception):
+    """The words of the command line are not understood."""
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        raise UsageError(f"{message} (see: {self.prog} --help)")
+
+
+class _ShowVersions(argparse.Action):
+    """Prints the versions of patchlaw and of dolfinx, which is not loaded for it."""
+
+    def __call__(self, *given: Any) -> NoReturn:
+        from importlib import metadata  # takes longer than all else that --help needs
+
+        found = []
+        for name, distribution in (("patchlaw", "patchlaw"), ("dolfinx", "fenics-dolfinx")):
+            try:
+                found.append(f"{name} {metadata.version(distribution)}")
+            except metadata.PackageNotFoundError:
+                found.append(f"{name} not installed")
+        print(", ".join(found))
+        raise SystemExit(0)
+
+
+def wall_time(text: str) -> float:
+    """Return a wall time in seconds.
+
+    Args:
+        text: A quantity such as ``"55m"`` or ``"2 h"``.
+
+    Raises:
+        argparse.ArgumentTypeError: When the text is no time, or not greater than zero.
+    """
+    from multiscale.scene.quantities import parse_duration
+
+    try:
+        return parse_duration(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r}: {error}") from None
+
+
+def sweep_part(text: str) -> tuple[int, int]:
+    """Return the part of a sweep that a text ``K/N`` names.
+
+    Args:
+        text: Number of the part, from 1, and number of parts.
+
+    Raises:
+        argparse.ArgumentTypeError: When the text is nothing of this kind.
+    """
+    which, _, parts = text.partition("/")
+    if which.isdecimal() and parts.isdecimal() and 1 <= int(which) <= int(parts):
+        return int(which), int(parts)
+    raise argparse.ArgumentTypeError(f"{text!r} is no part of a sweep; it is K/N, such as 2/8")
+
+
+_TIME: dict[str, Any] = {"type": wall_time, "metavar": "TIME"}
+
+
+def command_parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line; `function` says where the code of a command is."""
+    top = _Parser(
+        prog="patchlaw",
+        description="Multiscale contact of rough surfaces.",
+        epilog="PETSc options follow after --, such as: patchlaw run scene.toml -- -ksp_monitor",
+    )
+    top.add_argument("--version", action=_ShowVersions, nargs=0, help="show versions and exit")
+    commands = top.add_subparsers(required=True, metavar="COMMAND", parser_class=_Parser)
+
+    def command(name: str, function: str, summary: str) -> argparse.ArgumentParser:
+        made = commands.add_parser(name, help=summary, description=summary)
+        made.set_defaults(function=function)
+        return made
+
+    _add_init(command("init", "init.write_scene", "Write a scene for a surface, with comments."))
+    _add_runs(command)
+    _add_descriptions(command)
+    return top
+
+
+def _add_init(init: argparse.ArgumentParser) -> None:
+    """Add what the command takes that writes a scene."""
+    path: dict[str, Any] = {"type": Path}
+    init.add_argument("surface", nargs="?", help="a measured map; a spectrum without it", **path)
+    load = init.add_mutually_exclusive_group()
+    load.add_argument("--force", help="such as '100 N'; by default one that suits the surface")
+    load.add_argument("--approach", help="such as '2 um', instead of a force")
+    init.add_argument("--young-modulus", metavar="E", help="of the block; by default 210 GPa")
+    init.add_argument("--poisson-ratio", metavar="NU", help="of the block; by default 0.3")
+    sides: dict[str, Any] = {"nargs": 2, "metavar": ("LX", "LY")}
+    init.add_argument("--lengths", help="sides of the map, where its file lacks them", **sides)
+    init.add_argument("--height-unit", metavar="UNIT", help="of heights, where the file lacks it")
+    init.add_argument("--channel", help="name or number of a channel of the file")
+    where = "the scene to write; by default SURFACE.toml, here"
+    init.add_argument("--out", metavar="FILE", help=where, **path)
+    init.add_argument("--overwrite", action="store_true", help="replace a file that is there")
+
+
+def _add_runs(command: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
+    """Add the commands that run scenes."""
+    run = command("run", "run.run_scene", "Run a scene; write history, laws, figures and report.")
+    run.add_argument("--resume", action="store_true", help="go on with an interrupted run")
+    run.add_argument("--max-time", help="stop cleanly before this wall time is over", **_TIME)
+    _add_scene(run)
+    compare = command(
+        "compare",
+        "compare.compare_scene",
+        "Run a scene in every sensible configuration; draw error against time.",
+    )
+    _add_scene(compare, ending=COMPARE_ENDING)
+    against = f"compare with {', '.join(AGAINST)}; by default the best that is reached"
+    compare.add_argument("--against", metavar="KIND", choices=AGAINST, help=against)
+    budget = "wall time for all configurations, such as 5min; by default any"
+    compare.add_argument("--budget", help=budget, **_TIME)
+    ranks = "processes of each configuration, under mpirun"
+    compare.add_argument("--ranks", type=int, default=1, metavar="N", help=ranks)
+    sweep = command(
+        "sweep",
+        "sweep.sweep_scene",
+        "Run a scene for many values of its keys; write all load steps, means and bands.",
+    )
+    _add_scene(sweep, ending=SWEEP_ENDING)
+    values = (
+        "values of a key, such as surface.spectrum.seed=0..19 or "
+        "block.young_modulus='1 GPa, 4 GPa'; several keys make all combinations"
+    )
+    sweep.add_argument("--vary", action="append", required=True, metavar="KEY=VALUES", help=values)
+    part = "run the K-th of N parts of the cases; by default the task of a Slurm array"
+    sweep.add_argument("--part", metavar="K/N", type=sweep_part, help=part)
+    anew = "begin anew where another sweep's results are"
+    sweep.add_argument("--overwrite", action="store_true", help=anew)
+
+
+def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
+    """Add the commands that run no scene."""
+    plan = "Say what a run would do, and why; run nothing expensive."
+    unused = "accepted so that the words of a run can be reused: a plan writes nothing"
+    _add_scene(command("plan", "describe.plan_scene", plan), folder=unused)
+    laws = "Tabulate the patch laws of a scene; write and draw them."
+    _add_scene(command("laws", "describe.tabulate_laws", laws))
+    surface = "Describe and draw the surface of a scene."
+    _add_scene(command("surface", "describe.describe_surface", surface))
+    command("schema", "describe.print_schema", "Print the JSON Schema of scene files.")
+    keys = command("help", "describe.explain_keys", "Explain the sections and keys of a scene.")
+    topic = "a section or a key, such as load or load.force; all sections by default"
+    keys.add_argument("topic", nargs="?", metavar="KEY", help=topic)
+    checks = "Check versions, MPI, threads, form compiler and memory; solve a small block."
+    doctor = command("doctor", "doctor.examine_machine", checks)
+    doctor.add_argument("--json", action="store_true", help="results as JSON, for scripts")
+    forms = "Compile all finite element forms now, so that later runs need no compiler."
+    names: dict[str, Any] = {"nargs": "+", "default": [], "metavar": "NAME"}
+    warm = command("warm", "doctor.compile_ahead", forms)
+    warm.add_argument("--element", help="Q1, Q2, P1, P2; all by default", **names)
+
+
+def _add_scene(command: argparse.ArgumentParser, *, folder: str = "", ending: str = "") -> None:
+    """Add what every command on a scene takes: the file, the results folder, changes of keys."""
+    command.add_argument("scene", type=Path, help="scene file (TOML)")
+    where = f"folder of the results (default: results/SCENE{ending}, by the file's name)"
+    command.add_argument("--out", type=Path, metavar="DIR", help=folder or where)
+    keys: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
+    if not ending:  # the folders of comparisons and sweeps hold many scenes
+        other = "replace the results of another scene in this folder"
+        command.add_argument("--overwrite", action="store_true", help=other)
+    changes = "change keys of the scene, such as load.approach='4 um'"
+    command.add_argument("--set", metavar="KEY=VALUE", help=changes, **keys)

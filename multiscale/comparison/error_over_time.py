@@ -1,0 +1,137 @@
+"""The figure of a comparison that shows errors over wall time, and which ways are the best."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from multiscale.comparison.comparison import Comparison, Row
+from multiscale.figures.style import (
+    COLOURS,
+    ERROR_BAND,
+    MARKERS,
+    new_figure,
+    panels_above_legend,
+)
+
+PALE = 0.4
+"""Opacity of configurations that another one beats in time and error."""
+
+LEAST_ERROR = 1e-5
+"""Smaller errors are drawn here."""
+
+LEAST_SHARE = 0.2
+"""Errors below this share of the error bar are drawn there: they cannot be told apart."""
+
+NUMBER_SIZE = (14.0, 10.0)
+"""Width and height that a number takes [pt]."""
+
+_PLAIN: dict[str, Any] = {"ms": 7.0, "zorder": 4, "ls": "none"}
+_RING = _PLAIN | {"mec": "0.1", "mew": 1.4, "ms": 10.0, "zorder": 5}
+_BEATEN = _PLAIN | {"mew": 0.0, "alpha": PALE, "zorder": 3}
+_EARLY = _PLAIN | {"mfc": "none", "alpha": PALE, "zorder": 3}
+_NUMBER: dict[str, Any] = {"fontsize": 9, "fontweight": "bold", "color": "0.1", "zorder": 6}
+_NUMBER |= {"ha": "center", "va": "center"}
+
+
+def pareto_figure(comparison: Comparison) -> Figure:
+    """Draw errors of the response, the contact area and the pressure distribution over time.
+
+    The frontier is drawn, configurations that another one beats are pale, and the uncertainty of
+    the measure is a band: errors within it cannot be told apart. Configurations on a frontier have
+    the numbers of their rows.
+
+    Args:
+        comparison: The comparison; it has a measure.
+    """
+    response = comparison.response
+    titles = {
+        f"{response}_max": f"{response}: largest error over the curve",
+        "area_max": "contact area: largest error over the curve",
+        "distribution": "distribution of pressures: distance / mean",
+    }
+    figure = new_figure(13.2, 6.4)
+    panels, below = panels_above_legend(figure, 3, 0.16)
+    for axes, (error, title) in zip(panels, titles.items(), strict=True):
+        _draw_errors(axes, comparison, error)
+        axes.set_title(title, fontsize=10.5)
+    panels[0].set_ylabel("relative to the measure")
+    _draw_legend(below, comparison)
+    ahead = {row.name for error in titles for row in comparison.frontier(error)}
+    ahead.add(str(comparison.measure))
+    rows = enumerate(comparison.rows, 1)
+    names = [f"{number}: {row.name}" for number, row in rows if row.name in ahead]
+    lines = ["      ".join(names[first : first + 3]) for first in range(0, len(names), 3)]
+    figure.supxlabel("\n".join(lines), fontsize=8.5)
+    # Numbers are placed beside the points, whose places are known once the figure is laid out.
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    for axes, error in zip(panels, titles, strict=True):
+        _draw_numbers(axes, comparison, error)
+    return figure
+
+
+def _points(comparison: Comparison, error: str) -> list[tuple[float, float, int, Row]]:
+    """Return time, error as it is drawn, number and row of all configurations that have both."""
+    least = max(LEAST_ERROR, np.nan_to_num(LEAST_SHARE * getattr(comparison.uncertainty, error)))
+    points = [
+        # The error of the measure is its own uncertainty.
+        (row.seconds, float(np.maximum(abs(getattr(row.errors, error)), least)), number, row)
+        for number, row in enumerate(comparison.rows, 1)
+    ]
+    return [point for point in points if np.isfinite(point[:2]).all()]
+
+
+def _draw_errors(axes: Any, comparison: Comparison, error: str) -> None:
+    """Draw one panel of errors over time without its numbers."""
+    frontier, bar = comparison.frontier(error), getattr(comparison.uncertainty, error)
+    for seconds, size, _, row in _points(comparison, error):
+        look = _PLAIN if row in frontier else _BEATEN
+        if row.is_measure or row.status != "done":
+            look = _RING if row.is_measure else _EARLY
+        axes.plot(seconds, size, MARKERS[row.kind], color=COLOURS[row.kind], **look)
+    axes.set(xscale="log", yscale="log", xlabel="wall time [s]")
+    axes.margins(0.1)
+    axes.grid(alpha=0.25, which="major")
+    axes.autoscale_view()
+    axes.autoscale(False)
+    if np.isfinite(bar) and bar > 0.0:
+        axes.axhspan(1e-3 * axes.get_ylim()[0], bar, **ERROR_BAND)
+    if frontier:
+        times = [*(row.seconds for row in frontier), axes.get_xlim()[1]]
+        steps = [max(comparison.error(row, error), LEAST_ERROR) for row in frontier]
+        axes.step(times, [*steps, steps[-1]], where="post", color="0.25", lw=1.2)
+
+
+def _draw_numbers(axes: Any, comparison: Comparison, error: str) -> None:
+    """Write the numbers of the frontier and of the measure, from the fastest on.
+
+    Below and to the left of a point on the frontier there is no other configuration.
+    """
+    frontier, placed = comparison.frontier(error), np.empty((0, 2))
+    for *point, number, row in sorted(_points(comparison, error), key=lambda point: point[0]):
+        if row not in frontier and not row.is_measure:
+            continue
+        mark = 72.0 / axes.figure.dpi * axes.transData.transform(point)
+        spot = mark - (10.0, 9.0)
+        while (np.abs(placed - spot) < NUMBER_SIZE).all(axis=1).any():
+            spot[1] -= NUMBER_SIZE[1]
+        placed = np.vstack([placed, spot])
+        axes.annotate(str(number), point, spot - mark, textcoords="offset points", **_NUMBER)
+
+
+def _draw_legend(axes: Any, comparison: Comparison) -> None:
+    for kind, mark in MARKERS.items():
+        if any(row.kind == kind for row in comparison.rows):
+            axes.plot([], [], mark, color=COLOURS[kind], label=kind, **_PLAIN)
+    black: dict[str, Any] = {"color": "0.1"}
+    axes.plot([], [], "o", label="measure, at its error bar", **(black | _RING), mfc="none")
+    axes.plot([], [], "o", label="pale: another one is faster and as close", **black, **_BEATEN)
+    axes.plot([], [], "-", label="frontier: numbered", color="0.25", lw=1.2)
+    lowest = f"within the error bar; least drawn: {LEAST_SHARE:g} of it"
+    axes.fill_between([], [], [], label=lowest, **ERROR_BAND)
+    if any(row.steps and row.status != "done" for row in comparison.rows):
+        axes.plot([], [], "s", label="hollow: ended before the last load step", **black, **_EARLY)
+    axes.legend(loc="center", ncol=4, frameon=False, fontsize=9.5)

@@ -1,0 +1,144 @@
+"""The keys of a scene: values, unit, default and meaning of each, from the models that check them.
+
+They are those of the JSON Schema of scene files, so that help and schema say the same.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from multiscale.scene.scene import Scene
+
+_ANY = 1e9
+"""A bound from here on is none that a user meets."""
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """A key of a scene, or a section.
+
+    Args:
+        name: The dotted name, such as ``load.force``.
+        schema: Its JSON Schema.
+        required: Whether it has to be given.
+    """
+
+    name: str
+    schema: Mapping[str, Any]
+    required: bool
+
+    @property
+    def is_section(self) -> bool:
+        """Whether it holds further keys."""
+        return "properties" in self.schema
+
+    @property
+    def meaning(self) -> str:
+        """What it means, in a sentence or more."""
+        return " ".join(self.schema["description"].replace("``", "").split())
+
+    @property
+    def values(self) -> str:
+        """The values that it may have."""
+        return _values(self.schema)
+
+    @property
+    def unit(self) -> str:
+        """Unit of bare numbers; empty where numbers have none."""
+        return next(_units(self.schema), "")
+
+    @property
+    def default(self) -> str:
+        """Its default as it would stand in a scene file, or that it has none."""
+        if self.required:
+            return "none: it is required"
+        default = self.schema.get("default")
+        return "not given" if default is None else json.dumps(default)
+
+
+@cache
+def scene_keys() -> dict[str, Key]:
+    """Return all keys and sections of a scene by dotted name, each section before its keys."""
+    schema = Scene.model_json_schema(by_alias=True)
+    return {key.name: key for key in _keys(schema, schema["$defs"], "")}
+
+
+def _keys(section: Mapping[str, Any], parts: Mapping[str, Any], prefix: str) -> Iterator[Key]:
+    """Yield the keys of a section and of the sections in it."""
+    for name, stated in section["properties"].items():
+        options = (stated, *stated.get("anyOf", ()))
+        references = [option["$ref"] for option in options if "$ref" in option]
+        part = parts[references[0].rpartition("/")[2]] if references else {}
+        required = name in section.get("required", ())
+        yield Key(prefix + name, {**part, **stated}, required)
+        if part:
+            yield from _keys(part, parts, f"{prefix}{name}.")
+
+
+def _values(schema: Mapping[str, Any]) -> str:
+    """Return the values that a JSON Schema allows, in words."""
+    if "unit" in schema:
+        unit, (example,) = schema["unit"], schema["examples"]
+        return f'quantity, such as "{example}"' + (
+            f", or number in {unit}" if unit else ", or number"
+        )
+    if "enum" in schema or "const" in schema:
+        return " | ".join(json.dumps(one) for one in schema.get("enum", [schema.get("const")]))
+    if options := schema.get("anyOf"):
+        return "; or ".join(_values(one) for one in options if one.get("type") != "null")
+    kind = schema.get("type")
+    if kind == "array":
+        items = schema.get("prefixItems", ())
+        if not items:
+            return f"list of: {_values(schema['items'])}"
+        return f"list of {len(items)}: {_values(items[0])}"
+    words = {"boolean": "true | false", "integer": "whole number", "string": "text"}
+    return words.get(str(kind), "number") + _bounds(schema)
+
+
+def _bounds(schema: Mapping[str, Any]) -> str:
+    signs = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
+    stated = {sign: schema[name] for name, sign in signs.items() if name in schema}
+    bounds = [f"{sign} {bound:g}" for sign, bound in stated.items() if bound < _ANY]
+    return f" {' and '.join(bounds)}" if bounds else ""
+
+
+def _units(schema: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the units of the quantities in a JSON Schema."""
+    if "unit" in schema:
+        yield schema["unit"]
+    parts = (*schema.get("anyOf", ()), *schema.get("prefixItems", ()), schema.get("items", {}))
+    for part in parts:
+        if part:
+            yield from _units(part)
+
+
+def dotted(data: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the keys of nested dictionaries, dotted, with their values.
+
+    Args:
+        data: The dictionaries.
+        prefix: What stands before each name.
+    """
+    for name, value in data.items():
+        if isinstance(value, dict):
+            yield from dotted(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value
+
+
+def bare_quantities(scene: Scene) -> Iterator[str]:
+    """Yield what bare numbers of a scene were taken for, such as ``height = 1 taken in mm``.
+
+    Args:
+        scene: The scene.
+    """
+    for name, value in dotted(scene.written):
+        numbers = value if isinstance(value, list | tuple) else [value]
+        bare = any(isinstance(one, int | float) and one for one in numbers)
+        if bare and (unit := scene_keys()[name].unit):
+            yield f"{name} = {value} taken in {unit}"

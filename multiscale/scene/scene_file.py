@@ -1,0 +1,127 @@
+"""Reads the text of a scene file, and changes keys of what it says, before anything is checked."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from geometry.errors import InputError
+
+MOST_BYTES = 64 * 1024
+"""Size of the largest scene file [B]; a scene with every key takes 2 kB."""
+
+_OF_NUMBER = re.compile(r"[0-9]\.[0-9]+(?!\.)")
+_DEEPEST = 100  # sections within sections
+_EXCLUSIVE = {
+    "approach": ("force",),
+    "force": ("approach",),
+    "file": ("spectrum", "heights"),
+    "spectrum": ("file", "heights"),
+    "heights": ("file", "spectrum"),
+}
+"""Keys that one key replaces, as a section may have only one of them."""
+
+
+def read_scene_file(path: Path) -> dict[str, Any]:
+    """Return what a scene file says, unchecked.
+
+    Args:
+        path: TOML file in UTF-8.
+
+    Raises:
+        InputError: When it is no regular file, cannot be read, is too large or no TOML.
+    """
+    content = _content(path)
+    try:
+        return parsed(content.decode("utf-8-sig"))  # some editors put a mark before the text
+    except UnicodeDecodeError as error:
+        problem = f"is not UTF-8 text: {error}"
+    except ValueError as error:
+        problem = f"is not valid TOML: {error}"
+    raise InputError(problem, file=str(path))
+
+
+def _content(path: Path) -> bytes:
+    """Return the bytes of a regular file, which has an end, if a scene can be that large."""
+    try:
+        if path.exists() and not path.is_file():
+            raise ValueError("it is not a regular file")
+        with path.open("rb") as file:
+            content = file.read(MOST_BYTES + 1)
+        if len(content) > MOST_BYTES:
+            raise ValueError(f"it is larger than any scene (allowed: {MOST_BYTES} bytes)")
+    except (OSError, ValueError) as error:  # ValueError: also a zero byte in the name
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"cannot be read: {reason}", file=str(path)) from None
+    return content
+
+
+def overridden(data: dict[str, Any], text: str) -> dict[str, Any]:
+    """Return what a scene file says, with one key set from the command line.
+
+    Args:
+        data: The sections; they stay what they are.
+        text: ``key=value``; a value is TOML, or else a plain string.
+
+    Raises:
+        InputError: When it is no override, or a section in its key is none.
+    """
+    key, equals, value = (part.strip() for part in text.partition("="))
+    if not equals or not key or key.count(".") >= _DEEPEST:
+        raise InputError("is not an override", value=text, allowed="--set key=value")
+    return changed(data, key, _overriding(value))
+
+
+def changed(data: dict[str, Any], key: str, value: Any) -> dict[str, Any]:
+    """Return nested dictionaries with one key set, without the keys that it excludes.
+
+    Args:
+        data: The dictionaries; they stay what they are.
+        key: The dotted key.
+        value: Its value.
+
+    Raises:
+        InputError: When a section in the key is none.
+    """
+    first, _, rest = key.partition(".")
+    if not rest:
+        excluded = _EXCLUSIVE.get(first, ())
+        return {name: old for name, old in data.items() if name not in excluded} | {first: value}
+    section = data.get(first, {})
+    if not isinstance(section, dict):
+        raise InputError(f"'{first}' is not a section", key=key, value=value)
+    return data | {first: changed(section, rest, value)}
+
+
+def _overriding(text: str) -> Any:
+    try:
+        found = parsed(f"value = {text}")
+    except ValueError:
+        return text
+    return found["value"] if found.keys() == {"value"} else text
+
+
+def parsed(text: str) -> dict[str, Any]:
+    """Return a TOML text as nested dictionaries.
+
+    Args:
+        text: The text.
+
+    Raises:
+        ValueError: When it is no TOML, or nested deeper than anything sensible.
+    """
+    if any(_dots(line) > _DEEPEST for line in text.split("\n")):
+        raise ValueError("a line with more dots than any scene has")  # they take hours to parse
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+
+
+def _dots(line: str) -> int:
+    """Count the dots of a line that may part keys, not those of numbers or comments."""
+    if line.lstrip().startswith("#"):
+        return 0
+    return line.count(".") - len(_OF_NUMBER.findall(line))

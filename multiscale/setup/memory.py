@@ -1,0 +1,92 @@
+"""The memory that a scene needs, and its refusal before anything is allocated."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from geometry import InputError
+from geometry.files.content import BYTES_PER_HEIGHT
+from multiscale.machine import ClusterNodes, MemoryRequest
+from multiscale.scene.scene import Scene
+from multiscale.setup.surface_and_block import block_cells, meshes_block
+
+BYTES_PER_CELL = 5000
+"""Memory that mesh, stiffness and multigrid take per cell, roughly, over all ranks [B]."""
+BYTES_PER_SENT_HEIGHT = 17
+"""Memory of a height and its spline on every rank, once the surface is made [B]."""
+BYTES_PER_PAIR = 40
+"""Memory of dense matrices per pair of patches: compliance, tangent and factors [B]."""
+BYTES_PER_LAW, BYTES_PER_NEW_LAW = 3_600, 11_400
+"""Memory of a law with 65 rows of 7 numbers on every rank, and of what it takes besides where it
+is made, while rows are inserted [B]."""
+BYTES_PER_STATE, BYTES_PER_STEP = 24, 1000
+"""Memory of a patch's results and of the other results of a load step [B]."""
+
+
+def check_memory(
+    scene: Scene, nodes: ClusterNodes, requests: Iterable[MemoryRequest] | None = None
+) -> None:
+    """Refuse what does not fit into the memory of the nodes, before it is allocated.
+
+    Args:
+        scene: The scene.
+        nodes: The nodes of the run.
+        requests: The memory that is needed; by default `memory_requests` of the scene.
+
+    Raises:
+        InputError: Names the key, its value and what is allowed.
+    """
+    for request in memory_requests(scene) if requests is None else requests:
+        if not nodes.fits(request):
+            value, other = request.value, request.alternative
+            raise InputError(
+                request.sentence,
+                key=request.key,
+                value=list(value) if isinstance(value, tuple) else value,
+                allowed=f"what fits into {nodes.remedy(request)}{'; or ' * bool(other)}{other}",
+                file=scene.file,
+            )
+
+
+def memory_requests(scene: Scene) -> Iterator[MemoryRequest]:
+    """Yield the memory that a scene needs, key by key.
+
+    Auto values are left out: none is chosen that would not fit. A reference requests the memory of
+    its meshes itself.
+
+    Args:
+        scene: The scene.
+    """
+
+    def request(key: str, value: Any, purpose: str = "", **sizes: Any) -> MemoryRequest:
+        return MemoryRequest(key=key, value=value, purpose=purpose, **sizes)
+
+    grid, patches, kind = scene.surface.grid, scene.patches.grid, scene.coupling.kind
+    for key, heights in (("surface.grid", grid), ("surface.resample", scene.surface.resample)):
+        if isinstance(heights, tuple):
+            sent = math.prod(heights) * BYTES_PER_SENT_HEIGHT
+            made = math.prod(heights) * BYTES_PER_HEIGHT - sent
+            yield request(key, heights, per_rank=sent, root_only=made)
+    if meshes_block(scene):
+        nx, ny, nz = block_cells(scene)
+        yield request("block.cells", (nx, ny, nz), shared=nx * ny * nz * BYTES_PER_CELL)
+        if scene.block.margin:
+            margin = scene.block.margin_cells
+            cells = (nx + 2 * margin) * (ny + 2 * margin) * nz
+            yield request("block.margin_cells", margin, shared=cells * BYTES_PER_CELL)
+    if not isinstance(patches, tuple):
+        return
+    key, count = "patches.grid", math.prod(patches)
+    yield request(key, patches, per_rank=count * BYTES_PER_HEIGHT)
+    if kind not in ("analytic", "reference"):
+        purpose = "the interaction of all patches with each other"
+        yield request(key, patches, purpose, per_rank=count**2 * BYTES_PER_PAIR)
+    if kind in ("isolated", "consistent"):  # isolated laws are divided over the ranks
+        where = "shared" if kind == "isolated" else "root_only"
+        sizes = {"per_rank": count * BYTES_PER_LAW, where: count * BYTES_PER_NEW_LAW}
+        yield request(key, patches, "a law for every patch", **sizes)
+    steps, purpose = scene.loading.load_history.count, f"the history of {count} patches"
+    size = steps * (count * BYTES_PER_STATE + BYTES_PER_STEP)
+    yield request("load.steps", scene.loading.steps, purpose, per_rank=size)

@@ -1,0 +1,127 @@
+"""patchlaw init writes a scene that runs; patchlaw help explains keys as text."""
+
+import tomllib
+
+import numpy as np
+import pytest
+
+from multiscale.cli.command_line import main
+from multiscale.scene.keys import scene_keys
+
+
+def call(capsys, *words):
+    code = main(list(words))
+    shown = capsys.readouterr()
+    return code, " ".join(shown.out.split()), shown.err
+
+
+@pytest.fixture
+def rough(tmp_path, monkeypatch):
+    """A folder with a tilted map without lengths, of which one height is missing."""
+    monkeypatch.chdir(tmp_path)
+    x = np.linspace(0.0, 1.0, 32)
+    heights = np.add.outer(0.02 * x, 0.001 * np.cos(12 * x)) + 0.001 * np.sin(9 * x)[:, None]
+    heights[3, 4] = np.nan
+    (tmp_path / "maps").mkdir()
+    np.save("maps/my.npy", heights)
+    return tmp_path
+
+
+LENGTHS = ("--lengths", "2 mm", "1 mm")
+
+
+def test_a_measured_map_runs_at_once(capsys, rough):
+    code, shown, err = call(capsys, "init", "maps/my.npy", *LENGTHS, "--force", "2 N")
+    assert (code, err) == (0, "")
+    assert "32 × 32 heights on 2 mm × 1 mm" in shown
+    assert "Heights are missing" in shown
+    assert "As it was: the map is tilted" in shown
+    assert shown.endswith("to run it: patchlaw run my.toml")
+    said = tomllib.loads((rough / "my.toml").read_text(encoding="utf-8"))
+    assert said["surface"] == {
+        "file": "maps/my.npy", "lengths": ["2 mm", "1 mm"], "missing": "fill", "detrend": "plane",
+    }  # fmt: skip
+    assert said["load"] == {"force": "2 N", "steps": 8}
+    assert said["block"]["height"] == "1 mm"
+    quick = ("--set", "coupling.kind=analytic", "load.steps=1", "output.figures=false")
+    code, shown, err = call(capsys, "run", "my.toml", *quick)
+    assert (code, err) == (0, "")
+    assert "level plane" not in shown
+
+
+def test_nothing_is_overwritten_unasked(capsys, rough):
+    words = ("init", "maps/my.npy", *LENGTHS, "--approach", "1 um")
+    assert call(capsys, *words)[0] == 0
+    before = (rough / "my.toml").read_bytes()
+    code, shown, err = call(capsys, *words[:-1], "2 um")
+    assert (code, shown) == (2, "")
+    assert "--out = 'my.toml': exists already (allowed: another file, or --overwrite)" in err
+    assert (rough / "my.toml").read_bytes() == before
+    assert call(capsys, *words[:-1], "2 um", "--overwrite")[0] == 0
+    assert 'approach = "2 um"' in (rough / "my.toml").read_text(encoding="utf-8")
+
+
+def test_without_a_surface_it_is_synthesised(capsys, rough):
+    constants = ("--young-modulus", "3 GPa", "--poisson-ratio", "0.4")
+    code, shown, _ = call(capsys, "init", *constants, "--out", "deep/new.toml")
+    assert code == 0
+    assert "The force of" in shown
+    assert "steel" not in shown
+    said = tomllib.loads((rough / "deep" / "new.toml").read_text(encoding="utf-8"))
+    assert said["surface"]["spectrum"]["hurst"] == 0.8
+    assert (said["block"]["young_modulus"], said["block"]["poisson_ratio"]) == ("3 GPa", 0.4)
+
+
+def test_file_is_found_from_the_folder_of_the_scene(capsys, rough):
+    assert call(capsys, "init", "maps/my.npy", *LENGTHS, "--out", "scenes/my.toml")[0] == 0
+    assert call(capsys, "plan", "scenes/my.toml")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (("nowhere.npy",), "there is no such file"),
+        (("maps/my.npy",), "the file has no lengths"),
+        (("maps/my.npy", *LENGTHS, "--force", "2 mm"), "load.force = '2 mm'"),
+        (("maps/my.npy", *LENGTHS, "--poisson-ratio", "0.7"), "block.poisson_ratio = 0.7"),
+        (("maps/my.npy", *LENGTHS, "--height-unit", "parsec"), "is no unit of heights"),
+        (("maps/my.npy", *LENGTHS, "--channel", "3"), "the file has one channel only"),
+        (("maps/my.npy", "--force", "1 N", "--approach", "1 um"), "not allowed with argument"),
+        (("scene.toml",), "is a scene, not a surface"),
+        (("--out", "x" * 300), "cannot be written"),
+    ],
+)
+def test_wrong_words_write_nothing(capsys, rough, words, text):
+    code, shown, err = call(capsys, "init", *words)
+    assert (code, shown) == (5 if "written" in text else 2, "")
+    assert text in err
+    assert err.count("\n") == 1
+    assert [path.name for path in rough.iterdir()] == ["maps"]
+
+
+def test_help_lists_sections(capsys):
+    code, shown, _ = call(capsys, "help")
+    assert code == 0
+    for name, key in scene_keys().items():
+        assert ("." in name) or key.meaning in shown
+
+
+@pytest.mark.parametrize("topic", ["load.force", "force"])
+def test_help_on_a_key(capsys, topic):
+    code, shown, _ = call(capsys, "help", topic)
+    assert code == 0
+    assert shown.startswith(f"load.force {scene_keys()['load.force'].meaning} values: quantity")
+    assert shown.endswith("default: not given")
+
+
+def test_help_on_a_section_has_its_keys_and_no_others(capsys):
+    _, shown, _ = call(capsys, "help", "load")
+    assert {word for word in shown.split() if word.startswith("load.")} == {
+        "load.approach", "load.force", "load.steps", "load.tilt", "load.force_change",
+    }  # fmt: skip
+
+
+def test_help_on_nothing(capsys):
+    code, shown, err = call(capsys, "help", "load.forze")
+    assert (code, shown) == (2, "")
+    assert "is no key of a scene; did you mean 'load.force'?" in err

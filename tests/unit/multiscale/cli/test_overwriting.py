@@ -1,0 +1,103 @@
+"""Results of another scene are kept unless they are given up; those of the same scene are not."""
+
+import json
+
+import pytest
+
+from multiscale.cli.command_line import main
+from multiscale.restart.checkpoint import FILE_NAME, CheckpointWriter
+from multiscale.run import Run
+from multiscale.scene.scene import Scene
+
+SCENE = """
+[surface]
+spectrum = { hurst = 0.8, waves = [2, 5], rms_slope = 0.2, seed = 1 }
+grid = [16, 16]
+lengths = ["1 mm", "1 mm"]
+[block]
+young_modulus = "4 GPa"
+poisson_ratio = 0.3
+[patches]
+grid = [2, 2]
+[micro]
+model = "half-space"
+[coupling]
+kind = "analytic"
+[load]
+approach = "5 um"
+steps = 1
+[output]
+figures = false
+report = false
+"""
+STIFFER = "block.young_modulus=5 GPa"
+
+
+@pytest.fixture
+def scene(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("command", ["run", "surface", "laws"])
+def test_results_of_another_scene_are_kept(scene, capsys, command):
+    words = [command, "scene.toml", "--set", "coupling.kind=isolated", "patches.grid=[1, 1]"]
+    assert main(["run", *words[1:]]) == 0
+    capsys.readouterr()
+    files = [path for path in (scene.parent / "results").rglob("*") if path.is_file()]
+    before = [path.stat().st_mtime_ns for path in files]
+    assert main([*words, STIFFER, "load.steps=2"]) == 2
+    error = capsys.readouterr().err
+    assert "--out = 'results/scene': holds results of another scene, where" in error
+    assert "block.young_modulus was 4000.0, load.steps was 1 (allowed: another folder, " in error
+    assert error.rstrip().endswith("or --overwrite)")
+    assert before == [path.stat().st_mtime_ns for path in files]
+    assert main([*words, STIFFER, "load.steps=2", "--overwrite"]) == 0
+
+
+def test_the_same_scene_is_run_again(scene, capsys):
+    assert main(["run", "scene.toml"]) == 0
+    assert main(["run", "scene.toml", "--set", "block.young_modulus=4000"]) == 0
+    # what is written beside the results makes no other scene of it
+    assert main(["run", "scene.toml", "--set", "output.report=true"]) == 0
+    assert (scene.parent / "results" / "scene" / "report.html").is_file()
+
+
+def test_only_the_first_keys_are_named(scene, capsys):
+    assert main(["run", "scene.toml"]) == 0
+    changes = ("patches.grid=[3, 3]", "load.steps=3", "surface.spectrum.seed=4")
+    assert main(["run", "scene.toml", "--set", STIFFER, *changes]) == 2
+    assert "block.young_modulus was 4000.0" in (error := capsys.readouterr().err)
+    assert error.count(" was ") == 3
+    assert "and 1 more" in error
+
+
+def test_what_an_earlier_version_did_not_know_is_no_difference(scene):
+    assert main(["run", "scene.toml"]) == 0
+    path = scene.parent / "results" / "scene" / "provenance.json"
+    facts = json.loads(path.read_text(encoding="utf-8"))
+    del facts["scene_given"]["surface"]["periodic"], facts["scene_given"]["reference"]
+    path.write_text(json.dumps(facts), encoding="utf-8")
+    assert main(["run", "scene.toml"]) == 0
+
+
+@pytest.mark.parametrize("content", ["", "[1]", '{"scene_given": 3}', "{}"])
+def test_what_is_no_result_is_replaced(scene, content):
+    folder = scene.parent / "results" / "scene"
+    folder.mkdir(parents=True)
+    (folder / "provenance.json").write_text(content, encoding="utf-8")
+    assert main(["run", "scene.toml"]) == 0
+
+
+def test_a_killed_run_of_another_scene_is_kept(scene, capsys):
+    folder = scene.parent / "results" / "scene"
+    folder.mkdir(parents=True)
+    run = Run(Scene.load(scene))
+    with CheckpointWriter(folder, run, lambda: None) as checkpoints:
+        checkpoints.write()
+    assert (folder / FILE_NAME).is_file()
+    assert main(["run", "scene.toml", "--set", STIFFER]) == 2
+    assert "block.young_modulus was 4000.0" in capsys.readouterr().err
+    assert main(["run", "scene.toml"]) == 0

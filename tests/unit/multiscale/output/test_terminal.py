@@ -1,0 +1,83 @@
+"""What a run is at is shown: by a line for each tenth under mpirun, by a text beside a bar."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from geometry import PatchGrid, Spectrum, patch_means, synthesise
+from geometry.collective import shared
+from geometry.rigid_plane import Control
+from micro import micro_model
+from multiscale.laws.consistent import consistent_laws
+from multiscale.laws.isolated import isolated_laws
+from multiscale.loading.stepper import LoadHistory
+from multiscale.output import terminal
+
+LOADS = LoadHistory(quantity="approach", points=(8e-3,), steps=4, tilt=(0.0, 0.0))
+STEP = SimpleNamespace(step=1, approach_mm=0.008, force_N=1234.5)
+
+
+def shown_on(rank, capsys):
+    with terminal.progress(SimpleNamespace(rank=rank, size=2), LOADS) as (advance, observe):
+        observe("block", 0, 0)
+        for done in range(1, 98):
+            observe("rows of laws", done, 97)
+        advance(STEP)
+    return capsys.readouterr().out.splitlines()
+
+
+def test_a_line_for_each_tenth_under_mpirun(capsys):
+    *tenths, step = shown_on(0, capsys)
+    assert [line.split()[3] for line in tenths] == [
+        "10", "20", "30", "39", "49", "59", "68", "78", "88", "97",
+    ]  # fmt: skip
+    assert tenths[0] == "rows of laws: 10 of at most 97"
+    assert step == "load step 1/4: 8 µm, 1.234 kN"
+
+
+def test_other_ranks_are_silent(capsys):
+    assert shown_on(1, capsys) == []
+
+
+def test_a_text_for_all_that_is_counted():
+    texts = []
+    observe = terminal.counting(texts.append)
+    observe("block", 0, 0)
+    observe("laws of patches", 3, 16)
+    assert texts == ["block", "laws of patches: 3 of at most 16"]
+
+
+def test_shared_tasks_are_counted_over_all_ranks():
+    told = []
+    shared(None, 4, lambda index: index, observe=told.append)
+    assert told == [1, 2, 3, 4]
+    del told[:]
+    # of three ranks this one does the tasks 0, 3, 6
+    gathered = SimpleNamespace(
+        rank=0, size=3, allgather=lambda mine: [None] * 3 if mine is None else [[0] * 3] * 3
+    )
+    shared(gathered, 7, lambda index: index, observe=told.append)
+    assert told == [3, 6, 7]
+
+
+def test_laws_say_how_many_rows_and_patches_are_done():
+    spectrum = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=3)
+    surface = synthesise(spectrum, grid=(32, 32), lengths=(1.0, 1.0))
+    model = micro_model("circular-independent", surface, contact_modulus=4000.0)
+    patches = PatchGrid(grid=(2, 2), lengths=surface.lengths)
+    means, told = patch_means(surface, patches), []
+
+    def observe(*what):
+        told.append(what)
+
+    largest = Control(approach=9e-3, tilt=(0.0, 0.0))
+    consistent_laws(
+        model, patches, mean_heights=means, largest=largest, most_rows=97, observe=observe
+    )
+    rows = [done for _, done, _ in told]
+    assert {(what, most) for what, _, most in told} == {("rows of laws", 97)}
+    assert rows == sorted(set(rows)) and rows[0] <= 2 and 17 <= rows[-1] <= 97
+    del told[:]
+    ends = np.full(4, 9e-3)
+    isolated_laws(model, patches, mean_heights=means, closure_ends=ends, observe=observe)
+    assert told == [("laws of patches", done, 4) for done in (1, 2, 3, 4)]

@@ -1,0 +1,88 @@
+"""Every key of a scene says what it is, in help and schema alike."""
+
+import pytest
+
+from multiscale.scene.keys import bare_quantities, dotted, scene_keys
+from multiscale.scene.scene import Scene
+
+GIVEN = {
+    "surface": {
+        "spectrum": {"hurst": 0.8, "waves": [2, 8], "rms_slope": 0.1},
+        "grid": [32, 32],
+        "lengths": ["1 mm", "1 mm"],
+    },
+    "block": {"young_modulus": "210 GPa", "poisson_ratio": 0.3},
+    "load": {"approach": "8 um", "tilt": [1e-3, 0]},
+}
+
+
+def models(annotation):
+    """Yield the sections in a type."""
+    if hasattr(annotation, "model_fields"):
+        yield annotation
+    for part in getattr(annotation, "__args__", ()):
+        yield from models(part)
+
+
+def fields(model):
+    """Yield all fields of a section and of those in it, which the schema has or leaves out."""
+    for name, field in model.model_fields.items():
+        yield f"{model.__name__}.{name}", field
+        for inner in models(field.annotation):
+            yield from fields(inner)
+
+
+@pytest.mark.parametrize(("name", "field"), list(fields(Scene)))
+def test_every_key_has_a_description(name, field):
+    text = field.description or ""
+    assert len(text) > 10, name
+    assert text[0].isupper() and text.endswith("."), name
+
+
+@pytest.mark.parametrize("key", scene_keys().values(), ids=lambda key: key.name)
+def test_every_key_of_the_schema_is_explained(key):
+    assert key.meaning.endswith(".")
+    assert key.is_section or key.values
+    assert "``" not in key.meaning
+
+
+def test_sections_come_before_their_keys():
+    names = list(scene_keys())
+    assert names.index("load") < names.index("load.force")
+    assert names.index("surface.spectrum") < names.index("surface.spectrum.hurst")
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "unit", "default"),
+    [
+        ("block.young_modulus", 'quantity, such as "4 GPa", or number in MPa', "MPa", "required"),
+        ("block.poisson_ratio", "number > -1 and < 0.5", "", "required"),
+        ("surface.lengths", 'list of 2: quantity, such as "8 um", or number in mm', "mm", "not"),
+        ("load.steps", "whole number ≥ 1 and ≤ 1e+06", "", "8"),
+        ("output.report", "true | false", "", "true"),
+        ("block.sides", '"free" | "roller"', "", '"free"'),
+        ("patches.grid", 'list of 2: whole number ≥ 1; or "auto"', "", "[4, 4]"),
+        ("surface.file", "text", "", "not given"),
+    ],
+)
+def test_values_unit_and_default(name, values, unit, default):
+    key = scene_keys()[name]
+    assert (key.values, key.unit) == (values, unit)
+    assert default in key.default
+
+
+def test_units_that_bare_numbers_were_taken_in():
+    assert list(bare_quantities(Scene.from_dict(GIVEN))) == []  # ratios and counts have no unit
+    scene = Scene.from_dict(GIVEN).with_(
+        {"block.young_modulus": 210, "surface.lengths": [1, "1 mm"], "block.margin": 0}
+    )
+    assert list(bare_quantities(scene)) == [
+        "surface.lengths = [1, '1 mm'] taken in mm",
+        "block.young_modulus = 210 taken in MPa",
+    ]
+
+
+def test_dotted_keys():
+    assert dict(dotted({"a": {"b": 1, "c": {"d": [2]}}, "e": None})) == {
+        "a.b": 1, "a.c.d": [2], "e": None,
+    }  # fmt: skip

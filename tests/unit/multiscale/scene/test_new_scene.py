@@ -1,0 +1,65 @@
+"""A new scene says what it does, and its force makes contact on about a fiftieth of the surface."""
+
+import tomllib
+
+import pytest
+
+from geometry import Material, Spectrum, synthesise
+from micro import HalfSpaceModel
+from multiscale.scene.keys import scene_keys
+from multiscale.scene.new_scene import (
+    CONTACT_AREA,
+    START,
+    SYNTHESISED,
+    findings,
+    scene_text,
+    sensible_force,
+)
+from multiscale.scene.quantities import parse_quantity
+from multiscale.scene.scene import Scene
+
+DATA = {**START, "surface": SYNTHESISED, "load": {"steps": 8, "force": "2 N"}}
+
+
+def test_text_is_the_scene_again_with_every_key_explained():
+    text = scene_text(DATA, ["A remark.", "Another."])
+    assert tomllib.loads(text) == DATA
+    Scene.from_dict(tomllib.loads(text))
+    words = " ".join(text.replace("# ", "").split())
+    assert words.startswith("A remark. # Another.")
+    for section, keys in DATA.items():
+        for key in keys:
+            assert scene_keys()[f"{section}.{key}"].meaning in words
+    assert max(map(len, text.splitlines())) <= 100
+
+
+def test_odd_file_names_survive():
+    data = {"surface": {"file": 'a "b" \\ c\t# µ.npy'}}
+    assert tomllib.loads(scene_text(data, [])) == data
+
+
+@pytest.mark.parametrize(("seed", "slope", "modulus"), [(1, 0.1, 210e3), (2, 0.02, 3e3)])
+def test_force_makes_the_contact_area_that_it_says(seed, slope, modulus):
+    """The area is that of the contact problem: within the single digit and Persson's factor."""
+    spectrum = Spectrum(hurst=0.8, waves=(4, 32), rms_slope=slope, seed=seed)
+    surface = synthesise(spectrum, grid=(128, 128), lengths=(0.5, 0.5))
+    material = Material(young_modulus=modulus, poisson_ratio=0.3)
+    force = parse_quantity(sensible_force(surface, material), "N")
+    model = HalfSpaceModel(surface=surface, contact_modulus=material.contact_modulus)
+    area = model.solve_force(force).contact_area / surface.area
+    assert area == pytest.approx(CONTACT_AREA, rel=0.6)
+
+
+def test_a_level_surface_has_a_force_too():
+    spectrum = Spectrum(hurst=0.8, waves=(2, 4), rms_slope=0.1, seed=1)
+    level = synthesise(spectrum, grid=(16, 16), lengths=(1.0, 1.0))
+    level = type(level)(heights=0.0 * level.heights, lengths=(1.0, 1.0))
+    assert sensible_force(level, Material(young_modulus=1e3, poisson_ratio=0.3)) == "1 N"
+
+
+def test_findings_are_grid_sides_and_roughness():
+    spectrum = Spectrum(hurst=0.8, waves=(2, 8), rms_slope=0.1, seed=1)
+    surface = synthesise(spectrum, grid=(32, 32), lengths=(0.02, 0.03))
+    text = " ".join(findings(surface))
+    assert "32 × 32 heights on 20 µm × 30 µm" in text
+    assert "rms gradient 0.1" in text

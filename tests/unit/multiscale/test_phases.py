@@ -1,0 +1,46 @@
+"""The phases of a run add up to its time, whichever way it is loaded."""
+
+import itertools
+import time
+from types import ModuleType
+
+import pytest
+from scene_inputs import BASE
+
+from multiscale.output.report import LIBRARIES, provenance
+from multiscale.run import Run
+from multiscale.scene.scene import Scene
+
+
+@pytest.mark.parametrize("load", [{"approach": "5 um"}, {"force": "2 N"}])
+@pytest.mark.parametrize("kind", ["analytic", "concurrent", "consistent"])
+def test_phases_add_up(monkeypatch, load, kind):
+    """A clock that counts how often it is looked at, so that nothing depends on the machine."""
+    scene = Scene.from_dict(BASE | {"load": load | {"steps": 1}, "coupling": {"kind": kind}})
+    looks = itertools.count(100.0)
+    monkeypatch.setattr(time, "perf_counter", lambda: next(looks))
+    run = Run(scene)
+    assert len(list(run.load_steps())) == 1
+    elapsed = next(looks) - 101.0  # from the first look of the run to the last
+    times = run.times
+    assert sum(times.values()) == pytest.approx(elapsed, rel=1e-12)  # sums of whole numbers
+    assert {"surface", "load estimate", "load steps", "other"} <= set(times)
+    assert min(times.values()) >= 0.0
+    assert run.history().seconds == times
+
+
+def test_versions_of_libraries_without_an_attribute(monkeypatch):
+    import sys
+
+    bare, odd = ModuleType("numpy"), ModuleType("gmsh")
+    odd.version = ModuleType("version")
+    odd.version.version = "9.9"
+    run = Run(Scene.from_dict(BASE))
+    for name in LIBRARIES:
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    monkeypatch.setitem(sys.modules, "numpy", bare)
+    monkeypatch.setitem(sys.modules, "gmsh", odd)
+    versions = provenance(run, options=[])["versions"]
+    assert versions["numpy"][0].isdecimal()  # of the installed distribution
+    assert versions["gmsh"] == "9.9"
+    assert "unknown" not in versions.values()

@@ -1,0 +1,51 @@
+"""Times and quantities as people say them, and that they mean the number that they stand for."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from multiscale.readable import duration, quantity
+from multiscale.scene.quantities import parse_quantity
+
+SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0.0, "0 s"), (0.0347, "0.035 s"), (9.94, "9.9 s"), (12.34, "12.3 s"), (59.94, "59.9 s"),
+        (59.96, "1 min"), (80.3, "1 min 20 s"), (119.7, "2 min"), (3599.6, "1 h"),
+        (7500.0, "2 h 5 min"), (86400.0, "24 h"),
+    ],
+)  # fmt: skip
+def test_durations(seconds, text):
+    assert duration(seconds) == text
+
+
+@given(st.floats(0.01, 1e6))
+def test_duration_is_the_time(seconds):
+    words = duration(seconds).split()
+    said = sum(float(n) * SECONDS[unit] for n, unit in zip(words[::2], words[1::2], strict=True))
+    assert said == pytest.approx(seconds, rel=0.051)  # two digits below 10 s
+    assert all(
+        float(n) < 60 for n, unit in zip(words[::2], words[1::2], strict=True) if unit != "h"
+    )
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (0.008, "mm", "8 µm"), (1.0, "mm", "1 mm"), (999.99, "mm", "1 m"),
+        (-3.2e-4, "mm", "-320 nm"),
+        (210e3, "MPa", "210 GPa"), (4000.0, "MPa", "4 GPa"), (12345.678, "N", "12.35 kN"),
+        (0.00099999, "N", "1 mN"), (0.0, "N", "0 N"), (1e-9, "mm", "0.001 nm"),
+    ],
+)  # fmt: skip
+def test_quantities(value, unit, text):
+    assert quantity(value, unit) == text
+
+
+@given(st.floats(1e-12, 1e12), st.sampled_from(["mm", "N", "MPa"]), st.integers(1, 9))
+def test_quantity_is_read_back(value, unit, digits):
+    again = parse_quantity(quantity(value, unit, digits), unit)
+    assert again == pytest.approx(value, rel=0.51 * 10.0 ** (1 - digits))  # its last digit
