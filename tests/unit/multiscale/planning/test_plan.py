@@ -15,13 +15,13 @@ def setup_of(lengths=(1.0, 1.0), kind="concurrent", **block):
         Scene.from_dict(
             {
                 "surface": {
-                    "spectrum": {"hurst": 0.8, "waves": [2, 6], "rms_height": 1e-3 * size},
+                    "spectrum": {"hurst": 0.8, "waves": [2, 6], "rms_height": f"{size} um"},
                     "grid": [48, 48],
-                    "lengths": list(lengths),
+                    "lengths": [f"{side} mm" for side in lengths],
                 },
                 "block": {"young_modulus": "4 GPa", "poisson_ratio": 0.3} | block,
                 "coupling": {"kind": kind},
-                "load": {"approach": 1e-3 * size},
+                "load": {"approach": f"{size} um"},
             }
         )
     )
@@ -54,4 +54,4 @@ def test_a_block_beyond_three_to_one_is_noted(lengths, block, note):
 
 
 def test_proportions_of_three_to_one_are_not_noted():
-    assert not list(warnings(setup_of((3.0, 1.0), height=3.0)))
+    assert not list(warnings(setup_of((3.0, 1.0), height="3 mm")))
