@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ LARGEST_SEED = 2**128 - 1
 
 _BANDS = ("waves", "waves_x", "waves_y")
 _AMPLITUDES = ("rms_slope", "rms_height", "s0")
+_UNITS = {"rms_height": " mm", "s0": " mm^4"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,10 +86,16 @@ class Spectrum:
 
     def __str__(self) -> str:
         given = self._given(("hurst", *_BANDS, *_AMPLITUDES, "seed"))
-        return "spectrum with " + ", ".join(f"{name} {getattr(self, name)}" for name in given)
+        return "spectrum with " + ", ".join(
+            f"{name} {_written(getattr(self, name))}{_UNITS.get(name, '')}" for name in given
+        )
 
     def _given(self, names: Sequence[str]) -> list[str]:
         return [name for name in names if getattr(self, name) is not None]
+
+
+def _written(value: Any) -> str:
+    return f"{value:.12g}" if isinstance(value, float) else str(value)  # without rounding noise
 
 
 def _checked_band(band: tuple[float, float], name: str) -> tuple[float, float]:

@@ -101,7 +101,8 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
         def write() -> list[Path]:
             from multiscale.output.figures import surface_figure
 
-            figure = surface_figure(setup.surface, setup.asperities, setup.patches)
+            summits = setup.asperities if setup.uses_summits else None
+            figure = surface_figure(setup.surface, summits, setup.patches)
             return [write_figure(folder / "surface.png", figure)]
 
         terminal.show_files(comm, on_root(comm, write))

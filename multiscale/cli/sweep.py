@@ -103,8 +103,15 @@ def _summary(found: SweepResults) -> Iterator[str]:
     yield f"{len(found) - found.unfinished} of {len(found)} cases are done"
     for record in _last_steps(_ensemble_records(found))[:MOST_LINES]:
         values = "".join(f"{key} = {record[key]}, " for key in found.keys if key in record)
-        low, middle, high = (record[f"force_N{end}"] for end in ("_low", "", "_high"))
-        yield f"{values}mean force at last {middle:.4g} N, 5 to 95 %: {low:.4g} … {high:.4g} N"
+        force, approach = _spread(record, "force_N"), _spread(record, "approach_mm", 1e3)
+        yield f"{values}at last: force {force} N, approach {approach} µm"
+
+
+def _spread(record: dict[str, Any], name: str, scale: float = 1.0) -> str:
+    """Return a mean and, where the cases of an ensemble differ, the band about it."""
+    low, middle, high = (scale * record[f"{name}{end}"] for end in ("_low", "", "_high"))
+    same = high - low <= 1e-6 * abs(middle)
+    return f"{middle:.4g}" if same else f"{middle:.4g} (5 to 95 %: {low:.4g} … {high:.4g})"
 
 
 def _last_steps(records: list[dict[str, Any]]) -> list[dict[str, Any]]:

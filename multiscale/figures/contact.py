@@ -11,7 +11,7 @@ from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from multiscale.figures.style import COLOURS, new_figure
+from multiscale.figures.style import COLOURS, map_unit, new_figure
 
 Array = NDArray[np.float64]
 
@@ -42,9 +42,12 @@ def contact_figure(record: Any) -> Figure:
         _draw_gaps(figure, panels[1], record)
     else:
         _draw_spots(figure, panels[0], record)
+    (width, depth), (scale, unit) = record.lengths_mm, map_unit(record.lengths_mm)
     for axes in panels[:-1]:
-        width, depth = record.lengths_mm
-        axes.set(xlabel="x [mm]", ylabel="y [mm]", xlim=(0, width), ylim=(0, depth), aspect="equal")
+        axes.set(xlim=(0, width), ylim=(0, depth), aspect="equal")
+        axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]")
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_formatter(lambda place, _: f"{scale * place:g}")
     _draw_sizes(panels[-1], record)
     figure.suptitle(
         f"load step {record.step}: approach {1e3 * record.approach_mm:.3g} µm, "
@@ -60,7 +63,7 @@ def _draw_pressures(figure: Figure, axes: Any, record: Any) -> None:
     scale = Normalize(0.0, top)
     image = _draw_field(axes, record, shown, _PRESSURES, scale, largest=True)
     figure.colorbar(image, ax=axes, label="contact pressure [MPa]", extend="max")
-    axes.set_title(f"pressure, at most {pressure.max():.4g} MPa")
+    axes.set_title(f"pressure, at most {pressure.max():.5g} MPa")
 
 
 def _draw_gaps(figure: Figure, axes: Any, record: Any) -> None:

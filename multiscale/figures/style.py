@@ -33,6 +33,15 @@ def new_figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
+def map_unit(lengths: tuple[float, float]) -> tuple[float, str]:
+    """Return the unit of x and y on maps, µm below 1 mm, and its number in a mm.
+
+    Args:
+        lengths: Sides of the map [mm].
+    """
+    return (1e3, "µm") if max(lengths) < 1.0 else (1.0, "mm")
+
+
 def add_grid_and_legend(figure: Figure) -> None:
     """Draw a grid in every panel, and a legend in the first when it has more than one line."""
     for axes in figure.axes:

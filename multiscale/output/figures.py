@@ -12,7 +12,7 @@ from geometry.asperities import Asperities
 from geometry.patches import PatchGrid
 from geometry.surface import Surface
 from multiscale.figures.block import block_figure
-from multiscale.figures.style import PRESSURE_LABEL, add_grid_and_legend, new_figure
+from multiscale.figures.style import PRESSURE_LABEL, add_grid_and_legend, map_unit, new_figure
 from multiscale.laws.law_table import LawTable
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
@@ -22,12 +22,12 @@ MOST_NUMBERED_PATCHES = 100
 """A map of more patches shows colours alone; the numbers would cover each other."""
 
 
-def surface_figure(surface: Surface, asperities: Asperities, patches: PatchGrid) -> Figure:
+def surface_figure(surface: Surface, asperities: Asperities | None, patches: PatchGrid) -> Figure:
     """Draw heights above the mean plane with summits, border maxima and patch borders.
 
     Args:
         surface: The heights.
-        asperities: The summits of the surface.
+        asperities: The summits of the surface; None leaves them out.
         patches: The partition of the interface.
     """
     figure = new_figure(6.4, 5.4)
@@ -36,7 +36,11 @@ def surface_figure(surface: Surface, asperities: Asperities, patches: PatchGrid)
 
 
 def draw_surface(
-    figure: Figure, axes: Any, surface: Surface, asperities: Asperities, patches: PatchGrid
+    figure: Figure,
+    axes: Any,
+    surface: Surface,
+    asperities: Asperities | None,
+    patches: PatchGrid,
 ) -> None:
     """Draw one surface into given axes.
 
@@ -44,14 +48,20 @@ def draw_surface(
         figure: The figure of the axes; a colour bar is added to it.
         axes: Axes to draw into.
         surface: The heights.
-        asperities: The summits of the surface.
+        asperities: The summits of the surface; None leaves them out.
         patches: The partition of the interface.
     """
+    scale, unit = map_unit(surface.lengths)
     heights = 1e3 * (surface.heights - surface.mean_height).T
-    extent = (0, surface.lengths[0], 0, surface.lengths[1])
+    extent = (0, scale * surface.lengths[0], 0, scale * surface.lengths[1])
     image = axes.imshow(heights, origin="lower", extent=extent, cmap="cividis")
     figure.colorbar(image, ax=axes, label="height over the mean plane [µm]")
     _draw_patch_borders(axes, patches, colour="white")
+    axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]")
+    title = f"{patches.grid[0]} × {patches.grid[1]} patches"
+    if asperities is None:
+        axes.set_title(f"{heights.shape[1]} × {heights.shape[0]} heights, {title}")
+        return
     summits: dict[str, Any] = {"marker": "o", "ms": 5, "mfc": "#d1495b", "mec": "white"}
     cut: dict[str, Any] = {"marker": "x", "ms": 6, "color": "black"}
     for x, y, look, label in (
@@ -59,9 +69,8 @@ def draw_surface(
         (asperities.border_x, asperities.border_y, cut, "border maxima (unused)"),
     ):
         if x.size:
-            axes.plot(x, y, ls="none", label=label, clip_on=False, **look)
-    axes.set(xlabel="x [mm]", ylabel="y [mm]")
-    axes.set_title(f"{len(asperities)} summits, {patches.grid[0]} × {patches.grid[1]} patches")
+            axes.plot(scale * x, scale * y, ls="none", label=label, clip_on=False, **look)
+    axes.set_title(f"{len(asperities)} summits, {title}")
     if len(asperities) or asperities.border_x.size:
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncol=2, frameon=False)
 
@@ -97,20 +106,20 @@ def draw_pressures(
     Returns:
         The map, for a colour bar.
     """
-    values = pressure.reshape(patches.grid)
-    image = axes.pcolormesh(
-        patches.borders_x, patches.borders_y, values.T, cmap="magma_r", vmin=0.0, vmax=top
-    )
+    values, (scale, unit) = pressure.reshape(patches.grid), map_unit(patches.lengths)
+    borders = scale * patches.borders_x, scale * patches.borders_y
+    image = axes.pcolormesh(*borders, values.T, cmap="magma_r", vmin=0.0, vmax=top)
     if top is None:
         figure.colorbar(image, ax=axes, label=PRESSURE_LABEL)
     _draw_patch_borders(axes, patches, colour="0.7")
     if patches.count <= MOST_NUMBERED_PATCHES:
         dark = 0.55 * max(top or values.max(), 1e-300)
-        for (x, y), value in zip(patches.centres, pressure, strict=True):
-            text = f"{value:.2g}" if value > 0 else "open"
+        for (x, y), value in zip(scale * patches.centres, pressure, strict=True):
+            number = f"{value:.2g}" if value < 100.0 else f"{value:.0f}"
+            text = number if value > 0.0 else "open"
             colour = "white" if value > dark else "black"
             axes.text(x, y, text, ha="center", va="center", color=colour)
-    axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
+    axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]", aspect="equal")
     return image
 
 
@@ -148,6 +157,7 @@ def law_figure(table: LawTable) -> Figure:
 
 
 def _draw_patch_borders(axes: Any, patches: PatchGrid, colour: str) -> None:
+    scale, _ = map_unit(patches.lengths)
     for draw, borders in ((axes.axvline, patches.borders_x), (axes.axhline, patches.borders_y)):
         for border in borders[1:-1]:
-            draw(border, color=colour, lw=0.8, alpha=0.9)
+            draw(scale * border, color=colour, lw=0.8, alpha=0.9)

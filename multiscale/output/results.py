@@ -158,7 +158,8 @@ def _figure(run: Run, name: str) -> Figure:
 
     setup = run.setup
     if name == "surface":
-        return figures.surface_figure(setup.surface, setup.asperities, setup.patches)
+        summits = setup.asperities if setup.uses_summits else None
+        return figures.surface_figure(setup.surface, summits, setup.patches)
     if name == "curves":
         return run.history().plot(run.scene.coupling.kind)
     if name == "block":

@@ -17,6 +17,8 @@ are 0.5, 1.1 and 1.5 % too stiff."""
 LEAST_ACROSS = {1: 12.0, 2: 3.0}
 """Edges across a typical contact below which the force is wrong by several per cent, by the
 element's degree."""
+MOST_UNEQUAL = 3.0
+"""Ratio of two edges of the block that deserves a note: few mean it, and many forget a unit."""
 LEAST_CELLS_PER_PATCH = 4
 """Linear cells along a patch below which the block is too stiff under a patch's pressure."""
 
@@ -49,11 +51,12 @@ def block_statement(setup: ProblemSetup) -> str:
 
 
 def block_warnings(setup: ProblemSetup) -> Iterator[str]:
-    """Yield what a user should know about the cells of the block.
+    """Yield what a user should know about the proportions and the cells of the block.
 
     Args:
         setup: The problem, with a block.
     """
+    yield from _proportions(setup)
     yield from _patch_warnings(setup)
     if setup.meshes is not None:
         yield from _mesh_warnings(setup.meshes)
@@ -91,6 +94,26 @@ def memory_warnings(setup: ProblemSetup, nodes: ClusterNodes) -> Iterator[str]:
         if not nodes.fits(request):
             key = "" if request.value is None else f"{request.key} = {request.value}: "
             yield f"{key}{request.sentence}; there is {nodes.remedy(request)}"
+
+
+def _proportions(setup: ProblemSetup) -> Iterator[str]:
+    widths, height = [side + 2.0 * setup.shape.margin for side in setup.surface.lengths], ""
+    (least, most), high = sorted(widths), setup.shape.height
+    if high > MOST_UNEQUAL * least:
+        height = "most of the approach may be the compression of the column below the surface"
+    elif least > MOST_UNEQUAL * high:
+        height = "the fixed bottom is near, and stiffens what lies above it"
+    if height:
+        ratio = max(high / least, least / high)
+        yield (
+            f"the block is {high:g} mm high and {least:g} mm wide, a ratio of {ratio:.3g}: "
+            f"{height}; block.height is the shorter side when not given"
+        )
+    if most > MOST_UNEQUAL * least:
+        yield (
+            f"the block is {widths[0]:g} × {widths[1]:g} mm wide, a ratio of {most / least:.3g}: "
+            "are these the lengths along x and y of the whole map?"
+        )
 
 
 def _patch_warnings(setup: ProblemSetup) -> Iterator[str]:

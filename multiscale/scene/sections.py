@@ -233,7 +233,7 @@ class MicroSection(Section):
         "islands",
         "half-space",
         "auto",
-    ] = "elliptic"
+    ] = "half-space"
     """How contacts are solved: ``half-space`` cell by cell; as elliptic or circular summits, with
     interaction or ``-independent`` of each other (Waddad et al. 2016); as ``islands``; ``auto``
     takes the cheapest that keeps ``tolerance``."""

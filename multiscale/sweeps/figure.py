@@ -22,7 +22,7 @@ _BAND = (0.05, 0.95)  # quantiles
 
 
 class Ensemble(NamedTuple):
-    """The curves of cases that differ in their seeds alone; arrays of shape (cases, steps).
+    """The curves of cases that differ in seed or file alone; arrays of shape (cases, steps).
 
     Attributes:
         label: What the cases have in common; empty for nothing.

@@ -21,7 +21,7 @@ _COLUMNS = {column.name: index for index, column in enumerate(COLUMNS)}
 _NUMBERS = [name for name in _COLUMNS if name != "reason"]
 _BAND = (0.05, 0.95)  # quantiles
 _AVERAGED = ("approach_mm", "force_N", "mean_pressure_MPa", "contact_area_fraction")
-_RANDOM = ".seed"  # ending of the keys over whose values means are taken
+_DRAWN = ("surface.spectrum.seed", "surface.file")  # keys over whose values means are taken
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,13 +85,11 @@ class SweepResults:
         )
 
     def ensembles(self) -> list[tuple[dict[str, Any], SweepResults]]:
-        """Return the parts of a sweep that differ in their seeds alone, and their other values.
+        """Return the parts of a sweep that differ in seed or file alone, and their other values.
 
-        A sweep that varies no seed is one ensemble.
+        Where neither is varied every case is a part of its own: a mean over other keys says little.
         """
-        others = [key for key in self.keys if not key.endswith(_RANDOM)]
-        if len(others) == len(self.keys):
-            return [({}, self)]
+        others = [key for key in self.keys if key not in _DRAWN]
         chosen = [{key: case.values[key] for key in others} for case in self.cases]
         different = [values for index, values in enumerate(chosen) if values not in chosen[:index]]
         return [(values, self.where(values)) for values in different]

@@ -20,7 +20,7 @@ EXAMPLES = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
 
 def shown_by(example):
     """Return the lines that an example prints."""
-    assert len(example.splitlines()) <= 25
+    assert len(example.splitlines()) <= 20
     shown = subprocess.run(
         [sys.executable, "-c", example], cwd=ROOT, capture_output=True, text=True, check=False
     )
@@ -30,8 +30,15 @@ def shown_by(example):
 
 def test_example_of_a_run():
     lines = shown_by(EXAMPLES[0])
-    assert [line.split()[0] for line in lines[:4]] == ["2", "4", "6", "8"]
-    assert lines[4].startswith("largest patch pressure")
+    assert [line.split()[0] for line in lines[:4]] == ["5", "10", "15", "20"]
+    assert re.fullmatch(r"cut-offs change \[\[0\.00\d+\]", lines[4])  # mm: a softer block
+
+
+def test_scene_shown_first_is_the_one_that_is_run_first():
+    (shown,) = re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL)
+    assert len(shown.splitlines()) <= 20
+    scene = tomllib.loads((DEMOS / "scenes" / "my_surface.toml").read_text(encoding="utf-8"))
+    assert tomllib.loads(shown) == scene
 
 
 def test_example_of_a_part():

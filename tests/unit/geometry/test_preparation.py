@@ -87,10 +87,20 @@ def test_maps_that_users_should_know_more_of(tmp_path):
     gaps = heights.copy()
     gaps[10:40, 10:60] = np.nan
     assert "37 % of the heights are missing" in read(tmp_path, gaps, missing="fill").notes[0]
-    (large,) = read(tmp_path, heights, lengths=(1e3, 1e3)).notes
-    assert "1000 × 1000 mm large" in large
+    large, flat = read(tmp_path, heights, lengths=(1e3, 1e3)).notes
+    assert "1000 × 1000 mm large" in large and "far less than of machined" in flat
     (smooth,) = read(tmp_path, 1e-6 * heights).notes
-    assert "far less than of any machined surface" in smooth
+    assert "far less than of machined surfaces" in smooth
+
+
+def test_coordinates_in_the_wrong_unit_are_noted(tmp_path):
+    x, y = np.meshgrid(np.arange(64) + 0.5, np.arange(64) + 0.5, indexing="ij")  # µm
+    points = np.column_stack((x.ravel(), y.ravel(), (64.0 * rough().heights).ravel()))
+    np.savetxt(tmp_path / "scan.xyz", points)
+    (flat,) = read_surface(tmp_path / "scan.xyz", height_unit="um").notes
+    assert "x and y of an .xyz are taken in mm" in flat
+    right = read_surface(tmp_path / "scan.xyz", height_unit="um", lengths=(0.064, 0.064))
+    assert right.notes == ()
 
 
 def test_heights_in_the_wrong_unit_are_asked_about(tmp_path):

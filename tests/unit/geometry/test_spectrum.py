@@ -176,6 +176,13 @@ def test_largest_seed_makes_a_surface():
     assert str(LARGEST_SEED) in synthesise(spectrum, grid=(16, 16), lengths=(1.0, 1.0)).source
 
 
+def test_a_spectrum_is_written_with_units_and_without_rounding():
+    spectrum = Spectrum(hurst=0.8, waves=(2, 8), rms_height=8e-3 * 1e-3)  # "8 nm", in mm
+    assert str(spectrum) == (
+        "spectrum with hurst 0.8, waves (2.0, 8.0), rms_height 8e-06 mm, seed 0"
+    )
+
+
 def test_slopes_below_any_scale_are_refused():
     with pytest.raises(InputError, match="differ by less than any roughness"):
         synthesise(Spectrum(**RING | {"rms_slope": 1e-100}), grid=(16, 16), lengths=(1.0, 1.0))

@@ -1,0 +1,57 @@
+"""The plan says what was taken by default: micro model, proportions of the block."""
+
+import pytest
+
+from micro import HalfSpaceModel
+from multiscale.planning.plan import statements, warnings
+from multiscale.planning.problem_setup import make_setup
+from multiscale.scene.scene import Scene
+
+
+def setup_of(lengths=(1.0, 1.0), kind="concurrent", **block):
+    """Return the setup of a scene that states as little as it can."""
+    size = min(lengths)
+    return make_setup(
+        Scene.from_dict(
+            {
+                "surface": {
+                    "spectrum": {"hurst": 0.8, "waves": [2, 6], "rms_height": f"{size} um"},
+                    "grid": [48, 48],
+                    "lengths": [f"{side} mm" for side in lengths],
+                },
+                "block": {"young_modulus": "4 GPa", "poisson_ratio": 0.3} | block,
+                "coupling": {"kind": kind},
+                "load": {"approach": f"{size} um"},
+            }
+        )
+    )
+
+
+def test_the_micro_model_is_half_space_when_not_given():
+    setup = setup_of()
+    assert isinstance(setup.micro, HalfSpaceModel)
+    assert dict(statements(setup))["micro model"] == "half-space"
+
+
+@pytest.mark.parametrize("size", [0.02, 0.1, 5.0, 50.0])
+def test_the_block_of_a_map_of_any_size_is_a_cube_and_needs_no_note(size):
+    setup = setup_of((size, size))
+    assert f"{size:g} × {size:g} mm and {size:g} mm high" in dict(statements(setup))["block"]
+    assert not list(warnings(setup))
+
+
+@pytest.mark.parametrize(
+    ("lengths", "block", "note"),
+    [
+        ((0.02, 0.02), {"height": "1 mm"}, "1 mm high and 0.02 mm wide, a ratio of 50: most of"),
+        ((4.0, 5.0), {"height": "1 mm"}, "1 mm high and 4 mm wide, a ratio of 4: the fixed bottom"),
+        ((5.0, 1.0), {}, "5 × 1 mm wide, a ratio of 5: are these the lengths along x and y"),
+    ],
+)
+def test_a_block_beyond_three_to_one_is_noted(lengths, block, note):
+    (said,) = warnings(setup_of(lengths, **block))
+    assert note in said
+
+
+def test_proportions_of_three_to_one_are_not_noted():
+    assert not list(warnings(setup_of((3.0, 1.0), height="3 mm")))
