@@ -117,7 +117,7 @@ def completed(
     spacing = lengths[0] / heights.shape[0], lengths[1] / heights.shape[1]
     whole, share = filled(heights, spacing)
     if share:
-        done.append(f"{share:.3g} of the heights missing and filled by a membrane")
+        done.append(f"{100 * share:.3g} % of the heights missing and filled by a membrane")
     if share > _MUCH_MISSING:
         notes.append(
             f"{100 * share:.0f} % of the heights are missing: what fills them is smooth and has no "

@@ -118,6 +118,9 @@ def _with_surface(data: dict[str, Any], loaded: bool) -> tuple[Scene, Surface, l
         scene = scene.with_({"surface.missing": "fill"})
         raw = make_surface(scene.with_({"surface.detrend": "none"}))
     surface = make_surface(scene)
+    if any("spikes" in note for note in surface.notes):
+        scene = scene.with_({"surface.outliers": "remove"})
+        surface = make_surface(scene)
     remarks += [f"As it was: {note}." for note in raw.notes if note not in surface.notes]
     return scene, surface, [*findings(surface), *remarks]
 

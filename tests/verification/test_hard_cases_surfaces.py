@@ -135,7 +135,7 @@ def test_missing_heights_are_refused_or_filled_on_request(tmp_path):
         history(**gaps)
     made = make_setup(scene(surface__missing="fill", **gaps))
     said = dict(statements(made))["surface"]
-    assert "0.0479 of the heights missing and filled by a membrane" in said
+    assert "4.79 % of the heights missing and filled by a membrane" in said
     # the summit is not in a gap, and what is filled nowhere rises above what is around it; slopes
     # of what does not touch would count, too
     small = {"micro__finite_slopes": False}

@@ -41,7 +41,7 @@ def test_a_map_is_cropped_filled_levelled_filtered_and_resampled(tmp_path):
         "heights taken in mm",
         "cropped to 500 × 1000 µm from x = 500 µm",
         "y = 0 µm",
-        "0.000488 of the heights missing and filled by a membrane",
+        "0.0488 % of the heights missing and filled by a membrane",
         "its plane removed",
         "waves below 100 µm removed (Gaussian)",
         "waves beyond 400 µm removed (Gaussian)",

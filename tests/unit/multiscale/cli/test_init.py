@@ -125,3 +125,14 @@ def test_help_on_nothing(capsys):
     code, shown, err = call(capsys, "help", "load.forze")
     assert (code, shown) == (2, "")
     assert "is no key of a scene; did you mean 'load.force'?" in err
+
+
+def test_spikes_above_all_else_are_removed(capsys, rough):
+    heights = np.load("maps/my.npy")
+    heights[20, 20] += 0.05
+    np.save("maps/my.npy", heights)
+    code, shown, err = call(capsys, "init", "maps/my.npy", *LENGTHS, "--force", "2 N")
+    assert (code, err) == (0, "")
+    assert "As it was: 1 heights are spikes" in shown
+    said = tomllib.loads((rough / "my.toml").read_text(encoding="utf-8"))
+    assert said["surface"]["outliers"] == "remove"
