@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from multiscale.figures.style import COLOURS, map_unit, new_figure
+from multiscale.readable import quantity
 
 Array = NDArray[np.float64]
 
@@ -63,7 +64,7 @@ def _draw_pressures(figure: Figure, axes: Any, record: Any) -> None:
     scale = Normalize(0.0, top)
     image = _draw_field(axes, record, shown, _PRESSURES, scale, largest=True)
     figure.colorbar(image, ax=axes, label="contact pressure [MPa]", extend="max")
-    axes.set_title(f"pressure, at most {pressure.max():.5g} MPa")
+    axes.set_title(f"pressure, at most {quantity(float(pressure.max()), 'MPa')}")
 
 
 def _draw_gaps(figure: Figure, axes: Any, record: Any) -> None:

@@ -18,6 +18,7 @@ from multiscale.couplings.reference import ReferenceCoupling
 from multiscale.loading.load_step import LoadStep
 from multiscale.machine import peak_memory
 from multiscale.planning import plan
+from multiscale.readable import quantity
 from multiscale.results.history import History, with_error
 from multiscale.results.html_page import filled
 from multiscale.run import Run
@@ -65,9 +66,9 @@ def _peak(step: LoadStep) -> str:
     """Say the largest pressure and the stiffness of a load step, as far as they are known."""
     text = ""
     if step.peak_pressure_MPa:
-        text += f", with pressures up to {step.peak_pressure_MPa:.4g} MPa"
+        text += f", with pressures up to {quantity(step.peak_pressure_MPa, 'MPa')}"
     if step.stiffness_N_per_mm:
-        text += f"; its interfacial stiffness is {step.stiffness_N_per_mm:.4g} N/mm"
+        text += f"; its interfacial stiffness is {quantity(step.stiffness_N_per_mm, 'N')}/mm"
     return text
 
 

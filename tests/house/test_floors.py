@@ -45,7 +45,8 @@ FLOORS = {
         "compliance fields",
     ],
     "multiscale": [
-        "figures installation machine readable storage",
+        "readable",
+        "figures installation machine storage",
         "doctor laws loading",
         "compiled_forms results scene",
         "setup",

@@ -1,4 +1,4 @@
-"""Linter, formatter and type checker, as a developer runs them."""
+"""Linter, formatter and type checker, as a developer runs them; no merge is left half done."""
 
 import subprocess
 import sys
@@ -22,3 +22,15 @@ def test_tool_has_no_complaint(command):
         [sys.executable, "-m", *command], cwd=ROOT, capture_output=True, text=True, check=False
     )
     assert result.returncode == 0, result.stdout + result.stderr
+
+
+def test_no_merge_is_left_half_done():
+    marks = ("<" * 7 + " ", ">" * 7 + " ")
+    files = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=False)
+    if files.returncode:
+        pytest.skip("not a clone")
+    for name in filter(None, files.stdout.decode().split("\0")):
+        path = ROOT / name
+        if path.is_file() and path.suffix not in (".png", ".npz"):
+            text = path.read_text(encoding="utf-8", errors="replace")
+            assert not any(line.startswith(marks) for line in text.splitlines()), name
