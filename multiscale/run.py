@@ -51,7 +51,7 @@ class Run:
         table: The patch laws, once made.
         coupling: What finds the load steps, once made.
         steps: The load steps accepted so far.
-        fields: What the fields of those that the scene names are made from.
+        fields: The states that the fields of chosen load steps are written from.
         position: Position in the load history after them.
     """
 
