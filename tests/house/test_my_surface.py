@@ -49,6 +49,7 @@ def test_the_map_is_what_its_script_makes():
     )
 
 
+@pytest.mark.long
 def test_commands_end_as_the_page_says(said):
     assert len(said) == 8
     for command, (text, code) in said.items():
@@ -57,6 +58,7 @@ def test_commands_end_as_the_page_says(said):
         assert ("note: " in text) >= ("# a note" in command), text
 
 
+@pytest.mark.long
 def test_numbers_of_the_page_are_those_of_its_commands(said):
     whole, _ = said[COMMANDS[0]]
     table = re.search(r"```text\n(.*?)```", PAGE, re.DOTALL)[1].splitlines()
@@ -72,6 +74,7 @@ def test_numbers_of_the_page_are_those_of_its_commands(said):
     assert f"falls from {most} to {least} µm" in " ".join(PAGE.split())
 
 
+@pytest.mark.long
 def test_contacts_are_as_many_and_as_loaded_as_the_page_says(said, place):
     results = place / "results" / "my_surface"
     rows = (results / "contacts.csv").read_text(encoding="utf-8").splitlines()
@@ -81,6 +84,7 @@ def test_contacts_are_as_many_and_as_loaded_as_the_page_says(said, place):
     assert (results / "contact.png").is_file()
 
 
+@pytest.mark.long
 def test_python_of_the_page_runs_where_its_commands_ran(said, place):
     (example,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     done = subprocess.run(
