@@ -20,17 +20,14 @@ class ContactRecorder:
 
     Args:
         setup: The problem set up from the scene.
-        make_model: Makes its micro model on the body; called where laws stand for the contact.
         comm: MPI communicator; None for this process alone.
 
     Attributes:
         records: The contacts so far, the same on every rank.
     """
 
-    def __init__(
-        self, setup: ProblemSetup, make_model: Callable[[], MicroModel], comm: Any
-    ) -> None:
-        self._setup, self._make_model, self._comm = setup, make_model, comm
+    def __init__(self, setup: ProblemSetup, comm: Any) -> None:
+        self._setup, self._comm = setup, comm
         self._asked = setup.scene.output.contact
         self.records: list[ContactRecord] = []
         self._latest: tuple[HasContact, Any, int] | None = None
@@ -59,13 +56,16 @@ class ContactRecorder:
         iterations = step.linear_iterations + spent
         return replace(step, stiffness_N_per_mm=found, linear_iterations=iterations)
 
-    def record(self, step: LoadStep, *, last: bool) -> LoadStep:
+    def record(
+        self, step: LoadStep, make_model: Callable[[], MicroModel], *, last: bool
+    ) -> LoadStep:
         """Record the contact of a load step if it is requested and not yet recorded.
 
         With laws the contact problem that they stand for is solved under the step's plane.
 
         Args:
             step: The load step accepted last.
+            make_model: Makes the micro model on the body; called where laws stand for the contact.
             last: Whether no other follows.
 
         Returns:
@@ -83,12 +83,17 @@ class ContactRecorder:
         if asked == "none" or known or not (last or asked == "all"):
             return step
         if laws:
-            step = self._solved(step)
+            step = self._solved(step, make_model())
         if self._latest is not None and self._latest[2] == step.step:
             coupling, latest, _ = self._latest
             lengths = self._setup.surface.lengths
             self.records.append(ContactRecord.of(coupling.detail(latest), step, lengths))
+            self.release()
         return step
+
+    def release(self) -> None:
+        """Let go of the coupling, whose blocks stay in memory as long as it is held."""
+        self._latest = None
 
     @property
     def notes(self) -> list[str]:
@@ -101,10 +106,9 @@ class ContactRecorder:
             f"the plane of the step, with a force of {last.force_N:.5g} N"
         ]
 
-    def _solved(self, step: LoadStep) -> LoadStep:
+    def _solved(self, step: LoadStep, model: MicroModel) -> LoadStep:
         """Solve the contact problem under the plane of a load step of laws."""
         setup = self._setup
-        model = self._make_model()
         coupling = ContactCoupling(model, setup.patches, setup.mean_heights, self._comm)
         found = coupling.press(Control(approach=step.approach_mm, tilt=step.tilt))
         self._latest = coupling, coupling.latest, step.step

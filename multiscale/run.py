@@ -73,7 +73,7 @@ class Run:
         self.setup: ProblemSetup = on_root(large, lambda: make_setup(scene, resolved, nodes))
         self.scene, self.seconds = self.setup.scene, dict(self.setup.seconds)
         self.fields = FieldRecord(self.setup, comm)
-        self._recorder = ContactRecorder(self.setup, self._model_on_body, comm)
+        self._recorder = ContactRecorder(self.setup, comm)
         self._until = time.perf_counter()
 
     def make_body(self) -> OnBody | None:
@@ -145,7 +145,8 @@ class Run:
             return
         with self.phase("contact"):
             try:
-                self.steps[-1] = self._recorder.record(self.steps[-1], last=last)
+                made = self._recorder.record(self.steps[-1], self._model_on_body, last=last)
+                self.steps[-1] = made
             except NotConverged as error:
                 step = self.steps[-1].step
                 self._notes.append(f"contact of load step {step} not found: {error}")
@@ -265,6 +266,7 @@ class Run:
             Collective.
         """
         meshed, self.coupling = assembly.meshed_blocks(self.coupling), None
+        self._recorder.release()
         assembly.free_blocks(meshed)
 
     @contextmanager
