@@ -4,33 +4,15 @@ import csv
 
 import pytest
 from on_ranks import RANKS
+from small_scene import SMALL_SCENE
 
 from multiscale.cli import main
-
-SCENE = """
-[surface]
-spectrum = { hurst = 0.95, waves = [2, 5], rms_slope = 0.215 }
-grid = [16, 16]
-lengths = ["1 mm", "1 mm"]
-[block]
-young_modulus = "4 GPa"
-poisson_ratio = 0.15
-[micro]
-model = "half-space"
-[coupling]
-kind = "analytic"
-[load]
-approach = "8 um"
-steps = 2
-[output]
-figures = false
-"""
 
 
 @pytest.mark.parametrize("ranks", RANKS)
 def test_ranks_share_the_cases(mpirun, tmp_path, ranks):
     scene = tmp_path / "scene.toml"
-    scene.write_text(SCENE)
+    scene.write_text(SMALL_SCENE)
     found, vary = [], ("--vary", "surface.spectrum.seed=0..4")
     for count in (1, ranks):
         out = tmp_path / str(count)

@@ -3,33 +3,13 @@
 import json
 
 import pytest
+from small_scene import SMALL_SCENE
 
 from multiscale.cli.command_line import main
 from multiscale.restart.checkpoint import FILE_NAME, CheckpointWriter
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
 
-SCENE = """
-[surface]
-spectrum = { hurst = 0.8, waves = [2, 5], rms_slope = 0.2, seed = 1 }
-grid = [16, 16]
-lengths = ["1 mm", "1 mm"]
-[block]
-young_modulus = "4 GPa"
-poisson_ratio = 0.3
-[patches]
-grid = [2, 2]
-[micro]
-model = "half-space"
-[coupling]
-kind = "analytic"
-[load]
-approach = "5 um"
-steps = 1
-[output]
-figures = false
-report = false
-"""
 STIFFER = "block.young_modulus=5 GPa"
 
 
@@ -37,13 +17,14 @@ STIFFER = "block.young_modulus=5 GPa"
 def scene(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "scene.toml"
-    path.write_text(SCENE, encoding="utf-8")
+    path.write_text(SMALL_SCENE, encoding="utf-8")
     return path
 
 
 @pytest.mark.parametrize("command", ["run", "surface", "laws"])
 def test_results_of_another_scene_are_kept(scene, capsys, command):
     words = [command, "scene.toml", "--set", "coupling.kind=isolated", "patches.grid=[1, 1]"]
+    words.append("load.steps=1")
     assert main(["run", *words[1:]]) == 0
     capsys.readouterr()
     files = [path for path in (scene.parent / "results").rglob("*") if path.is_file()]

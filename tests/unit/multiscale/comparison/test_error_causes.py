@@ -12,7 +12,6 @@ from multiscale.comparison.errors import ErrorCauses
 from multiscale.comparison.scene_content import LOW_HEIGHTS, SMALL_SLOPES
 
 ROUNDING = 1e-12  # sums of five doubles of order one
-DIFFERENCE = 1e-11  # differences of such sums
 FIRST, WHOLE = -0.025, -0.03
 KINDS = ("analytic", "isolated", "consistent", "concurrent", "reference")
 NUMBERS = ("approach", "area", "separation", "approach_error", "force_error", "area_error")
@@ -60,28 +59,28 @@ def test_shares_add_up(kind, against, model, known, slopes):
 
 def test_micro_model_of_small_slopes_against_the_meshed_roughness():
     found = split(ALONE, "reference")
-    assert found.micro == pytest.approx((3.2 * (1.0 + FIRST) - 3.4) / 3.0, rel=DIFFERENCE)
-    assert found.block == pytest.approx((3.4 - 3.1) / 3.0, rel=DIFFERENCE)
-    assert found.slopes == pytest.approx(-3.2 * WHOLE / 3.0, rel=DIFFERENCE)
+    assert found.micro == pytest.approx((3.2 * (1.0 + FIRST) - 3.4) / 3.0, rel=ROUNDING)
+    assert found.block == pytest.approx((3.4 - 3.1) / 3.0, rel=ROUNDING)
+    assert found.slopes == pytest.approx(-3.2 * WHOLE / 3.0, rel=ROUNDING)
     assert found.coupling == 0.0
 
 
 def test_slopes_in_the_first_order_alone():
     found = split(TOPS["concurrent"], "reference")
     lost = 1.0 - (1.0 + WHOLE) / (1.0 + FIRST)
-    assert found.slopes == pytest.approx(3.1 * lost / 3.0, rel=DIFFERENCE)
-    assert found.discretisation == pytest.approx(3.1 / 3.0 - 1.0 - found.slopes, rel=DIFFERENCE)
+    assert found.slopes == pytest.approx(3.1 * lost / 3.0, rel=ROUNDING)
+    assert found.discretisation == pytest.approx(3.1 / 3.0 - 1.0 - found.slopes, rel=ROUNDING)
     assert (found.micro, found.coupling, found.block) == (0.0, 0.0, 0.0)
 
 
 def test_laws_against_the_block():
     found = split(result("isolated", 2.5, model="elliptic", name="laws"), "concurrent")
     micro = (3.2 * (1.0 + FIRST) - 3.4) / 3.1
-    assert found.micro == pytest.approx(micro, rel=DIFFERENCE)
+    assert found.micro == pytest.approx(micro, rel=ROUNDING)
     coupling = (2.5 * (1.0 + FIRST) - 3.1) / 3.1 - micro
-    assert found.coupling == pytest.approx(coupling, rel=DIFFERENCE)
+    assert found.coupling == pytest.approx(coupling, rel=ROUNDING)
     assert found.block == 0.0
-    assert found.slopes == pytest.approx(-2.5 * FIRST / 3.1, rel=DIFFERENCE)
+    assert found.slopes == pytest.approx(-2.5 * FIRST / 3.1, rel=ROUNDING)
     assert found.discretisation == pytest.approx(0.0, abs=ROUNDING)
 
 
@@ -94,9 +93,9 @@ def test_cells_of_the_half_space_are_discretisation():
 
 def test_the_other_way_round():
     found = split(TOPS["reference"], "analytic")
-    assert found.block == pytest.approx(-(3.4 - 3.1) / 3.4, rel=DIFFERENCE)
+    assert found.block == pytest.approx(-(3.4 - 3.1) / 3.4, rel=ROUNDING)
     lost = 1.0 - (1.0 + FIRST) / (1.0 + WHOLE)
-    assert found.slopes == pytest.approx(3.0 * lost / 3.4, rel=DIFFERENCE)
+    assert found.slopes == pytest.approx(3.0 * lost / 3.4, rel=ROUNDING)
 
 
 def test_what_was_not_reached_is_unknown():

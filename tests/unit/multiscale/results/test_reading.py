@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from small_scene import SMALL_SCENE
 
 from geometry.errors import InputError
 from multiscale import read_history, run
@@ -9,39 +10,19 @@ from multiscale.cli.command_line import main
 from multiscale.results.history import COLUMNS
 from multiscale.scene.scene import Scene
 
-SCENE = """
-[surface]
-spectrum = { hurst = 0.95, waves = [2, 5], rms_slope = 0.215, seed = 1 }
-grid = [16, 16]
-lengths = ["1 mm", "1 mm"]
-[block]
-young_modulus = "4 GPa"
-poisson_ratio = 0.15
-[patches]
-grid = [2, 4]
-[micro]
-model = "half-space"
-[coupling]
-kind = "analytic"
-[load]
-approach = "8 um"
-steps = 2
-tilt = [1e-3, 0.0]
-[output]
-figures = false
-"""
+TILTED = ["load.tilt=[1e-3, 0.0]", "output.check=last"]
 
 
 @pytest.fixture
 def folder(tmp_path):
     file = tmp_path / "scene.toml"
-    file.write_text(SCENE)
-    assert main(["run", str(file), "--out", str(tmp_path / "out")]) == 0
+    file.write_text(SMALL_SCENE)
+    assert main(["run", str(file), "--out", str(tmp_path / "out"), "--set", *TILTED]) == 0
     return tmp_path / "out"
 
 
 def test_history_is_the_one_that_was_written(folder, tmp_path):
-    found, made = read_history(folder), run(Scene.load(tmp_path / "scene.toml"))
+    found, made = read_history(folder), run(Scene.load(tmp_path / "scene.toml", TILTED))
     for column in COLUMNS:
         if column.name != "wall_s":
             np.testing.assert_array_equal(getattr(found, column.name), getattr(made, column.name))

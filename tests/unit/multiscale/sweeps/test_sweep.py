@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from small_scene import SMALL_SCENE
 
 from geometry.errors import InputError, NotConverged
 from multiscale import run, sweep
@@ -13,24 +14,6 @@ from multiscale.run import Run
 from multiscale.scene.scene import Scene
 from multiscale.sweeps.cases import sweep_cases, values_from_text
 
-SCENE = """
-[surface]
-spectrum = { hurst = 0.95, waves = [2, 5], rms_slope = 0.215, seed = 1 }
-grid = [16, 16]
-lengths = ["1 mm", "1 mm"]
-[block]
-young_modulus = "4 GPa"
-poisson_ratio = 0.15
-[micro]
-model = "half-space"
-[coupling]
-kind = "analytic"
-[load]
-approach = "8 um"
-steps = 2
-[output]
-check = "none"
-"""
 SEED, MODULUS = "surface.spectrum.seed", "block.young_modulus"
 VARY = {MODULUS: ["1 GPa", "4 GPa"], SEED: range(3)}
 
@@ -38,7 +21,7 @@ VARY = {MODULUS: ["1 GPa", "4 GPa"], SEED: range(3)}
 @pytest.fixture
 def file(tmp_path):
     path = tmp_path / "scene.toml"
-    path.write_text(SCENE)
+    path.write_text(SMALL_SCENE)
     return path
 
 
@@ -213,7 +196,7 @@ def test_command_says_which_cases_failed(file, tmp_path, capsys, monkeypatch):
 def test_command_writes_cases_histories_and_ensembles(file, tmp_path, capsys, monkeypatch):
     out = tmp_path / "out"
     words = ["sweep", str(file), "--vary", f"{SEED}=0..2", "--out", str(out)]
-    assert main(words) == 0
+    assert main([*words, "--set", "output.figures=true"]) == 0
     assert "3 of 3 cases are done" in capsys.readouterr().out
     cases, steps, bands = (rows(out / f"{name}.csv") for name in ("cases", "history", "ensembles"))
     assert [case["status"] for case in cases] == 3 * ["done"]
@@ -221,6 +204,8 @@ def test_command_writes_cases_histories_and_ensembles(file, tmp_path, capsys, mo
     mean = np.mean([float(case["force_N"]) for case in cases])
     assert float(bands[-1]["force_N"]) == pytest.approx(mean, rel=1e-14)
     assert (out / "sweep.png").read_bytes().startswith(b"\x89PNG")
+    assert main(words) == 0  # whether figures are drawn makes no other scene of it
+    capsys.readouterr()
     assert main([*words, "--set", "load.steps=1"]) == 2
     assert "--overwrite" in capsys.readouterr().err
     assert main([*words, "--set", "load.steps=1", "--overwrite"]) == 0
