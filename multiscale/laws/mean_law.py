@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import bisect
 
 from geometry.collective import shared
 from multiscale.laws.patch_law import PatchLaw
@@ -29,6 +30,7 @@ _ROWS_TOGETHER = 2
 """Rows of a sample that one rank solves in sequence, each starting from the one before, so that
 results do not depend on the number of ranks."""
 
+_CLOSE = 0.01  # of the way to full contact: further than needed that the last row may lie
 _FULL_ROWS = 4  # of a law that goes on in full contact
 
 
@@ -98,7 +100,7 @@ class PeriodicSamples:
         if limit.closure <= touch:
             open_law = PatchLaw.of(SolvedRows.none(), touch, self.reference)
             return replace(open_law, sample_area=area)
-        end = 1.0 - np.sqrt(self.last_separation(limit) / self.first_touch)
+        end = self.end(limit)
         last = self.rows(np.array([end]), 0.0)[:, 0]
         compliance = float((last.closure[0] - touch) / last.pressure[0])
 
@@ -119,19 +121,28 @@ class PeriodicSamples:
         )
         return replace(law, sample_area=area)
 
-    def last_separation(self, limit: Limit) -> float:
-        """Return the separation of the last row [mm], where no sample carries less; collective.
+    def end(self, limit: Limit) -> float:
+        """Return the parameter of the last row, in full contact at most; collective.
 
         Args:
-            limit: What the last row reaches at least, up to full contact.
+            limit: What that row reaches.
         """
-        separation = 0.0
-        if np.isfinite(limit.pressure):
-            samples, pressure = self.samples, limit.pressure
-            separation = min(
-                shared(self.comm, len(samples), lambda k: samples[k].separation_under(pressure))
-            )
-        return max(separation, self.reference - limit.closure, 0.0)
+        by_closure = self._parameter(max(self.reference - limit.closure, 0.0))
+        if not np.isfinite(limit.pressure):
+            return by_closure
+        samples, pressure = self.samples, limit.pressure
+        under = shared(self.comm, len(samples), lambda k: samples[k].separation_under(pressure))
+        low, high = self._parameter(max(under)), self._parameter(min(under))
+
+        def excess(parameter: float) -> float:
+            return float(self.rows(np.array([parameter]), 0.0).pressure[0, 0]) - pressure
+
+        if high - low > _CLOSE and excess(low) < 0.0 < excess(high):
+            high = min(high, float(bisect(excess, low, high, xtol=0.5 * _CLOSE)) + 0.5 * _CLOSE)
+        return min(by_closure, high)
+
+    def _parameter(self, separation: float) -> float:
+        return 1.0 - float(np.sqrt(separation / self.first_touch))
 
     def rows(self, parameters: Array, compliance: float) -> SolvedRows:
         """Return rows of the mean law, columns of shape (m, 1); collective.
