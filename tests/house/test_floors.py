@@ -20,8 +20,8 @@ FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 FLOORS = {
     "geometry": [
         "blocked_spline collective errors legendre_modes slope_search",
-        "checks face_frame interpolant materials missing",
-        "filters spectrum surface",
+        "checks interpolant materials missing",
+        "face_frame filters spectrum surface",
         "patches statistics summits synthesis",
         "plausibility preparation rigid_plane",
         "files",
