@@ -98,7 +98,7 @@ def test_a_column_in_series_with_the_law(mode):
     sample = synthesise(spectrum, grid=(16, 16), lengths=(1.0, 1.0))
     block = block_of("roller", height=0.6, cells=(3, 4, 3))
     law = representative_law([sample], block.material.contact_modulus, largest_pressure=200.0)
-    pressed = LawContactProblem(block, interface_of(block, (1, 1)), [law], mode)
+    pressed = LawContactProblem(interface_of(block, (1, 1)), [law], mode)
     column = block.material.confined_modulus / 0.6  # u = p H / M
     for approach in (6e-3, 18e-3):
         state = pressed.solve(Control(approach=approach))
