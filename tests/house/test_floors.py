@@ -41,7 +41,7 @@ FLOORS = {
         "mesh",
         "linear_solvers",
         "elastic_body",
-        "block meshed_body",
+        "block body_pair meshed_body",
         "contact",
         "compliance fields",
     ],
