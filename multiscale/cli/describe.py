@@ -84,7 +84,9 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
             laws = write_whole(folder / "laws.h5", lambda path: write_laws(path, table))
             files = [laws, write_figure(folder / "laws.png", law_figure(table))]
             remove_exports(folder)
-            return files + [write_text(folder / name, text) for name, text in exports.items()]
+            for name, text in exports.items():
+                write_text(folder / name, text)
+            return files + [folder / name for name in {Path(path).parts[0]: 0 for path in exports}]
 
         terminal.show_files(comm, on_root(comm, write))
     for note in run.history().notes:

@@ -29,9 +29,8 @@ _ABAQUS = "Beyond the last row Abaqus continues the last line: the laws are not 
 _CALCULIX = """\
 The last row of each table continues the tangent beyond the end of the law, because CalculiX keeps
 the last pressure: overclosures beyond the stated end are outside the law.
-Use TYPE=NODE TO SURFACE, linear elements, and the rough face as the dependent (first) surface:
-CalculiX 2.20 finds no pressure in a table, and says nothing, with TYPE=SURFACE TO SURFACE."""
-
+Use *CONTACT PAIR, TYPE=NODE TO SURFACE, linear elements, and the rough face as the first surface.
+With the other types CalculiX 2.20 finds no pressure in such a table, and says nothing."""
 _OPEN = "It stays open up to {:.9g} mm: no surface interaction, leave it out of contact."
 
 

@@ -1,4 +1,4 @@
-"""``patchlaw laws --export``: files beside the laws, wrong words refused before anything is done."""
+"""``patchlaw laws --export``: files beside the laws; wrong words are refused beforehand."""
 
 import csv
 
@@ -26,7 +26,8 @@ def test_laws_are_exported_beside_their_file(folder, capsys):
     assert main([*LAWS, "out", *words]) == 0
     shown = " ".join(capsys.readouterr().out.split())
     assert {path.name for path in folder.iterdir()} == {"laws.h5", "laws.png", *FILES}
-    assert "laws_calculix.inp" in shown and "law_0_1.py" in shown
+    assert "laws.h5, laws.png, laws.csv, laws_4c, laws_abaqus.inp, laws_calculix.inp" in shown
+    assert len(list((folder / "laws_4c").iterdir())) == 2
     table = read_laws(folder / "laws.h5")
     with (folder / "laws.csv").open(encoding="utf-8", newline="") as file:
         rows = [row for row in csv.DictReader(file) if row["iy"] == "0"]
