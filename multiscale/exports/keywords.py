@@ -69,17 +69,14 @@ def _text(table: LawTable, tolerance: float, remarks: str, *, most: int | None) 
         if not len(sample):
             lines += _comments(_OPEN.format(law.first_touch))
             continue
-        name = "PATCH_{}_{}".format(*table.patches.unravel(index))
-        lines += _interaction(name, law, sample, extended=most is not None)
+        lines += _interaction(table.key(index).upper(), law, sample, extended=most is not None)
     return "".join(f"{line}\n" for line in lines)
 
 
 def _facts(table: LawTable, index: int) -> Iterator[str]:
     """Yield what is known of a patch."""
-    (x0, x1), (y0, y1) = table.patches.bounds(index)
-    law = table[index]
-    ix, iy = table.patches.unravel(index)
-    yield f"Patch ({ix}, {iy}): {x0:.9g} < x < {x1:.9g}, {y0:.9g} < y < {y1:.9g} [mm]"
+    law, label = table[index], table.label(index)
+    yield f"{label[0].upper()}{label[1:]}: {table.place(index)}"
     yield f"mean plane {law.initial_separation:.9g} mm below the highest point of the surface"
 
 

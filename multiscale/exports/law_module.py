@@ -81,7 +81,7 @@ _COPIED: tuple[Callable[..., object], ...] = (
 
 
 _HEAD = """\
-Contact law of patch ({ix}, {iy}) of a rough surface, written by patchlaw, for 4C.
+Contact law of {label} of a rough surface, written by patchlaw, for 4C.
 
     CONTACT CONSTITUTIVE LAWS:
       - LAW: 1
@@ -92,7 +92,7 @@ Contact law of patch ({ix}, {iy}) of a rough surface, written by patchlaw, for 4
 Units: mm, N, MPa. The closure is -(gap + offset). Closure 0: a rigid plane at the height of the
 highest point of the surface. Flat faces of the mesh that just touch stand for this state; the mean
 plane of the patch lies {below:.9g} mm below.
-Patch: {x0:.9g} < x < {x1:.9g}, {y0:.9g} < y < {y1:.9g} [mm].
+Place: {place}.
 {range}
 The values are those of patchlaw's own interpolant, to rounding.
 Made by: {made_by}
@@ -114,18 +114,13 @@ def law_modules(table: LawTable) -> dict[str, str]:
     """
     texts = {}
     for index, law in enumerate(table.laws):
-        ix, iy = table.patches.unravel(index)
         if law.is_flat:
-            raise InputError(NO_FUNCTION.format(ix, iy), allowed=REMEDY)
-        (x0, x1), (y0, y1) = table.patches.bounds(index)
+            raise InputError(NO_FUNCTION.format(table.label(index)), allowed=REMEDY)
+        name = f"law_{table.key(index).removeprefix('patch_')}.py"
         head = _HEAD.format(
-            ix=ix,
-            iy=iy,
-            x0=x0,
-            x1=x1,
-            y0=y0,
-            y1=y1,
-            name=(name := f"law_{ix}_{iy}.py"),
+            label=table.label(index),
+            place=table.place(index),
+            name=name,
             below=law.initial_separation,
             range="The patch stays open: no pressure."
             if law.is_open

@@ -9,15 +9,15 @@ from numpy.typing import NDArray
 
 from geometry import InputError
 from multiscale.laws.interpolation import LawPoint
-from multiscale.laws.law_table import LawTable, repaired_law
-from multiscale.laws.patch_law import PatchLaw
+from multiscale.laws.law_table import LawTable
+from multiscale.laws.patch_law import PatchLaw, repaired_law
 
 Array = NDArray[np.float64]
 
 LEAST_PRESSURE = 0.01
 """Pressures below this part of the law's largest count as that much in relative errors."""
 
-NO_FUNCTION = "the pressure of patch ({}, {}) is no function of closure from first touch on"
+NO_FUNCTION = "the pressure of {} is no function of closure from first touch on"
 REMEDY = "csv, or other laws: coupling.kind = consistent, larger patches"
 
 _CANDIDATES = 128  # per interval between two rows of the law
@@ -68,7 +68,7 @@ def sample_patch(
     try:
         return sample_law(table[index], tolerance=tolerance, most=most)
     except InputError:
-        problem = NO_FUNCTION.format(*table.patches.unravel(index))
+        problem = NO_FUNCTION.format(table.label(index))
         raise InputError(problem, allowed=REMEDY) from None
 
 

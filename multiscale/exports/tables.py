@@ -9,7 +9,7 @@ from io import StringIO
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import InputError
+from geometry import InputError, Regions
 from multiscale.exports.sampling import sample_law
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
@@ -18,7 +18,7 @@ CSV_COLUMNS = (
     "ix", "iy", "approach_mm", "closure_mm", "pressure_MPa", "stiffness_MPa_per_mm",
     "contact_area_fraction", "separation_mm", "contacts",
 )  # fmt: skip
-"""Columns of ``laws.csv``."""
+"""Columns of ``laws.csv``; of regions, their name comes first and the scatter of pressures last."""
 
 
 def csv_text(table: LawTable, tolerance: float) -> str:
@@ -33,9 +33,19 @@ def csv_text(table: LawTable, tolerance: float) -> str:
     """
     text = StringIO()
     writer = csv.writer(text)
-    writer.writerow(CSV_COLUMNS)
+    if isinstance(table.patches, Regions):
+        writer.writerow(("region", *CSV_COLUMNS[2:], "pressure_scatter_MPa"))
+    else:
+        writer.writerow(CSV_COLUMNS)
     for index, law in enumerate(table.laws):
-        writer.writerows((*table.patches.unravel(index), *row) for row in _rows_of(law, tolerance))
+        rows = _rows_of(law, tolerance)
+        if isinstance(table.patches, Regions):
+            region = table.patches.names[index]
+            # the second column of a row is the closure
+            writer.writerows((region, *row, float(law.pressure_scatter(row[1]))) for row in rows)
+        else:
+            place = table.patches.unravel(index)
+            writer.writerows((*place, *row) for row in rows)
     return text.getvalue()
 
 
