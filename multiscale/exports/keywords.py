@@ -31,7 +31,7 @@ The last row of each table continues the tangent beyond the end of the law, beca
 the last pressure: overclosures beyond the stated end are outside the law.
 Use *CONTACT PAIR, TYPE=NODE TO SURFACE, linear elements, and the rough face as the first surface.
 With the other types CalculiX 2.20 finds no pressure in such a table, and says nothing."""
-_OPEN = "It stays open up to {:.9g} mm: no surface interaction, leave it out of contact."
+_OPEN = "It stays open: no surface interaction, leave it out of contact. First touch: {:.9g} mm."
 
 
 def abaqus_text(table: LawTable, tolerance: float) -> str:

@@ -100,7 +100,7 @@ Made by: {made_by}
 _RANGE = """\
 First touch at a closure of {:.9g} mm. The law is known up to {:.9g} mm; beyond, its tangent
 continues."""
-_OPEN = "The patch stays open up to a closure of {:.9g} mm; the pressure is zero at any."
+_OPEN = "The patch stays open, its pressure is zero. First touch at a closure of {:.9g} mm."
 
 
 def law_modules(table: LawTable) -> dict[str, str]:
