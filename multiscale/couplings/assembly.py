@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from geometry import InputError
 from micro import MicroModel
-from multiscale.couplings.body import embedding, patch_compliance, patch_displacements
 from multiscale.couplings.condensed import CondensedCoupling
 from multiscale.couplings.contact import ContactCoupling
 from multiscale.couplings.law_couplings import EmbeddedCoupling, FreePlaneCoupling
+from multiscale.couplings.patch_compliance import embedding, patch_compliance, patch_displacements
 from multiscale.couplings.reference import ReferenceCoupling, make_reference
 from multiscale.laws.consistent import consistent_laws
 from multiscale.laws.isolated import isolated_laws
@@ -88,6 +88,8 @@ def newton_choice(setup: ProblemSetup, table: LawTable | None = None) -> NewtonC
         return NewtonChoice(True, why)
     if coupling.interface == "pointwise":
         return NewtonChoice(False, "laws at points need the whole mesh")
+    if setup.both_give_way and coupling.newton == "auto":
+        return NewtonChoice(True, "the counter-body, a half-space, is in the compliance of patches")
     if coupling.newton != "auto":
         return NewtonChoice(coupling.newton == "condensed", "as the scene asks")
     patches, steps = setup.patches.count, setup.scene.loading.load_history.count

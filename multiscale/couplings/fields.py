@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, PatchGrid
-from multiscale.couplings.body import embedding
 from multiscale.couplings.contact import ContactCoupling
 from multiscale.couplings.law_couplings import EmbeddedCoupling
+from multiscale.couplings.patch_compliance import embedding
 from multiscale.couplings.reference import ReferenceCoupling
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling

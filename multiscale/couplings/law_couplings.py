@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, InputError, NotConverged, RigidPlane
-from multiscale.couplings.body import Displacements
+from multiscale.couplings.patch_compliance import Displacements
 from multiscale.laws.interpolation import LawPoint
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaws

@@ -135,7 +135,7 @@ def block_figure_of(setup: ProblemSetup, record: ContactRecord) -> Figure:
         f"load step {record.step}: approach {1e3 * record.approach_mm:.3g} µm, "
         f"force {record.force_N:.4g} N, {len(record.spots)} spots"
     )
-    poisson_ratio = setup.scene.block.poisson_ratio
+    poisson_ratio = setup.materials.first.poisson_ratio
     return block_figure(setup.surface, pressure, poisson_ratio, title=title)
 
 

@@ -9,6 +9,7 @@ from multiscale.machine import ClusterNodes
 from multiscale.planning.costs import run_memory_requests
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import ReferenceMeshes
+from multiscale.setup.surface_and_block import block_section
 
 LOCKING_FROM = 0.45
 """Poisson's ratio above which linear elements lock. Two by two patches on 8 × 8 × 6 trilinear
@@ -30,8 +31,9 @@ def block_statement(setup: ProblemSetup) -> str:
         setup: The problem, with a block.
     """
     if setup.meshes is not None:
-        return f"{_meshes(setup.meshes)}; {setup.scene.block.sides} sides"
+        return f"{_meshes(setup.meshes)}; {block_section(setup.scene).sides} sides"
     (lx, ly), shape = setup.surface.lengths, setup.shape
+    sides, modulus = block_section(setup.scene).sides, setup.materials.contact_modulus
     text = (
         "decomposed: the half-space's own near field, and what the finite block adds to it in "
         "smooth modes of its contact face, from finite elements of high order"
@@ -46,7 +48,7 @@ def block_statement(setup: ProblemSetup) -> str:
         )
     return (
         f"{text}, {lx:g} × {ly:g} mm and {shape.height:g} mm high, "
-        f"{setup.scene.block.sides} sides, contact modulus {setup.model.contact_modulus:.6g} MPa"
+        f"{sides} sides, contact modulus {modulus:.6g} MPa"
     )
 
 
@@ -71,7 +73,7 @@ def block_warnings(setup: ProblemSetup) -> Iterator[str]:
                 "make the block stiffer by several per cent under a patch's pressure; refine "
                 "block.cells"
             )
-    mesh, poisson_ratio = setup.meshes or setup.shape, setup.scene.block.poisson_ratio
+    mesh, poisson_ratio = setup.meshes or setup.shape, setup.materials.first.poisson_ratio
     if mesh.degree == 1 and poisson_ratio > LOCKING_FROM:
         yield (
             f"linear elements lock as Poisson's ratio comes near 0.5 (here {poisson_ratio:g}): the "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from geometry.materials import Material
 from geometry.statistics import roughness
 from micro import MODELS, AsperityModel, HalfSpaceModel
 from multiscale.couplings.assembly import newton_choice
@@ -102,13 +103,15 @@ def inputs_statement(setup: ProblemSetup) -> str:
     Args:
         setup: The problem.
     """
-    block, (lx, ly) = setup.scene.block, (quantity(side, "mm") for side in setup.surface.lengths)
-    height = quantity(setup.shape.height, "mm")
+    lx, ly = (quantity(side, "mm") for side in setup.surface.lengths)
+    height, second = quantity(setup.shape.height, "mm"), setup.materials.second
     solid = f"a block {height} high" if setup.has_block else "a half-space"
-    return (
-        f"E = {quantity(block.young_modulus, 'MPa')}, ν = {block.poisson_ratio:g}; a surface "
-        f"of {lx} × {ly} on {solid}"
-    )
+    against = f", against a half-space with {_constants(second)}" if second else ""
+    return f"{_constants(setup.materials.first)}; a surface of {lx} × {ly} on {solid}{against}"
+
+
+def _constants(material: Material) -> str:
+    return f"E = {quantity(material.young_modulus, 'MPa')}, ν = {material.poisson_ratio:g}"
 
 
 def surface_statement(setup: ProblemSetup) -> str:

@@ -36,11 +36,12 @@ from multiscale.setup.memory import check_memory
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import reference_meshes
 from multiscale.setup.surface_and_block import (
-    block_material,
     check_load,
     check_patches,
     make_shape,
     make_surface,
+    make_surfaces,
+    materials_in_contact,
     patch_grid,
 )
 
@@ -97,7 +98,10 @@ def _setup(
     """
     began = time.perf_counter()
     check_memory(scene, nodes)
-    surface = like.surface if like else make_surface(scene)
+    if like:
+        surface, counter_surface = like.surface, like.counter_surface
+    else:
+        surface, counter_surface = make_surfaces(scene)
     check_patches(scene, surface)
     check_load(scene, surface)
     patches = PatchGrid(grid=patch_grid(scene), lengths=surface.lengths)
@@ -105,6 +109,8 @@ def _setup(
         ProblemSetup,
         scene=scene,
         surface=surface,
+        counter_surface=counter_surface,
+        materials=materials_in_contact(scene),
         # the block's sides are free
         asperities=like.asperities if like else find_asperities(surface, periodic=False),
         patches=patches,
@@ -218,4 +224,4 @@ def _chosen_model(scene: Scene, surface: Surface, patches: PatchGrid, label: str
 
 
 def _modulus(scene: Scene) -> float:
-    return block_material(scene).contact_modulus
+    return materials_in_contact(scene).contact_modulus

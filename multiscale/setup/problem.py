@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Asperities, BlockShape, PatchGrid, RigidPlane, Surface
+from geometry import Asperities, BlockShape, MaterialPair, PatchGrid, RigidPlane, Surface
 from micro import AsperityModel, Choice, HalfSpaceModel, MicroModel, ScaledModel
 from multiscale.laws.refinement import MOST_ROWS
 from multiscale.readable import duration
@@ -105,15 +105,17 @@ class ProblemSetup:
 
     Attributes:
         scene: The scene with its auto values resolved, but for ``micro.model``.
-        surface: Its rough surface.
+        surface: Its rough surface, with the heights of both sides where both are rough.
         asperities: The surface's summits.
         micro: Micro model of the whole surface; None in a reference, which has none.
         patches: Partition of the interface.
         mean_heights: Mean height of each patch, shape (N,) [mm].
         shape: Shape and mesh of the block.
+        materials: The materials on both sides of the interface.
         plane_at_largest_load: The rigid plane at the largest load. Where the force or the moment is
             prescribed, it is the plane in equilibrium on a half-space, estimated on few of its
             cells where load steps solve the half-space model itself and need no plane before.
+        counter_surface: What of the surface is the counter-body's; None where that is smooth.
         choice: Why this micro model was chosen, where the scene says ``auto``.
         meshes: The meshes of a reference; None with other couplings.
         decision: Why the auto values became what they are, where measured errors decided.
@@ -127,7 +129,9 @@ class ProblemSetup:
     patches: PatchGrid
     mean_heights: Array
     shape: BlockShape
+    materials: MaterialPair
     plane_at_largest_load: RigidPlane
+    counter_surface: Surface | None = None
     choice: Choice | None = None
     meshes: ReferenceMeshes | None = None
     decision: Decision | None = None
@@ -143,6 +147,11 @@ class ProblemSetup:
         if self.micro is None:
             raise ValueError("a reference has no micro model")
         return self.micro
+
+    @property
+    def both_give_way(self) -> bool:
+        """Whether the counter-body is elastic."""
+        return self.materials.second is not None
 
     @property
     def has_block(self) -> bool:

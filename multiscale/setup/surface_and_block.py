@@ -10,10 +10,21 @@ from typing import Any
 
 import numpy as np
 
-from geometry import BlockShape, InputError, Material, Surface, read_surface, synthesise
+from geometry import (
+    BlockShape,
+    InputError,
+    Material,
+    MaterialPair,
+    Surface,
+    facing,
+    read_surface,
+    synthesise,
+    turned_over,
+)
 from geometry.files.reading import surface_of
 from geometry.preparation import prepared
 from multiscale.scene.scene import Scene
+from multiscale.scene.sections import BlockSection, SurfaceSection
 
 LAW_BLOCK_CELLS, FIELD_CELLS = (40, 40, 25), (20, 20, 12)
 """Cells of a block that carries laws on its mesh, those of Waddad et al. 2016, or contacts, and of
@@ -25,20 +36,50 @@ PROVISIONAL_PATCHES = (4, 4)
 
 
 def make_surface(scene: Scene) -> Surface:
-    """Make or read the surface of a scene.
+    """Return the surface of a scene, with the heights of both sides where both are rough.
 
     Raises:
         InputError: When it cannot be made or read; names file and key.
     """
-    section = scene.surface
+    return make_surfaces(scene)[0]
+
+
+def make_surfaces(scene: Scene) -> tuple[Surface, Surface | None]:
+    """Return the surface of a scene, and what of it is the counter-body's, turned over.
+
+    Returns:
+        The heights of both sides, and those of the counter-body; None where it is smooth.
+
+    Raises:
+        InputError: When one cannot be made or read, or they do not fit; names file and key.
+    """
+    own = sample_surface(scene, scene.surface, "surface")
+    if scene.counter_surface is None:
+        return own, None
+    counter = turned_over(sample_surface(scene, scene.counter_surface, "counter_surface"))
+    with located(scene, "counter_surface"):
+        return facing(own, counter), counter
+
+
+def sample_surface(scene: Scene, section: SurfaceSection, key: str) -> Surface:
+    """Make or read the surface of one section of a scene.
+
+    Args:
+        scene: The scene.
+        section: The section.
+        key: Its dotted name, for errors.
+
+    Raises:
+        InputError: When it cannot be made or read; names file and key.
+    """
     extent: dict[str, Any] = {"grid": section.grid, "lengths": section.lengths}
     if section.spectrum is not None:
-        with located(scene, "surface.spectrum"):
+        with located(scene, f"{key}.spectrum"):
             surface = synthesise(section.spectrum.spectrum(), **extent)
-        with located(scene, "surface"):
+        with located(scene, key):
             surface = prepared(surface, section.preparation)
     elif section.heights is not None:
-        with located(scene, "surface.heights"):
+        with located(scene, f"{key}.heights"):
             return surface_of(
                 section.heights.values,
                 lengths=section.lengths or (0.0, 0.0),
@@ -49,8 +90,8 @@ def make_surface(scene: Scene) -> Surface:
     else:
         extent |= {"height_unit": section.height_unit, "channel": section.channel}
         extent |= {"periodic": section.periodic, **asdict(section.preparation)}
-        with located(scene, "surface.file"):
-            surface = read_surface(scene.surface_path or Path(), **extent)
+        with located(scene, f"{key}.file"):
+            surface = read_surface(scene.path_of(section.file) or Path(), **extent)
     if section.periodic and not surface.periodic:  # it continues so, whatever was removed of it
         return replace(surface, periodic=True)
     return surface
@@ -62,7 +103,7 @@ def make_shape(scene: Scene, surface: Surface) -> BlockShape:
     Raises:
         InputError: When they do not fit together or the coupling; names file and key.
     """
-    block = scene.block
+    block = block_section(scene)
     with located(scene, "block"):
         return BlockShape(
             interface=surface.lengths,
@@ -78,8 +119,27 @@ def make_shape(scene: Scene, surface: Surface) -> BlockShape:
 
 def block_material(scene: Scene) -> Material:
     """Return the elastic constants of a scene's block."""
-    block = scene.block
+    block = block_section(scene)
     return Material(young_modulus=block.young_modulus, poisson_ratio=block.poisson_ratio)
+
+
+def block_section(scene: Scene) -> BlockSection:
+    """Return the section on the block of a scene that has one.
+
+    Raises:
+        ValueError: When its body is a mesh.
+    """
+    if scene.block is None:
+        raise ValueError("a scene with a body of its own has no block")
+    return scene.block
+
+
+def materials_in_contact(scene: Scene) -> MaterialPair:
+    """Return the materials on both sides of a scene's interface; the second may be rigid."""
+    second = scene.counter_body
+    return MaterialPair(
+        first=block_material(scene), second=None if second is None else second.whole_material
+    )
 
 
 def block_cells(scene: Scene) -> tuple[int, int, int]:
@@ -88,7 +148,7 @@ def block_cells(scene: Scene) -> tuple[int, int, int]:
     Laws need a fine mesh under every patch, and contacts are to be seen in fields; the mean
     pressures of patches need less.
     """
-    cells = scene.block.cells
+    cells = block_section(scene).cells
     if cells is None or cells == "auto":
         fine = scene.coupling.on_mesh or scene.coupling.kind == "concurrent"
         return LAW_BLOCK_CELLS if fine else FIELD_CELLS
@@ -129,7 +189,7 @@ def check_load(scene: Scene, surface: Surface) -> None:
 
     Numbers of load steps that there will not be are refused, too.
     """
-    block, loading, fields = scene.block, scene.loading, scene.output.fields
+    block, loading, fields = block_section(scene), scene.loading, scene.output.fields
     count = loading.load_history.count
     if isinstance(fields, list) and loading.force_change is None and max(fields) > count:
         raise InputError(
