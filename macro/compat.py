@@ -173,6 +173,12 @@ def cell_nodes(space: Any) -> NDArray[np.int32]:
     return table.array.reshape(-1, space.dofmap.dof_layout.num_dofs)
 
 
+def lagrange_degree(space: Any) -> int:
+    """Return the polynomial degree of a Lagrange space."""
+    element = space.ufl_element()
+    return int(element.degree if isinstance(element.degree, int) else element.degree())
+
+
 def cell_vertices(mesh: Any) -> NDArray[np.int32]:
     """Return the rows of ``mesh.geometry.x`` of every rank-local cell, shape (cells, vertices)."""
     geometry = mesh.geometry

@@ -21,7 +21,7 @@ from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.surface_and_block import block_section
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import Interface
+    from macro import LoadedFace
 
 Array = NDArray[np.float64]
 Displacements = Callable[[Array], Array]
@@ -49,8 +49,8 @@ def patch_displacements(setup: ProblemSetup, comm: Any, *, dense: bool) -> Displ
         return lambda pressures: np.asarray(pressures @ compliance.T)
     from macro import displacements_under
 
-    interface = embedding(setup, comm)
-    return lambda pressures: displacements_under(interface, pressures)
+    face = embedding(setup, comm)
+    return lambda pressures: displacements_under(face, pressures)
 
 
 def patch_compliance(setup: ProblemSetup, comm: Any) -> Array:
@@ -87,8 +87,8 @@ def _of_first(setup: ProblemSetup, comm: Any) -> Array:
     return cached("plain", key, compute, comm or MPI.COMM_SELF)["compliance"]
 
 
-def embedding(setup: ProblemSetup, comm: Any) -> Interface:
-    """Mesh and assemble the block of a scene, with its patches on top.
+def embedding(setup: ProblemSetup, comm: Any) -> LoadedFace:
+    """Mesh the block of a scene, and return the patches on its top.
 
     Args:
         setup: The problem set up from the scene.
@@ -99,8 +99,9 @@ def embedding(setup: ProblemSetup, comm: Any) -> Interface:
     """
     from mpi4py import MPI
 
-    from macro import Block, Interface, block_mesh
+    from macro import Block, LoadedFace, block_mesh
 
     sides = block_section(setup.scene).sides
     mesh = block_mesh(setup.shape, comm or MPI.COMM_SELF)
-    return Interface(Block(mesh, setup.materials.first, sides=sides), setup.patches)
+    block = Block(mesh, setup.materials.first, sides=sides)
+    return LoadedFace.of_block(block, setup.patches)

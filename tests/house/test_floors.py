@@ -20,7 +20,7 @@ FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 FLOORS = {
     "geometry": [
         "blocked_spline collective errors legendre_modes slope_search",
-        "checks interpolant materials missing",
+        "checks face_frame interpolant materials missing",
         "filters spectrum surface",
         "facing patches statistics summits synthesis",
         "plausibility preparation rigid_plane",
@@ -40,7 +40,8 @@ FLOORS = {
         "compat",
         "mesh",
         "linear_solvers",
-        "block",
+        "elastic_body",
+        "block meshed_body",
         "contact",
         "compliance fields",
     ],
