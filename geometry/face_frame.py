@@ -1,92 +1,135 @@
-"""Coordinates in the plane of a contact face."""
+"""Coordinates on a planar contact face that lies anywhere in space."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from geometry.checks import frozen_array
 from geometry.errors import InputError
 
 Array = NDArray[np.float64]
 
-_ALONG_X = np.cos(np.radians(30.0))
-"""Cosine of the angle to the x axis below which a normal counts as along it."""
-_RIGHT_ANGLES = 1e-9
-"""Largest deviation of axes from unit length and right angles."""
+_ROUNDING = 1e-12
+"""Component of a unit normal that is taken as zero: a face across an axis is exactly across it."""
+
+_NEAR_X = np.cos(np.pi / 6.0) + 1e-9
+"""Cosine beyond which a normal lies along x; 30° sharp does not, whatever its rounding."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FaceFrame:
-    """Coordinates (x, y) in the plane of a contact face, and heights above it.
+    """Rectangular coordinates of a planar face: two in the plane, and the height above it.
 
     Args:
-        origin: Where both coordinates are zero, shape (3,) [mm].
-        axes: Unit vectors along x and y and of the normal out of the body, as rows, right-handed,
-            shape (3, 3).
+        origin: Point of the plane that has the coordinates (0, 0), shape (3,) [mm].
+        axes: Rows e1, e2 and n: orthonormal, right-handed, n out of the body, shape (3, 3).
 
     Raises:
-        InputError: When the axes are no right-handed system of unit vectors.
+        InputError: When the origin is not finite or the axes are no rotation.
     """
 
     origin: Array
     axes: Array
 
     def __post_init__(self) -> None:
-        origin, axes = np.array(self.origin, float), np.array(self.axes, float)
-        turned = axes.shape == (3, 3) and np.allclose(
-            axes @ axes.T, np.eye(3), rtol=0.0, atol=_RIGHT_ANGLES
-        )
-        if not turned or np.linalg.det(axes) < 0.0 or origin.shape != (3,):
+        origin, axes = frozen_array(self.origin), frozen_array(self.axes)
+        if origin.shape != (3,) or not np.isfinite(origin).all():
+            raise InputError(
+                "the origin of a face is no point",
+                value=self.origin,
+                allowed="three finite numbers",
+            )
+        turned = axes.shape == (3, 3) and np.isfinite(axes).all()
+        if not turned or np.abs(axes @ axes.T - np.eye(3)).max() > 1e-9 or np.linalg.det(axes) < 0:
             raise InputError(
                 "the axes of a face do not fit",
-                value=axes.tolist(),
-                allowed="three unit vectors at right angles, right-handed",
+                value=np.asarray(self.axes).tolist(),
+                allowed="three orthonormal, right-handed rows e1, e2, n",
             )
         object.__setattr__(self, "origin", origin)
         object.__setattr__(self, "axes", axes)
 
     @classmethod
-    def through(cls, points: ArrayLike, normal: ArrayLike) -> Self:
-        """Return the usual frame of a face: x as near to the global x axis as the plane allows.
+    def across(cls, normal: ArrayLike, origin: Sequence[float] | Array = (0, 0, 0)) -> FaceFrame:
+        """Return the frame with the default axes of a normal.
 
-        Where the normal is along the global x axis, within 30 degrees, x is near the global y
-        axis. The origin is the lower corner of the smallest rectangle along these axes that holds
-        the points, at the height of the highest point.
+        e1 is the global x axis made perpendicular to the normal n, or the global y axis where n is
+        within 30 degrees of ±x; e2 = n × e1. For the top of a block these are x, y and z.
 
         Args:
-            points: Points of the face, shape (n, 3) [mm].
-            normal: Normal out of the body, of any length, shape (3,).
+            normal: Outward normal, of any length, shape (3,).
+            origin: Point of the plane with coordinates (0, 0), shape (3,) [mm].
+
+        Raises:
+            InputError: When the normal is no direction.
         """
-        places = np.asarray(points, float)
-        n = np.asarray(normal, float) / np.linalg.norm(normal)
-        along = np.eye(3)[1] if abs(n[0]) > _ALONG_X else np.eye(3)[0]
-        first = along - (along @ n) * n
-        first /= np.linalg.norm(first)
-        axes = np.stack([first, np.cross(n, first), n])
-        offset = places @ axes.T
-        corner = np.array([*offset[:, :2].min(axis=0), offset[:, 2].max()])
-        return cls(origin=corner @ axes, axes=axes)
+        n = np.asarray(normal, dtype=float)
+        if n.shape != (3,) or not np.isfinite(n).all() or not n.any():
+            raise InputError(
+                "the normal of a face is no direction",
+                value=np.asarray(normal).tolist(),
+                allowed="three finite numbers that are not all zero",
+            )
+        n = n / np.abs(n).max()
+        n = n / np.linalg.norm(n)
+        n = np.where(np.abs(n) < _ROUNDING, 0.0, n)
+        n /= np.linalg.norm(n)
+        along = np.array([0.0, 1.0, 0.0] if abs(n[0]) > _NEAR_X else [1.0, 0.0, 0.0])
+        e1 = along - (along @ n) * n
+        e1 /= np.linalg.norm(e1)
+        axes = np.stack([e1, np.cross(n, e1), n]) + 0.0  # no negative zeros
+        return cls(origin=np.asarray(origin, dtype=float), axes=axes)
+
+    @classmethod
+    def through(cls, points: ArrayLike, normal: ArrayLike) -> FaceFrame:
+        """Return the frame of a planar face, with default axes and the face's lower corner.
+
+        The origin is the lower corner of the bounding rectangle of the points in (e1, e2), at the
+        height of the highest of them along the normal.
+
+        Args:
+            points: Points of the face, of all ranks together, shape (n, 3) [mm].
+            normal: Outward normal of the face, of any length, shape (3,).
+
+        Raises:
+            InputError: When there are no points, or the normal is no direction.
+        """
+        places = np.asarray(points, dtype=float).reshape(-1, 3)
+        if not len(places):
+            raise InputError("a face without points has no frame")
+        frame = cls.across(normal)
+        local = places @ frame.axes.T
+        lower, upper = local.min(axis=0), local.max(axis=0)
+        corner = np.array([lower[0], lower[1], upper[2]])
+        return cls(origin=corner @ frame.axes, axes=frame.axes)
 
     @property
     def normal(self) -> Array:
-        """Unit normal out of the body, shape (3,)."""
-        return np.asarray(self.axes[2])
+        """Unit normal that points out of the body, shape (3,)."""
+        return self.axes[2]
 
-    def in_plane(self, points: Array) -> Array:
-        """Return the coordinates (x, y) of points of shape (…, 3), shape (…, 2) [mm]."""
-        return np.asarray((points - self.origin) @ self.axes[:2].T)
+    def in_plane(self, points: ArrayLike) -> Array:
+        """Return the coordinates along e1 and e2 of points (n, 3) [mm], shape (n, 2) [mm]."""
+        return (np.asarray(points, dtype=float) - self.origin) @ self.axes[:2].T
 
-    def height(self, points: Array) -> Array:
-        """Return the heights of points of shape (…, 3) above the plane, shape (…) [mm]."""
-        return np.asarray((points - self.origin) @ self.normal)
+    def height(self, points: ArrayLike) -> Array:
+        """Return the heights of points (n, 3) [mm] above the plane along n, shape (n,) [mm]."""
+        return (np.asarray(points, dtype=float) - self.origin) @ self.axes[2]
 
-    def moved(self, x: float, y: float) -> FaceFrame:
-        """Return the same frame with its origin at a point of the plane [mm]."""
-        return FaceFrame(origin=self.origin + np.array([x, y]) @ self.axes[:2], axes=self.axes)
+    def in_space(self, places: ArrayLike, height: ArrayLike = 0.0) -> Array:
+        """Return the points in space of coordinates in the plane, shape (n, 3) [mm].
+
+        Args:
+            places: Coordinates along e1 and e2, shape (n, 2) [mm].
+            height: Heights above the plane, shape (n,) or a number [mm].
+        """
+        lifted = np.multiply.outer(np.asarray(height, dtype=float), self.axes[2])
+        return self.origin + np.asarray(places, dtype=float) @ self.axes[:2] + lifted
 
 
 UPWARD = FaceFrame(origin=np.zeros(3), axes=np.eye(3))
-"""The frame of a block's top: the coordinates x and y themselves."""
+"""Frame of a block's top, whose coordinates are x and y themselves."""

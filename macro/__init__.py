@@ -10,8 +10,10 @@ A TaggedMesh makes a MeshedBody of any shape, which takes the place of the Block
 
 from geometry.materials import Material
 from macro.block import Block
+from macro.body_pair import BodyPair
 from macro.compliance.face_compliance import FaceCompliance, face_compliance
 from macro.contact.contact_forces import ContactLaw
+from macro.contact.face_pair import FacePair
 from macro.contact.law_problem import LawContactProblem, LawContactState
 from macro.contact.loaded_face import (
     LoadedFace,
@@ -37,10 +39,12 @@ __all__ = [
     "TOP",
     "Block",
     "BlockMesh",
+    "BodyPair",
     "ContactFacets",
     "ContactLaw",
     "ElasticBody",
     "FaceCompliance",
+    "FacePair",
     "LawContactProblem",
     "LawContactState",
     "LoadedFace",

@@ -20,8 +20,8 @@ FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 FLOORS = {
     "geometry": [
         "blocked_spline collective errors legendre_modes slope_search",
-        "checks face_frame interpolant materials missing",
-        "filters spectrum surface",
+        "checks interpolant materials missing",
+        "face_frame filters spectrum surface",
         "facing patches statistics summits synthesis",
         "plausibility preparation rigid_plane",
         "files",
@@ -41,7 +41,7 @@ FLOORS = {
         "mesh",
         "linear_solvers",
         "elastic_body",
-        "block meshed_body",
+        "block body_pair meshed_body",
         "contact",
         "compliance fields",
     ],
