@@ -11,6 +11,8 @@ from multiscale.laws.law_table import read_laws as read_laws
 from multiscale.laws.law_table import write_laws as write_laws
 from multiscale.laws.patch_law import PatchLaw as PatchLaw
 from multiscale.laws.patch_law import PatchLaws as PatchLaws
+from multiscale.laws.representative import representative_law as representative_law
+from multiscale.laws.representative import representative_laws as representative_laws
 from multiscale.loading.load_step import LoadStep as LoadStep
 from multiscale.loading.stepper import LoadHistory as LoadHistory
 from multiscale.loading.stepper import load_steps as load_steps

@@ -6,7 +6,7 @@ Theory: demos/theory.md, section 10.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -46,6 +46,7 @@ class PatchLaw:
         warning_pressure: Mean pressure from which on the micro model warned that it is outside
             its range of validity [MPa]; infinite when it never did.
         repaired: Largest change that made falling rows rise, see `LawRows.rising`.
+        sample_area: Nominal area that contacts are counted on [mm²]; NaN where that is the patch.
 
     Raises:
         InputError: When the rows are no law.
@@ -58,6 +59,7 @@ class PatchLaw:
     stiffness_error: float = float("nan")
     warning_pressure: float = np.inf
     repaired: float = 0.0
+    sample_area: float = float("nan")
 
     @classmethod
     def of(cls, rows: SolvedRows, first_touch: float, initial_separation: float) -> PatchLaw:
@@ -151,6 +153,35 @@ class PatchLaw:
     def stiffness(self, closure: ArrayLike) -> Array:
         """Return the derivative of `pressure` over the closure [MPa/mm]."""
         return self.at(closure, extend=True).stiffness
+
+    def pressure_scatter(self, closure: ArrayLike) -> Array:
+        """Return the standard deviation of the pressure among the samples of the law [MPa].
+
+        Args:
+            closure: Closures of any shape [mm]; beyond the rows it stays that of the last one.
+        """
+        closures = np.asarray(closure, dtype=float)
+        if self.is_open:
+            return np.zeros(closures.shape)
+        rows = self.rows[: self._rising]
+        return np.interp(closures, rows.closure, rows.pressure_scatter, left=0.0)
+
+    def shifted(self, distance: float) -> PatchLaw:
+        """Return the law with approach and closure counted from a plane that is higher.
+
+        Args:
+            distance: How much higher it is [mm].
+        """
+        return replace(
+            self,
+            rows=replace(
+                self.rows,
+                approach=self.rows.approach + distance,
+                closure=self.rows.closure + distance,
+            ),
+            first_touch=self.first_touch + distance,
+            initial_separation=self.initial_separation + distance,
+        )
 
     @cached_property
     def _rising(self) -> int:

@@ -20,7 +20,7 @@ FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 FLOORS = {
     "geometry": [
         "blocked_spline collective errors legendre_modes slope_search",
-        "checks interpolant materials missing",
+        "checks interpolant materials missing regions",
         "face_frame filters spectrum surface",
         "facing patches statistics summits synthesis",
         "plausibility preparation rigid_plane",
