@@ -112,7 +112,7 @@ class _Catalogue:
         content["block"].pop("cells", None)
         cells = block_section(scene).cells
         stated = cells if isinstance(cells, tuple) else None
-        self._own_cells = stated if scene.coupling.on_mesh else None
+        self._own_cells = stated if scene.on_mesh else None
         self._cells = stated or LAW_BLOCK_CELLS
         self._base = content | {"patches": {"grid": list(pressure_grid(scene))}}
         nx, ny = content["surface"].get("grid") or make_surface(scene).grid

@@ -146,7 +146,7 @@ def contact_model(setup: ProblemSetup, comm: Any, put_on_body: OnBody | None = N
         Collective.
     """
     model = setup.model
-    isolated = setup.scene.coupling.kind == "isolated"
+    isolated = setup.scene.kind == "isolated"
     if isinstance(model, HalfSpaceModel):
         put_on_body = put_on_body or on_body(setup, comm, half_space=isolated)
         return put_on_body(model, SLOPES if setup.finite_slopes else 0)

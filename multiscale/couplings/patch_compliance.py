@@ -21,7 +21,7 @@ from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.surface_and_block import block_section
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import LoadedFace
+    from macro import FacePair, LoadedFace
 
 Array = NDArray[np.float64]
 Displacements = Callable[[Array], Array]
@@ -70,8 +70,8 @@ def patch_compliance(setup: ProblemSetup, comm: Any) -> Array:
 
 
 def _of_first(setup: ProblemSetup, comm: Any) -> Array:
-    """Return the compliance of the first body under its patches."""
-    if setup.scene.coupling.decomposed:
+    """Return the compliance of the meshes under the patches, of the first body or of both."""
+    if setup.scene.decomposed:
         return scene_body(setup, side_term=True).patch_compliance(setup.patches, comm)
     from mpi4py import MPI
 
@@ -82,13 +82,26 @@ def _of_first(setup: ProblemSetup, comm: Any) -> Array:
     def compute() -> dict[str, Array]:
         return {"compliance": patch_compliance_matrix(embedding(setup, comm))}
 
-    sides = block_section(setup.scene).sides
-    key = (setup.shape, setup.materials.first, sides, setup.patches, users_options())
+    key = (*_bodies_as_text(setup), setup.patches, users_options())
     return cached("plain", key, compute, comm or MPI.COMM_SELF)["compliance"]
 
 
-def embedding(setup: ProblemSetup, comm: Any) -> LoadedFace:
-    """Mesh the block of a scene, and return the patches on its top.
+def _bodies_as_text(setup: ProblemSetup) -> tuple[Any, ...]:
+    """Return all that the compliance of the meshes depends on, besides the patches."""
+    scene, counter = setup.scene, setup.scene.counter_body
+    parts: list[Any] = []
+    if setup.block_shape is not None:
+        parts += [setup.shape, setup.materials.first, block_section(scene).sides]
+    for section, face in ((scene.body, setup.face), (counter, setup.counter_face)):
+        if section is not None and face is not None:
+            parts += [section.model_dump_json(), face.digest]
+    return tuple(parts)
+
+
+def embedding(setup: ProblemSetup, comm: Any) -> LoadedFace | FacePair:
+    """Return the patches on the contact face of a scene's body, or of two bodies on meshes.
+
+    A block is meshed for it.
 
     Args:
         setup: The problem set up from the scene.
@@ -97,11 +110,34 @@ def embedding(setup: ProblemSetup, comm: Any) -> LoadedFace:
     Note:
         Collective.
     """
+    from macro import BodyPair, FacePair, FaceRegions, LoadedFace
+
+    first, counter = _first_face(setup, comm), setup.bodies.counter
+    if counter is None:
+        return first
+    second = LoadedFace(counter.body, counter.facets[0], setup.patches)
+    if setup.samples and setup.face is not None:
+        second = FaceRegions.covering(counter.body, counter.facets, setup.face.lengths)
+    return FacePair(first, second, BodyPair(first.body, counter.body))
+
+
+def _first_face(setup: ProblemSetup, comm: Any) -> LoadedFace:
+    """Return the patches, or regions under laws of samples, on the first body."""
     from mpi4py import MPI
 
-    from macro import Block, LoadedFace, block_mesh
+    from macro import Block, FaceRegions, LoadedFace, block_mesh
+    from macro.mesh.contact_face import top_facets
 
-    sides = block_section(setup.scene).sides
-    mesh = block_mesh(setup.shape, comm or MPI.COMM_SELF)
-    block = Block(mesh, setup.materials.first, sides=sides)
-    return LoadedFace.of_block(block, setup.patches)
+    body: Any
+    if setup.bodies.first is not None:
+        body, facets = setup.bodies.first.body, setup.bodies.first.facets
+    else:
+        sides = block_section(setup.scene).sides
+        mesh = block_mesh(setup.shape, comm or MPI.COMM_SELF)
+        body = Block(mesh, setup.materials.first, sides=sides)
+        if not setup.samples:
+            return LoadedFace.of_block(body, setup.patches)
+        facets = (top_facets(mesh),)
+    if setup.samples and setup.face is not None:
+        return FaceRegions.covering(body, facets, setup.face.lengths)
+    return LoadedFace(body, facets[0], setup.patches)

@@ -10,6 +10,7 @@ from micro import MODELS, AsperityModel, HalfSpaceModel
 from multiscale.couplings.assembly import newton_choice
 from multiscale.planning.auto_keys import heights_per_wave
 from multiscale.planning.block_plan import block_statement, block_warnings
+from multiscale.planning.body_plan import body_term_statement, sample_statement
 from multiscale.planning.costs import Cost
 from multiscale.readable import duration, quantity
 from multiscale.scene.keys import bare_quantities
@@ -31,7 +32,9 @@ def statements(setup: ProblemSetup, cost: Cost | None = None) -> Iterator[tuple[
     yield "micro model", _model(setup)
     yield "coupling", _coupling(setup)
     if setup.has_block:
-        yield "block", block_statement(setup)
+        yield "block" if setup.face is None else "body", block_statement(setup)
+        if setup.bodies.first is not None and not setup.samples:
+            yield "body term", body_term_statement(setup)
     if setup.uses_laws:
         choice = newton_choice(setup)
         way = "condensed to the patches" if choice.condensed else "full, on the mesh"
@@ -104,9 +107,13 @@ def inputs_statement(setup: ProblemSetup) -> str:
         setup: The problem.
     """
     lx, ly = (quantity(side, "mm") for side in setup.surface.lengths)
-    height, second = quantity(setup.shape.height, "mm"), setup.materials.second
-    solid = f"a block {height} high" if setup.has_block else "a half-space"
-    against = f", against a half-space with {_constants(second)}" if second else ""
+    high = setup.face.depth if setup.face else setup.shape.height
+    what, second = "block" if setup.block_shape else "body", setup.materials.second
+    solid = f"a {what} {quantity(high, 'mm')} high" if setup.has_block else "a half-space"
+    other = "a half-space" if setup.both_give_way else "a body"
+    against = f", against {other} with {_constants(second)}" if second else ""
+    if setup.samples:
+        solid = f"{solid} as sample"
     return f"{_constants(setup.materials.first)}; a surface of {lx} × {ly} on {solid}{against}"
 
 
@@ -157,6 +164,8 @@ def _model(setup: ProblemSetup) -> str:
 
 
 def _coupling(setup: ProblemSetup) -> str:
+    if setup.samples:
+        return sample_statement(setup)
     coupling, patches = setup.scene.coupling, setup.patches
     grid = f"{patches.grid[0]} × {patches.grid[1]} patches"
     if setup.meshes is not None:
@@ -215,6 +224,8 @@ def _slopes(tilt: tuple[float, float]) -> str:
 def _error(setup: ProblemSetup) -> str:
     """Say how the run will know its error."""
     check = setup.scene.output.check
+    if setup.samples:
+        return "not measured; the notes have that of the laws between rows, and their scatter"
     if setup.meshes is not None:
         if len(setup.meshes.shapes) > 1:
             return "the meshes of the reference tell it, at every load step"

@@ -149,6 +149,9 @@ class LawSection(Section):
     seeds: tuple[Seed, ...] = ()
     """Of a spectrum: seeds of several samples. The law is that of their mean, and their scatter is
     reported; the seed of the spectrum when not given."""
+    largest_pressure: Annotated[Pressure, Field(gt=0)] | None = None
+    """Largest pressure at a point of the face that the laws are made for; when not given, ten times
+    the mean one, or more on a crowned face."""
     regions: tuple[RegionSection, ...] = ()
     """Further faces of the contact, each with a sample of its own."""
     crown: tuple[Radius, Radius] | None = None
@@ -157,7 +160,7 @@ class LawSection(Section):
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
         if self.kind == "patch":
-            for key in ("seeds", "regions", "crown"):
+            for key in ("seeds", "largest_pressure", "regions", "crown"):
                 if getattr(self, key):
                     raise ValueError(
                         f"'{key}' needs kind = 'representative' (allowed: leave it out)"

@@ -62,6 +62,23 @@ class SceneSections(Section):
     output: OutputSection = OutputSection()
     """What is written beside the tables of results."""
 
+    @property
+    def kind(self) -> str:
+        """The coupling, or that the laws are those of samples."""
+        return "representative" if self.law.representative else self.coupling.kind
+
+    @property
+    def decomposed(self) -> bool:
+        """Whether the body is the half-space and what the finite body adds to it, in modes."""
+        if self.law.representative:
+            return False
+        return self.kind == "concurrent" if self.body is not None else self.coupling.decomposed
+
+    @property
+    def on_mesh(self) -> bool:
+        """Whether laws lie on finite elements of the body, plain or condensed."""
+        return self.kind not in ("analytic", "concurrent", "reference") and not self.decomposed
+
     @model_validator(mode="after")
     def _fit_together(self) -> Self:
         """Refuse sections that make no sense together, with the first reason."""
@@ -129,6 +146,13 @@ class SceneSections(Section):
                 "isolated laws against a half-space need the compliance of both bodies (allowed: "
                 "coupling.newton = 'condensed' and coupling.interface = 'patchwise'; or "
                 "coupling.kind = 'consistent')",
+            )
+        chosen = self.accuracy is not None or "auto" in (coupling.kind, self.surface.grid)
+        if self.body is not None and chosen:
+            yield (
+                "accuracy",
+                "is not kept on [body], nor are surface.grid or coupling.kind chosen there "
+                "(allowed: leave it out, and state them)",
             )
         if self.law.representative:
             yield from self._problems_of_representative_laws()

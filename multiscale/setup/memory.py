@@ -63,13 +63,13 @@ def memory_requests(scene: Scene) -> Iterator[MemoryRequest]:
     def request(key: str, value: Any, purpose: str = "", **sizes: Any) -> MemoryRequest:
         return MemoryRequest(key=key, value=value, purpose=purpose, **sizes)
 
-    grid, patches, kind = scene.surface.grid, scene.patches.grid, scene.coupling.kind
+    grid, patches, kind = scene.surface.grid, scene.patches.grid, scene.kind
     for key, heights in (("surface.grid", grid), ("surface.resample", scene.surface.resample)):
         if isinstance(heights, tuple):
             sent = math.prod(heights) * BYTES_PER_SENT_HEIGHT
             made = math.prod(heights) * BYTES_PER_HEIGHT - sent
             yield request(key, heights, per_rank=sent, root_only=made)
-    if meshes_block(scene):
+    if scene.block is not None and meshes_block(scene):
         nx, ny, nz = block_cells(scene)
         yield request("block.cells", (nx, ny, nz), shared=nx * ny * nz * BYTES_PER_CELL)
         if block_section(scene).margin:

@@ -12,13 +12,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from geometry import InputError, Material
+from geometry import InputError, Material, MaterialPair
 from geometry.collective import on_root
-from geometry.face_frame import FaceFrame
-from multiscale.scene.body_sections import BodySection, CounterBodySection
+from geometry.face_frame import UPWARD, FaceFrame
+from multiscale.scene.body_sections import CounterBodySection
 from multiscale.scene.scene import Scene
+from multiscale.setup.surface_and_block import block_material
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import ContactFacets, MeshedBody, TaggedMesh
@@ -43,7 +43,7 @@ class FaceFacts:
         depth: Extent of the body below its contact face [mm].
         cells: What its mesh is made of, in words.
         unknowns: Degrees of freedom.
-        degree: Degree of the displacements.
+        element: Hexahedra Q or tetrahedra P, and the degree of the displacements.
         materials: Elastic constants at the contact face, and at its further regions.
         poisson_ratio: Largest Poisson's ratio in the body.
         above: Whether parts of the body lie above the plane of its contact face.
@@ -56,12 +56,21 @@ class FaceFacts:
     depth: float
     cells: str
     unknowns: int
-    degree: int
+    element: str
     materials: tuple[Material, ...]
     poisson_ratio: float
     above: bool = False
     digest: str = ""
     notes: tuple[str, ...] = ()
+
+    @property
+    def degree(self) -> int:
+        """Degree of the displacements."""
+        return int(self.element[1])
+
+
+Faces = tuple[FaceFacts | None, FaceFacts | None]
+"""What is known of the meshes of a body and of its counter-body."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -71,8 +80,8 @@ class SceneBody:
     Attributes:
         body: The elastic body.
         facets: Facets of the contact face, by region, in `frame`.
-        frame: Coordinates of the contact face. Their origin is the lower corner of the surface's
-            rectangle or, without a rectangle, that of the face.
+        frame: Coordinates of the contact face. Their origin is the lower corner of the bounding
+            rectangle, or of the rectangle of the surface once it is placed.
         facts: What is known of it without the mesh.
     """
 
@@ -80,6 +89,19 @@ class SceneBody:
     facets: tuple[ContactFacets, ...]
     frame: FaceFrame
     facts: FaceFacts
+
+    def placed(self, place: tuple[float, float]) -> SceneBody:
+        """Return the body with its coordinates counted from a point of the contact face.
+
+        Args:
+            place: The point in the present coordinates [mm].
+        """
+        frame = self.frame.moved(*place)
+        facets = tuple(
+            replace(part, frame=frame, corners=part.corners - np.asarray(place))
+            for part in self.facets
+        )
+        return replace(self, frame=frame, facets=facets)
 
 
 @dataclass(eq=False)
@@ -95,13 +117,47 @@ class SceneBodies:
     counter: SceneBody | None = None
 
     @property
-    def facts(self) -> tuple[FaceFacts | None, FaceFacts | None]:
+    def facts(self) -> Faces:
         """What is known of the body and of the counter-body."""
-        return self.first and self.first.facts, self.counter and self.counter.facts
+        first, counter = (one.facts if one else None for one in (self.first, self.counter))
+        return first, counter
+
+    def place(self, place: tuple[float, float]) -> None:
+        """Count the coordinates of both contact faces from a point of the first one.
+
+        Args:
+            place: The point [mm].
+        """
+        self.first = self.first and self.first.placed(place)
+        self.counter = self.counter and self.counter.placed(place)
 
     def release(self) -> None:
         """Let go of the bodies, whose matrices stay in memory as long as they are held."""
         self.first = self.counter = None
+
+
+def materials_in_contact(scene: Scene, faces: Faces) -> MaterialPair:
+    """Return the materials on both sides of a scene's interface; the second may be rigid.
+
+    Args:
+        scene: The scene.
+        faces: What is known of its meshes.
+    """
+    face, counter = faces
+    first = block_material(scene) if face is None else face.materials[0]
+    return MaterialPair(first=first, second=second_material(scene, counter))
+
+
+def second_material(scene: Scene, counter: FaceFacts | None) -> Material | None:
+    """Return the material of a scene's counter-body at the interface; None where it is rigid.
+
+    Args:
+        scene: The scene.
+        counter: What is known of its mesh; None of a half-space.
+    """
+    if counter is not None:
+        return counter.materials[0]
+    return None if scene.counter_body is None else scene.counter_body.whole_material
 
 
 def scene_bodies(scene: Scene, comm: Any) -> SceneBodies:
@@ -123,7 +179,7 @@ def scene_bodies(scene: Scene, comm: Any) -> SceneBodies:
         reader = _Reader(scene, scene.body, "body", comm)
         found.first = reader.read([region.surface for region in scene.law.regions])
     if second is not None and second.mesh is not None:
-        frame = found.first.frame if found.first else None
+        frame = found.first.frame if found.first else UPWARD
         found.counter = _Reader(scene, second, "counter_body", comm).read((), opposite=frame)
     return found
 
@@ -171,14 +227,10 @@ class _Reader:
         for tag in tags:
             check_supports(mesh, supports, tag, key=f"{key}.supports")
         loads = [
-            Traction(
-                tag=mesh.facet_tag(one.surface, key=f"{key}.tractions"), stress=one.stress
-            )
+            Traction(tag=mesh.facet_tag(one.surface, key=f"{key}.tractions"), stress=one.stress)
             for one in section.tractions
         ]
         frame = face.frame if opposite is None else _opposed(opposite, face.frame, key)
-        if isinstance(section, BodySection):
-            frame = self._placed(frame, face.lengths)
         axis = face.frame.normal
         body = MeshedBody(
             mesh,
@@ -202,7 +254,7 @@ class _Reader:
             depth=-lowest,
             cells=f"{_cells(mesh)} {'hexahedra' if body.hexahedral else 'tetrahedra'}",
             unknowns=body.dofs,
-            degree=body.degree,
+            element=f"{'Q' if body.hexahedral else 'P'}{body.degree}",
             materials=tuple(self._at_face(body, part) for part in facets),
             poisson_ratio=body.poisson_ratio,
             above=highest > _SAME_PLANE * max(face.lengths),
@@ -247,19 +299,6 @@ class _Reader:
     def _shortest(self, mesh: TaggedMesh) -> float:
         lower, upper = mesh.bounding_box()
         return float(np.sort(upper - lower)[1])  # of the two longer sides
-
-    def _placed(self, frame: FaceFrame, lengths: tuple[float, float]) -> FaceFrame:
-        """Return the frame with its origin at the lower corner of the surface's rectangle."""
-        section, surface = self._section, self._scene.surface
-        assert isinstance(section, BodySection)
-        if self._scene.law.representative:
-            return frame
-        place = section.place
-        if place is None and surface.lengths is not None:
-            place = tuple(0.5 * np.subtract(lengths, surface.lengths))
-        if place is None:
-            return frame
-        return replace(frame, origin=frame.in_space([place])[0])
 
     def _materials(self, mesh: TaggedMesh) -> Material | dict[int, Material]:
         section = self._section

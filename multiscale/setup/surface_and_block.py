@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from geometry import (
     BlockShape,
     InputError,
     Material,
-    MaterialPair,
     Surface,
     facing,
     read_surface,
@@ -104,10 +103,11 @@ def make_shape(scene: Scene, surface: Surface) -> BlockShape:
         InputError: When they do not fit together or the coupling; names file and key.
     """
     block = block_section(scene)
+    lengths = block.lengths or surface.lengths
     with located(scene, "block"):
         return BlockShape(
-            interface=surface.lengths,
-            height=block.height_under(surface.lengths),
+            interface=lengths,
+            height=block.height_under(lengths),
             cells=block_cells(scene),
             element=block.element,
             grading=block.grading,
@@ -134,14 +134,6 @@ def block_section(scene: Scene) -> BlockSection:
     return scene.block
 
 
-def materials_in_contact(scene: Scene) -> MaterialPair:
-    """Return the materials on both sides of a scene's interface; the second may be rigid."""
-    second = scene.counter_body
-    return MaterialPair(
-        first=block_material(scene), second=None if second is None else second.whole_material
-    )
-
-
 def block_cells(scene: Scene) -> tuple[int, int, int]:
     """Return the cells of the flat block's mesh: those of the scene, or as many as its use needs.
 
@@ -150,15 +142,15 @@ def block_cells(scene: Scene) -> tuple[int, int, int]:
     """
     cells = block_section(scene).cells
     if cells is None or cells == "auto":
-        fine = scene.coupling.on_mesh or scene.coupling.kind == "concurrent"
+        fine = scene.on_mesh or scene.kind == "concurrent"
         return LAW_BLOCK_CELLS if fine else FIELD_CELLS
     return cells
 
 
 def meshes_block(scene: Scene) -> bool:
     """Tell whether the flat block is meshed: under laws, or for fields after the load."""
-    flat = scene.coupling.kind not in ("analytic", "reference")
-    return scene.coupling.on_mesh or (flat and bool(scene.output.fields))
+    flat = scene.kind not in ("analytic", "reference")
+    return scene.on_mesh or (flat and bool(scene.output.fields))
 
 
 def patch_grid(scene: Scene) -> tuple[int, int]:
@@ -167,10 +159,24 @@ def patch_grid(scene: Scene) -> tuple[int, int]:
     return PROVISIONAL_PATCHES if grid == "auto" else grid
 
 
+class Bulk(NamedTuple):
+    """What is compared with loads of a body.
+
+    Attributes:
+        area: Area of its contact face [mm²].
+        height: Its extent below the contact face [mm].
+        young_modulus: Young's modulus at the contact face [MPa].
+    """
+
+    area: float
+    height: float
+    young_modulus: float
+
+
 def check_patches(scene: Scene, surface: Surface) -> None:
     """Refuse more patches than heights of the surface or cells of the interface."""
     limits: dict[str, Sequence[int]] = {"heights of the surface": surface.grid}
-    if meshes_block(scene):
+    if scene.block is not None and meshes_block(scene):
         limits["cells of the interface (block.cells)"] = block_cells(scene)[:2]
     grid = patch_grid(scene)
     for what, limit in limits.items():
@@ -184,12 +190,17 @@ def check_patches(scene: Scene, surface: Surface) -> None:
             )
 
 
-def check_load(scene: Scene, surface: Surface) -> None:
-    """Refuse loads lost in the rounding of heights, or that press the block to nothing.
+def check_load(scene: Scene, surface: Surface, body: Bulk) -> None:
+    """Refuse loads lost in the rounding of heights, or that press the body to nothing.
 
     Numbers of load steps that there will not be are refused, too.
+
+    Args:
+        scene: The scene.
+        surface: Its surface.
+        body: Size and stiffness of its body.
     """
-    block, loading, fields = block_section(scene), scene.loading, scene.output.fields
+    loading, fields = scene.loading, scene.output.fields
     count = loading.load_history.count
     if isinstance(fields, list) and loading.force_change is None and max(fields) > count:
         raise InputError(
@@ -208,17 +219,17 @@ def check_load(scene: Scene, surface: Surface) -> None:
             allowed=f"at least {resolved:.3g} mm, for heights of this size",
             file=scene.file,
         )
-    if scene.coupling.kind == "analytic":
+    if scene.kind == "analytic":
         return
     if loading.force is not None:
         key, points = "load.force", loading.force
-        most, named, unit = block.young_modulus * surface.area, "E times area", "N"
+        most, named, unit = body.young_modulus * body.area, "E times area", "N"
     else:
         key, points = "load.approach", loading.approach or ()
-        most, named, unit = block.height_under(surface.lengths), "the block's height", "mm"
+        most, named, unit = body.height, "the body's height", "mm"
     if max(points) > most:
         raise InputError(
-            "presses the block to nothing",
+            "presses the body to nothing",
             key=key,
             value=list(points),
             allowed=f"at most {named}, {most:.6g} {unit}",
