@@ -4,6 +4,7 @@ from multiscale.comparison.compare import compare as compare
 from multiscale.comparison.comparison import Comparison as Comparison
 from multiscale.couplings.condensed import CondensedCoupling as CondensedCoupling
 from multiscale.couplings.reference import ReferenceCoupling as ReferenceCoupling
+from multiscale.exports.export import export_laws as export_laws
 from multiscale.laws.consistent import consistent_laws as consistent_laws
 from multiscale.laws.isolated import isolated_laws as isolated_laws
 from multiscale.laws.law_table import LawTable as LawTable

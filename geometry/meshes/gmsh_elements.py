@@ -69,7 +69,7 @@ def elements_of(gmsh: Any, dimension: int) -> Elements:
             nodes.setdefault(kind, []).append(np.reshape(table, (-1, count)))
             tag = np.full(len(table) // count, own[0] if own else NO_GROUP, np.int32)
             tags.setdefault(kind, []).append(tag)
-    if any((NO_GROUP == part).any() for parts in tags.values() for part in parts):
+    if any(np.any(part == NO_GROUP) for parts in tags.values() for part in parts):
         names[str(NO_GROUP)] = NO_GROUP
     return Elements(
         nodes={kind: np.concatenate(parts) for kind, parts in nodes.items()},

@@ -95,7 +95,7 @@ class PatchLaw:
     @property
     def is_function(self) -> bool:
         """Whether the pressure is a function of closure in the whole range of the law."""
-        return self._rising == len(self.rows)
+        return self.rising_rows == len(self.rows)
 
     @property
     def is_flat(self) -> bool:
@@ -103,7 +103,7 @@ class PatchLaw:
 
         Then the pressure is a function of closure nowhere.
         """
-        return not self.is_open and self._rising == 1
+        return not self.is_open and self.rising_rows == 1
 
     @property
     def range(self) -> tuple[float, float]:
@@ -111,7 +111,7 @@ class PatchLaw:
 
         The first is that of first touch.
         """
-        end = self.first_touch if self.is_open else float(self.rows.closure[self._rising - 1])
+        end = self.first_touch if self.is_open else float(self.rows.closure[self.rising_rows - 1])
         return self.first_touch, end
 
     @cached_property
@@ -140,7 +140,7 @@ class PatchLaw:
         closures = np.asarray(closure, dtype=float)
         if not extend:
             self._check_range(closures)
-        return self._rising_curves.at_closure(closures)
+        return self.rising_curves.at_closure(closures)
 
     def pressure(self, closure: ArrayLike) -> Array:
         """Return the pressure at any closure, as an iteration needs it [MPa].
@@ -184,15 +184,15 @@ class PatchLaw:
         )
 
     @cached_property
-    def _rising(self) -> int:
+    def rising_rows(self) -> int:
         """Number of rows before closure stops rising."""
         stops = np.flatnonzero(np.diff(self.rows.closure) <= 0.0)
         return int(stops[0]) + 1 if stops.size else len(self.rows)
 
     @cached_property
-    def _rising_curves(self) -> LawCurves:
+    def rising_curves(self) -> LawCurves:
         """The curves up to where closure stops rising, and their tangents there."""
-        return self.curves if self.is_function else self.curves.cut(self._rising)
+        return self.curves if self.is_function else self.curves.cut(self.rising_rows)
 
     def _check_range(self, closures: Array) -> None:
         start, end = self.range

@@ -49,7 +49,7 @@ FLOORS = {
         "readable",
         "figures installation machine storage",
         "doctor laws loading",
-        "compiled_forms results scene",
+        "compiled_forms exports results scene",
         "setup",
         "couplings",
         "contact_recorder measured_errors",
