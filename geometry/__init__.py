@@ -7,6 +7,7 @@ contact modulus, and block shapes the mesh of the body under the surface.
 
 from geometry.asperities import Asperities, find_asperities
 from geometry.errors import InputError, NotConverged, PatchlawError
+from geometry.facing import facing, turned_over
 from geometry.files.reading import read_surface
 from geometry.materials import Material, MaterialPair
 from geometry.meshes.block import BlockShape, misalignment
@@ -42,6 +43,7 @@ __all__ = [
     "Surface",
     "UnevenPartition",
     "characteristic_size",
+    "facing",
     "find_asperities",
     "mirrored",
     "misalignment",
@@ -54,4 +56,5 @@ __all__ = [
     "roughness",
     "suggested_fine",
     "synthesise",
+    "turned_over",
 ]

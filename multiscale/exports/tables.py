@@ -15,14 +15,14 @@ from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 
 CSV_COLUMNS = (
-    "ix", "iy", "approach_mm", "closure_mm", "pressure_MPa", "stiffness_MPa_per_mm",
-    "contact_area_fraction", "separation_mm", "contacts",
+    "approach_mm", "closure_mm", "pressure_MPa", "stiffness_MPa_per_mm",
+    "contact_area_fraction", "separation_mm", "contacts", "pressure_scatter_MPa",
 )  # fmt: skip
-"""Columns of ``laws.csv``; of regions, their name comes first and the scatter of pressures last."""
+"""Columns of ``laws.csv`` after those that say where the law holds: ix and iy, or the region."""
 
 
 def csv_text(table: LawTable, tolerance: float) -> str:
-    """Return the text of ``laws.csv``: points on the laws, patch by patch, along the approach.
+    """Return the text of ``laws.csv``: points on the laws, one after the other, along the approach.
 
     Where the pressure is a function of closure, rows are chosen as for contact programs; beyond,
     they are the rows of the law. A patch that stays open has none.
@@ -33,20 +33,19 @@ def csv_text(table: LawTable, tolerance: float) -> str:
     """
     text = StringIO()
     writer = csv.writer(text)
-    if isinstance(table.patches, Regions):
-        writer.writerow(("region", *CSV_COLUMNS[2:], "pressure_scatter_MPa"))
-    else:
-        writer.writerow(CSV_COLUMNS)
+    regions = isinstance(table.patches, Regions)
+    writer.writerow((*(("region",) if regions else ("ix", "iy")), *CSV_COLUMNS))
     for index, law in enumerate(table.laws):
-        rows = _rows_of(law, tolerance)
-        if isinstance(table.patches, Regions):
-            region = table.patches.names[index]
-            # the second column of a row is the closure
-            writer.writerows((region, *row, float(law.pressure_scatter(row[1]))) for row in rows)
-        else:
-            place = table.patches.unravel(index)
-            writer.writerows((*place, *row) for row in rows)
+        place = _place(table, index)
+        writer.writerows((*place, *row) for row in _rows_of(law, tolerance))
     return text.getvalue()
+
+
+def _place(table: LawTable, index: int) -> tuple[int | str, ...]:
+    """Return what says in a row where its law holds."""
+    if isinstance(table.patches, Regions):
+        return (table.patches.names[index],)
+    return table.patches.unravel(index)
 
 
 def _rows_of(law: PatchLaw, tolerance: float) -> Iterator[tuple[float, ...]]:
@@ -61,6 +60,7 @@ def _rows_of(law: PatchLaw, tolerance: float) -> Iterator[tuple[float, ...]]:
         point.contact_area_fraction,
         point.separation,
         point.contacts,
+        law.pressure_scatter(point.closure),
     )
     yield from zip(*(column.tolist() for column in columns), strict=True)
 
