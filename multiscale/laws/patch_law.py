@@ -163,7 +163,7 @@ class PatchLaw:
         closures = np.asarray(closure, dtype=float)
         if self.is_open:
             return np.zeros(closures.shape)
-        rows = self.rows[: self._rising]
+        rows = self.rows[: self.rising_rows]
         return np.interp(closures, rows.closure, rows.pressure_scatter, left=0.0)
 
     def shifted(self, distance: float) -> PatchLaw:
