@@ -217,6 +217,9 @@ def test_regions_are_exported_by_name(table):
     last = [row for row in rows if row["region"] == "outer ring"][-1]
     assert float(last["pressure_MPa"]) == pytest.approx(table["outer ring"].rows.pressure[-1])
     assert float(last["pressure_scatter_MPa"]) > 0.0
+    (text,) = export_texts(table, "calculix").values()
+    assert "NAME=REGION_INNER" in text and "NAME=REGION_OUTER_RING" in text
+    assert list(export_texts(table, "4c")) == ["laws_4c/law_inner.py", "laws_4c/law_outer_ring.py"]
 
 
 def test_a_report_says_how_samples_scatter(table):
