@@ -16,16 +16,12 @@ from multiscale.laws.patch_law import PatchLaw
 
 CSV_COLUMNS = (
     "approach_mm", "closure_mm", "pressure_MPa", "stiffness_MPa_per_mm",
-    "contact_area_fraction", "separation_mm", "contacts", "pressure_scatter_MPa",
+    "contact_area_fraction", "separation_mm", "contacts",
 )  # fmt: skip
-<<<<<<< HEAD
-"""Columns of ``laws.csv`` after those that say where the law holds: ix and iy, or the region."""
-=======
 """Columns of ``laws.csv`` after those that say where the law holds: ix and iy, or the region.
 
 Laws of regions have the scatter of pressures between their samples as a last column.
 """
->>>>>>> main
 
 
 def csv_text(table: LawTable, tolerance: float) -> str:
@@ -45,13 +41,9 @@ def csv_text(table: LawTable, tolerance: float) -> str:
     writer.writerow((*where, *CSV_COLUMNS, *scatter))
     for index, law in enumerate(table.laws):
         place = _place(table, index)
-<<<<<<< HEAD
-        writer.writerows((*place, *row) for row in _rows_of(law, tolerance))
-=======
         for row in _rows_of(law, tolerance):
             more = (float(law.pressure_scatter(row[1])),) if regions else ()  # over the closure
             writer.writerow((*place, *row, *more))
->>>>>>> main
     return text.getvalue()
 
 
@@ -74,7 +66,6 @@ def _rows_of(law: PatchLaw, tolerance: float) -> Iterator[tuple[float, ...]]:
         point.contact_area_fraction,
         point.separation,
         point.contacts,
-        law.pressure_scatter(point.closure),
     )
     yield from zip(*(column.tolist() for column in columns), strict=True)
 
