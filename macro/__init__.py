@@ -2,7 +2,7 @@
 
 BlockShape → block_mesh → Block (with a Material) → LoadedFace (with a PatchGrid)
 → LawContactProblem (with one ContactLaw per patch) → LawContactState for every load step.
-A file of a mesh → read_mesh → TaggedMesh makes a MeshedBody of any shape, which takes the place of the Block.
+A file → read_mesh → TaggedMesh makes a MeshedBody of any shape, which takes the place of the Block.
 
 `face_compliance` is the displacement of the contact face in smooth modes; rough_block_mesh → Block
 → UnilateralContactProblem meshes the roughness itself, as a reference.
