@@ -94,7 +94,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path(__file__).parent)
     choice = parser.parse_args()
     for name in VIEWS:
-        draw(name, choice.results / name, choice.out)
+        if (choice.results / name / "fields.h5").exists():
+            draw(name, choice.results / name, choice.out)
 
 
 if __name__ == "__main__":

@@ -35,7 +35,7 @@ CASES = {  # edges; contact face; volumes; areas
         },
     ),
     "flange": (
-        6.0,
+        4.0,
         "raised face",
         {
             "flange": 18.0 * (ring(27.5, 82.5) - 4.0 * ring(0.0, 9.0))
