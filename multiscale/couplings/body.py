@@ -208,6 +208,15 @@ class Body:
         return np.asarray(half_space + correction.patch_compliance(patches))
 
 
+def has_body_term(setup: ProblemSetup) -> bool:
+    """Tell whether contact problems of the whole surface know the body of a scene.
+
+    Args:
+        setup: The problem set up from the scene.
+    """
+    return setup.has_block and setup.block_shape is not None
+
+
 def scene_body(setup: ProblemSetup, *, side_term: bool | None = None) -> Body:
     """Return the block of a scene.
 
