@@ -16,7 +16,8 @@ from multiscale.contact_recorder import ContactRecorder
 from multiscale.couplings import assembly
 from multiscale.couplings.contact import OnBody, contact_model, on_body
 from multiscale.couplings.fields import FieldRecord
-from multiscale.laws.law_table import LawTable, law_bytes, read_laws
+from multiscale.laws.law_file import law_bytes, read_laws
+from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling, LoadPosition, LoadStepper, Restorable
 from multiscale.machine import cluster_nodes
