@@ -20,7 +20,7 @@ from multiscale.loading.stepper import BeyondLaws
 from multiscale.storage import Arrays, packed, unpacked
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import Block, Interface, LawContactProblem, LawContactState
+    from macro import ElasticBody, LawContactProblem, LawContactState, LoadedFace
 
 Array = NDArray[np.float64]
 
@@ -36,19 +36,19 @@ class EmbeddedCoupling:
     """Patch laws on the flat interface of an elastic block (Waddad et al. 2016, section 3.2).
 
     Args:
-        problem: The block with the laws on its interface.
+        problem: The body with the laws on its contact face.
         table: The laws, which also give contact area, contacts and separation.
-        interface: The interface of the block.
+        face: The patches on its contact face.
     """
 
-    def __init__(self, problem: LawContactProblem, table: LawTable, interface: Interface) -> None:
-        self._problem, self._table, self.interface = problem, table, interface
+    def __init__(self, problem: LawContactProblem, table: LawTable, face: LoadedFace) -> None:
+        self._problem, self._table, self.face = problem, table, face
         self._last: LawContactState | None = None
 
     @property
-    def blocks(self) -> list[Block]:
-        """The block, as a list of one."""
-        return [self.interface.block]
+    def blocks(self) -> list[ElasticBody]:
+        """The body, as a list of one."""
+        return [self.face.body]
 
     @property
     def displacement(self) -> Array:

@@ -21,7 +21,7 @@ FLOORS = {
     "geometry": [
         "blocked_spline collective errors legendre_modes slope_search",
         "checks interpolant materials missing",
-        "filters spectrum surface",
+        "face_frame filters spectrum surface",
         "patches statistics summits synthesis",
         "plausibility preparation rigid_plane",
         "files",
@@ -40,7 +40,8 @@ FLOORS = {
         "compat",
         "mesh",
         "linear_solvers",
-        "block",
+        "elastic_body",
+        "block meshed_body",
         "contact",
         "compliance fields",
     ],
