@@ -1,4 +1,4 @@
-"""Quadrature on outer facets of any mesh: places, outward normals, basis functions.
+"""Quadrature on the outer facets of any mesh: places, outward normals, basis functions.
 
 Facets may be warped; integrals over them are those of the mapped reference facet.
 """
@@ -9,117 +9,101 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from dolfinx import mesh as dmesh
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from macro import compat
+from macro.mesh.neighbours import outer_sides
 
 Array = NDArray[np.float64]
-Facets = NDArray[np.int32]
 
-_GEOMETRY = {4: 1, 10: 2, 8: 1, 27: 2}
+_SHAPES = {4: 1, 10: 2, 8: 1, 27: 2}
 """Degree of a cell's shape by the number of its nodes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OuterQuadrature:
-    """Quadrature points of this rank on outer facets; there may be none.
+class OuterFacets:
+    """Outer facets of the cells that this rank owns, and q quadrature points on each.
 
     Args:
-        points: Places, shape (n, 3) [mm].
-        normals: Outward unit normals, shape (n, 3).
-        weights: Weights, whose sum over all ranks is the facets' area, shape (n,) [mm²].
-        nodes: Rank-local nodes of the cell of every point, shape (n, m).
-        values: Basis functions of these nodes, shape (n, m).
+        cell: Rank-local cell of every facet, shape (f,).
+        side: Index of the facet in its cell, shape (f,).
+        points: Places, shape (f, q, 3) [mm].
+        normals: Outward unit normals, shape (f, q, 3).
+        weights: Weights, whose sum over all ranks is the area of the body, shape (f, q) [mm²].
+        nodes: Rank-local nodes of the cells, shape (f, m).
+        values: Basis functions of these nodes by the side of the cell, shape (sides, q, m).
     """
 
+    cell: NDArray[np.int64]
+    side: NDArray[np.int64]
     points: Array
     normals: Array
     weights: Array
     nodes: NDArray[np.int32]
     values: Array
 
+    @property
+    def on_facet(self) -> NDArray[np.bool_]:
+        """Which of the nodes lie on the facet, shape (f, m)."""
+        return (np.abs(self.values).max(axis=1) > 1e-9)[self.side]
 
-def outer_facets(mesh: Any) -> Facets:
-    """Return the outer facets whose cells this rank owns, ascending.
+    def among(self, chosen: NDArray[np.bool_]) -> OuterFacets:
+        """Return some of the facets, shape of the choice (f,)."""
+        return OuterFacets(
+            cell=self.cell[chosen],
+            side=self.side[chosen],
+            points=self.points[chosen],
+            normals=self.normals[chosen],
+            weights=self.weights[chosen],
+            nodes=self.nodes[chosen],
+            values=self.values,
+        )
+
+
+def outer_facets(space: Any, exact: int) -> OuterFacets:
+    """Place quadrature points on the outer facets of this rank's cells; there may be none.
+
+    Args:
+        space: Lagrange space of the displacements.
+        exact: Polynomial degree on the reference facet that is integrated exactly.
 
     Note:
         Collective.
     """
-    mesh.topology.create_connectivity(2, 3)
-    facets = np.sort(dmesh.exterior_facet_indices(mesh.topology)).astype(np.int32)
-    cells = _cells_of(mesh, facets)
-    return facets[cells < mesh.topology.index_map(3).size_local]
-
-
-def outer_quadrature(space: Any, degree: int, facets: Facets, exact: int) -> OuterQuadrature:
-    """Place quadrature points on outer facets.
-
-    Args:
-        space: Lagrange space of the displacements.
-        degree: Its polynomial degree.
-        facets: Rank-local outer facets whose cells this rank owns, shape (f,).
-        exact: Polynomial degree on the reference facet that is integrated exactly.
-    """
     mesh = space.mesh
-    name = mesh.topology.cell_name()
-    vertices, shapes = compat.reference_facets(name)
-    cells = _cells_of(mesh, facets)
-    mesh.topology.create_connectivity(3, 2)
-    mates = mesh.topology.connectivity(3, 2).array.reshape(-1, len(shapes))[cells]
-    sides = np.argmax(mates == facets[:, None], axis=1)
-    shape_nodes, nodes = compat.cell_vertices(mesh), compat.cell_nodes(space)
-    geometry = _GEOMETRY[shape_nodes.shape[1]]
-    rule, weights = _facet_rule(shapes.shape[1], exact)
-    middle = vertices.mean(axis=0)
-    parts = []
-    for side, corners in enumerate(shapes):
-        members = cells[sides == side]
-        corner, *ends = vertices[corners[:3]]
-        tangents = np.array(ends) - corner
-        reference = corner + rule @ tangents
-        places = mesh.geometry.x[shape_nodes[members]]
-        values = compat.lagrange_values(name, geometry, reference)
-        slopes = compat.lagrange_gradients(name, geometry, reference)
-        points = np.einsum("qa,caj->cqj", values, places)
-        maps = np.einsum("qak,tk,caj->cqtj", slopes, tangents, places)
-        areas = np.cross(maps[:, :, 0], maps[:, :, 1])
-        areas *= np.sign(np.dot(np.cross(*tangents), corner - middle)) * _handed(
-            name, geometry, places
-        )
-        basis = compat.lagrange_values(name, degree, reference)
-        count = len(members), len(rule)
-        parts.append(
-            (
-                points.reshape(-1, 3),
-                (areas * weights[:, None]).reshape(-1, 3),
-                np.repeat(nodes[members], count[1], axis=0),
-                np.tile(basis, (count[0], 1)),
-            )
-        )
-    points, areas, cell_nodes, basis = (np.concatenate(part) for part in zip(*parts, strict=True))
-    sizes = np.linalg.norm(areas, axis=1)
-    return OuterQuadrature(
-        points=points,
-        normals=areas / np.where(sizes > 0.0, sizes, 1.0)[:, None],
-        weights=sizes,
-        nodes=cell_nodes,
+    name, degree = mesh.topology.cell_name(), compat.lagrange_degree(space)
+    vertices, corners = compat.reference_facets(name)
+    cell, side = outer_sides(mesh)
+    shape_nodes = compat.cell_vertices(mesh)[cell]
+    shape = _SHAPES[shape_nodes.shape[1]]
+    rule, weights = _facet_rule(corners.shape[1], exact)
+    first = vertices[corners[:, 0]]
+    tangents = vertices[corners[:, 1:3]] - first[:, None]  # (sides, 2, 3)
+    reference = first[:, None] + rule @ tangents
+    flat = reference.reshape(-1, 3)
+    by_side = (len(corners), len(rule))
+    values, basis = (
+        compat.lagrange_values(name, of, flat).reshape(*by_side, -1) for of in (shape, degree)
+    )
+    slopes = compat.lagrange_gradients(name, shape, flat).reshape(*by_side, -1, 3)
+    outwards = np.cross(*tangents.transpose(1, 0, 2))
+    outwards = np.sign(np.einsum("si,si->s", outwards, first - vertices.mean(axis=0)))
+    places = mesh.geometry.x[shape_nodes]
+    maps = np.einsum("fqak,faj->fqkj", slopes[side], places)  # ∂x_j/∂X_k
+    along = np.einsum("ftk,fqkj->fqtj", tangents[side], maps)
+    areas = np.cross(along[:, :, 0], along[:, :, 1]) * np.sign(np.linalg.det(maps))[..., None]
+    areas *= outwards[side, None, None]
+    sizes = np.linalg.norm(areas, axis=2)
+    return OuterFacets(
+        cell=cell,
+        side=side,
+        points=np.einsum("fqa,faj->fqj", values[side], places),
+        normals=areas / sizes[..., None],
+        weights=sizes * weights,
+        nodes=compat.cell_nodes(space)[cell],
         values=basis,
     )
-
-
-def _cells_of(mesh: Any, facets: Facets) -> NDArray[np.int32]:
-    """Return the one cell of every outer facet."""
-    mesh.topology.create_connectivity(2, 3)
-    cells = mesh.topology.connectivity(2, 3)
-    return np.asarray(cells.array[cells.offsets[facets]])
-
-
-def _handed(name: str, geometry: int, places: Array) -> Array:
-    """Return 1 for cells that are mapped from the reference cell without a mirror, else −1."""
-    slopes = compat.lagrange_gradients(name, geometry, np.full((1, 3), 0.25))[0]
-    return np.sign(np.linalg.det(np.einsum("ak,caj->ckj", slopes, places)))[:, None, None]
 
 
 def _facet_rule(corners: int, exact: int) -> tuple[Array, Array]:
