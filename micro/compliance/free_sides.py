@@ -50,6 +50,8 @@ class FreeSides:
         lengths: Sides (Lx, Ly) of the rectangle [mm].
         poisson_ratio: ν.
         decay_length: λ [mm].
+        share: E* of the contact over that of the block alone; less than 1 where a second body gives
+            way too. Displacements are those for pressures over E* of the contact.
         present: Whether the low x, high x, low y and high y sides are there.
 
     Raises:
@@ -59,6 +61,7 @@ class FreeSides:
     lengths: tuple[float, float]
     poisson_ratio: float
     decay_length: float
+    share: float = 1.0
     present: tuple[bool, bool, bool, bool] = (True, True, True, True)
 
     def __post_init__(self) -> None:
@@ -82,7 +85,8 @@ class FreeSides:
             Shape (w, n, n); symmetric.
         """
         nu, numbers = self.poisson_ratio, self._wave_numbers(axis, waves, self.decay_length)
-        return np.stack([side_compliance(nu, distances, number) for number in numbers])
+        found = np.stack([side_compliance(nu, distances, number) for number in numbers])
+        return self.share * found
 
     def stresses(self, axis: int, distances: Array, waves: Indices) -> Array:
         """Return the stresses that one side adds at distances by line loads at distances.
