@@ -16,6 +16,7 @@ from scipy.sparse import csr_matrix
 from geometry.legendre_modes import mode_values
 from geometry.patches import PatchGrid
 from macro import compat
+from macro.compliance.surroundings import whole
 from macro.contact.loaded_face import LoadedFace
 from macro.elastic_body import ElasticBody
 from macro.mesh.contact_face import ContactFacets
@@ -62,7 +63,7 @@ class FaceMoments:
     ) -> None:
         self._body, self._frame = body, facets.frame
         self._area = float(np.prod(rectangle.lengths))
-        one = PatchGrid(grid=(1, 1), lengths=rectangle.lengths, origin=rectangle.origin)
+        one = whole(rectangle)
         degree = (4 if body.hexahedral else 2) * body.degree + _MORE
         number = max(body.comm.allreduce(len(facets.cell)), 1)
         degree += 2 * round(2.0 * count / np.sqrt(number))  # on few facets modes vary much

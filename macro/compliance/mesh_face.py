@@ -24,12 +24,12 @@ from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
 from geometry.errors import InputError
+from geometry.face_frame import FaceFrame
 from geometry.materials import Material
 from geometry.patches import PatchGrid
 from macro import compat
 from macro.compliance.face_compliance import FaceCompliance
 from macro.compliance.face_moments import FaceMoments
-from macro.compliance.surroundings import rectangle_frame
 from macro.elastic_body import ElasticBody
 from macro.elasticity import stiffness_form
 from macro.linear_solvers.node_matrices import distributed
@@ -44,7 +44,6 @@ MOST_DOFS = 500_000
 """Degrees of freedom up to which linear elements are raised to quadratic ones."""
 _FACTORISED = 100_000
 """Degrees of freedom up to which the stiffness is factorised: 10⁵ take 5 s and 1 GB."""
-_RAISED = {"hexahedron": 8.0, "tetrahedron": 8.0}
 _FLAT = 1e-9
 """Height below the plane, relative to the rectangle, that is rounding."""
 _BATCH = 20_000
@@ -70,6 +69,39 @@ class HalfSpaceFields(Protocol):
     def modes(self) -> tuple[Array, Array]:
         """Return displacements (K², K²) [mm/N] and stresses (3, K², K²) [1/mm²] in modes."""
         ...
+
+
+def from_outside(facets: ContactFacets, length: float) -> ContactFacets:
+    """Return a counter-body's facets in a frame of its own, turned about the y axis.
+
+    Args:
+        facets: In the frame of the face of the body that it is pressed on.
+        length: Length Lx of the rectangle, from the origin of that frame: x becomes Lx − x [mm].
+    """
+    e1, e2, normal = facets.frame.axes
+    origin = facets.frame.in_space([length, 0.0])
+    x, y = np.moveaxis(facets.corners, -1, 0)
+    return replace(
+        facets,
+        frame=FaceFrame(origin=origin, axes=np.stack([-e1, e2, -normal])),
+        corners=np.stack([length - x, y], axis=-1),
+    )
+
+
+def turned(face: FaceCompliance) -> FaceCompliance:
+    """Return the compliance of a face as seen with its x axis turned round.
+
+    Args:
+        face: With x counted from the other end of the rectangle.
+    """
+    odd = np.kron((-1.0) ** np.arange(face.count), np.ones(face.count))
+    signs = np.multiply.outer(odd, odd)
+    shear = np.array([1.0, 1.0, -1.0])[:, None, None]
+    return FaceCompliance(
+        normal=signs * face.normal,
+        growth=signs * face.growth,
+        stresses=shear * signs * face.stresses,
+    )
 
 
 def raised(body: ElasticBody) -> ElasticBody:
@@ -146,7 +178,9 @@ def _gathered(
     else:  # Hooke's law with σ_zz = −p
         stresses[:2] -= nu / (1.0 - nu) * one
     xx, yy, xy = stresses
-    strain = (xx.T @ (xx - nu * yy) + yy.T @ (yy - nu * xx) + 2.0 * (1.0 + nu) * xy.T @ xy) / modulus
+    strain = (
+        xx.T @ (xx - nu * yy) + yy.T @ (yy - nu * xx) + 2.0 * (1.0 + nu) * xy.T @ xy
+    ) / modulus
     growth = one / modulus - area * strain
     return FaceCompliance(
         normal=0.5 * (normal + normal.T), growth=0.5 * (growth + growth.T), stresses=stresses
@@ -201,7 +235,7 @@ class _Corrections(_Loads):
         material: Material,
         fields: HalfSpaceFields,
     ) -> None:
-        frame = rectangle_frame(facets, rectangle)
+        frame = facets.frame.moved(*rectangle.origin)
         outer = outer_facets(body.space, 2 * body.degree + _MORE)
         level = np.abs(frame.height(outer.points.reshape(-1, 3))).reshape(outer.weights.shape)
         off = level.max(axis=1, initial=0.0) > _FLAT * max(rectangle.lengths)

@@ -40,14 +40,14 @@ class Surroundings:
 
     Args:
         free_sides: Whether a free plane across the face bounds the rectangle, by side.
-        whole: Whether the rectangle is all of the face.
+        covers: Whether the rectangle is all of the face.
         thickness: Least distance under the rectangle to the other side of the body [mm].
         above: Largest height of the body above the plane of the face, at least 0 [mm].
         material: Elastic constants under the rectangle.
     """
 
     free_sides: Sides
-    whole: bool
+    covers: bool
     thickness: float
     above: float
     material: Material
@@ -88,20 +88,19 @@ def surroundings(body: ElasticBody, facets: ContactFacets, rectangle: PatchGrid)
     strip = _STRIP * min(*rectangle.lengths, thickness)
     free = outer.among(~_held(body, outer))
     sides = [_free_plane(body, free, frame, rectangle, side, strip, slack) for side in range(4)]
-    whole = comm.allreduce(float(facets.area.sum())) < (1.0 + _COVERED) * area
+    covers = comm.allreduce(float(facets.area.sum())) < (1.0 + _COVERED) * area
     return Surroundings(
         free_sides=(sides[0], sides[1], sides[2], sides[3]),
-        whole=whole,
+        covers=covers,
         thickness=thickness,
         above=above if above > slack else 0.0,
         material=_material_under(body, facets, rectangle),
     )
 
 
-def rectangle_frame(facets: ContactFacets, rectangle: PatchGrid) -> FaceFrame:
-    """Return the frame of the face moved to the lower corner of a rectangle on it."""
-    corner = facets.frame.in_space(np.array([rectangle.origin]))[0]
-    return FaceFrame(origin=corner, axes=facets.frame.axes)
+def whole(rectangle: PatchGrid) -> PatchGrid:
+    """Return a rectangle of patches as one patch."""
+    return PatchGrid(grid=(1, 1), lengths=rectangle.lengths, origin=rectangle.origin)
 
 
 def _area_in(
@@ -155,7 +154,7 @@ def _free_plane(
     if along @ other < 0.0:  # the strip is to run from 0 to the length of the side
         corner = corner + np.eye(2)[1 - axis] * rectangle.lengths
     axes = np.stack([along, -frame.normal, outward])
-    plane = FaceFrame(origin=frame.in_space(corner[None])[0], axes=axes)
+    plane = FaceFrame(origin=frame.in_space(corner), axes=axes)
     level = np.abs(plane.height(free.points.reshape(-1, 3))).reshape(free.weights.shape)
     flat = (level.max(axis=1, initial=0.0) < slack) & np.all(
         free.normals @ outward > 1.0 - _FLAT, axis=1
@@ -177,8 +176,7 @@ def contact_sides(body: ElasticBody, outer: OuterFacets, frame: FaceFrame) -> Co
 
 def _material_under(body: ElasticBody, facets: ContactFacets, rectangle: PatchGrid) -> Material:
     """Return the one material of the cells under the rectangle."""
-    one = PatchGrid(grid=(1, 1), lengths=rectangle.lengths, origin=rectangle.origin)
-    cells = np.unique(LoadedFace(body, facets, one, degree=1).quadrature.cell)
+    cells = np.unique(LoadedFace(body, facets, whole(rectangle), degree=1).quadrature.cell)
     own = _pairs(body, cells)
     found = set().union(*body.comm.allgather(own))
     if len(found) != 1:
