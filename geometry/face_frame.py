@@ -103,8 +103,7 @@ class FaceFrame:
             raise InputError("a face without points has no frame")
         frame = cls.across(normal)
         local = places @ frame.axes.T
-        lower, upper = local.min(axis=0), local.max(axis=0)
-        corner = np.array([lower[0], lower[1], upper[2]])
+        corner = np.array([*local[:, :2].min(axis=0), local[:, 2].max()])
         return cls(origin=corner @ frame.axes, axes=frame.axes)
 
     @property
@@ -113,23 +112,27 @@ class FaceFrame:
         return self.axes[2]
 
     def in_plane(self, points: ArrayLike) -> Array:
-        """Return the coordinates along e1 and e2 of points (n, 3) [mm], shape (n, 2) [mm]."""
+        """Return the coordinates along e1 and e2 of points (…, 3) [mm], shape (…, 2) [mm]."""
         return (np.asarray(points, dtype=float) - self.origin) @ self.axes[:2].T
 
     def height(self, points: ArrayLike) -> Array:
-        """Return the heights of points (n, 3) [mm] above the plane along n, shape (n,) [mm]."""
+        """Return the heights of points (…, 3) [mm] above the plane, shape (…) [mm]."""
         return (np.asarray(points, dtype=float) - self.origin) @ self.axes[2]
 
     def in_space(self, places: ArrayLike, height: ArrayLike = 0.0) -> Array:
-        """Return the points in space of coordinates in the plane, shape (n, 3) [mm].
+        """Return the points in space of coordinates in the plane, shape (…, 3) [mm].
 
         Args:
-            places: Coordinates along e1 and e2, shape (n, 2) [mm].
-            height: Heights above the plane, shape (n,) or a number [mm].
+            places: Coordinates along e1 and e2, shape (…, 2) [mm].
+            height: Heights above the plane, shape (…) or a number [mm].
         """
         lifted = np.multiply.outer(np.asarray(height, dtype=float), self.axes[2])
         return self.origin + np.asarray(places, dtype=float) @ self.axes[:2] + lifted
 
+    def moved(self, x: float, y: float) -> FaceFrame:
+        """Return the same frame with its origin at a point of the plane [mm]."""
+        return FaceFrame(origin=self.in_space([x, y]), axes=self.axes)
+
 
 UPWARD = FaceFrame(origin=np.zeros(3), axes=np.eye(3))
-"""Frame of a block's top, whose coordinates are x and y themselves."""
+"""The frame of a block's top: the coordinates x and y themselves."""
