@@ -12,6 +12,8 @@ from geometry.materials import Material
 from macro.block import Block
 from macro.compliance.face_compliance import FaceCompliance, face_compliance
 from macro.contact.contact_forces import ContactLaw
+from macro.contact.contact_problem import ContactProblem
+from macro.contact.interface import Interface
 from macro.contact.law_problem import LawContactProblem, LawContactState
 from macro.contact.loaded_face import (
     LoadedFace,
@@ -39,8 +41,10 @@ __all__ = [
     "BlockMesh",
     "ContactFacets",
     "ContactLaw",
+    "ContactProblem",
     "ElasticBody",
     "FaceCompliance",
+    "Interface",
     "LawContactProblem",
     "LawContactState",
     "LoadedFace",
