@@ -19,11 +19,13 @@ if TYPE_CHECKING:  # what `_HOMES` says, for editors and type checkers
         InputError,
         NotConverged,
         PatchGrid,
+        RigidPlane,
         Spectrum,
         Surface,
         read_surface,
         synthesise,
     )
+    from macro import ContactProblem, Interface, LawOperator
     from micro import HalfSpaceModel
     from multiscale import (
         Comparison,
@@ -41,8 +43,9 @@ if TYPE_CHECKING:  # what `_HOMES` says, for editors and type checkers
     )
 
 _NAMES = {
-    "geometry": "Control InputError NotConverged PatchGrid Spectrum Surface read_surface "
-    "synthesise",
+    "geometry": "Control InputError NotConverged PatchGrid RigidPlane Spectrum Surface "
+    "read_surface synthesise",
+    "macro": "ContactProblem Interface LawOperator",
     "micro": "HalfSpaceModel",
     "multiscale": "Comparison History LawTable LoadStep Run Scene compare make_setup read_history "
     "read_laws run sweep",

@@ -14,6 +14,7 @@ from macro.compliance.face_compliance import FaceCompliance, face_compliance
 from macro.contact.contact_forces import ContactLaw
 from macro.contact.contact_problem import ContactProblem
 from macro.contact.interface import Interface
+from macro.contact.law_operator import LawOperator, LawsAtPoints
 from macro.contact.law_problem import LawContactProblem, LawContactState
 from macro.contact.loaded_face import (
     LoadedFace,
@@ -47,6 +48,8 @@ __all__ = [
     "Interface",
     "LawContactProblem",
     "LawContactState",
+    "LawOperator",
+    "LawsAtPoints",
     "LoadedFace",
     "Material",
     "MeshQuality",

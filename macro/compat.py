@@ -212,7 +212,17 @@ def lagrange_degree(space: Any) -> int:
     return int(element.degree if isinstance(element.degree, int) else element.degree())
 
 
-_NODES = {("tetrahedron", 4): 1, ("tetrahedron", 10): 2, ("hexahedron", 8): 1, ("hexahedron", 27): 2}
+_NODES = {
+    ("tetrahedron", 4): 1,
+    ("tetrahedron", 10): 2,
+    ("hexahedron", 8): 1,
+    ("hexahedron", 27): 2,
+}
+    ("tetrahedron", 4): 1,
+    ("tetrahedron", 10): 2,
+    ("hexahedron", 8): 1,
+    ("hexahedron", 27): 2,
+}
 
 
 def displacement_degree(space: Any) -> int | None:

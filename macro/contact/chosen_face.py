@@ -30,11 +30,13 @@ class ChosenFace:
 
     Args:
         facets: This rank's facets of it.
+        marked: Facet tags whose marker 1 stands for the face.
         lower: Lower corner of its bounding rectangle in the frame, shape (2,) [mm].
         lengths: Sides of that rectangle [mm].
     """
 
     facets: ContactFacets
+    marked: Any
     lower: Array
     lengths: tuple[float, float]
 
@@ -46,7 +48,7 @@ class ChosenFace:
             frame=self.facets.frame.moved(x, y),
             corners=self.facets.corners - shift,
         )
-        return ChosenFace(facets=facets, lower=self.lower - shift, lengths=self.lengths)
+        return replace(self, facets=facets, lower=self.lower - shift)
 
 
 def check_space(space: Any) -> None:
@@ -107,7 +109,7 @@ def chosen_face(
     found = planar_face(TaggedMesh(mesh=mesh, facet_tags=marked), 1, name=name)
     if frame is None:
         placed = contact_facets(mesh, facets, found.frame)
-        return ChosenFace(facets=placed, lower=np.zeros(2), lengths=found.lengths)
+        return ChosenFace(facets=placed, marked=marked, lower=np.zeros(2), lengths=found.lengths)
     if np.abs(frame.normal - found.frame.normal).max() > _PARALLEL:
         raise InputError(
             "the frame's normal is not that of the face",
@@ -120,7 +122,7 @@ def chosen_face(
     lower, upper = (np.array([end[k] for end in ends if end is not None]) for k in (0, 1))
     corner, other = lower.min(axis=0), upper.max(axis=0)
     lengths = (float(other[0] - corner[0]), float(other[1] - corner[1]))
-    return ChosenFace(facets=placed, lower=corner, lengths=lengths)
+    return ChosenFace(facets=placed, marked=marked, lower=corner, lengths=lengths)
 
 
 def _tagged(mesh: Any, tags: Any, names: Mapping[str, Any] | None) -> TaggedMesh:

@@ -74,6 +74,10 @@ class Interface:
         frame: Coordinates of the face.
         patches: The patches in them.
         mode: How the laws are evaluated.
+        laws: One law per patch.
+        marked: Facet tags whose marker 1 stands for the face.
+        sampling: The samples that laws are evaluated at.
+        forces: The forces of the laws, with the plane.
 
     Raises:
         InputError: On all ranks, when the space, the face, the laws or the patches do not fit.
@@ -115,11 +119,8 @@ class Interface:
         self.laws: tuple[ContactLaw, ...] = chosen.laws
         self._face = LoadedFace(_Displacements(self.space), face.facets, chosen.patches)
         sampling = self._face.sampling(chosen.mode)
-        gap = sampling.depth
-        if crown is not None:
-            places = sampling.x, sampling.y
-            gap = gap + together(self.comm, lambda: np.asarray(crown(*places), dtype=np.float64))
-        self.sampling = sampling
+        self.sampling, self.marked, self._crown = sampling, face.marked, crown
+        gap = together(self.comm, lambda: sampling.depth + self.crown_at(sampling.x, sampling.y))
         self.forces = ContactForces(self._face, sampling, chosen.laws, gap)
         self._load = sampling.operator.createVecLeft()
 
@@ -141,17 +142,28 @@ class Interface:
                 value=indenter,
                 allowed="RigidPlane(approach=…) or Control(force=…)",
             )
-        control = indenter
-        if isinstance(indenter, RigidPlane):
-            approach = float(indenter.at(*self.patches.middle))
-            control = Control(approach=approach, tilt=indenter.tilt)
-        self.forces.prescribe(control, self.forces.plane)
+        self.forces.prescribe(_prescribed(indenter, self.patches.middle), self.forces.plane)
         self._indenter = indenter
 
     @property
     def assembles(self) -> bool:
         """Whether `add_tangent` gives the whole tangent: pointwise laws, the plane not free."""
         return self.mode == "pointwise" and not self.forces.control.free.any()
+
+    @property
+    def quadrature_degree(self) -> int:
+        """Polynomial degree that the quadrature on the face is exact for."""
+        return self._face.quadrature_degree
+
+    def crown_at(self, x: Array, y: Array) -> Array:
+        """Return the depth of the crown at points of the plane, shapes (n,) [mm]."""
+        depth = np.zeros(len(x)) if self._crown is None else self._crown(x, y)
+        return np.broadcast_to(np.asarray(depth, dtype=np.float64), x.shape)
+
+    def approach_at(self, x: Array, y: Array) -> Array:
+        """Return the approach of the plane, where it is now, at points of it, shapes (n,) [mm]."""
+        (approach, tx, ty), (xc, yc) = self.forces.plane, self.patches.middle
+        return np.asarray(approach + tx * (x - xc) + ty * (y - yc))
 
     def constrain(self, bcs: Sequence[Any]) -> None:
         """Leave out what contact adds to unknowns that Dirichlet conditions constrain.
@@ -346,3 +358,11 @@ class Interface:
                 allowed=f"{self._load.getSize()} unknowns",
             )
         return vector
+
+
+def _prescribed(indenter: RigidPlane | Control, middle: Array) -> Control:
+    """Return what an indenter prescribes of the plane at the middle of the patches."""
+    if isinstance(indenter, Control):
+        return indenter
+    x, y = middle
+    return Control(approach=float(indenter.at(x, y)), tilt=indenter.tilt)
