@@ -10,9 +10,11 @@ A TaggedMesh makes a MeshedBody of any shape, which takes the place of the Block
 
 from geometry.materials import Material
 from macro.block import Block
+from macro.body_pair import BodyPair
 from macro.compliance.face_compliance import FaceCompliance, face_compliance
 from macro.contact.contact_forces import ContactLaw
 from macro.contact.contact_problem import ContactProblem
+from macro.contact.face_pair import FacePair
 from macro.contact.interface import Interface
 from macro.contact.law_operator import LawOperator, LawsAtPoints
 from macro.contact.law_problem import LawContactProblem, LawContactState
@@ -40,11 +42,13 @@ __all__ = [
     "TOP",
     "Block",
     "BlockMesh",
+    "BodyPair",
     "ContactFacets",
     "ContactLaw",
     "ContactProblem",
     "ElasticBody",
     "FaceCompliance",
+    "FacePair",
     "Interface",
     "LawContactProblem",
     "LawContactState",

@@ -67,6 +67,8 @@ def laws_on_face(
             laws=(laws,) * patches.count, patches=patches, mode=mode or "pointwise", shift=shift
         )
     if hasattr(laws, "patches") and hasattr(laws, "laws"):
+        if not isinstance(laws.patches, PatchGrid):
+            return laws_on_face(_only_region(laws), patches, mode, lower, lengths)
         if patches is None:
             patches = laws.patches
             shift = lower + 0.5 * np.asarray(lengths) - patches.middle
@@ -83,6 +85,18 @@ def laws_on_face(
     if len(laws) != patches.count:
         raise InputError("every patch needs a law", value=len(laws), allowed=f"{patches.count}")
     return InterfaceLaws(laws=tuple(laws), patches=patches, mode=mode or "patchwise", shift=shift)
+
+
+def _only_region(table: Any) -> Any:
+    """Return the law of a table of regions, which must be one: others need faces of their own."""
+    if len(table.laws) != 1:
+        raise InputError(
+            "a table of several regions holds on no single face",
+            value=len(table.laws),
+            allowed="an Interface for the facets of each region, with that region's law of the "
+            "table, such as laws=table['ring']",
+        )
+    return table.laws[0]
 
 
 def _is_law(candidate: Any) -> bool:

@@ -105,7 +105,7 @@ class EmbeddedCoupling:
         mean_closures = zip(laws, state.closure, strict=True)
         contacts = [law.at(closure, extend=True).contacts for law, closure in mean_closures]
         return LoadStep.of_patches(
-            self._table.patches,
+            self._table.grid,
             plane=(state.approach, *state.tilt),
             load=(state.force, *state.moment),
             closure=state.closure,
@@ -150,7 +150,7 @@ class FreePlaneCoupling:
         Raises:
             NotConverged: Also when the laws were made for another macro model.
         """
-        path, patches = self._path, self._table.patches
+        path, patches = self._path, self._table.grid
         approach, evaluations = control.approach, 0
         if approach is None:
             approach, evaluations = path.approach_under(control.force or 0.0, self._force)
@@ -190,13 +190,13 @@ class FreePlaneCoupling:
         if self._approach is None:
             return None, 0
         rates = self._along(self._approach).dpressure
-        return self._table.patches.area * float(rates.sum()), 0
+        return self._table.grid.area * float(rates.sum()), 0
 
     def _force(self, approach: float) -> float:
-        return self._table.patches.area * float(self._along(approach).pressure.sum())
+        return self._table.grid.area * float(self._along(approach).pressure.sum())
 
     def _along(self, approach: float) -> LawPoint:
-        return self._laws.along(np.full(self._table.patches.count, approach))
+        return self._laws.along(np.full(self._table.grid.count, approach))
 
 
 def beyond_law(

@@ -20,7 +20,7 @@ FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 FLOORS = {
     "geometry": [
         "blocked_spline collective errors legendre_modes slope_search",
-        "checks interpolant materials missing",
+        "checks interpolant materials missing regions",
         "face_frame filters spectrum surface",
         "patches statistics summits synthesis",
         "plausibility preparation rigid_plane",
@@ -41,7 +41,7 @@ FLOORS = {
         "mesh",
         "linear_solvers",
         "elastic_body",
-        "block meshed_body",
+        "block body_pair meshed_body",
         "contact",
         "compliance fields",
     ],
@@ -49,7 +49,7 @@ FLOORS = {
         "readable",
         "figures installation machine storage",
         "doctor laws loading",
-        "compiled_forms results scene",
+        "compiled_forms exports results scene",
         "setup",
         "couplings",
         "contact_recorder measured_errors",

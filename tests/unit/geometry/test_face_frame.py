@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from geometry.errors import InputError
-from geometry.face_frame import UPWARD, FaceFrame
+from geometry.face_frame import FaceFrame
 
 ANGLE = np.pi / 6.0
 
@@ -12,7 +12,7 @@ ANGLE = np.pi / 6.0
 def test_top_of_a_block_has_its_own_coordinates():
     corners = [[0, 0, 0], [2, 0, 0], [0, 3, 0], [2, 3, 0]]
     frame = FaceFrame.through(corners, [1e-17, -3e-18, 4.0])
-    assert frame.axes.tolist() == UPWARD.axes.tolist() == np.eye(3).tolist()
+    assert frame.axes.tolist() == np.eye(3).tolist()
     assert frame.origin.tolist() == [0.0, 0.0, 0.0]
     assert frame.in_plane(corners).tolist() == [c[:2] for c in corners]
     assert frame.height([[0.3, 0.2, -0.7]]).tolist() == [-0.7]
@@ -55,10 +55,9 @@ def test_turned_face_keeps_lengths_and_comes_back():
     np.testing.assert_allclose(np.cross(frame.axes[0], frame.axes[1]), frame.normal, atol=1e-15)
 
 
-def test_plane_goes_through_the_highest_point():
+def test_plane_touches_the_highest_point():
     frame = FaceFrame.through([[1, 1, 0.0], [2, 1, 0.0], [1, 2, 0.0], [2, 2, 0.2]], [0, 0, 1])
     assert frame.origin.tolist() == [1.0, 1.0, 0.2]
-    assert frame.moved(0.5, 0.25).origin.tolist() == [1.5, 1.25, 0.2]
 
 
 @pytest.mark.parametrize("normal", [[0, 0, 0], [np.nan, 0, 1], [1, 0]])
