@@ -218,11 +218,6 @@ _NODES = {
     ("hexahedron", 8): 1,
     ("hexahedron", 27): 2,
 }
-    ("tetrahedron", 4): 1,
-    ("tetrahedron", 10): 2,
-    ("hexahedron", 8): 1,
-    ("hexahedron", 27): 2,
-}
 
 
 def displacement_degree(space: Any) -> int | None:
