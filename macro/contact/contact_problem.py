@@ -32,6 +32,12 @@ Array = NDArray[np.float64]
 _INNER = 1e-3
 """Share of the inner forces J u that residuals are compared with where contact forces are less."""
 
+_SMALL = 3000
+"""Largest number of unknowns that is factorised by default. The coarse grids of smaller problems
+have too few nodes for the rigid body modes of PETSc 3.18."""
+
+_FACTORISED = {"pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
+
 _REMEDIES = {
     "DIVERGED_LINEAR_SOLVE": "another linear solver by petsc_options: {'pc_type': 'lu'}, or "
     "{'ksp_type': 'gmres'} where the tangent is not symmetric; and supports that hold the body",
@@ -56,8 +62,9 @@ class ContactProblem:
         interfaces: The interfaces; their conditions are set to `bcs`.
         tangent: Derivative of the residual as UFL; None: `ufl.derivative`.
         petsc_options: Options of the solvers without a prefix, such as ``{"pc_type": "lu"}``. By
-            default conjugate gradients with smoothed aggregation and rigid body modes. What stands
-            behind ``-patchlaw_`` on the command line wins.
+            default conjugate gradients with smoothed aggregation and rigid body modes, or with a
+            factorisation of small problems. What stands behind ``-patchlaw_`` on the command line
+            wins.
         in_matrix: Whether the tangents of pointwise interfaces are assembled too, so that the
             preconditioner knows them: needed where only contact holds the body. The preconditioner
             is made anew in every Newton step then.
@@ -96,6 +103,7 @@ class ContactProblem:
         for interface in self.interfaces:
             interface.constrain(self._bcs)
         tangent = ufl.derivative(residual, displacement) if tangent is None else tangent
+        tangent = ufl.algorithms.expand_derivatives(tangent)  # linear ones lose the displacement
         self._ingredients = [*tangent.coefficients(), *tangent.constants()]
         self._form, self._slope = compat.compile_form(residual), compat.compile_form(tangent)
         self._residual = compat.assemble_vector(self._form)
@@ -109,12 +117,10 @@ class ContactProblem:
         self._norms: list[float] = []
         self._contact = self._matrix.createVecRight()
         self._inner = self._contact.duplicate()
-        self._options = {
-            **KRYLOV_DEFAULTS,
-            **NONLINEAR_DEFAULTS,
-            **ALGEBRAIC_DEFAULTS,
-            **(petsc_options or {}),
-        }
+        usual = _FACTORISED if self._matrix.getSize()[0] <= _SMALL else ALGEBRAIC_DEFAULTS
+        given = dict(petsc_options or {})
+        self._options = {**KRYLOV_DEFAULTS, **NONLINEAR_DEFAULTS, **usual, **given}
+        self._forcing = not given.keys() & {"ksp_rtol", "snes_ksp_ew"}
         self._snes = self._solver()
 
     def solve(self) -> int:
@@ -175,8 +181,7 @@ class ContactProblem:
         with default_options(PREFIX, self._options):
             snes.setFromOptions()
         user = PETSc.Options(PREFIX)
-        given = {"ksp_rtol", "snes_ksp_ew"}.intersection(self._options) - set(KRYLOV_DEFAULTS)
-        self._forcing = not (given or user.hasName("ksp_rtol") or user.hasName("snes_ksp_ew"))
+        self._forcing &= not (user.hasName("ksp_rtol") or user.hasName("snes_ksp_ew"))
         return snes
 
     def _write_residual(self, _snes: Any, x: PETSc.Vec, residual: PETSc.Vec) -> None:
