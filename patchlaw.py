@@ -25,7 +25,7 @@ if TYPE_CHECKING:  # what `_HOMES` says, for editors and type checkers
         read_surface,
         synthesise,
     )
-    from macro import ContactProblem, Interface, LawOperator
+    from macro import ContactProblem, Interface, LawOperator, vector_space
     from micro import HalfSpaceModel
     from multiscale import (
         Comparison,
@@ -39,6 +39,7 @@ if TYPE_CHECKING:  # what `_HOMES` says, for editors and type checkers
         make_setup,
         read_history,
         read_laws,
+        representative_law,
         run,
         sweep,
     )
@@ -46,10 +47,10 @@ if TYPE_CHECKING:  # what `_HOMES` says, for editors and type checkers
 _NAMES = {
     "geometry": "Control InputError NotConverged PatchGrid RigidPlane Spectrum Surface "
     "read_surface synthesise",
-    "macro": "ContactProblem Interface LawOperator",
+    "macro": "ContactProblem Interface LawOperator vector_space",
     "micro": "HalfSpaceModel",
     "multiscale": "Comparison History LawTable LoadStep Run Scene compare export_laws make_setup "
-    "read_history read_laws run sweep",
+    "read_history read_laws representative_law run sweep",
 }
 _HOMES = {name: package for package, names in _NAMES.items() for name in names.split()}
 

@@ -10,11 +10,13 @@ A TaggedMesh makes a MeshedBody of any shape, which takes the place of the Block
 
 from geometry.materials import Material
 from macro.block import Block
+from macro.compat import vector_space
 from macro.body_pair import BodyPair
 from macro.compliance.face_compliance import FaceCompliance, face_compliance
 from macro.contact.contact_forces import ContactLaw
 from macro.contact.contact_problem import ContactProblem
 from macro.contact.face_pair import FacePair
+from macro.contact.face_regions import FaceRegions
 from macro.contact.interface import Interface
 from macro.contact.law_operator import LawOperator, LawsAtPoints
 from macro.contact.law_problem import LawContactProblem, LawContactState
@@ -29,7 +31,7 @@ from macro.contact.unilateral_problem import (
     nodal_contact,
 )
 from macro.elastic_body import ElasticBody
-from macro.fields import write_fields, write_rough_fields
+from macro.fields import AtPoints, write_fields, write_rough_fields
 from macro.mesh.block import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
 from macro.mesh.contact_face import ContactFacets, contact_facets
 from macro.mesh.rough_surface import MeshQuality, rough_block_mesh
@@ -40,6 +42,7 @@ __all__ = [
     "BOTTOM",
     "SIDES",
     "TOP",
+    "AtPoints",
     "Block",
     "BlockMesh",
     "BodyPair",
@@ -49,6 +52,7 @@ __all__ = [
     "ElasticBody",
     "FaceCompliance",
     "FacePair",
+    "FaceRegions",
     "Interface",
     "LawContactProblem",
     "LawContactState",
@@ -70,6 +74,7 @@ __all__ = [
     "nodal_contact",
     "patch_compliance_matrix",
     "rough_block_mesh",
+    "vector_space",
     "write_fields",
     "write_rough_fields",
 ]

@@ -86,9 +86,8 @@ def refusals():
 
 if __name__ == "__main__":
     result = {}
-    for element in ("P1", "P2", "Q1", "Q2"):
-        for mode in ("patchwise", "pointwise"):
-            result |= cube(element, mode)
+    for element, mode in zip(("P1", "P2", "Q1", "Q2"), 2 * ("patchwise", "pointwise"), strict=True):
+        result |= cube(element, mode)
     ends, facets = bar()
     errors = refusals()
     if COMM.rank == 0:
