@@ -10,8 +10,8 @@ A TaggedMesh makes a MeshedBody of any shape, which takes the place of the Block
 
 from geometry.materials import Material
 from macro.block import Block
-from macro.compat import vector_space
 from macro.body_pair import BodyPair
+from macro.compat import vector_space
 from macro.compliance.face_compliance import FaceCompliance, face_compliance
 from macro.contact.contact_forces import ContactLaw
 from macro.contact.contact_problem import ContactProblem
