@@ -114,7 +114,8 @@ class LawOperator:
         InputError: Without the package, or on a dolfinx that it does not serve.
 
     Note:
-        Construction is collective.
+        Construction is collective. Import the package before the first form is made: UFL counts
+        its types, to which the package adds one.
     """
 
     def __init__(self, interface: Interface, displacement: Any, degree: int | None = None) -> None:
