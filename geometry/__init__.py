@@ -14,6 +14,7 @@ from geometry.meshes.expected_contact import places_in_reach
 from geometry.meshes.families import characteristic_size, reference_shapes, suggested_fine
 from geometry.meshes.refined_block import RefinedShape
 from geometry.patches import Partition, PatchGrid, UnevenPartition, overlaps, patch_means
+from geometry.regions import Regions
 from geometry.rigid_plane import Control, RigidPlane
 from geometry.spectrum import Spectrum
 from geometry.statistics import PowerSpectrum, Roughness, power_spectrum, roughness
@@ -33,6 +34,7 @@ __all__ = [
     "PatchlawError",
     "PowerSpectrum",
     "RefinedShape",
+    "Regions",
     "RigidPlane",
     "Roughness",
     "Spectrum",

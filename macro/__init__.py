@@ -1,7 +1,8 @@
-"""The elastic block in dolfinx, in contact with a rigid plane.
+"""Elastic bodies in dolfinx, in contact with a rigid plane or with each other.
 
-BlockShape → block_mesh → Block (with a Material) → Interface (with a PatchGrid)
+BlockShape → block_mesh → Block (with a Material) → LoadedFace (with a PatchGrid)
 → LawContactProblem (with one ContactLaw per patch) → LawContactState for every load step.
+A TaggedMesh makes a MeshedBody of any shape, which takes the place of the Block.
 
 `face_compliance` is the displacement of the contact face in smooth modes; rough_block_mesh → Block
 → UnilateralContactProblem meshes the roughness itself, as a reference.
@@ -9,22 +10,28 @@ BlockShape → block_mesh → Block (with a Material) → Interface (with a Patc
 
 from geometry.materials import Material
 from macro.block import Block
+from macro.body_pair import BodyPair
 from macro.compliance.face_compliance import FaceCompliance, face_compliance
-from macro.contact.law_interface import (
-    ContactLaw,
-    Interface,
+from macro.contact.contact_forces import ContactLaw
+from macro.contact.face_pair import FacePair
+from macro.contact.law_problem import LawContactProblem, LawContactState
+from macro.contact.loaded_face import (
+    LoadedFace,
     displacements_under,
     patch_compliance_matrix,
 )
-from macro.contact.law_problem import LawContactProblem, LawContactState
 from macro.contact.unilateral_problem import (
     UnilateralContactProblem,
     UnilateralContactState,
     nodal_contact,
 )
+from macro.elastic_body import ElasticBody
 from macro.fields import write_fields, write_rough_fields
 from macro.mesh.block import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
+from macro.mesh.contact_face import ContactFacets, contact_facets
 from macro.mesh.rough_surface import MeshQuality, rough_block_mesh
+from macro.mesh.tagged import TaggedMesh
+from macro.meshed_body import MeshedBody, Support, Traction
 
 __all__ = [
     "BOTTOM",
@@ -32,16 +39,25 @@ __all__ = [
     "TOP",
     "Block",
     "BlockMesh",
+    "BodyPair",
+    "ContactFacets",
     "ContactLaw",
+    "ElasticBody",
     "FaceCompliance",
-    "Interface",
+    "FacePair",
     "LawContactProblem",
     "LawContactState",
+    "LoadedFace",
     "Material",
     "MeshQuality",
+    "MeshedBody",
+    "Support",
+    "TaggedMesh",
+    "Traction",
     "UnilateralContactProblem",
     "UnilateralContactState",
     "block_mesh",
+    "contact_facets",
     "displacements_under",
     "face_compliance",
     "nodal_contact",

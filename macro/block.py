@@ -1,4 +1,4 @@
-"""The elastic block: displacement space, supports, assembled stiffness and its solver.
+"""The elastic block: its supports, its stiffness, and the solver that its lattice allows.
 
 Theory: section 11 of ``demos/theory.md``.
 """
@@ -18,9 +18,9 @@ from petsc4py import PETSc
 from geometry.errors import InputError
 from geometry.materials import Material
 from macro import compat
-from macro.elasticity import rigid_body_modes, stiffness_form
+from macro.elastic_body import ElasticBody
+from macro.elasticity import stiffness_form
 from macro.linear_solvers.multigrid import Lattice, lattice_of
-from macro.linear_solvers.options import solve_linear
 from macro.linear_solvers.selection import block_solver
 from macro.mesh.block import BlockMesh
 
@@ -31,10 +31,8 @@ _FLAT = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class Block(ElasticBody):
     """An elastic block, clamped at the bottom, ready to be loaded on its top.
-
-    Stiffness and preconditioner are made once, on first use, and serve every load afterwards.
 
     Args:
         mesh: Mesh with marked faces.
@@ -59,25 +57,15 @@ class Block:
                 "unknown support of the sides", value=self.sides, allowed="free, roller"
             )
 
-    @cached_property
-    def space(self) -> Any:
-        """Vector Lagrange space of the displacements."""
-        return compat.vector_space(self.mesh.mesh, self.degree)
-
     @property
     def degree(self) -> int:
         """Polynomial degree of the displacements."""
         return self.mesh.shape.degree
 
     @property
-    def dofs(self) -> int:
-        """Number of degrees of freedom, all ranks together."""
-        return 3 * int(self.space.dofmap.index_map.size_global)
-
-    @property
-    def owned_dofs(self) -> int:
-        """Number of degrees of freedom that this rank owns."""
-        return 3 * int(self.space.dofmap.index_map.size_local)
+    def cell_lame(self) -> tuple[float, float]:
+        """Lamé's constants [MPa]."""
+        return self.material.lame
 
     @cached_property
     def conditions(self) -> list[Any]:
@@ -89,13 +77,7 @@ class Block:
     @cached_property
     def stiffness(self) -> PETSc.Mat:
         """Stiffness matrix [N/mm] with unit rows for constrained degrees of freedom."""
-        kind = "baij" if self.lattice else "aij"
-        matrix = compat.assemble_matrix(compat.compile_form(self.form), self.conditions, kind)
-        if kind == "aij":
-            matrix.setOption(PETSc.Mat.Option.SPD, True)  # for the user's direct solvers
-        points = self.space.tabulate_dof_coordinates()[: self.owned_dofs // 3]
-        matrix.setNearNullSpace(rigid_body_modes(points, self.mesh.comm))
-        return matrix
+        return self.assembled("baij" if self.lattice else "aij")
 
     @cached_property
     def solver(self) -> PETSc.KSP:
@@ -103,34 +85,6 @@ class Block:
         return block_solver(
             self.stiffness, self.space, self.mesh.shape, self.lattice, self.material, self.free
         )
-
-    def solve(self, load: PETSc.Vec) -> Any:
-        """Return the displacement under a nodal load.
-
-        Args:
-            load: Nodal forces [N], zero at constrained degrees of freedom.
-
-        Returns:
-            dolfinx Function, ghosts up to date [mm].
-
-        Raises:
-            NotConverged: When the linear solver fails.
-        """
-        solution = self.stiffness.createVecRight()
-        solve_linear(self.solver, load, solution)
-        return self.function(solution.array_r)
-
-    def function(self, values: NDArray[np.float64], name: str = "displacement") -> Any:
-        """Return rank-local displacements as a Function.
-
-        Args:
-            values: Owned degrees of freedom [mm], ghosts may follow.
-            name: Name of the function in files.
-        """
-        function = fem.Function(self.space, name=name)
-        function.x.array[: self.owned_dofs] = values[: self.owned_dofs]
-        function.x.scatter_forward()
-        return function
 
     def reaction(self, displacement: PETSc.Vec) -> float:
         """Return the reaction force of the clamped bottom, from nodal residuals [N].
@@ -148,19 +102,7 @@ class Block:
     @cached_property
     def form(self) -> Any:
         """Bilinear form of the stiffness, as UFL."""
-        # exact on boxes and straight tetrahedra, full integration on distorted hexahedra
-        degree = 2 * self.degree if self.mesh.shape.hexahedral else 2 * (self.degree - 1)
-        return stiffness_form(self.space, self.material, degree)
-
-    @property
-    def free(self) -> PETSc.Vec:
-        """1 for free degrees of freedom, 0 for those that the supports constrain."""
-        free = self.stiffness.createVecRight()
-        free.set(1.0)
-        for condition in self.conditions:
-            dofs, _ = condition.dof_indices()
-            free.array[dofs[dofs < self.owned_dofs]] = 0.0
-        return free
+        return stiffness_form(self.space, self.material, self.quadrature_degree)
 
     @cached_property
     def _bottom_row(self) -> PETSc.Vec:

@@ -110,22 +110,55 @@ def mesh_from_cells(
     Note:
         Collective. The coordinate element is that of `mesh_from_gmsh`: compiled forms serve both.
     """
-    cell = {8: "hexahedron", 4: "tetrahedron"}[cells.shape[1]]
     owners = np.full(len(cells), comm.rank)
-    if "ghost_mode" not in inspect.signature(dmesh.create_mesh).parameters:
+    if not _makes_ghosts():
         stay = _adjacency(np.arange(len(cells)), owners)
-        variant = basix.LagrangeVariant.equispaced
-        element = basix.ufl.element("Lagrange", cell, 1, variant, shape=(3,), dtype=np.float64)
-        domain = ufl.Mesh(element)
+        domain = _straight_domain(cells)
         return dmesh.create_mesh(comm, cells=cells, x=points, e=domain, partitioner=lambda *_: stay)
     # dolfinx 0.5 finds common vertices through ghosts, which it drops afterwards
     rows = np.concatenate([np.arange(len(cells)), neighbours[0]])
     stay = _adjacency(rows, np.concatenate([owners, neighbours[1]]))
+    domain = _straight_domain(cells)
+    return dmesh.create_mesh(comm, cells, points, domain, dmesh.GhostMode.none, lambda *_: stay)
+
+
+@quiet_compiler()
+def partitioned_mesh(cells: NDArray[np.int64], points: NDArray[np.float64], comm: Any) -> Any:
+    """Make a mesh of straight cells, which dolfinx distributes over the ranks.
+
+    Args:
+        cells: Numbers of the nodes of this rank's share of the cells in the order of dolfinx, shape
+            (cells, 8 or 4); there may be none.
+        points: This rank's share of the nodes, numbered through the ranks, shape (n, 3).
+        comm: MPI communicator.
+
+    Note:
+        Collective. There are ghost cells in dolfinx 0.5, and none later. The coordinate element is
+        that of `mesh_from_gmsh`.
+    """
+    domain = _straight_domain(cells)
+    if _makes_ghosts():
+        return dmesh.create_mesh(comm, cells, points, domain)
+    return dmesh.create_mesh(comm, cells=cells, x=points, e=domain)
+
+
+def _makes_ghosts() -> bool:
+    """Tell whether meshes from cells take a mode of ghosts, as in dolfinx 0.5."""
+    return "ghost_mode" in inspect.signature(dmesh.create_mesh).parameters
+
+
+def _straight_domain(cells: NDArray[np.int64]) -> Any:
+    """Return the coordinate element of straight hexahedra or tetrahedra, as UFL's mesh."""
+    cell = {8: "hexahedron", 4: "tetrahedron"}[cells.shape[1]]
+    if not _makes_ghosts():
+        variant = basix.LagrangeVariant.equispaced
+        return ufl.Mesh(
+            basix.ufl.element("Lagrange", cell, 1, variant, shape=(3,), dtype=np.float64)
+        )
     straight = ufl.FiniteElement(
         "Lagrange", ufl.Cell(cell, geometric_dimension=3), 1, variant="equispaced"
     )
-    domain = ufl.Mesh(ufl.VectorElement(straight))
-    return dmesh.create_mesh(comm, cells, points, domain, dmesh.GhostMode.none, lambda *_: stay)
+    return ufl.Mesh(ufl.VectorElement(straight))
 
 
 def _adjacency(rows: NDArray[np.int64], values: NDArray[np.int64]) -> Any:
@@ -171,6 +204,12 @@ def cell_nodes(space: Any) -> NDArray[np.int32]:
     if isinstance(table, np.ndarray):
         return table
     return table.array.reshape(-1, space.dofmap.dof_layout.num_dofs)
+
+
+def lagrange_degree(space: Any) -> int:
+    """Return the polynomial degree of a Lagrange space."""
+    element = space.ufl_element()
+    return int(element.degree if isinstance(element.degree, int) else element.degree())
 
 
 def cell_vertices(mesh: Any) -> NDArray[np.int32]:

@@ -33,17 +33,21 @@ def stress(displacement: Any, lame: tuple[Any, Any]) -> Any:
     return first * ufl.tr(eps) * ufl.Identity(3) + 2.0 * shear * eps
 
 
-def stiffness_form(space: Any, material: Material, quadrature_degree: int) -> Any:
+def stiffness_form(space: Any, material: Material | tuple[Any, Any], quadrature_degree: int) -> Any:
     """Return the bilinear form a(u, v) = ∫ σ(u) : ε(v) dV as UFL.
 
     Lamé's constants enter as UFL constants, so that one compiled form serves every material.
 
     Args:
         space: Vector space of the displacements.
-        material: Elastic constants [MPa].
+        material: Elastic constants [MPa], or Lamé's constants as functions on the mesh.
         quadrature_degree: Polynomial degree that is integrated exactly.
     """
-    first, shear = (fem.Constant(space.mesh, PETSc.ScalarType(value)) for value in material.lame)
+    first, shear = (
+        (fem.Constant(space.mesh, PETSc.ScalarType(value)) for value in material.lame)
+        if isinstance(material, Material)
+        else material
+    )
     trial, test = ufl.TrialFunction(space), ufl.TestFunction(space)
     dx = ufl.Measure("dx", domain=space.mesh, metadata={"quadrature_degree": quadrature_degree})
     return ufl.inner(stress(trial, (first, shear)), strain(test)) * dx

@@ -1,4 +1,4 @@
-"""Writes displacements, stresses and contact pressures of a block for ParaView.
+"""Writes displacements, stresses and contact pressures of a body for ParaView.
 
 Theory: demos/theory.md, section 11.
 """
@@ -18,10 +18,9 @@ from petsc4py import PETSc
 from geometry.collective import on_root
 from geometry.materials import von_mises
 from macro import compat
-from macro.block import Block
-from macro.contact.law_interface import Interface
+from macro.contact.loaded_face import LoadedFace
 from macro.contact.unilateral_problem import UnilateralContactProblem, UnilateralContactState
-from macro.mesh.contact_face import top_facets
+from macro.elastic_body import ElasticBody
 
 Array = NDArray[np.float64]
 
@@ -33,36 +32,36 @@ _ZERO = 1e-9
 
 
 def write_fields(
-    path: Path | str, interface: Interface, steps: Iterable[tuple[int, Array, Array]]
+    path: Path | str, face: LoadedFace, steps: Iterable[tuple[int, Array, Array]]
 ) -> None:
     """Write displacements [mm], stresses and contact pressures [MPa] of load steps as XDMF.
 
     The numbers of the load steps are the times. A stress, and its equivalent by von Mises, is that
     at the middle of a cell, computed from the displacements there; it is constant on the cell.
     Quadratic displacements are written at the vertices. The pressure of a cell is the mean pressure
-    over its facet on the top, weighted by the areas of the patches there, and zero elsewhere. Where
+    over its contact facet, weighted by the areas of the patches there, and zero elsewhere. Where
     dolfinx has ADIOS2, displacements of any degree are also written as VTX, in a folder of the same
     name that ends in ``.bp``.
 
     Args:
         path: File to write, ending in ``.xdmf``; an HDF5 file goes beside it.
-        interface: Patches on the block.
+        face: Patches on the contact face of a body.
         steps: Number of each load step, this rank's owned displacements, dof by dof [mm], and mean
             pressures of the N patches, shape (N,) [MPa].
 
     Note:
         Collective.
     """
-    block = interface.block
+    body = face.body
 
     def functions() -> Iterator[tuple[int, list[Any]]]:
         for number, displacement, pressure in steps:
-            moved = block.function(displacement)
+            moved = body.function(displacement)
             vtx.write(number, moved)
-            yield number, [*_of_block(block, moved), _facet_pressures(interface, pressure)]
+            yield number, [*_of_body(body, moved), _facet_pressures(face, pressure)]
 
     with compat.VtxFile(str(Path(path).with_suffix(".bp"))) as vtx:
-        _write_xdmf(str(path), block.mesh.mesh, functions())
+        _write_xdmf(str(path), body.mesh.mesh, functions())
 
 
 def write_rough_fields(
@@ -90,19 +89,19 @@ def write_rough_fields(
         space = compat.scalar_space(mesh, _file_degree(mesh))
         for number, state in steps:
             pressures = _interpolated(space, _vertex_pressures(problem, state), "pressure")
-            yield number, [*_of_block(block, block.function(state.displacement)), pressures]
+            yield number, [*_of_body(block, block.function(state.displacement)), pressures]
 
     _write_xdmf(str(path), mesh, functions())
 
 
-def cell_stresses(block: Block, displacement: Any) -> Array:
+def cell_stresses(body: ElasticBody, displacement: Any) -> Array:
     """Return the stresses at the middles of this rank's cells, shape (cells, 3, 3) [MPa].
 
     Args:
-        block: The block.
+        body: The body.
         displacement: Its displacements, ghosts up to date.
     """
-    mesh = block.mesh.mesh
+    mesh = body.mesh.mesh
     name, geometry = mesh.topology.cell_name(), compat.cell_vertices(mesh)
     middle = compat.reference_facets(name)[0].mean(axis=0)[None]
 
@@ -113,35 +112,35 @@ def cell_stresses(block: Block, displacement: Any) -> Array:
         return total
 
     moved = displacement.x.array.reshape(-1, 3)
-    strain = gradient(moved, compat.cell_nodes(block.space), block.degree) @ np.linalg.inv(
+    strain = gradient(moved, compat.cell_nodes(body.space), body.degree) @ np.linalg.inv(
         gradient(mesh.geometry.x, geometry, _file_degree(mesh))
     )
     strain = 0.5 * (strain + np.swapaxes(strain, 1, 2))
-    first, shear = block.material.lame
-    pressure = first * np.trace(strain, axis1=1, axis2=2)
-    return np.asarray(pressure[:, None, None] * np.eye(3) + 2.0 * shear * strain)
+    first, shear = (np.asarray(constant)[..., None, None] for constant in body.cell_lame)
+    dilation = np.trace(strain, axis1=1, axis2=2)[:, None, None]
+    return np.asarray(first * dilation * np.eye(3) + 2.0 * shear * strain)
 
 
-def _of_block(block: Block, displacement: Any) -> list[Any]:
+def _of_body(body: ElasticBody, displacement: Any) -> list[Any]:
     """Return displacement, stress and von Mises' stress, as XDMF files can hold them."""
-    mesh = block.mesh.mesh
+    mesh = body.mesh.mesh
     shown = _interpolated(
         compat.vector_space(mesh, _file_degree(mesh)), displacement, "displacement"
     )
     stress = fem.Function(compat.scalar_space(mesh, 0, "DG", shape=(3, 3)), name="stress")
     equivalent = fem.Function(compat.scalar_space(mesh, 0, "DG"), name="von_Mises")
-    values = cell_stresses(block, displacement)
+    values = cell_stresses(body, displacement)
     rows = compat.cell_nodes(equivalent.function_space)[:, 0]
     stress.x.array.reshape(-1, 9)[rows] = values.reshape(-1, 9)
     equivalent.x.array[rows] = von_mises(values)
     return [shown, stress, equivalent]
 
 
-def _facet_pressures(interface: Interface, pressure: Array) -> Any:
-    """Return the mean pressures over the facets of the top, on their cells [MPa]."""
-    block, points = interface.block, interface.quadrature
-    pressures = fem.Function(compat.scalar_space(block.mesh.mesh, 0, "DG"), name="pressure")
-    facets, cells = top_facets(block.mesh), compat.cell_nodes(pressures.function_space)[:, 0]
+def _facet_pressures(face: LoadedFace, pressure: Array) -> Any:
+    """Return the mean pressures over the facets of the face, on their cells [MPa]."""
+    facets, points = face.facets, face.quadrature
+    pressures = fem.Function(compat.scalar_space(face.space.mesh, 0, "DG"), name="pressure")
+    cells = compat.cell_nodes(pressures.function_space)[:, 0]
     force = points.weight * pressure[points.patch]
     total = np.bincount(cells[points.cell], force, minlength=len(pressures.x.array))
     loaded = cells[facets.cell]

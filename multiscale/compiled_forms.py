@@ -134,14 +134,14 @@ def known_solve(comm: Any) -> CheckResult:
     from geometry.meshes.block import BlockShape
     from geometry.patches import PatchGrid
     from geometry.rigid_plane import Control
-    from macro import Block, Interface, LawContactProblem, Material, block_mesh
+    from macro import Block, LawContactProblem, LoadedFace, Material, block_mesh
 
     began = time.perf_counter()
     material = Material(young_modulus=4000.0, poisson_ratio=0.15)
     shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(10, 10, 8))
     block = Block(block_mesh(shape, comm or MPI.COMM_SELF), material, sides="roller")
     patches = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
-    pressed = LawContactProblem(block, Interface(block, patches), [_Spring()] * patches.count)
+    pressed = LawContactProblem(LoadedFace.of_block(block, patches), [_Spring()] * patches.count)
     state = pressed.solve(Control(approach=_APPROACH))
     seconds = time.perf_counter() - began
     expected = _APPROACH / (1.0 / _SPRING + 1.0 / material.confined_modulus)
@@ -207,13 +207,20 @@ def _use_all_forms(element: str) -> None:
 
     from geometry.meshes.block import BlockShape
     from geometry.patches import PatchGrid
-    from macro import Block, Interface, Material, UnilateralContactProblem, block_mesh, write_fields
+    from macro import (
+        Block,
+        LoadedFace,
+        Material,
+        UnilateralContactProblem,
+        block_mesh,
+        write_fields,
+    )
 
     shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(2, 2, 2), element=element)
     block = Block(block_mesh(shape, MPI.COMM_SELF), Material(young_modulus=1.0, poisson_ratio=0.3))
     UnilateralContactProblem(block, 0.0)
     rest = block.stiffness.createVecRight()
     block.reaction(rest)
-    interface = Interface(block, PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)))
+    face = LoadedFace.of_block(block, PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)))
     with tempfile.TemporaryDirectory() as folder:
-        write_fields(Path(folder) / "fields.xdmf", interface, [(0, rest.array_r, np.zeros(1))])
+        write_fields(Path(folder) / "fields.xdmf", face, [(0, rest.array_r, np.zeros(1))])

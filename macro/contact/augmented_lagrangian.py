@@ -22,9 +22,10 @@ from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from macro.block import Block
 from macro.contact.augmented_newton import LOOSEST, SPARE, AugmentedLaw, FacetNewton
+from macro.contact.contact_forces import ContactForces
 from macro.contact.equilibrium import Equilibrium
 from macro.contact.face_nodes import TopNodes
-from macro.contact.law_interface import Interface
+from macro.contact.loaded_face import LoadedFace
 from macro.contact.node_contact import (
     ContactSolution,
     Extrapolation,
@@ -77,17 +78,19 @@ class AugmentedLagrangian:
     def __init__(self, block: Block, top: TopNodes, plane: PlaneOverNodes) -> None:
         self._block, self._top, self._plane = block, top, plane
         whole = PatchGrid(grid=(1, 1), lengths=block.mesh.shape.interface)
-        self._interface = interface = Interface(block, whole, degree=2 * block.degree)
-        self._sampling = sampling = interface.pointwise
+        face = LoadedFace.of_block(block, whole, degree=2 * block.degree)
+        self._sampling = sampling = face.pointwise
         (distance,) = top.with_ghosts(plane.distance)
-        points = interface.quadrature
+        points = face.quadrature
         unit = block.material.contact_modulus / _facet_sizes(points.cell, points.weight)
         self._stiff, self._soft = _HARD * unit, _SOFT * unit
         self._tolerance = contact_tolerance()
         self._penetration = PENETRATION[block.degree]
         self.law = AugmentedLaw(np.sum(points.values * distance[points.nodes], axis=1))
-        self.equilibrium = Equilibrium(interface, sampling, [self.law])
-        self._newton = FacetNewton(self.equilibrium, self.law, interface, top, plane)
+        none = np.zeros_like(points.x)  # the law has the distances between face and plane
+        self._forces = ContactForces(face, sampling, [self.law], none)
+        self.equilibrium = Equilibrium(block, self._forces)
+        self._newton = FacetNewton(self.equilibrium, self.law, face, top, plane)
         self._history = Extrapolation(block.owned_dofs, len(points.x))
 
     def solve(self, control: Control) -> ContactSolution:
@@ -98,8 +101,8 @@ class AugmentedLagrangian:
                 stay what they were.
         """
         guess = self._history.guess(control)
-        equilibrium, law = self.equilibrium, self.law
-        equilibrium.control, equilibrium.plane = control, self._plane.placed(control, guess.plane)
+        forces, law = self._forces, self.law
+        forces.control, forces.plane = control, self._plane.placed(control, guess.plane)
         law.multiplier = np.maximum(guess.contact, 0.0)
         displacement = self._block.stiffness.createVecRight()
         displacement.array[:] = guess.displacement
@@ -109,7 +112,7 @@ class AugmentedLagrangian:
         for _ in range(_MOST_UPDATES):
             more, cycles = self._newton.solve(displacement, tolerance, control)
             steps, spent = steps + more, spent + cycles
-            closure = self.equilibrium.closure(displacement)
+            closure = forces.closure(displacement)
             # penetration of points without pressure, penetration or gap of points under pressure
             depth = largest((law.pressure(closure) - law.multiplier) / law.slope, comm)
             allowed = self._penetration * largest(displacement.array_r, comm)
@@ -129,7 +132,7 @@ class AugmentedLagrangian:
         raise not_found(control, "MULTIPLIERS", _MOST_UPDATES)
 
     def _converged(self, displacement: PETSc.Vec, steps: int, spent: int) -> ContactSolution:
-        closure, plane = self.equilibrium.closure(displacement), self.equilibrium.plane.copy()
+        closure, plane = self._forces.closure(displacement), self._forces.plane.copy()
         pressure, load = self.law.pressure(closure), displacement.duplicate()
         samples = self._sampling.operator.createVecRight()
         samples.array[:] = pressure

@@ -18,7 +18,7 @@ from geometry.slope_search import slope_search
 from macro import compat
 from macro.contact.equilibrium import Equilibrium
 from macro.contact.face_nodes import TopNodes
-from macro.contact.law_interface import Interface
+from macro.contact.loaded_face import LoadedFace
 from macro.contact.node_contact import PlaneOverNodes, not_found
 from macro.linear_solvers.constrained import ConstrainedPreconditioner
 from macro.linear_solvers.node_matrices import node_submatrix
@@ -71,7 +71,7 @@ class FacetNewton:
     Args:
         equilibrium: The equations.
         law: Law of the quadrature points; multipliers and stiffnesses may change between solves.
-        interface: The interface whose quadrature points they are.
+        face: The contact face whose quadrature points they are.
         top: Nodes of the top.
         plane: The plane over the nodes.
 
@@ -83,14 +83,14 @@ class FacetNewton:
         self,
         equilibrium: Equilibrium,
         law: AugmentedLaw,
-        interface: Interface,
+        face: LoadedFace,
         top: TopNodes,
         plane: PlaneOverNodes,
     ) -> None:
-        self._equilibrium, self._law, self._interface = equilibrium, law, interface
-        self._top, self._plane, block = top, plane, equilibrium.block
+        self._equilibrium, self._law, self._face = equilibrium, law, face
+        self._top, self._plane, block = top, plane, equilibrium.body
         self._preconditioner = StiffPreconditioner(
-            block.stiffness, block.solver.pc, interface.points_by_dofs, layers=3 - block.degree
+            block.stiffness, block.solver.pc, face.points_by_dofs, layers=3 - block.degree
         )
         self._ksp = PETSc.KSP().create(block.stiffness.comm)
         self._ksp.setPC(self._preconditioner.pc)
@@ -138,11 +138,11 @@ class FacetNewton:
     def _linearise(self, displacement: PETSc.Vec) -> None:
         """Move the tangent and its preconditioner to a displacement."""
         self._equilibrium.update_tangent(displacement)
-        slope = self._law.stiffness(self._equilibrium.closure(displacement))
-        points = self._interface.quadrature
+        slope = self._law.stiffness(self._equilibrium.forces.closure(displacement))
+        points = self._face.quadrature
         rows, columns = np.nonzero((np.abs(points.values) > _ON) & (slope > 0.0)[:, None])
         loaded = self._top.sum_of_ranks(points.nodes[rows, columns], np.ones(len(rows))) > 0.0
-        free = self._equilibrium.control.free
+        free = self._equilibrium.forces.control.free
         motions = self._plane.levers.scaled(free)[loaded]
         motions = motions @ self._plane.supported_motions(free, loaded)
         self._preconditioner.update(slope / points.weight, self._top.dofs[loaded], motions)

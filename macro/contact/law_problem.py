@@ -1,4 +1,4 @@
-"""A block with contact laws on its top, under a rigid plane: one load step at a time.
+"""A body with contact laws on a face, under a rigid plane: one load step at a time.
 
 Theory: section 11 of ``demos/theory.md``.
 """
@@ -16,9 +16,9 @@ from geometry.collective import together
 from geometry.errors import InputError
 from geometry.rigid_plane import Control
 from macro import compat
-from macro.block import Block
+from macro.contact.contact_forces import ContactForces, ContactLaw
 from macro.contact.equilibrium import Equilibrium
-from macro.contact.law_interface import ContactLaw, Interface, Mode
+from macro.contact.loaded_face import Loadable, Mode
 from macro.contact.newton import DisplacementBasis, NewtonReport, NewtonSolver
 from macro.linear_solvers.options import solve_linear
 
@@ -27,24 +27,25 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LawContactState:
-    """Equilibrium of the block at one load step.
+    """Equilibrium of the body at one load step.
 
     All but the displacement is the same on every rank.
 
     Args:
         approach: Approach of the rigid plane at the middle of the patches [mm].
         tilt: Change of the approach along x and y [mm/mm].
-        displacement: This rank's owned displacements, dof by dof [mm].
+        displacement: This rank's owned displacements, dof by dof, those by other loads than the
+            contact included [mm].
         closure: Mean closure of the patches, shape (N,) [mm].
         pressure: Mean pressure of the patches, shape (N,) [MPa].
-        force: Force on the interface [N].
+        force: Force on the contact face [N].
         moment: First moments of the pressures along x and y, about the middle of the patches,
             shape (2,) [N mm].
-        reaction: Force that the bottom bears [N]; equals ``force`` in equilibrium.
+        reaction: Force that the supports bear [N]; equals ``force`` in equilibrium.
         newton_iterations: Newton steps.
         linear_iterations: Iterations of the linear solver, all Newton steps together.
         residuals: Norm of the residual before each Newton step and at the end, relative to the
-            norm of the interface's load there.
+            norm of the load on the face there.
         reason: Name of PETSc's reason to stop.
     """
 
@@ -63,19 +64,20 @@ class LawContactState:
 
 
 class LawContactProblem:
-    """A block with contact laws under a rigid plane, solved by Newton's method.
+    """A body with contact laws under a rigid plane, solved by Newton's method.
 
     Each load step prescribes the plane's approach or force, and its tilt or zero moment. All take
     the same Newton's method in the displacements, and about as many linear solves. The tangent is
-    the exact derivative. Conjugate gradients are preconditioned by the multigrid of the block
+    the exact derivative. Conjugate gradients are preconditioned by the multigrid of the body
     alone, which is made once. The initial guess is the best combination of earlier solutions.
 
     Args:
-        block: The elastic block.
-        interface: Patches on its top.
+        face: Patches on the contact face of an elastic body.
         laws: One law per patch, in flat order, the same on every rank.
         mode: ``"patchwise"``: the closure averaged over a patch gives one pressure for it;
             ``"pointwise"``: the law holds at every quadrature point.
+        crown: Depth of the face below its plane at points (x, y) of the plane, beside that of the
+            mesh, such as of a crowned face [mm]; None: none.
 
     Raises:
         InputError: When there is not one law per patch, or no such mode.
@@ -86,18 +88,26 @@ class LawContactProblem:
 
     def __init__(
         self,
-        block: Block,
-        interface: Interface,
+        face: Loadable,
         laws: Sequence[ContactLaw],
         mode: Mode = "patchwise",
+        *,
+        crown: Callable[[Array, Array], Array] | None = None,
     ) -> None:
-        if len(laws) != interface.patches.count:
+        if len(laws) != face.patches.count:
             raise InputError(
-                "every patch needs a law", value=len(laws), allowed=f"{interface.patches.count}"
+                "every patch needs a law", value=len(laws), allowed=f"{face.patches.count}"
             )
-        self._interface, self._sampling = interface, interface.sampling(mode)
-        self.equilibrium = Equilibrium(interface, self._sampling, laws)
-        self.newton = NewtonSolver(self.equilibrium, block.solver)
+        self._face, self._sampling = face, face.sampling(mode)
+        body, sampling = face.body, self._sampling
+        gap = sampling.depth if crown is None else sampling.depth + crown(sampling.x, sampling.y)
+        if body.preload is not None:
+            preload = body.stiffness.createVecRight()
+            preload.array[:] = body.preload
+            gap = gap + sampling.displacements(preload)
+        self.forces = ContactForces(face, sampling, laws, gap)
+        self.equilibrium = Equilibrium(body, self.forces)
+        self.newton = NewtonSolver(self.equilibrium, body.solver)
         self.basis = DisplacementBasis(self.equilibrium, self._sampling)
         self._plane: Array = np.zeros(3)
         self._closure: Array = np.zeros(len(self._sampling.weight))
@@ -116,8 +126,8 @@ class LawContactProblem:
                 solutions stay what they were, so that a smaller step can be tried.
         """
         equilibrium = self.equilibrium
-        equilibrium.prescribe(control, self._plane)
-        solution = equilibrium.block.stiffness.createVecRight()
+        self.forces.prescribe(control, self._plane)
+        solution = equilibrium.body.stiffness.createVecRight()
         self.basis.write_guess(solution)
         report = self.newton.solve(solution, control)
         self.basis.add(solution)
@@ -136,9 +146,9 @@ class LawContactProblem:
         """
         if not pressure.any():
             return
-        block = self.equilibrium.block
-        displacement = block.stiffness.createVecRight()
-        solve_linear(block.solver, self._interface.load(pressure), displacement)
+        body = self.equilibrium.body
+        displacement = body.stiffness.createVecRight()
+        solve_linear(body.solver, self._face.load(pressure), displacement)
         self.basis.add(displacement)
 
     def patch_means(self, functions: Sequence[Callable[[Array], Array]]) -> Array:
@@ -156,26 +166,26 @@ class LawContactProblem:
         Note:
             Collective.
         """
-        comm, sampling = self.equilibrium.block.mesh.comm, self._sampling
-        values = together(comm, lambda: sampling.by_patch(functions, self._closure))
-        return sampling.patch_sums(values) / self._interface.areas
+        sampling = self._sampling
+        values = together(self._face.comm, lambda: sampling.by_patch(functions, self._closure))
+        return sampling.patch_sums(values) / self._face.areas
 
     def _state(self, solution: PETSc.Vec, report: NewtonReport) -> LawContactState:
-        equilibrium, sampling = self.equilibrium, self._sampling
-        self._closure = closure = equilibrium.closure(solution)
-        self._plane = plane = equilibrium.plane.copy()
-        pressure = equilibrium.pressure(closure)
-        forces, load = sampling.patch_sums(pressure), equilibrium.loads(pressure)
-        areas = self._interface.areas
+        body, contact, sampling = self.equilibrium.body, self.forces, self._sampling
+        self._closure = closure = contact.closure(solution)
+        self._plane = plane = contact.plane.copy()
+        pressure = contact.pressure(closure)
+        forces, load = sampling.patch_sums(pressure), contact.loads(pressure)
+        areas = self._face.areas
         return LawContactState(
             approach=float(plane[0]),
             tilt=(float(plane[1]), float(plane[2])),
-            displacement=solution.array_r.copy(),
+            displacement=solution.array_r + (0.0 if body.preload is None else body.preload),
             closure=sampling.patch_sums(closure) / areas,
             pressure=forces / areas,
             force=float(forces.sum()),
             moment=load[1:],
-            reaction=equilibrium.block.reaction(solution),
+            reaction=body.reaction(solution),
             newton_iterations=report.iterations,
             linear_iterations=report.linear_iterations,
             residuals=report.residuals,

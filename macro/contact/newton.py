@@ -21,7 +21,7 @@ from petsc4py import PETSc
 from geometry.errors import NotConverged
 from geometry.rigid_plane import Control
 from macro.contact.equilibrium import Equilibrium
-from macro.contact.law_interface import Sampling
+from macro.contact.loaded_face import Sampling
 from macro.linear_solvers.options import (
     KRYLOV_DEFAULTS,
     PREFIX,
@@ -190,8 +190,8 @@ class DisplacementBasis:
 
     def __init__(self, equilibrium: Equilibrium, sampling: Sampling, *, size: int = 32) -> None:
         self._equilibrium, self._sampling, self._size = equilibrium, sampling, size
-        self._comm = equilibrium.block.mesh.comm
-        self.vectors: Array = np.empty((0, equilibrium.block.owned_dofs))
+        self._comm = equilibrium.body.comm
+        self.vectors: Array = np.empty((0, equilibrium.body.owned_dofs))
         self.forces: Array = np.empty_like(self.vectors)
         self._sampled: Array = np.empty((0, len(sampling.weight)))  # Wᵀ B of this rank's samples
 
@@ -201,7 +201,7 @@ class DisplacementBasis:
     def add(self, displacement: PETSc.Vec) -> None:
         """Add the part of a displacement that is new to the basis; collective."""
         work = displacement.duplicate()
-        self._equilibrium.block.stiffness.mult(displacement, work)
+        self._equilibrium.body.stiffness.mult(displacement, work)
         vector, force = displacement.array_r.copy(), work.array_r.copy()
         before = self._sum(vector @ force)
         for _ in range(2):  # a second pass removes what rounding left
@@ -244,7 +244,8 @@ class DisplacementBasis:
 
     def _projected(self, y: Array) -> tuple[Array, Array]:
         """Return the equilibrium's residual and tangent in the basis."""
-        equations, weight, columns = self._equilibrium, self._sampling.weight, self._sampled
+        equations, weight = self._equilibrium.forces, self._sampling.weight
+        columns = self._sampled
         closure = equations.closure_of((y @ columns) / weight)
         pressure, stiffness = equations.pressure(closure), equations.stiffness(closure)
         parts = np.vstack([

@@ -78,15 +78,35 @@ def block_solver(
     """
     ratio = material.poisson_ratio
     requested = PETSc.Options(PREFIX).getString("pc_type", "")
-    limit = COMPRESSIBLE if lattice is None else STIFF
-    if not requested and ratio > limit and matrix.getSize()[0] <= FACTORISED:
+    if lattice is None:
+        return body_solver(matrix, space, degree=shape.degree, poisson_ratio=ratio, free=free)
+    if not requested and ratio > STIFF and matrix.getSize()[0] <= FACTORISED:
         return linear_solver(matrix, preconditioner=DIRECT_DEFAULTS)
     if requested not in ("", "mg"):
         return linear_solver(matrix)
-    if lattice is not None:
-        smoother = smoothing(ratio, hexahedral=shape.hexahedral)
-        return linear_solver(matrix, coarser_grids(lattice, matrix, free), smoother)
-    if shape.degree == 2:
+    smoother = smoothing(ratio, hexahedral=shape.hexahedral)
+    return linear_solver(matrix, coarser_grids(lattice, matrix, free), smoother)
+
+
+def body_solver(
+    matrix: PETSc.Mat, space: Any, *, degree: int, poisson_ratio: float, free: PETSc.Vec
+) -> PETSc.KSP:
+    """Return a solver for the stiffness of a body whose mesh is no lattice.
+
+    Args:
+        matrix: The stiffness with unit rows for constrained unknowns, its near-nullspace attached.
+        space: Its space.
+        degree: Degree of the displacements.
+        poisson_ratio: Largest Poisson's ratio of the body.
+        free: 1 for unknowns that are free, 0 for constrained ones.
+
+    Note:
+        Collective.
+    """
+    requested = PETSc.Options(PREFIX).getString("pc_type", "")
+    if not requested and poisson_ratio > COMPRESSIBLE and matrix.getSize()[0] <= FACTORISED:
+        return linear_solver(matrix, preconditioner=DIRECT_DEFAULTS)
+    if degree == 2 and requested in ("", "mg"):
         return linear_solver(matrix, vertex_grid(matrix, space, free), QUADRATIC_DEFAULTS)
     return linear_solver(matrix)
 

@@ -1,4 +1,4 @@
-"""Quadrature on the block's top, cut along the borders of the patches."""
+"""Facets of a planar contact face, and quadrature on it, cut along the borders of patches."""
 
 from __future__ import annotations
 
@@ -8,11 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.face_frame import UPWARD, FaceFrame
 from geometry.patches import PatchGrid
 from macro import compat
 from macro.mesh.block import TOP, BlockMesh
 
 Array = NDArray[np.float64]
+
+_BILINEAR_STEPS = 8
+"""Newton steps that invert the bilinear map of a quadrilateral; a parallelogram needs none."""
+_BENT = 1e-12
+"""Deviation from a parallelogram, relative to its edges, that is rounding."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,8 +26,9 @@ class FacetQuadrature:
     """Quadrature points of this rank on the patches, sorted by patch; there may be none.
 
     Args:
-        x: Abscissae, shape (n,) [mm].
+        x: Abscissae in the frame of the face, shape (n,) [mm].
         y: Ordinates, shape (n,) [mm].
+        depth: Depths of the face below the plane of its frame, shape (n,) [mm].
         weight: Weights, whose sum over a patch and all ranks is its area, shape (n,) [mm²].
         patch: Flat index of the patch, ascending, shape (n,).
         cell: Rank-local cell that the point belongs to, shape (n,).
@@ -31,6 +38,7 @@ class FacetQuadrature:
 
     x: Array
     y: Array
+    depth: Array
     weight: Array
     patch: NDArray[np.intp]
     cell: NDArray[np.int32]
@@ -39,52 +47,85 @@ class FacetQuadrature:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TopFacets:
-    """Facets of the top whose cells this rank owns; affine images of a triangle or a square.
+class ContactFacets:
+    """Facets of a contact face whose cells this rank owns: triangles, or quadrilaterals.
 
     Args:
+        frame: Frame of the face, or of the one that it is pressed on.
+        outward: Unit normal out of the body, shape (3,): that of the frame, or its opposite.
         cell: Rank-local cell that the facet belongs to, shape (n,).
         side: Index of the facet in its cell, shape (n,).
         reference: Vertices on the reference cell, shape (n, 3 or 4, 3).
         corners: Vertices in the plane, shape (n, 3 or 4, 2) [mm].
+        depth: Depths of the vertices below the plane, into the body, shape (n, 3 or 4) [mm].
     """
 
+    frame: FaceFrame
+    outward: Array
     cell: NDArray[np.int32]
     side: NDArray[np.intp]
     reference: Array
     corners: Array
+    depth: Array
 
     @property
     def area(self) -> Array:
         """Areas in the plane, shape (n,) [mm²]."""
-        parallelogram = 2.0 * triangle_areas(self.corners[:, :3])
-        return parallelogram if self.corners.shape[1] == 4 else 0.5 * parallelogram
+        triangles, facet = _triangles(self.corners)
+        areas = np.bincount(facet, triangle_areas(triangles), minlength=len(self.corners))
+        return np.asarray(areas, dtype=np.float64)
 
-    def pull_back(self, facet: NDArray[np.intp], points: Array) -> Array:
-        """Map points (n, 2) of given facets (n,) to the reference cell, (n, 3)."""
-        edges = np.swapaxes(self.corners[:, 1:3] - self.corners[:, :1], 1, 2)
-        offset = points - self.corners[facet, 0]
+    def local(self, facet: NDArray[np.intp], points: Array) -> Array:
+        """Return the coordinates of points on the unit triangle or square, shape (n, 2).
+
+        Args:
+            facet: The facet of each point, shape (n,).
+            points: Points in the plane, shape (n, 2) [mm].
+        """
+        corners = self.corners
+        edges = np.swapaxes(corners[:, 1:3] - corners[:, :1], 1, 2)
+        offset = points - corners[facet, 0]
         s = np.einsum("nij,nj->ni", np.linalg.inv(edges)[facet], offset)
+        if corners.shape[1] == 3:
+            return s
+        twist = corners[:, 0] - corners[:, 1] - corners[:, 2] + corners[:, 3]
+        bent = (np.abs(twist).max(axis=1) > _BENT * np.abs(edges).max(axis=(1, 2)))[facet]
+        edges, twist = edges[facet[bent]], twist[facet[bent]]
+        for _ in range(_BILINEAR_STEPS if bent.any() else 0):
+            at = s[bent]
+            miss = np.einsum("nij,nj->ni", edges, at) + twist * at.prod(axis=1)[:, None]
+            slope = edges + twist[:, :, None] * at[:, None, ::-1]
+            s[bent] = at - np.linalg.solve(slope, (miss - offset[bent])[..., None])[..., 0]
+        return s
+
+    def pull_back(self, facet: NDArray[np.intp], local: Array) -> Array:
+        """Map coordinates (n, 2) on given facets (n,) to the reference cell, (n, 3)."""
         start, ends = self.reference[:, 0], self.reference[:, 1:3] - self.reference[:, :1]
-        return start[facet] + np.einsum("nk,nkj->nj", s, ends[facet])
+        return start[facet] + np.einsum("nk,nkj->nj", local, ends[facet])
+
+    def depths(self, facet: NDArray[np.intp], local: Array) -> Array:
+        """Return depths below the plane at coordinates (n, 2) on given facets, shape (n,) [mm]."""
+        s, t = local.T
+        weights = [1.0 - s - t, s, t]
+        if self.corners.shape[1] == 4:
+            weights = [(1.0 - s) * (1.0 - t), s * (1.0 - t), (1.0 - s) * t, s * t]
+        return np.einsum("kn,nk->n", np.array(weights), self.depth[facet])
 
 
 def facet_quadrature(
-    block: BlockMesh, space: Any, patches: PatchGrid, *, degree: int
+    facets: ContactFacets, space: Any, patches: PatchGrid, *, degree: int
 ) -> FacetQuadrature:
-    """Place quadrature points on the part of the block's top that the patches cover.
+    """Place quadrature points on the part of a contact face that the patches cover.
 
     Every facet is cut into triangles along the borders of the patches, so that integrals over a
     patch are exact for polynomials of the degree also where a border runs through elements.
 
     Args:
-        block: Mesh of the block.
-        space: Displacements on it.
-        patches: Patches on its top.
+        facets: Facets of the face.
+        space: Displacements on their mesh.
+        patches: Patches on the face, in its frame.
         degree: Polynomial degree that is integrated exactly.
     """
-    cell_name = block.mesh.topology.cell_name()
-    facets = top_facets(block)
     triangles, facet = _cut_into_patches(*_triangles(facets.corners), patches)
     patch = patches.index_of(*triangles.mean(axis=1).T)
     order = np.argsort(patch, kind="stable")
@@ -94,36 +135,63 @@ def facet_quadrature(
     edges = triangles[:, 1:] - triangles[:, :1]
     positions = (triangles[:, :1] + np.einsum("qk,nkj->nqj", points, edges)).reshape(-1, 2)
     facet, patch = np.repeat(facet, len(weights)), np.repeat(patch, len(weights))
+    local = facets.local(facet, positions)
     return FacetQuadrature(
         x=positions[:, 0],
         y=positions[:, 1],
+        depth=facets.depths(facet, local),
         weight=np.multiply.outer(2.0 * triangle_areas(triangles), weights).ravel(),
         patch=patch,
         cell=facets.cell[facet],
         nodes=compat.cell_nodes(space)[facets.cell[facet]],
         values=compat.lagrange_values(
-            cell_name, block.shape.degree, facets.pull_back(facet, positions)
+            space.mesh.topology.cell_name(),
+            compat.lagrange_degree(space),
+            facets.pull_back(facet, local),
         ),
     )
 
 
-def top_facets(block: BlockMesh) -> TopFacets:
-    """Return the facets of the top whose cells this rank owns; there may be none."""
-    topology = block.mesh.topology
+def contact_facets(
+    mesh: Any, facets: NDArray[np.int32], frame: FaceFrame, *, opposed: bool = False
+) -> ContactFacets:
+    """Return those of this rank's outer facets whose cells it owns; there may be none.
+
+    Args:
+        mesh: dolfinx mesh of tetrahedra or hexahedra.
+        facets: Rank-local facets of the contact face, shape (n,).
+        frame: Frame of the face.
+        opposed: Whether the frame is that of the face of another body, which this one is pressed
+            on: its normal points into this body.
+    """
+    side_of_body = -1.0 if opposed else 1.0
+    topology = mesh.topology
     topology.create_connectivity(2, 3)
     topology.create_connectivity(3, 2)
     cells_of, facets_of = topology.connectivity(2, 3), topology.connectivity(3, 2)
     vertices, shapes = compat.reference_facets(topology.cell_name())
-    facets = block.facet_tags.find(TOP)
     cell = cells_of.array[cells_of.offsets[facets]]  # an outer facet has one cell
     owned = cell < topology.index_map(3).size_local
     cell, facets = cell[owned], facets[owned]
     mates = facets_of.array.reshape(-1, len(shapes))[cell]
     side = np.argmax(mates == facets[:, None], axis=1)
     at = shapes[side]
-    rows = np.take_along_axis(compat.cell_vertices(block.mesh)[cell], at, axis=1)
-    corners = block.mesh.geometry.x[rows][..., :2]
-    return TopFacets(cell=cell, side=side, reference=vertices[at], corners=corners)
+    rows = np.take_along_axis(compat.cell_vertices(mesh)[cell], at, axis=1)
+    corners = mesh.geometry.x[rows]
+    return ContactFacets(
+        frame=frame,
+        outward=side_of_body * frame.normal,
+        cell=cell,
+        side=side,
+        reference=vertices[at],
+        corners=frame.in_plane(corners),
+        depth=-side_of_body * frame.height(corners),
+    )
+
+
+def top_facets(block: BlockMesh) -> ContactFacets:
+    """Return the facets of a block's top whose cells this rank owns; there may be none."""
+    return contact_facets(block.mesh, block.facet_tags.find(TOP), UPWARD)
 
 
 def _triangles(corners: Array) -> tuple[Array, NDArray[np.intp]]:

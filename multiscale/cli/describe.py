@@ -15,6 +15,7 @@ from geometry.errors import InputError
 from geometry.statistics import roughness
 from multiscale.cli.execution import scene_and_folder
 from multiscale.couplings.assembly import check_has_laws, load_finite_elements
+from multiscale.exports.export import export_texts, remove_exports
 from multiscale.laws.law_table import write_laws
 from multiscale.machine import cluster_nodes, large_object_comm
 from multiscale.output import terminal
@@ -28,7 +29,7 @@ from multiscale.run import Run
 from multiscale.scene.keys import Key, scene_keys
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
-from multiscale.storage import write_whole
+from multiscale.storage import write_text, write_whole
 
 
 def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -54,7 +55,9 @@ def _setup(scene: Scene, comm: Any) -> ProblemSetup:
 
 
 def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
-    """Tabulate the patch laws of a scene; write and draw them.
+    """Tabulate the patch laws of a scene; write and draw them, and export them when asked to.
+
+    Exports of earlier laws in the folder are removed.
 
     Args:
         choice: Parsed words of the command line.
@@ -75,8 +78,15 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         def write() -> list[Path]:
             from multiscale.output.figures import law_figure
 
+            exports: dict[str, str] = {}
+            for name in choice.export:
+                exports |= export_texts(table, name)
             laws = write_whole(folder / "laws.h5", lambda path: write_laws(path, table))
-            return [laws, write_figure(folder / "laws.png", law_figure(table))]
+            files = [laws, write_figure(folder / "laws.png", law_figure(table))]
+            remove_exports(folder)
+            for name, text in exports.items():
+                write_text(folder / name, text)
+            return files + [folder / name for name in {Path(path).parts[0]: 0 for path in exports}]
 
         terminal.show_files(comm, on_root(comm, write))
     for note in run.history().notes:

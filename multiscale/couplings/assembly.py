@@ -28,7 +28,7 @@ from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import Block
+    from macro import ElasticBody
 
 Array = NDArray[np.float64]
 
@@ -186,23 +186,23 @@ def assemble(setup: ProblemSetup, made: LawTable | MicroModel | None, comm: Any)
         return CondensedCoupling(made, patch_compliance(setup, comm))
     from macro import LawContactProblem
 
-    interface = embedding(setup, comm)
-    problem = LawContactProblem(interface.block, interface, made.laws, mode=mode)
-    return EmbeddedCoupling(problem, made, interface)
+    face = embedding(setup, comm)
+    problem = LawContactProblem(face, made.laws, mode=mode)
+    return EmbeddedCoupling(problem, made, face)
 
 
-def meshed_blocks(coupling: Coupling | None) -> list[Block]:
-    """Return the meshed blocks that a coupling solves its load steps on, the finest last.
+def meshed_blocks(coupling: Coupling | None) -> list[ElasticBody]:
+    """Return the meshed bodies that a coupling solves its load steps on, the finest last.
 
     Args:
         coupling: The coupling; None before it is made.
     """
     if isinstance(coupling, ReferenceCoupling | EmbeddedCoupling):
-        return coupling.blocks
+        return [*coupling.blocks]
     return []
 
 
-def free_blocks(blocks: list[Block]) -> None:
+def free_blocks(blocks: list[ElasticBody]) -> None:
     """Free blocks that nothing else refers to any more.
 
     PETSc keeps objects that Python drops until it is asked on their own communicator. Without this

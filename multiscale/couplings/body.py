@@ -38,7 +38,7 @@ from multiscale.setup.surface_and_block import block_material
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from geometry import BlockShape, PatchGrid
-    from macro import FaceCompliance, Interface
+    from macro import FaceCompliance, LoadedFace
     from macro.block import Sides
 
 Array = NDArray[np.float64]
@@ -254,8 +254,8 @@ def patch_displacements(setup: ProblemSetup, comm: Any, *, dense: bool) -> Displ
         return lambda pressures: np.asarray(pressures @ compliance.T)
     from macro import displacements_under
 
-    interface = embedding(setup, comm)
-    return lambda pressures: displacements_under(interface, pressures)
+    face = embedding(setup, comm)
+    return lambda pressures: displacements_under(face, pressures)
 
 
 def patch_compliance(setup: ProblemSetup, comm: Any) -> Array:
@@ -284,8 +284,8 @@ def patch_compliance(setup: ProblemSetup, comm: Any) -> Array:
     return cached("plain", key, compute, comm or MPI.COMM_SELF)["compliance"]
 
 
-def embedding(setup: ProblemSetup, comm: Any) -> Interface:
-    """Mesh and assemble the block of a scene, with its patches on top.
+def embedding(setup: ProblemSetup, comm: Any) -> LoadedFace:
+    """Mesh the block of a scene, and return the patches on its top.
 
     Args:
         setup: The problem set up from the scene.
@@ -296,8 +296,9 @@ def embedding(setup: ProblemSetup, comm: Any) -> Interface:
     """
     from mpi4py import MPI
 
-    from macro import Block, Interface, block_mesh
+    from macro import Block, LoadedFace, block_mesh
 
     section = setup.scene.block
     mesh = block_mesh(setup.shape, comm or MPI.COMM_SELF)
-    return Interface(Block(mesh, block_material(setup.scene), sides=section.sides), setup.patches)
+    block = Block(mesh, block_material(setup.scene), sides=section.sides)
+    return LoadedFace.of_block(block, setup.patches)

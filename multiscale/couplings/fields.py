@@ -27,7 +27,7 @@ from multiscale.loading.stepper import Coupling
 from multiscale.setup.problem import ProblemSetup
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import Interface
+    from macro import LoadedFace
 
 Array = NDArray[np.float64]
 
@@ -104,20 +104,20 @@ class FieldRecord:
         if isinstance(coupling, ReferenceCoupling):
             macro.write_rough_fields(path, coupling.finest, sorted(self.kept.items()))
             return
-        interface, fields = self.on_block(coupling, steps)
-        macro.write_fields(path, interface, fields)
+        face, fields = self.on_body(coupling, steps)
+        macro.write_fields(path, face, fields)
 
-    def on_block(
+    def on_body(
         self, coupling: Coupling | None, steps: Sequence[LoadStep]
-    ) -> tuple[Interface, Iterator[tuple[int, Array, Array]]]:
-        """Return the flat block, meshed where it was not yet, and its fields of the load steps.
+    ) -> tuple[LoadedFace, Iterator[tuple[int, Array, Array]]]:
+        """Return the flat body, meshed where it was not yet, and its fields of the load steps.
 
         Args:
             coupling: What found the load steps; not a reference.
             steps: The load steps.
 
         Returns:
-            The block with the parts of its face, and by load step its number, this rank's
+            The parts of the contact face of the body, and by load step its number, this rank's
             displacements [mm] and the pressures of the parts [MPa].
 
         Note:
@@ -126,15 +126,16 @@ class FieldRecord:
         kept = sorted(self.kept.items())
         if isinstance(coupling, EmbeddedCoupling):
             pressures = {step.step: step.patches.pressure_MPa for step in steps}
-            return coupling.interface, ((number, u, pressures[number]) for number, u in kept)
-        interface = replace(embedding(self._setup, self._comm), patches=self._parts(coupling))
+            fields = ((number, u, pressures[number]) for number, u in kept)
+            return coupling.face, fields
+        face = replace(embedding(self._setup, self._comm), patches=self._parts(coupling))
 
         def solved() -> Iterator[tuple[int, Array, Array]]:
             for number, pressure in kept:
-                found = interface.block.solve(interface.load(pressure))
-                yield number, found.x.array[: interface.block.owned_dofs].copy(), pressure
+                found = face.body.solve(face.load(pressure))
+                yield number, found.x.array[: face.body.owned_dofs].copy(), pressure
 
-        return interface, solved()
+        return face, solved()
 
     def _parts(self, coupling: Coupling | None) -> PatchGrid:
         """Return the parts of the contact face: facets of the mesh where contacts are known."""

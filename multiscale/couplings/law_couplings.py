@@ -20,7 +20,7 @@ from multiscale.loading.stepper import BeyondLaws
 from multiscale.storage import Arrays, packed, unpacked
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import Block, Interface, LawContactProblem, LawContactState
+    from macro import ElasticBody, LawContactProblem, LawContactState, LoadedFace
 
 Array = NDArray[np.float64]
 
@@ -36,19 +36,19 @@ class EmbeddedCoupling:
     """Patch laws on the flat interface of an elastic block (Waddad et al. 2016, section 3.2).
 
     Args:
-        problem: The block with the laws on its interface.
+        problem: The body with the laws on its contact face.
         table: The laws, which also give contact area, contacts and separation.
-        interface: The interface of the block.
+        face: The patches on its contact face.
     """
 
-    def __init__(self, problem: LawContactProblem, table: LawTable, interface: Interface) -> None:
-        self._problem, self._table, self.interface = problem, table, interface
+    def __init__(self, problem: LawContactProblem, table: LawTable, face: LoadedFace) -> None:
+        self._problem, self._table, self.face = problem, table, face
         self._last: LawContactState | None = None
 
     @property
-    def blocks(self) -> list[Block]:
-        """The block, as a list of one."""
-        return [self.interface.block]
+    def blocks(self) -> list[ElasticBody]:
+        """The body, as a list of one."""
+        return [self.face.body]
 
     @property
     def displacement(self) -> Array:
@@ -105,7 +105,7 @@ class EmbeddedCoupling:
         mean_closures = zip(laws, state.closure, strict=True)
         contacts = [law.at(closure, extend=True).contacts for law, closure in mean_closures]
         return LoadStep.of_patches(
-            self._table.patches,
+            self._table.grid,
             plane=(state.approach, *state.tilt),
             load=(state.force, *state.moment),
             closure=state.closure,
@@ -150,7 +150,7 @@ class FreePlaneCoupling:
         Raises:
             NotConverged: Also when the laws were made for another macro model.
         """
-        path, patches = self._path, self._table.patches
+        path, patches = self._path, self._table.grid
         approach, evaluations = control.approach, 0
         if approach is None:
             approach, evaluations = path.approach_under(control.force or 0.0, self._force)
@@ -190,13 +190,13 @@ class FreePlaneCoupling:
         if self._approach is None:
             return None, 0
         rates = self._along(self._approach).dpressure
-        return self._table.patches.area * float(rates.sum()), 0
+        return self._table.grid.area * float(rates.sum()), 0
 
     def _force(self, approach: float) -> float:
-        return self._table.patches.area * float(self._along(approach).pressure.sum())
+        return self._table.grid.area * float(self._along(approach).pressure.sum())
 
     def _along(self, approach: float) -> LawPoint:
-        return self._laws.along(np.full(self._table.patches.count, approach))
+        return self._laws.along(np.full(self._table.grid.count, approach))
 
 
 def beyond_law(

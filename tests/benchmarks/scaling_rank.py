@@ -22,7 +22,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from geometry import BlockShape, PatchGrid
-from macro import Block, Interface, Material, block_mesh
+from macro import Block, LoadedFace, Material, block_mesh
 from macro.linear_solvers.options import PREFIX
 
 COMM = MPI.COMM_WORLD
@@ -147,7 +147,7 @@ class Counts:
 def loaded(block: Block) -> PETSc.Vec:
     """Return the load of a patch amid the interface."""
     patches = PatchGrid(grid=(4, 4), lengths=block.mesh.shape.interface)
-    return Interface(block, patches).load(np.eye(16)[5])
+    return LoadedFace.of_block(block, patches).load(np.eye(16)[5])
 
 
 def measure(sizes: dict) -> dict:

@@ -32,7 +32,7 @@ def run(case, mode):
     """Press a block and return what must not depend on the number of ranks."""
     shape, grid = SHAPES[case]
     interface = interface_of(block_of(comm=COMM, **shape), grid)
-    pressed = LawContactProblem(interface.block, interface, uneven_laws(np.prod(grid)), mode)
+    pressed = LawContactProblem(interface, uneven_laws(np.prod(grid)), mode)
     states = [
         pressed.solve(Control(approach=approach, tilt=(1e-3, 5e-4))) for approach in (4e-3, 8e-3)
     ]
@@ -87,17 +87,13 @@ def fail_in_law(mode):
     shape, grid = SHAPES["one facet"]
     interface = interface_of(block_of(comm=COMM, **shape), grid)
     laws = [*uneven_laws(3), RefusingLaw(1.0)]
-    return error_of(
-        lambda: LawContactProblem(interface.block, interface, laws, mode).solve(
-            Control(approach=1e-3)
-        )
-    )
+    return error_of(lambda: LawContactProblem(interface, laws, mode).solve(Control(approach=1e-3)))
 
 
 def fail_to_converge():
     """Return the error that every rank meets when Newton's method may take one step only."""
     interface = interface_of(block_of(comm=COMM), (2, 2))
-    pressed = LawContactProblem(interface.block, interface, uneven_laws(4))
+    pressed = LawContactProblem(interface, uneven_laws(4))
     pressed.newton.snes.setTolerances(max_it=1)
     return error_of(lambda: pressed.solve(Control(approach=8e-3)))
 
@@ -107,7 +103,7 @@ def fail_to_hold(mode):
     shape, grid = SHAPES["one facet"]
     interface = interface_of(block_of(comm=COMM, **shape), grid)
     laws = [*[PowerLaw(3e4, touch=np.inf)] * 2, *uneven_laws(2)]
-    pressed = LawContactProblem(interface.block, interface, laws, mode)
+    pressed = LawContactProblem(interface, laws, mode)
     return error_of(lambda: pressed.solve(Control(force=1.0, tilt=None)))
 
 

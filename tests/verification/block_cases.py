@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid
-from macro import Block, Interface, Material, block_mesh
+from macro import Block, LoadedFace, Material, block_mesh
 
 
 @dataclass(frozen=True)
@@ -41,4 +41,4 @@ def block_of(sides="free", young_modulus=4000.0, poisson_ratio=0.15, comm=MPI.CO
 
 def interface_of(block, grid):
     """Put patches over the whole interface of a block."""
-    return Interface(block, PatchGrid(grid=grid, lengths=block.mesh.shape.interface))
+    return LoadedFace.of_block(block, PatchGrid(grid=grid, lengths=block.mesh.shape.interface))

@@ -22,7 +22,7 @@ CONTROLS = {
 @pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2"])
 def test_bottom_bears_the_force_of_the_interface(mode, element):
     interface = interface_of(block_of(element=element, cells=(4, 4, 3)), (2, 3))
-    pressed = LawContactProblem(interface.block, interface, uneven_laws(6), mode)
+    pressed = LawContactProblem(interface, uneven_laws(6), mode)
     for approach in (2e-3, 8e-3):
         state = pressed.solve(Control(approach=approach, tilt=(1e-3, -2e-3)))
         assert state.force > 0.0
@@ -38,7 +38,7 @@ def test_confined_block_under_one_law_solves_a_scalar_equation(mode):
     block = block_of("roller", height=0.6, cells=(4, 5, 3))
     law = PowerLaw(2e5, touch=1e-3)
     interface = interface_of(block, (3, 2))  # borders cut elements: nothing may change
-    state = LawContactProblem(block, interface, [law] * 6, mode).solve(Control(approach=9e-3))
+    state = LawContactProblem(interface, [law] * 6, mode).solve(Control(approach=9e-3))
     stiffness = block.material.confined_modulus / 0.6
     pressure = brentq(lambda p: law.pressure(9e-3 - p / stiffness) - p, 0.0, 100.0, xtol=1e-13)
     # uniform strain is exact; what is left is the tolerance of Newton's method
@@ -50,7 +50,7 @@ def test_pointwise_and_patchwise_agree_where_the_closure_is_uniform():
     block = block_of("roller", cells=(3, 3, 2))
     interface = interface_of(block, (1, 1))
     states = [
-        LawContactProblem(block, interface, [PowerLaw(1e5)], m).solve(Control(approach=6e-3))
+        LawContactProblem(interface, [PowerLaw(1e5)], m).solve(Control(approach=6e-3))
         for m in MODES
     ]
     assert states[0].force == pytest.approx(states[1].force, rel=1e-9)  # Newton's tolerance
@@ -61,8 +61,8 @@ def test_pointwise_and_patchwise_agree_where_the_closure_is_uniform():
 def test_tangent_is_the_derivative_of_the_residual(mode, control):
     interface = interface_of(block_of(element="P2", cells=(3, 3, 2)), (2, 2))
     laws = [PowerLaw(3e4 * (i + 1), touch=1e-4 * i) for i in range(4)]
-    pressed = LawContactProblem(interface.block, interface, laws, mode)
-    at = interface.block.stiffness.createVecRight()
+    pressed = LawContactProblem(interface, laws, mode)
+    at = interface.body.stiffness.createVecRight()
     at.array[:] = pressed.solve(control).displacement
     equations = pressed.equilibrium
     direction, ahead, behind, product = (at.duplicate() for _ in range(4))
@@ -72,7 +72,7 @@ def test_tangent_is_the_derivative_of_the_residual(mode, control):
     equations.residual(at - step * direction, behind)
     equations.update_tangent(at)
     equations.tangent.mult(direction, product)
-    interface.block.stiffness.mult(direction, at)
+    interface.body.stiffness.mult(direction, at)
     numerical = (ahead.array - behind.array) / (2.0 * step) - at.array
     analytic = product.array - at.array  # the laws' part alone, or K would hide it
     assert np.abs(analytic).max() > 1e-3
@@ -86,7 +86,7 @@ def test_newton_ends_quadratically(mode, control):
     options["ksp_rtol"], options["snes_rtol"] = 1e-13, 1e-11
     try:
         interface = interface_of(block_of(cells=(6, 6, 4)), (3, 3))
-        pressed = LawContactProblem(interface.block, interface, uneven_laws(9, k=2e5), mode)
+        pressed = LawContactProblem(interface, uneven_laws(9, k=2e5), mode)
         residuals = pressed.solve(control).residuals
     finally:
         options.delValue("ksp_rtol"), options.delValue("snes_rtol")
@@ -102,18 +102,18 @@ def test_newton_ends_quadratically(mode, control):
 def test_default_tolerances_take_few_steps_and_give_the_same_answer(mode):
     interface = interface_of(block_of(cells=(8, 8, 5)), (4, 4))
     laws = uneven_laws(16)
-    pressed = LawContactProblem(interface.block, interface, laws, mode)
+    pressed = LawContactProblem(interface, laws, mode)
     states = [pressed.solve(Control(approach=1e-3 * k)) for k in range(1, 9)]
     assert max(state.newton_iterations for state in states) <= 6
     assert all(state.residuals[-1] <= 1e-9 for state in states)
-    alone = LawContactProblem(interface.block, interface, laws, mode).solve(Control(approach=8e-3))
+    alone = LawContactProblem(interface, laws, mode).solve(Control(approach=8e-3))
     # the answer does not depend on the path: laws without hysteresis, residuals below 1e-9
     np.testing.assert_allclose(states[-1].pressure, alone.pressure, rtol=1e-8)
 
 
 def test_unloading_opens_the_interface_again():
     interface = interface_of(block_of(cells=(4, 4, 3)), (2, 2))
-    pressed = LawContactProblem(interface.block, interface, [PowerLaw(3e4, touch=1e-3)] * 4)
+    pressed = LawContactProblem(interface, [PowerLaw(3e4, touch=1e-3)] * 4)
     forces = [
         pressed.solve(Control(approach=approach)).force for approach in (2e-3, 6e-3, 2e-3, 5e-4)
     ]
@@ -123,20 +123,18 @@ def test_unloading_opens_the_interface_again():
 
 def test_known_solutions_make_further_load_steps_free():
     interface = interface_of(block_of(cells=(4, 4, 3)), (1, 1))
-    pressed = LawContactProblem(interface.block, interface, [PowerLaw(3e4)])
+    pressed = LawContactProblem(interface, [PowerLaw(3e4)])
     first, second = pressed.solve(Control(approach=2e-3)), pressed.solve(Control(approach=7e-3))
     # one patch: every solution is a multiple of the first, up to the tolerance of its solve
     assert second.linear_iterations < first.linear_iterations // 4
-    other = LawContactProblem(interface.block, interface, [PowerLaw(3e4)]).solve(
-        Control(approach=7e-3)
-    )
+    other = LawContactProblem(interface, [PowerLaw(3e4)]).solve(Control(approach=7e-3))
     assert second.force == pytest.approx(other.force, rel=1e-9)
 
 
 @pytest.mark.parametrize("mode", MODES)
 def test_nearly_rigid_laws_still_converge(mode):
     interface = interface_of(block_of(cells=(6, 6, 4)), (3, 3))
-    pressed = LawContactProblem(interface.block, interface, uneven_laws(9, k=3e8), mode)
+    pressed = LawContactProblem(interface, uneven_laws(9, k=3e8), mode)
     for approach in (2e-3, 4e-3, 8e-3):
         state = pressed.solve(Control(approach=approach))
     # what a rigid plane would do: closures stay at the touch, 4 orders stiffer than the block
@@ -149,7 +147,7 @@ def test_patchwise_pressures_solve_the_condensed_problem():
     from scipy.optimize import root
 
     interface = interface_of(block_of(cells=(5, 5, 3)), (2, 3))
-    block, laws = interface.block, uneven_laws(6)
+    block, laws = interface.body, uneven_laws(6)
     compliance = []
     for unit in np.eye(6):
         load = interface.load(unit)
@@ -162,7 +160,5 @@ def test_patchwise_pressures_solve_the_condensed_problem():
         return p - [law.pressure(c) for law, c in zip(laws, closure, strict=True)]
 
     expected = root(mismatch, np.zeros(6), tol=1e-13).x
-    state = LawContactProblem(block, interface, laws).solve(
-        Control(approach=8e-3, tilt=(1e-3, 2e-3))
-    )
+    state = LawContactProblem(interface, laws).solve(Control(approach=8e-3, tilt=(1e-3, 2e-3)))
     np.testing.assert_allclose(state.pressure, expected, rtol=1e-8)  # two solves of 1e-9

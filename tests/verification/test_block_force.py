@@ -9,7 +9,7 @@ from scipy.optimize import brentq, root
 from geometry.errors import NotConverged
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
-from macro import Interface, LawContactProblem
+from macro import LawContactProblem, LoadedFace
 
 MODES = ["patchwise", "pointwise"]
 HALF = 0.5 * np.sqrt(2.0)
@@ -18,14 +18,14 @@ TILTS = {"level": (0.0, 0.0), "tilted": (3e-3, -2e-3), "free": None}
 
 def uneven_block(mode, grid=(3, 3), **given):
     interface = interface_of(block_of(cells=(6, 6, 4)), grid)
-    return LawContactProblem(interface.block, interface, uneven_laws(np.prod(grid), **given), mode)
+    return LawContactProblem(interface, uneven_laws(np.prod(grid), **given), mode)
 
 
 @pytest.mark.parametrize("mode", MODES)
 def test_column_under_a_force_has_a_closed_form(mode):
     block = block_of("roller", height=0.6, cells=(4, 5, 3))
     interface = interface_of(block, (3, 2))
-    pressed = LawContactProblem(block, interface, [PowerLaw(2e5, touch=1e-3)] * 6, mode)
+    pressed = LawContactProblem(interface, [PowerLaw(2e5, touch=1e-3)] * 6, mode)
     stiffness = block.material.confined_modulus / 0.6
     for force in (3.0, 40.0, 1e-3):
         for tilt in ((0.0, 0.0), None):
@@ -119,7 +119,7 @@ def test_one_patch_under_a_force_is_one_linear_solve():
     options = PETSc.Options("patchlaw_")
     options["ksp_rtol"] = 1e-12
     try:
-        pressed = LawContactProblem(interface.block, interface, [PowerLaw(3e4)])
+        pressed = LawContactProblem(interface, [PowerLaw(3e4)])
     finally:
         options.delValue("ksp_rtol")
     state = pressed.solve(Control(force=3.0))
@@ -144,7 +144,7 @@ def test_a_force_takes_no_more_than_an_approach(mode):
 def test_what_nothing_holds_is_told_and_changes_nothing():
     interface = interface_of(block_of(cells=(4, 4, 3)), (2, 2))
     right = [PowerLaw(3e4, touch=np.inf)] * 2 + [PowerLaw(3e4), PowerLaw(6e4)]
-    pressed = LawContactProblem(interface.block, interface, right)
+    pressed = LawContactProblem(interface, right)
     before = pressed.solve(Control(force=2.0))
     known = len(pressed.basis)
     with pytest.raises(NotConverged, match=r"NO_SUPPORT .*prescribe its tilt \(load.tilt\)"):
@@ -155,7 +155,7 @@ def test_what_nothing_holds_is_told_and_changes_nothing():
         before.closure,  # still of the latest equilibrium
     )
     assert pressed.solve(Control(force=2.0)).approach == pytest.approx(before.approach, rel=1e-9)
-    nothing = LawContactProblem(interface.block, interface, [PowerLaw(3e4, touch=np.inf)] * 4)
+    nothing = LawContactProblem(interface, [PowerLaw(3e4, touch=np.inf)] * 4)
     for force in (1.0, 0.0):
         with pytest.raises(NotConverged, match="NO_CONTACT"):
             nothing.solve(Control(force=force))
@@ -164,9 +164,7 @@ def test_what_nothing_holds_is_told_and_changes_nothing():
 def test_free_plane_at_an_approach_swings_clear_of_what_lies_on_one_side():
     interface = interface_of(block_of(cells=(4, 4, 3)), (2, 1))
     right = [PowerLaw(3e4, touch=np.inf), PowerLaw(3e4)]
-    state = LawContactProblem(interface.block, interface, right).solve(
-        Control(approach=4e-3, tilt=None)
-    )
+    state = LawContactProblem(interface, right).solve(Control(approach=4e-3, tilt=None))
     assert (state.force, state.approach) == (0.0, 4e-3)
     assert state.tilt[0] <= -4e-3 / 0.25  # down to the patch's touch at its centre
 
@@ -174,6 +172,8 @@ def test_free_plane_at_an_approach_swings_clear_of_what_lies_on_one_side():
 def test_moments_are_about_the_middle_of_the_patches():
     """Patches on a part of the top: their own middle counts."""
     block = block_of(cells=(4, 4, 3))
-    interface = Interface(block, PatchGrid(grid=(1, 1), lengths=(0.5, 0.5), origin=(0.5, 0.0)))
-    state = LawContactProblem(block, interface, [PowerLaw(3e4)]).solve(Control(force=1.0))
+    interface = LoadedFace.of_block(
+        block, PatchGrid(grid=(1, 1), lengths=(0.5, 0.5), origin=(0.5, 0.0))
+    )
+    state = LawContactProblem(interface, [PowerLaw(3e4)]).solve(Control(force=1.0))
     np.testing.assert_allclose(state.moment, 0.0, atol=1e-15)

@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from geometry import BlockShape, PatchGrid
-from macro import Block, Interface, Material, block_mesh, patch_compliance_matrix
+from macro import Block, LoadedFace, Material, block_mesh, patch_compliance_matrix
 from micro import FreeSides
 from multiscale.couplings.body import Body
 
@@ -32,7 +32,7 @@ def test_block_sinks_as_quadratic_elements_do(margin):
     whole = body(shape, known=not margin).patch_compliance(patches, COMM)
     mesh = block_mesh(replace(shape, element="Q2"), COMM)
     plain = Block(mesh, Material(young_modulus=1.0, poisson_ratio=0.15))
-    interface = Interface(plain, patches)
+    interface = LoadedFace.of_block(plain, patches)
     load = interface.load(np.ones(16))
     load.array[:] = plain.solve(load).x.array[: plain.owned_dofs]
     sunk = interface.patch_displacements(load).mean()
@@ -45,7 +45,7 @@ def test_single_patches_are_the_limit_of_quadratic_elements():
     patches = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
     whole = body(shape, nu=0.3).patch_compliance(patches, COMM)
     block = Block(block_mesh(shape, COMM), Material(young_modulus=1.0, poisson_ratio=0.3))
-    found = patch_compliance_matrix(Interface(block, patches))
+    found = patch_compliance_matrix(LoadedFace.of_block(block, patches))
     # elements are stiff below a patch's own edges: 0.33 % here, 0.16 % with 16, 16, 8
     assert np.all(np.diag(found) < np.diag(whole))
     np.testing.assert_allclose(found, whole, atol=0.005 * whole.max())

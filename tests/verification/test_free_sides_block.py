@@ -19,7 +19,7 @@ from geometry import (
     characteristic_size,
     reference_shapes,
 )
-from macro import Block, Interface, UnilateralContactProblem, block_mesh, rough_block_mesh
+from macro import Block, LoadedFace, UnilateralContactProblem, block_mesh, rough_block_mesh
 from micro import FreeSides
 from multiscale.results.extrapolation import extrapolated
 
@@ -43,11 +43,11 @@ def test_what_is_left_beside_a_side_is_smooth():
         growth=0.3,
         element="P2",
     )
-    interface = Interface(Block(block_mesh(shape, COMM), MATERIAL), patches)
+    interface = LoadedFace.of_block(Block(block_mesh(shape, COMM), MATERIAL), patches)
     pressure = np.zeros(patches.count)
     pressure[index] = 1.0
-    nodes = interface.block.space.tabulate_dof_coordinates()
-    down = -interface.block.solve(interface.load(pressure)).x.array.reshape(-1, 3)[:, 2]
+    nodes = interface.body.space.tabulate_dof_coordinates()
+    down = -interface.body.solve(interface.load(pressure)).x.array.reshape(-1, 3)[:, 2]
     at = (np.abs(nodes[:, 2]) < 1e-9) & (np.abs(nodes[:, 1] - square.centres[0, 1]) < 0.01)
     at &= (nodes[:, 0] > 1e-3) & (nodes[:, 0] < 0.06)
     x, y, _ = nodes[at].T

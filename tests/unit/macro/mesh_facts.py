@@ -3,7 +3,7 @@
 import numpy as np
 
 from geometry import PatchGrid
-from macro import BOTTOM, SIDES, TOP, Block, Interface, Material, compat
+from macro import BOTTOM, SIDES, TOP, Block, LoadedFace, Material, compat
 
 
 def cells_of(block):
@@ -31,7 +31,7 @@ def measures_of(block):
     cells = cells_of(block)
     elastic = Block(block, Material(young_modulus=4000.0, poisson_ratio=0.3), "roller")
     patches = PatchGrid(grid=(2, 2), lengths=block.shape.interface)
-    interface = Interface(elastic, patches)
+    interface = LoadedFace.of_block(elastic, patches)
     load = interface.load(np.array([1.0, 2.0, 3.0, 4.0]))
     found = load.duplicate()
     elastic.solver.solve(load, found)

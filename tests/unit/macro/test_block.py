@@ -7,7 +7,7 @@ from mpi4py import MPI
 from geometry.errors import InputError, NotConverged
 from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid
-from macro import Block, Interface, Material, block_mesh
+from macro import Block, LoadedFace, Material, block_mesh
 
 STEEL = Material(young_modulus=2e5, poisson_ratio=0.3)
 
@@ -33,7 +33,7 @@ def test_dofs_of_a_grid():
 @pytest.mark.parametrize("sides", ["free", "roller"])
 def test_supports_hold(sides):
     block = make(sides, margin=0.5, margin_cells=1, cells=(2, 2, 2))
-    interface = Interface(block, PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)))
+    interface = LoadedFace.of_block(block, PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)))
     u = block.solve(interface.load(np.array([100.0]))).x.array.reshape(-1, 3)
     x, y, z = block.space.tabulate_dof_coordinates().T
     assert np.abs(u[np.isclose(z, -1.0)]).max() == 0.0
@@ -47,7 +47,7 @@ def test_supports_hold(sides):
 
 def test_displacement_is_linear_in_the_load():
     block = make()
-    interface = Interface(block, PatchGrid(grid=(2, 2), lengths=(1.0, 1.0)))
+    interface = LoadedFace.of_block(block, PatchGrid(grid=(2, 2), lengths=(1.0, 1.0)))
     one, other = np.array([1.0, 0, 0, 2.0]), np.array([0.0, 3.0, -1.0, 0])
     parts = [block.solve(interface.load(p)).x.array for p in (one, other, one + other)]
     # the linear solver's 1e-10

@@ -10,7 +10,7 @@ from geometry import Control, PatchGrid, RefinedShape, Surface
 from geometry.meshes.block import BlockShape
 from macro import (
     Block,
-    Interface,
+    LoadedFace,
     Material,
     UnilateralContactProblem,
     block_mesh,
@@ -70,7 +70,7 @@ def flat_block(cells=(3, 2, 2), **options):
 def test_all_fields_of_a_load_step_are_on_one_grid(tmp_path):
     """ParaView shows stresses on the deformed block, step by step."""
     block = flat_block()
-    interface = Interface(block, PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)))
+    interface = LoadedFace.of_block(block, PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)))
     given = [(number, np.full(block.owned_dofs, 1.0 * number), np.ones(1)) for number in (2, 5)]
     write_fields(tmp_path / "fields.xdmf", interface, iter(given))
     domain = ElementTree.parse(tmp_path / "fields.xdmf").getroot()[0]
@@ -96,7 +96,7 @@ def test_stresses_below_a_hertz_contact():
     place = (np.arange(fine) + 0.5) / fine - 0.5
     pressure = np.sqrt(np.maximum(1.0 - (place[:, None] ** 2 + place**2) / radius**2, 0.0))
     parts = PatchGrid(grid=(cells, cells), lengths=(1.0, 1.0))
-    interface = Interface(block, parts)
+    interface = LoadedFace.of_block(block, parts)
     loads = pressure.reshape(cells, 3, cells, 3).mean(axis=(1, 3)).ravel()
     found = cell_stresses(block, block.solve(interface.load(loads)))
     middles = block.mesh.mesh.geometry.x[compat.cell_vertices(block.mesh.mesh)].mean(axis=1)

@@ -32,7 +32,7 @@ def at_points(found, state):
     """Return depths and pressures of the quadrature points."""
     method, displacement = found.method, found.block.stiffness.createVecRight()
     displacement.array[:] = state.displacement
-    closure = method.equilibrium.closure(displacement)
+    closure = method.equilibrium.forces.closure(displacement)
     return closure - method.law.distance, method.law.pressure(closure)
 
 

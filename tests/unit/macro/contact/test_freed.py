@@ -9,7 +9,7 @@ from geometry import Control, PatchGrid, Spectrum, synthesise
 from geometry.meshes.block import BlockShape
 from macro import (
     Block,
-    Interface,
+    LoadedFace,
     Material,
     UnilateralContactProblem,
     block_mesh,
@@ -80,7 +80,7 @@ def test_a_compliance_keeps_no_fields_of_its_patches(kept):
     block = Block(block_mesh(SHAPE, MPI.COMM_SELF), MATERIAL)
     found = []
     for grid in ((1, 1), (4, 4)):
-        interface = Interface(block, PatchGrid(grid=grid, lengths=(1.0, 1.0)))
+        interface = LoadedFace.of_block(block, PatchGrid(grid=grid, lengths=(1.0, 1.0)))
         patch_compliance_matrix(interface)
         found.append(kept(block.stiffness.comm))
     assert found[1] <= found[0]
@@ -88,7 +88,7 @@ def test_a_compliance_keeps_no_fields_of_its_patches(kept):
 
 def test_displacements_keep_no_fields_of_their_load_steps(kept):
     block = Block(block_mesh(SHAPE, MPI.COMM_SELF), MATERIAL)
-    interface = Interface(block, PatchGrid(grid=(2, 1), lengths=(1.0, 1.0)))
+    interface = LoadedFace.of_block(block, PatchGrid(grid=(2, 1), lengths=(1.0, 1.0)))
     found = []
     for count in (1, 8):
         assert (displacements_under(interface, np.ones((count, 2))) > 0.0).all()

@@ -13,7 +13,7 @@ from geometry.errors import InputError, NotConverged
 from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
-from macro import Block, Interface, LawContactProblem, Material, block_mesh, compat, write_fields
+from macro import Block, LawContactProblem, LoadedFace, Material, block_mesh, compat, write_fields
 from macro.contact.newton import DisplacementBasis
 
 
@@ -45,18 +45,16 @@ def interface():
     block = Block(
         block_mesh(shape, MPI.COMM_SELF), Material(young_modulus=4000.0, poisson_ratio=0.15)
     )
-    return Interface(block, PatchGrid(grid=(2, 2), lengths=(1.0, 1.0)))
+    return LoadedFace.of_block(block, PatchGrid(grid=(2, 2), lengths=(1.0, 1.0)))
 
 
 def test_every_patch_needs_a_law(interface):
     with pytest.raises(InputError, match=r"3: every patch needs a law \(allowed: 4\)"):
-        LawContactProblem(interface.block, interface, [Spring()] * 3)
+        LawContactProblem(interface, [Spring()] * 3)
 
 
 def test_open_interface_is_solved_at_once(interface):
-    state = LawContactProblem(interface.block, interface, [Spring(touch=1.0)] * 4).solve(
-        Control(approach=5e-3)
-    )
+    state = LawContactProblem(interface, [Spring(touch=1.0)] * 4).solve(Control(approach=5e-3))
     assert (state.newton_iterations, state.force, state.reaction) == (0, 0.0, 0.0)
     assert np.abs(state.displacement).max() == 0.0
     np.testing.assert_allclose(state.closure, 5e-3, rtol=1e-14)
@@ -65,14 +63,14 @@ def test_open_interface_is_solved_at_once(interface):
 
 @pytest.mark.parametrize("mode", ["patchwise", "pointwise"])
 def test_linear_laws_take_one_newton_step(interface, mode):
-    pressed = LawContactProblem(interface.block, interface, [Spring()] * 4, mode)
+    pressed = LawContactProblem(interface, [Spring()] * 4, mode)
     pressed.newton.snes.ksp.setTolerances(rtol=1e-12)
     pressed.newton.forcing = False
     assert pressed.solve(Control(approach=5e-3)).newton_iterations == 1
 
 
 def test_tilt_is_about_the_middle(interface):
-    press = LawContactProblem(interface.block, interface, [Spring()] * 4).solve
+    press = LawContactProblem(interface, [Spring()] * 4).solve
     level, tilted = press(Control(approach=5e-3)), press(Control(approach=5e-3, tilt=(2e-3, 0.0)))
     assert tilted.force == pytest.approx(level.force, rel=1e-7)  # exact for linear laws
     np.testing.assert_array_equal(tilted.pressure > level.pressure, [False, False, True, True])
@@ -80,7 +78,7 @@ def test_tilt_is_about_the_middle(interface):
 
 def test_failure_is_named_and_keeps_what_was_known(interface):
     laws = [Spring(k=1e3 * (i + 1), touch=1e-3 * i) for i in range(4)]
-    pressed = LawContactProblem(interface.block, interface, laws)
+    pressed = LawContactProblem(interface, laws)
     before = pressed.solve(Control(approach=2e-3))
     known = len(pressed.basis)
     pressed.newton.snes.setTolerances(max_it=1)
@@ -92,7 +90,7 @@ def test_failure_is_named_and_keeps_what_was_known(interface):
 
 
 def test_a_pressed_block_is_freed(interface):
-    pressed = LawContactProblem(interface.block, interface, [Spring()] * 4)
+    pressed = LawContactProblem(interface, [Spring()] * 4)
     pressed.solve(Control(approach=1e-3))
     gone = [weakref.ref(part) for part in (pressed, pressed.equilibrium, pressed.newton)]
     del pressed
@@ -102,13 +100,13 @@ def test_a_pressed_block_is_freed(interface):
 
 @pytest.mark.parametrize("law", [Spring(), Broken()])
 def test_the_block_alone_stays_what_it_is(interface, law):
-    pressed = LawContactProblem(interface.block, interface, [law] * 4)
+    pressed = LawContactProblem(interface, [law] * 4)
     if isinstance(law, Broken):
         with pytest.raises(NotConverged):
             pressed.solve(Control(approach=5e-3))
     else:
         pressed.solve(Control(approach=5e-3))
-    block, load = interface.block, interface.load(np.arange(4.0))
+    block, load = interface.body, interface.load(np.arange(4.0))
     found = block.stiffness.createVecRight()
     found.array[:] = block.solve(load.copy()).x.array
     missed = block.stiffness * found - load
@@ -118,14 +116,14 @@ def test_the_block_alone_stays_what_it_is(interface, law):
 
 def test_pressure_without_value_is_a_failure(interface):
     with pytest.raises(NotConverged, match="DIVERGED_F"):
-        LawContactProblem(interface.block, interface, [Broken()] * 4).solve(Control(approach=1e-3))
+        LawContactProblem(interface, [Broken()] * 4).solve(Control(approach=1e-3))
 
 
 def test_the_users_tolerances_win(interface):
     options = PETSc.Options("patchlaw_")
     options["snes_rtol"], options["ksp_rtol"] = 1e-4, 1e-3
     try:
-        pressed = LawContactProblem(interface.block, interface, [Spring()] * 4)
+        pressed = LawContactProblem(interface, [Spring()] * 4)
         state = pressed.solve(Control(approach=5e-3))
     finally:
         options.delValue("snes_rtol"), options.delValue("ksp_rtol")
@@ -134,11 +132,11 @@ def test_the_users_tolerances_win(interface):
 
 
 def test_basis_is_orthonormal_limited_and_ignores_what_it_knows(interface):
-    pressed = LawContactProblem(interface.block, interface, [Spring()] * 4)
+    pressed = LawContactProblem(interface, [Spring()] * 4)
     basis = DisplacementBasis(pressed.equilibrium, interface.patchwise, size=3)
     loads = [interface.load(pressures) for pressures in np.eye(4)]
     for load in (*loads, loads[-1]):
-        load.array[:] = interface.block.solve(load.copy()).x.array
+        load.array[:] = interface.body.solve(load.copy()).x.array
         basis.add(load)
         overlap = basis.vectors @ basis.forces.T
         np.testing.assert_allclose(overlap, np.eye(len(basis)), atol=1e-9)  # two passes
@@ -151,10 +149,8 @@ def test_fields_are_written_for_paraview(element, tmp_path):
     block = Block(
         block_mesh(shape, MPI.COMM_SELF), Material(young_modulus=4000.0, poisson_ratio=0.15)
     )
-    interface = Interface(block, PatchGrid(grid=(2, 1), lengths=(1.0, 1.0)))
-    state = LawContactProblem(block, interface, [Spring(), Spring(k=5e3)]).solve(
-        Control(approach=1e-3)
-    )
+    interface = LoadedFace.of_block(block, PatchGrid(grid=(2, 1), lengths=(1.0, 1.0)))
+    state = LawContactProblem(interface, [Spring(), Spring(k=5e3)]).solve(Control(approach=1e-3))
     step = (0, state.displacement, state.pressure)
     write_fields(tmp_path / "fields.xdmf", interface, [step])
     h5py = pytest.importorskip("h5py")
@@ -180,7 +176,7 @@ def test_fields_share_cells_that_borders_cut(element, tmp_path):
     block = Block(
         block_mesh(shape, MPI.COMM_SELF), Material(young_modulus=4000.0, poisson_ratio=0.15)
     )
-    interface = Interface(block, PatchGrid(grid=(3, 1), lengths=(1.0, 1.0)))
+    interface = LoadedFace.of_block(block, PatchGrid(grid=(3, 1), lengths=(1.0, 1.0)))
     given = np.array([3.0, 5.0, 8.0])
     step = (0, np.zeros(block.owned_dofs), given)
     write_fields(tmp_path / "fields.xdmf", interface, [step])

@@ -7,14 +7,14 @@ from mpi4py import MPI
 from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid
 from macro import block_mesh, compat
-from macro.mesh.contact_face import cut_triangles, facet_quadrature, triangle_areas
+from macro.mesh.contact_face import cut_triangles, facet_quadrature, top_facets, triangle_areas
 
 
 def points_on(patches, degree=2, **changes):
     shape = {"interface": (2.0, 1.0), "height": 0.4, "cells": (4, 3, 1)} | changes
     mesh = block_mesh(BlockShape(**shape), MPI.COMM_SELF)
     space = compat.vector_space(mesh.mesh, mesh.shape.degree)
-    return facet_quadrature(mesh, space, patches, degree=degree), space
+    return facet_quadrature(top_facets(mesh), space, patches, degree=degree), space
 
 
 @pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2"])

@@ -152,12 +152,12 @@ def test_fields_are_those_of_the_patch_pressures():
     fields = []
     for whole in (full, condensed):
         list(whole.load_steps())
-        interface, steps = whole.fields.on_block(whole.coupling, whole.steps)
+        interface, steps = whole.fields.on_body(whole.coupling, whole.steps)
         ((number, displacement, pressure),) = steps
         assert number == len(whole.steps)
         np.testing.assert_array_equal(pressure, whole.steps[-1].patches.pressure_MPa)
         fields.append(displacement)
-        assert interface.block.owned_dofs == displacement.size
+        assert interface.body.owned_dofs == displacement.size
     # linear solves to 1e-10 of the load
     np.testing.assert_allclose(fields[1], fields[0], atol=1e-8 * np.abs(fields[0]).max())
 

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from geometry.errors import InputError
 from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid
-from macro import Block, Interface, Material, block_mesh
+from macro import Block, LoadedFace, Material, block_mesh
 
 NODES = 1e-10  # gmsh places nodes to about 1e-11
 
@@ -18,15 +18,15 @@ def make(grid=(2, 3), lengths=(2.0, 1.0), origin=(0.0, 0.0), **changes):
     shape = {"interface": (2.0, 1.0), "height": 1.0, "cells": (4, 3, 2)} | changes
     mesh = block_mesh(BlockShape(**shape), MPI.COMM_SELF)
     block = Block(mesh, Material(young_modulus=1.0, poisson_ratio=0.3))
-    return Interface(block, PatchGrid(grid=grid, lengths=lengths, origin=origin))
+    return LoadedFace.of_block(block, PatchGrid(grid=grid, lengths=lengths, origin=origin))
 
 
 @pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2"])
 @pytest.mark.parametrize("grid", [(2, 3), (3, 2)])
 def test_linear_displacements_have_exact_means(element, grid):
     interface = make(grid, element=element, margin=0.5, margin_cells=1)
-    displacement = interface.block.stiffness.createVecRight()
-    x, y, _ = interface.block.space.tabulate_dof_coordinates().T
+    displacement = interface.body.stiffness.createVecRight()
+    x, y, _ = interface.body.space.tabulate_dof_coordinates().T
     displacement.array[2::3] = -(0.5 + 0.4 * x - 0.3 * y)  # downward
     expected = 0.5 + interface.patches.centres @ [0.4, -0.3]
     np.testing.assert_allclose(interface.patch_displacements(displacement), expected, rtol=NODES)
@@ -43,7 +43,7 @@ def test_load_has_the_force_and_moment_of_the_pressures():
     pressures = np.array([1.0, 0.0, 2.5, -1.0, 4.0, 3.0])
     load = interface.load(pressures).array.reshape(-1, 3)
     forces = pressures * interface.patches.area
-    places = interface.block.space.tabulate_dof_coordinates()[:, :2]
+    places = interface.body.space.tabulate_dof_coordinates()[:, :2]
     assert np.abs(load[:, :2]).max() == 0.0
     assert -load[:, 2].sum() == pytest.approx(forces.sum(), rel=NODES)
     np.testing.assert_allclose(-load[:, 2] @ places, forces @ interface.patches.centres, rtol=NODES)
@@ -52,7 +52,7 @@ def test_load_has_the_force_and_moment_of_the_pressures():
 def test_margin_is_free_of_traction():
     interface = make((1, 1), margin=1.0, margin_cells=3)
     load = interface.load(np.ones(1)).array.reshape(-1, 3)
-    x, y, _ = interface.block.space.tabulate_dof_coordinates()[load[:, 2] != 0.0].T
+    x, y, _ = interface.body.space.tabulate_dof_coordinates()[load[:, 2] != 0.0].T
     assert (x.min(), x.max(), y.min(), y.max()) == pytest.approx((0, 2, 0, 1), abs=1e-12)
 
 

@@ -1,0 +1,228 @@
+"""Forces of contact laws on a face under a rigid plane, and their exact derivative.
+
+Theory: section 11 of ``demos/theory.md``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from geometry.collective import together
+from geometry.plane_equilibrium import UNSUPPORTED, PlaneResponse, find_equilibrium
+from geometry.rigid_plane import Control, PlaneLevers, plane_failure
+from macro.contact.loaded_face import Loadable, Sampling
+
+Array = NDArray[np.float64]
+
+_FIRST, _FARTHEST = 1e-6, 1e3
+"""First and last approach that first touch is looked for at, in halves of the diagonal."""
+
+
+class ContactLaw(Protocol):
+    """Contact pressure p of a patch as a function of its closure c.
+
+    Closure is the approach of the plane minus the downward displacement of the block's surface
+    [mm]. Pressures are positive in compression [MPa], and the stiffness is dp/dc ≥ 0 [MPa/mm]. Both
+    must be defined for every closure, because Newton's iterates may leave the range of a tabulated
+    law: whoever tabulates laws extends them and checks the converged closures.
+    """
+
+    def pressure(self, closure: Array, /) -> Array:
+        """Return the pressures at closures of shape (n,)."""
+        ...
+
+    def stiffness(self, closure: Array, /) -> Array:
+        """Return the exact derivative of the pressures at closures of shape (n,)."""
+        ...
+
+
+class ContactForces:
+    """Nodal forces B p(c(u)) of contact laws on a face that a rigid plane is pressed on.
+
+    Closures are c = δ − g − Bᵀu / w, with the approach δ of the plane at the samples and the
+    macroscopic gap g. Free motions of the plane follow from the displacement s of the samples: the
+    force is the prescribed one, and there is no moment about the middle of the patches.
+
+    The forces are minus the gradient of a convex energy if no law softens: the minimum of the
+    energy over the motions of the plane is convex in s where the energy under a fixed plane is.
+    With the stiffness D of the laws, the areas W of the samples and their levers G, closures change
+    by G dq − ds, where (Gᵀ W D G) dq = Gᵀ W D ds. The derivative −B (diag(p'/w) − E Eᵀ) Bᵀ is
+    applied without being assembled: B has few columns (patches) or few rows with entries (nodes of
+    the interface), and E has a column for every free motion.
+
+    Args:
+        face: The contact face with its patches.
+        sampling: Where the laws are evaluated.
+        laws: One law per patch, the same on every rank.
+        gap: Macroscopic gap between plane and face at this rank's samples, shape (n,) [mm]; None:
+            the depth of the face below its plane.
+
+    Attributes:
+        levers: Levers of this rank's samples about the middle of the patches.
+        plane: Approach at the middle of the patches [mm] and slopes along x and y, shape (3,).
+        control: What the load step prescribes of the plane.
+
+    Note:
+        Every method is collective.
+    """
+
+    def __init__(
+        self,
+        face: Loadable,
+        sampling: Sampling,
+        laws: Sequence[ContactLaw],
+        gap: Array | None = None,
+    ) -> None:
+        self._sampling, self._comm = sampling, face.comm
+        self._pressures = [law.pressure for law in laws]
+        self._stiffnesses = [law.stiffness for law in laws]
+        patches = face.patches
+        self.levers = PlaneLevers.at(
+            sampling.x, sampling.y, patches.lengths, centre=patches.middle, comm=self._comm
+        )
+        self._gap = sampling.depth if gap is None else gap
+        self.plane: Array = np.zeros(3)
+        self.control = Control(approach=0.0)
+        self._slope: Array = np.zeros(len(sampling.weight))  # p'/w
+        self._border: Array = np.zeros((len(sampling.weight), 0))  # E
+
+    def prescribe(self, control: Control, plane: Array) -> None:
+        """Set what a load step prescribes; without any force the plane just touches the surface.
+
+        Args:
+            control: What a load step prescribes.
+            plane: Where the plane is now, shape (3,).
+
+        Raises:
+            NotConverged: When the plane should touch what cannot be touched.
+        """
+        self.control, self.plane = control, control.prescribed(plane)
+        if control.force == 0.0:
+            self.plane[0] = first_touch(self._touched, control, self.levers.half)
+
+    def closure(self, displacement: PETSc.Vec) -> Array:
+        """Bring the plane into equilibrium, and return this rank's closures, shape (n,) [mm]."""
+        return self.closure_of(self._sampling.displacements(displacement))
+
+    def closure_of(self, displacement: Array) -> Array:
+        """Bring the plane into equilibrium, and return the closures of this rank's samples.
+
+        Args:
+            displacement: Downward displacements of this rank's samples, shape (n,) [mm].
+
+        Returns:
+            Closures, shape (n,) [mm].
+
+        Raises:
+            NotConverged: When nothing can hold the plane.
+        """
+
+        def respond(plane: Array) -> PlaneResponse[Array]:
+            closure = self.levers.matrix @ plane - self._gap - displacement
+            weight = self._sampling.weight
+            return PlaneResponse(
+                loads=self.loads(self.pressure(closure)),
+                stiffness=lambda: self.levers.stiffness(weight * self.stiffness(closure)),
+                state=closure,
+            )
+
+        if not self.control.free.any():
+            return self.levers.matrix @ self.plane - self._gap - displacement
+        self.plane, closure = find_equilibrium(respond, self.control, self.plane, self.levers.half)
+        return closure
+
+    def write(self, displacement: PETSc.Vec, load: PETSc.Vec) -> None:
+        """Write the forces B p(c(u)) at a displacement u.
+
+        Args:
+            displacement: u [mm].
+            load: Receives the nodal forces [N].
+        """
+        samples = self._sampling.values
+        samples.array[:] = self.pressure(self.closure(displacement))
+        self._sampling.operator.mult(samples, load)
+
+    def update(self, displacement: PETSc.Vec) -> None:
+        """Move the derivative to a displacement."""
+        stiffness = self.stiffness(self.closure(displacement))
+        self._slope = stiffness / self._sampling.weight
+        self._border = self.border(stiffness)
+
+    def add_stiffness(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Add the product B (diag(p'/w) − E Eᵀ) Bᵀ x to y."""
+        operator, samples = self._sampling.operator, self._sampling.values
+        operator.multTranspose(x, samples)
+        stretch = samples.array_r
+        pressure = self._slope * stretch
+        if self._border.shape[1]:
+            pressure -= self._border @ self.levers.summed(self._border.T @ stretch)
+        samples.array[:] = pressure
+        operator.multAdd(samples, y, y)
+
+    def pressure(self, closure: Array) -> Array:
+        """Return the laws' pressures at this rank's samples, shape (n,) [MPa].
+
+        What a law raises on one rank is raised on all.
+        """
+        return together(self._comm, lambda: self._sampling.by_patch(self._pressures, closure))
+
+    def stiffness(self, closure: Array) -> Array:
+        """Return the laws' stiffnesses dp/dc likewise, shape (n,) [MPa/mm]."""
+        return together(self._comm, lambda: self._sampling.by_patch(self._stiffnesses, closure))
+
+    def loads(self, pressure: Array) -> Array:
+        """Return force and first moments about the middle of pressures, shape (3,) [N, N mm].
+
+        Args:
+            pressure: Pressures of this rank's samples, shape (n,) [MPa].
+        """
+        return self.levers.loads(self._sampling.weight * pressure)
+
+    def border(self, stiffness: Array) -> Array:
+        """Return E, shape (n, k'): free motions of the plane reduce D ds by E Eᵀ W ds.
+
+        Args:
+            stiffness: D of this rank's samples, shape (n,) [MPa/mm].
+        """
+        free, unit = self.control.free, self.levers.unit
+        columns = self.levers.scaled(free) * stiffness[:, None]
+        if not free.any():
+            return columns
+        resistance = self.levers.stiffness(self._sampling.weight * stiffness)
+        values, vectors = np.linalg.eigh((resistance * np.outer(unit, unit))[np.ix_(free, free)])
+        supported = values > UNSUPPORTED * max(values[-1], 0.0)
+        return columns @ (vectors[:, supported] / np.sqrt(values[supported]))
+
+    def _touched(self, approach: float) -> bool:
+        """Return whether the plane touches the undeformed block at an approach."""
+        closure = self.levers.matrix @ np.array([approach, *self.plane[1:]]) - self._gap
+        return float(self.loads(self.pressure(closure))[0]) > 0.0
+
+
+def first_touch(touched: Callable[[float], bool], control: Control, half: float) -> float:
+    """Find the largest approach at which a plane is not in contact yet [mm].
+
+    Args:
+        touched: Returns whether the plane is in contact at an approach.
+        control: What is prescribed of the plane, for an error.
+        half: Half the diagonal of the interface [mm].
+
+    Raises:
+        NotConverged: When it never is.
+    """
+    below, above, width = -_FIRST * half, _FIRST * half, np.inf
+    while touched(below):
+        below, above = 3.0 * below, below
+    while not touched(above):
+        below, above = above, 3.0 * above
+        if above > _FARTHEST * half:
+            raise plane_failure(control, "NO_CONTACT")
+    while 0.0 < above - below < width:  # to neighbouring numbers
+        width, middle = above - below, 0.5 * (below + above)
+        below, above = (below, middle) if touched(middle) else (middle, above)
+    return below

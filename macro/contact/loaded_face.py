@@ -1,0 +1,370 @@
+"""Patches on the contact face of a body: loads by pressures, and mean displacements.
+
+Theory: section 11 of ``demos/theory.md``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal, Protocol, get_args
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.sparse import csr_matrix
+
+from geometry.errors import InputError
+from geometry.meshes.block import require_inside
+from geometry.patches import PatchGrid
+from macro import compat
+from macro.block import Block
+from macro.linear_solvers.node_matrices import distributed
+from macro.linear_solvers.options import solve_linear
+from macro.mesh.contact_face import (
+    ContactFacets,
+    FacetQuadrature,
+    facet_quadrature,
+    top_facets,
+)
+
+Array = NDArray[np.float64]
+_ALONG_AXIS = 1e-14
+"""Component of a unit normal that is rounding."""
+_WHOLE = 1e-9
+"""Part of a patch beyond the face that is rounding."""
+Mode = Literal["patchwise", "pointwise"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sampling:
+    """The samples that laws are evaluated at, and the loads by their pressures.
+
+    A sample is a whole patch or a quadrature point. With the nodal displacements u, the pressures p
+    and the weights w of the samples, the nodal load is ``B p`` and the displacement of the
+    samples into the body is ``(Bᵀ u) / w``. The same operator in both makes every tangent
+    symmetric.
+
+    Args:
+        operator: B, rows like the displacements, columns like the samples [mm²].
+        weight: Area of each of this rank's samples, shape (n,) [mm²].
+        x: Abscissae of this rank's samples, shape (n,) [mm].
+        y: Ordinates of this rank's samples, shape (n,) [mm].
+        depth: Depths of the undeformed face below its plane at this rank's samples, (n,) [mm].
+        patch: Flat patch index of this rank's samples, ascending, shape (n,).
+        count: Number of patches N.
+    """
+
+    operator: PETSc.Mat
+    weight: Array
+    x: Array
+    y: Array
+    depth: Array
+    patch: NDArray[np.intp]
+    count: int
+
+    def displacements(self, displacement: PETSc.Vec) -> Array:
+        """Return the displacements of this rank's samples into the body, shape (n,) [mm].
+
+        Args:
+            displacement: Nodal displacements [mm].
+        """
+        self.operator.multTranspose(displacement, self.values)
+        return np.asarray(self.values.array_r / self.weight)
+
+    @cached_property
+    def values(self) -> PETSc.Vec:
+        """Work space for a value of every sample; PETSc would keep one of every product."""
+        return self.operator.createVecRight()
+
+    def patch_sums(self, values: Array) -> Array:
+        """Return the integrals of sampled values over every patch, shape (N,); collective."""
+        local = np.bincount(self.patch, weights=self.weight * values, minlength=self.count)
+        return self.operator.comm.tompi4py().allreduce(local, op=MPI.SUM)
+
+    def by_patch(self, functions: Sequence[Callable[[Array], Array]], closure: Array) -> Array:
+        """Return functions of closure, one per patch, at this rank's samples, shape (n,).
+
+        Args:
+            functions: One function per patch.
+            closure: Closures of the samples, shape (n,) [mm].
+        """
+        values = np.empty_like(closure)
+        ends = np.searchsorted(self.patch, np.arange(self.count + 1))
+        for i in np.unique(self.patch):
+            part = slice(ends[i], ends[i + 1])
+            values[part] = functions[i](closure[part])
+        return values
+
+
+class Loadable(Protocol):
+    """The contact face of a body, or of two bodies that are pressed together."""
+
+    @property
+    def body(self) -> Any:
+        """The body, or both."""
+        ...
+
+    @property
+    def patches(self) -> PatchGrid:
+        """Patches on the face, in its frame."""
+        ...
+
+    @property
+    def comm(self) -> Any:
+        """MPI communicator."""
+        ...
+
+    @property
+    def areas(self) -> Array:
+        """Areas of the patches, shape (N,) [mm²]."""
+        ...
+
+    def sampling(self, mode: Mode) -> Sampling:
+        """Return the samples of a mode."""
+        ...
+
+    def load(self, pressures: Array) -> PETSc.Vec:
+        """Return the nodal load of pressures that are uniform on every patch, (N,) [MPa]."""
+        ...
+
+    def patch_displacements(self, displacement: PETSc.Vec) -> Array:
+        """Return the mean displacements of the patches into the body, shape (N,) [mm]."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedFace:
+    """Patches on the contact face of a body; the rest of the face is free of traction.
+
+    Args:
+        body: The body, or anything else with the vector space of displacements as ``space``, which
+            is Lagrange of degree 1 or 2.
+        facets: Facets of the face, in its frame.
+        patches: Patches on the face, in its frame. Parts of a patch beyond the face do not count.
+        degree: Polynomial degree that the quadrature is exact for; None: that of products of two
+            basis functions.
+
+    Note:
+        Everything here is collective. A rank may own no facet, or no part of a patch.
+    """
+
+    body: Any
+    facets: ContactFacets
+    patches: PatchGrid
+    degree: int | None = None
+
+    @classmethod
+    def of_block(cls, block: Block, patches: PatchGrid, degree: int | None = None) -> LoadedFace:
+        """Return patches on a block's top.
+
+        Args:
+            block: The block.
+            patches: Patches inside the block's interface.
+            degree: As for any face.
+
+        Raises:
+            InputError: When a patch reaches beyond the top.
+        """
+        require_inside(block.mesh.shape.interface, patches)
+        return cls(block, top_facets(block.mesh), patches, degree)
+
+    @property
+    def space(self) -> Any:
+        """Vector space of the displacements."""
+        return self.body.space
+
+    @property
+    def comm(self) -> Any:
+        """Communicator of the mesh."""
+        return self.space.mesh.comm
+
+    @cached_property
+    def quadrature(self) -> FacetQuadrature:
+        """Quadrature points of this rank."""
+        hexahedral = self.space.mesh.topology.cell_name() == "hexahedron"
+        degree = self.degree or (4 if hexahedral else 2) * compat.lagrange_degree(self.space)
+        return facet_quadrature(self.facets, self.space, self.patches, degree=degree)
+
+    @cached_property
+    def areas(self) -> Array:
+        """Areas of the patches by quadrature, shape (N,) [mm²].
+
+        Raises:
+            InputError: When a patch has no part of the face.
+        """
+        points = self.quadrature
+        local = np.bincount(points.patch, weights=points.weight, minlength=self.patches.count)
+        areas = self.comm.allreduce(local, op=MPI.SUM)
+        if not np.all(areas > 0.0):
+            raise InputError(
+                "patches that have no part of the contact face",
+                value=int(np.sum(areas == 0.0)),
+                allowed="patches that each cover a part of it",
+            )
+        return np.asarray(areas)
+
+    def sampling(self, mode: Mode) -> Sampling:
+        """Return the samples of a mode: ``"patchwise"`` or ``"pointwise"``.
+
+        Raises:
+            InputError: When there is no such mode.
+        """
+        if mode not in get_args(Mode):
+            raise InputError("unknown interface", value=mode, allowed=", ".join(get_args(Mode)))
+        return self.patchwise if mode == "patchwise" else self.pointwise
+
+    @cached_property
+    def pointwise(self) -> Sampling:
+        """Laws at quadrature points."""
+        points = self.quadrature
+        operator = PETSc.Mat()
+        self.points_by_dofs.transpose(operator)
+        return Sampling(
+            operator=operator,
+            weight=points.weight,
+            x=points.x,
+            y=points.y,
+            depth=points.depth,
+            patch=points.patch,
+            count=self.patches.count,
+        )
+
+    @cached_property
+    def patchwise(self) -> Sampling:
+        """Laws at the mean closures of the patches, which are distributed over the ranks."""
+        points, comm = self.quadrature, self.comm
+        count = self.patches.count
+        member = csr_matrix(
+            (np.ones(len(points.x)), points.patch, np.arange(len(points.x) + 1)),
+            shape=(len(points.x), count),
+        )
+        columns = count // comm.size + (comm.rank < count % comm.size)
+        operator = self.points_by_dofs.transposeMatMult(distributed(member, columns, comm))
+        own = np.arange(*operator.getOwnershipRangeColumn())
+        x, y, depth = (mean[own] for mean in self._means)
+        return Sampling(
+            operator=operator,
+            weight=self.areas[own],
+            x=x,
+            y=y,
+            depth=depth,
+            patch=own,
+            count=self.patches.count,
+        )
+
+    def load(self, pressures: Array) -> PETSc.Vec:
+        """Return the nodal load of pressures that are uniform on every patch.
+
+        Args:
+            pressures: Pressures of all patches, on every rank, shape (N,) [MPa].
+        """
+        sampling = self.patchwise
+        values = sampling.operator.createVecRight()
+        values.array[:] = np.asarray(pressures, dtype=np.float64)[sampling.patch]
+        load = sampling.operator.createVecLeft()
+        sampling.operator.mult(values, load)
+        return load
+
+    def patch_displacements(self, displacement: PETSc.Vec) -> Array:
+        """Return the mean displacements of the patches into the body, on every rank, (N,) [mm]."""
+        sampling = self.patchwise
+        return sampling.patch_sums(sampling.displacements(displacement)) / self.areas
+
+    @cached_property
+    def points_by_dofs(self) -> PETSc.Mat:
+        """−w φ n of the displacements at every point, shape (points, dofs) [mm²]."""
+        points, nodes = self.quadrature, self.space.dofmap.index_map
+        used = np.abs(points.values) > 1e-12  # excludes nodes that are not on the facet
+        numbers = np.zeros(used.shape, dtype=np.int64)
+        numbers[used] = nodes.local_to_global(points.nodes[used])
+        rows = normal_rows(
+            points.weight[:, None] * points.values,
+            numbers,
+            used,
+            self.facets.outward,
+            nodes.size_global,
+        )
+        return distributed(rows, 3 * nodes.size_local, self.comm)
+
+    @cached_property
+    def _means(self) -> tuple[Array, Array, Array]:
+        """Mean place of the patches on the face, and its depth there, shape (N,) each [mm]."""
+        points, patches = self.quadrature, self.patches
+        moments = [
+            np.bincount(points.patch, points.weight * values, minlength=patches.count)
+            for values in (points.x, points.y, points.depth)
+        ]
+        means = self.comm.allreduce(np.array(moments), op=MPI.SUM) / self.areas
+        whole = np.abs(self.areas - patches.areas) <= _WHOLE * patches.areas
+        x, y = np.where(whole, patches.centres.T, means[:2])
+        return x, y, means[2]
+
+
+def normal_rows(
+    weights: Array,
+    numbers: NDArray[np.int64],
+    used: NDArray[np.bool_],
+    outward: Array,
+    nodes: int,
+) -> csr_matrix:
+    """Return −w φ n for the three displacements of every node, shape (points, 3 nodes) [mm²].
+
+    Args:
+        weights: w φ at every point for the nodes of its cell, shape (points, m) [mm²].
+        numbers: Global numbers of these nodes, shape (points, m).
+        used: Which of them take part, shape (points, m).
+        outward: Normal n out of the body, shape (3,).
+        nodes: Number of all nodes.
+    """
+    axes = np.flatnonzero(np.abs(outward) > _ALONG_AXIS)
+    columns = (3 * numbers[used][:, None] + axes).ravel()
+    starts = len(axes) * np.concatenate([[0], np.cumsum(used.sum(axis=1))])
+    entries = (-weights[used][:, None] * outward[axes]).ravel()
+    return csr_matrix((entries, columns, starts), shape=(len(weights), 3 * nodes))
+
+
+def patch_compliance_matrix(face: Loadable) -> Array:
+    """Return the mean displacement of patch i into the body by unit pressure on patch j.
+
+    By reciprocity the matrix is symmetric for patches of equal area. Errors of the linear solver
+    are averaged between the two triangles.
+
+    Args:
+        face: Patches on the contact face of a body.
+
+    Returns:
+        The compliance, the same on every rank, shape (N, N) [mm/MPa].
+
+    Raises:
+        NotConverged: When a linear solve fails.
+
+    Note:
+        Collective.
+    """
+    compliance = displacements_under(face, np.eye(face.patches.count))
+    return np.asarray(0.5 * (compliance + compliance.T))
+
+
+def displacements_under(face: Loadable, pressures: Array) -> Array:
+    """Return the mean displacements of patches under pressures on them, shape (m, N) [mm].
+
+    Args:
+        face: Patches on the contact face of a body.
+        pressures: Pressures of all patches, the same on every rank, shape (m, N) [MPa].
+
+    Raises:
+        NotConverged: When a linear solve fails.
+
+    Note:
+        Collective.
+    """
+    body, rows = face.body, []
+    work = body.stiffness.createVecRight()
+    for row in pressures:
+        solve_linear(body.solver, face.load(row), work)
+        rows.append(face.patch_displacements(work))
+        compat.collect_garbage(work.comm)
+    return np.array(rows)

@@ -1,0 +1,123 @@
+"""Meshes with tags in dolfinx's XDMF files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+from dolfinx import io
+from dolfinx import mesh as dmesh
+
+from geometry.collective import on_root
+from geometry.errors import InputError
+from macro import compat
+from macro.mesh.tagged import TaggedMesh
+from macro.mesh.tagging import filled, of_owned_cells
+
+_CELLS = {"tetrahedron": "triangle", "hexahedron": "quadrilateral"}
+"""Names of the cells' topology, without capitals, and of their facets'."""
+
+_ALLOWED = "one mesh of first-order tetrahedra or hexahedra, as dolfinx writes it"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Layout:
+    """Names of the grids of a file."""
+
+    mesh: str
+    facets: str | None
+    cells: str | None
+
+
+def read_xdmf(path: Path, comm: Any) -> TaggedMesh:
+    """Read a mesh, tags of its facets and tags of its cells from one file of dolfinx.
+
+    Args:
+        path: The file.
+        comm: MPI communicator.
+
+    Raises:
+        InputError: On all ranks, when the file holds no such mesh or several sets of tags.
+
+    Note:
+        Collective.
+    """
+    layout = on_root(comm, lambda: _layout(path))
+    try:
+        with compat.quiet_compiler(), io.XDMFFile(comm, str(path), "r") as file:
+            mesh = file.read_mesh(name=layout.mesh)
+            mesh.topology.create_connectivity(2, 3)
+            mesh.topology.create_connectivity(3, 2)
+            facets = file.read_meshtags(mesh, layout.facets) if layout.facets else None
+            cells = file.read_meshtags(mesh, layout.cells) if layout.cells else None
+    except RuntimeError as error:
+        line = str(error).strip().split("\n")[0]
+        raise InputError(f"dolfinx cannot read it: {line}", allowed=_ALLOWED) from error
+    if facets is None:
+        facets = dmesh.meshtags(mesh, 2, np.empty(0, np.int32), np.empty(0, np.int32))
+    cells = cells and filled(mesh, cells)
+    return TaggedMesh(
+        mesh=mesh,
+        facet_tags=of_owned_cells(mesh, facets),
+        cell_tags=cells,
+        facet_names=_numbers(facets, comm),
+        cell_names={} if cells is None else _numbers(cells, comm),
+    )
+
+
+def _numbers(tags: Any, comm: Any) -> dict[str, int]:
+    """Return the tags of all ranks by their numbers as text."""
+    own = {int(tag) for tag in np.unique(np.asarray(tags.values))}
+    return {str(tag): tag for tag in sorted(set().union(*comm.allgather(own)))}
+
+
+def _layout(path: Path) -> _Layout:
+    """Return which grids of the file hold the mesh and its tags."""
+    try:
+        root = ElementTree.parse(path).getroot()
+    except (OSError, ElementTree.ParseError) as error:
+        raise InputError(f"this is no XDMF file: {error}", allowed=_ALLOWED) from error
+    grids = {grid.get("Name", ""): grid for grid in root.findall("Domain/Grid")}
+    uniform = {
+        name: grid for name, grid in grids.items() if grid.get("GridType", "Uniform") == "Uniform"
+    }
+    kinds = {name: _kind(grid) for name, grid in uniform.items()}
+    meshes = [name for name, grid in uniform.items() if grid.find("Geometry") is not None]
+    if len(meshes) != 1:
+        raise InputError(f"the file has {len(meshes)} meshes", value=meshes, allowed=_ALLOWED)
+    (mesh,) = meshes
+    if kinds[mesh] not in _CELLS:
+        flat = " (two-dimensional)" if kinds[mesh] in _CELLS.values() else ""
+        raise InputError(
+            f"the mesh has cells that do not fit{flat}", value=kinds[mesh], allowed=_ALLOWED
+        )
+    _check_data(uniform[mesh], path)
+    tagged = {
+        name: kinds[name] for name, grid in uniform.items() if grid.find("Attribute") is not None
+    }
+    of_facets = [name for name, kind in tagged.items() if kind == _CELLS[kinds[mesh]]]
+    of_cells = [name for name, kind in tagged.items() if kind == kinds[mesh]]
+    for several, what in ((of_facets, "facets"), (of_cells, "cells")):
+        if len(several) > 1:
+            raise InputError(
+                f"the file has several sets of tags of {what}", value=several, allowed="one"
+            )
+    return _Layout(mesh=mesh, facets=next(iter(of_facets), None), cells=next(iter(of_cells), None))
+
+
+def _kind(grid: ElementTree.Element) -> str:
+    """Return the name of a grid's cells, without capitals."""
+    topology = grid.find("Topology")
+    return "" if topology is None else topology.get("TopologyType", "").casefold()
+
+
+def _check_data(grid: ElementTree.Element, path: Path) -> None:
+    """Refuse a mesh whose numbers are in another file that is missing."""
+    for item in grid.iter("DataItem"):
+        if item.get("Format") == "HDF" and item.text:
+            data = path.parent / item.text.strip().rsplit(":", 1)[0]
+            if not data.is_file():
+                raise InputError(f"its numbers are in {data.name}, which is not there")
