@@ -1,26 +1,24 @@
-"""Meshes of four machine parts for `body_solvers.py`, by gmsh: outlines that are extruded or filled.
+"""Meshes of machine parts in gmsh's files for `body_solvers.py`.
 
-``hex`` and ``layers`` are extruded, layer by layer, into hexahedra or into tetrahedra; ``tet`` fills
-the volumes with tetrahedra of one size. Layers can be flatter than they are wide.
+``hex`` and ``layers`` are outlines that are extruded, layer by layer, into hexahedra or into
+tetrahedra, and layers can be flatter than they are wide; ``tet`` fills the volumes with tetrahedra
+of one length. Volumes are named by numbers from the support up; surfaces are ``support`` (z = 0),
+``contact`` (the top) and, where the part has such planes, ``x`` and ``y`` (x = 0, y = 0).
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from geometry.collective import on_root
 from geometry.meshes.gmsh_session import gmsh_session
 
-PARTS = {
-    # outline, heights of the volumes from the support up [mm]
-    "pad": ("rectangle", (5.0, 12.0)),
-    "flange": ("flange", (12.0,)),
-    "ring": ("ring", (0.8,)),
-    "quarter ring": ("quarter ring", (0.8,)),
-    "L": ("L", (20.0,)),
+HEIGHTS = {"pad": (5.0, 12.0), "flange": (12.0,), "ring": (0.8,), "L": (20.0,)}
+"""Heights of the volumes of a part [mm]."""
+_CORNERS = {
+    "pad": [(0, 0), (100, 0), (100, 40), (0, 40)],
+    "L": [(0, 0), (80, 0), (80, 20), (20, 20), (20, 80), (0, 80)],
 }
+_SLACK = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,10 +26,10 @@ class Part:
     """A part to be meshed.
 
     Args:
-        name: One of `PARTS`.
+        name: One of `HEIGHTS`.
         cells: ``"hex"``, ``"layers"`` or ``"tet"``.
         size: Length of the cells in the plane [mm].
-        flat: Their length over their height.
+        flat: Their length over their height; 1 for ``"tet"``.
     """
 
     name: str
@@ -40,21 +38,58 @@ class Part:
     flat: float = 1.0
 
 
-def part_model(gmsh, part):
-    """Mesh a part in the current gmsh model; volumes are numbered from the support up."""
-    kind, heights = PARTS[part.name]
-    occ = gmsh.model.occ
-    faces = [_outline(occ, kind)]
-    bodies = []
-    for height in heights:
-        layers = max(1, round(height * part.flat / part.size))
-        more = {} if part.cells == "tet" else {"numElements": [layers], "recombine": part.cells == "hex"}
-        made = occ.extrude([(2, faces[-1])], 0.0, 0.0, height, **more)
-        faces.append(made[0][1])
-        bodies += [tag for dim, tag in made if dim == 3]
-    occ.synchronize()
-    for number, body in enumerate(bodies, start=1):
-        gmsh.model.addPhysicalGroup(3, [body], number)
+def write_part(part, path):
+    """Mesh a part and write gmsh's file."""
+    with gmsh_session(part.name) as gmsh:
+        occ, top, volumes = gmsh.model.occ, _outline(gmsh.model.occ, part.name), []
+        for height in HEIGHTS[part.name]:
+            layers = max(1, round(height * part.flat / part.size))
+            how = {"numElements": [layers], "recombine": part.cells == "hex"}
+            made = occ.extrude([(2, top)], 0.0, 0.0, height, **(how if part.cells != "tet" else {}))
+            top = made[0][1]
+            volumes += [tag for dimension, tag in made if dimension == 3]
+        occ.synchronize()
+        for number, volume in enumerate(volumes, start=1):
+            gmsh.model.addPhysicalGroup(3, [volume], number)
+        _name_surfaces(gmsh.model, sum(HEIGHTS[part.name]))
+        _set_sizes(gmsh, part)
+        gmsh.model.mesh.generate(3)
+        gmsh.option.setNumber("Mesh.Binary", 1)
+        gmsh.write(str(path))
+
+
+def _outline(occ, name):
+    """Return the surface that is extruded."""
+    if name in _CORNERS:
+        corners = [occ.addPoint(x, y, 0.0) for x, y in _CORNERS[name]]
+        pairs = zip(corners, corners[1:] + corners[:1], strict=True)
+        return occ.addPlaneSurface([occ.addCurveLoop([occ.addLine(a, b) for a, b in pairs])])
+    outer, inner = (60.0, 20.0) if name == "flange" else (42.0, 38.0)
+    holes = [(2, occ.addDisk(0.0, 0.0, 0.0, inner, inner))]
+    disc = [(2, occ.addDisk(0.0, 0.0, 0.0, outer, outer))]
+    if name == "flange":
+        for angle in np.arange(6) * np.pi / 3.0:
+            x, y = 45.0 * np.cos(angle), 45.0 * np.sin(angle)
+            holes.append((2, occ.addDisk(x, y, 0.0, 5.0, 5.0)))
+    else:  # a quarter, by symmetry
+        disc = occ.intersect(disc, [(2, occ.addRectangle(0.0, 0.0, 0.0, outer, outer))])[0]
+    return occ.cut(disc, holes)[0][0][1]
+
+
+def _name_surfaces(model, height):
+    everywhere = np.array([[-1e3] * 3, [1e3] * 3])
+    for number, (name, axis, place) in enumerate(
+        [("support", 2, 0.0), ("contact", 2, height), ("x", 0, 0.0), ("y", 1, 0.0)], start=1
+    ):
+        box = everywhere.copy()
+        box[:, axis] = place - _SLACK, place + _SLACK
+        found = model.getEntitiesInBoundingBox(*box.ravel(), 2)
+        if found:
+            model.addPhysicalGroup(2, [tag for _, tag in found], number)
+            model.setPhysicalName(2, number, name)
+
+
+def _set_sizes(gmsh, part):
     for name, value in {
         "Mesh.MeshSizeMax": part.size,
         "Mesh.MeshSizeMin": part.size,
@@ -62,48 +97,5 @@ def part_model(gmsh, part):
     }.items():
         gmsh.option.setNumber(name, value)
     if part.cells == "hex":
-        gmsh.model.mesh.setRecombine(2, faces[0])
-    gmsh.model.mesh.generate(3)
-
-
-def _outline(occ, kind):
-    if kind == "rectangle":
-        return occ.addRectangle(0.0, 0.0, 0.0, 100.0, 40.0)
-    if kind == "L":
-        points = [(0, 0), (80, 0), (80, 20), (20, 20), (20, 80), (0, 80)]
-        corners = [occ.addPoint(x, y, 0.0) for x, y in points]
-        pairs = zip(corners, corners[1:] + corners[:1], strict=True)
-        return occ.addPlaneSurface([occ.addCurveLoop([occ.addLine(a, b) for a, b in pairs])])
-    outer, inner = (60.0, 20.0) if kind == "flange" else (42.0, 38.0)
-    holes = [(2, occ.addDisk(0.0, 0.0, 0.0, inner, inner))]
-    if kind == "flange":
-        for angle in np.arange(6) * np.pi / 3.0:
-            x, y = 45.0 * np.cos(angle), 45.0 * np.sin(angle)
-            holes.append((2, occ.addDisk(x, y, 0.0, 5.0, 5.0)))
-    disc = [(2, occ.addDisk(0.0, 0.0, 0.0, outer, outer))]
-    if kind == "quarter ring":
-        disc = occ.intersect(disc, [(2, occ.addRectangle(0.0, 0.0, 0.0, outer, outer))])[0]
-    return occ.cut(disc, holes)[0][0][1]
-
-
-def part_mesh(part, comm):
-    """Return the distributed mesh of a part and, for its cells, the number of their volume."""
-    from dolfinx.io import gmshio
-
-    from macro import compat
-
-    sessions = []
-    on_root(comm, lambda: sessions.append(_opened(part)))
-    model = sessions[0][1].model if sessions else None
-    with compat.quiet_compiler():
-        mesh, cell_tags, _ = gmshio.model_to_mesh(model, comm, 0, gdim=3)
-    if sessions:
-        sessions[0][0].__exit__(None, None, None)
-    return mesh, cell_tags
-
-
-def _opened(part):
-    session = gmsh_session(part.name)
-    gmsh = session.__enter__()
-    part_model(gmsh, part)
-    return session, gmsh
+        for _, surface in gmsh.model.getEntities(2):
+            gmsh.model.mesh.setRecombine(2, surface)
