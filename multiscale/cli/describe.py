@@ -16,14 +16,14 @@ from geometry.statistics import roughness
 from multiscale.cli.execution import scene_and_folder
 from multiscale.couplings.assembly import check_has_laws, load_finite_elements
 from multiscale.exports.export import export_texts, remove_exports
-from multiscale.laws.law_table import write_laws
-from multiscale.machine import cluster_nodes, large_object_comm
+from multiscale.laws.law_file import write_laws
+from multiscale.machine import cluster_nodes
 from multiscale.output import terminal
 from multiscale.output.results import write_figure
 from multiscale.planning import plan
 from multiscale.planning.block_plan import memory_warnings
 from multiscale.planning.costs import predicted_cost
-from multiscale.planning.problem_setup import make_setup
+from multiscale.planning.set_up import set_up
 from multiscale.restart.results_folder import locked, refuse_other_results
 from multiscale.run import Run
 from multiscale.scene.keys import Key, scene_keys
@@ -50,8 +50,7 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
 
 def _setup(scene: Scene, comm: Any) -> ProblemSetup:
     """Set the problem up, as if these nodes had any memory that it may take."""
-    nodes = replace(cluster_nodes(comm), extensible=True)
-    return on_root(large_object_comm(comm), lambda: make_setup(scene, nodes=nodes))
+    return set_up(scene, comm, nodes=replace(cluster_nodes(comm), extensible=True))
 
 
 def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
