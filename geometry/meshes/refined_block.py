@@ -22,6 +22,7 @@ _DELAUNAY = 5
 """gmsh's number of the algorithm."""
 _DIGITS = 12
 """Significant digits of lengths passed to gmsh."""
+_NO_BOXES = np.empty((0, 2, 3))
 _PLACE = 3
 """Decimals of places passed to gmsh, beyond those of the fine edge length."""
 
@@ -108,23 +109,56 @@ class RefinedShape:
         lengths are in `unit`. A gmsh session of the caller goes on afterwards, with its model and
         options.
         """
-        width, depth, height, fine, coarse = (
-            float(f"{length / self.unit:.{_DIGITS}g}")
-            for length in (*self.interface, self.height, self.fine, self.coarse)
+        with refined_solid(self, self.unit) as model:
+            yield model
+
+
+@contextmanager
+def refined_solid(block: RefinedShape, unit: float, boxes: Array = _NO_BOXES) -> Iterator[Any]:
+    """Mesh a block, or a block and the boxes that it stands on, as long as the context lasts.
+
+    Args:
+        block: The block and the sizes of the cells.
+        unit: Length that gmsh meshes in [mm].
+        boxes: Lower and upper corners of boxes below the block, shape (n, 2, 3) [mm].
+
+    Raises:
+        InputError: When block and boxes are not one body.
+    """
+
+    def digits(length: float) -> float:
+        return float(f"{length / unit:.{_DIGITS}g}")
+
+    width, depth, height, fine, coarse = map(
+        digits, (*block.interface, block.height, block.fine, block.coarse)
+    )
+    decimals = _PLACE + math.ceil(-math.log10(fine))
+    places = np.clip(np.round(block.places / unit, decimals), 0.0, (width, depth))
+    shape = replace(
+        block, interface=(width, depth), height=height, places=places, fine=fine, coarse=coarse
+    )
+    with gmsh_session("patchlaw refined block") as gmsh:
+        box = gmsh.model.occ.addBox(0.0, 0.0, -shape.height, *shape.interface, shape.height)
+        if len(boxes):
+            corners = np.vectorize(digits)(boxes)
+            box = _joined(gmsh, box, [(*low, *(high - low)) for low, high in corners])
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(3, [box], 1)
+        _set_sizes(gmsh, shape)
+        _generate(gmsh, shape)
+        gmsh.model.mesh.setOrder(shape.degree)
+        yield gmsh.model
+
+
+def _joined(gmsh: Any, block: int, boxes: list[tuple[float, ...]]) -> int:
+    """Return the volume of a block and boxes, given by corner and sides, that are one body."""
+    tools = [(3, gmsh.model.occ.addBox(*box)) for box in boxes]
+    union, _ = gmsh.model.occ.fuse([(3, block)], tools)
+    if len(union) != 1:
+        raise InputError(
+            "block and boxes are not one body", value=len(union), allowed="boxes that share faces"
         )
-        decimals = _PLACE + math.ceil(-math.log10(fine))
-        places = np.clip(np.round(self.places / self.unit, decimals), 0.0, (width, depth))
-        shape = replace(
-            self, interface=(width, depth), height=height, places=places, fine=fine, coarse=coarse
-        )
-        with gmsh_session("patchlaw refined block") as gmsh:
-            box = gmsh.model.occ.addBox(0.0, 0.0, -shape.height, *shape.interface, shape.height)
-            gmsh.model.occ.synchronize()
-            gmsh.model.addPhysicalGroup(3, [box], 1)
-            _set_sizes(gmsh, shape)
-            _generate(gmsh, shape)
-            gmsh.model.mesh.setOrder(shape.degree)
-            yield gmsh.model
+    return int(union[0][1])
 
 
 def _generate(gmsh: Any, shape: RefinedShape) -> None:
