@@ -1,8 +1,9 @@
-"""Contact of a meshed block with a rigid plane: through laws of patches, or node by node.
+"""Contact of meshed bodies with a rigid plane or each other: by laws of patches, or node by node.
 
-    LawContactProblem           laws of patches on a flat interface          `law_problem`
-      └ Interface               where laws are evaluated                     `law_interface`
-      └ Equilibrium, Newton     residual, tangent, plane, PETSc's SNES       `equilibrium`, …
+    LawContactProblem           laws of patches on a face                    `law_problem`
+      └ LoadedFace, FacePair    patches on the faces of one body, or two     `loaded_face`, …
+      └ ContactForces           laws under a plane                           `contact_forces`
+      └ Equilibrium, Newton     residual, tangent, PETSc's SNES              `equilibrium`, …
     UnilateralContactProblem    no penetration of a rough top                `unilateral_problem`
       └ PrimalDualActiveSet     at its nodes                                 `active_set`
       └ AugmentedLagrangian     at its quadrature points                     `augmented_lagrangian`

@@ -278,14 +278,15 @@ class LoadedFace:
         """−w φ n of the displacements at every point, shape (points, dofs) [mm²]."""
         points, nodes = self.quadrature, self.space.dofmap.index_map
         used = np.abs(points.values) > 1e-12  # excludes nodes that are not on the facet
-        axes = np.flatnonzero(np.abs(self.facets.frame.normal) > _ALONG_AXIS)
-        normal = self.facets.frame.normal[axes]
-        first = 3 * nodes.local_to_global(points.nodes[used]).astype(np.int64)
-        columns = (first[:, None] + axes).ravel()
-        starts = len(axes) * np.concatenate([[0], np.cumsum(used.sum(axis=1))])
-        entries = -(points.weight[:, None] * points.values)[used][:, None] * normal
-        shape = (len(points.x), 3 * nodes.size_global)
-        rows = csr_matrix((entries.ravel(), columns, starts), shape=shape)
+        numbers = np.zeros(used.shape, dtype=np.int64)
+        numbers[used] = nodes.local_to_global(points.nodes[used])
+        rows = normal_rows(
+            points.weight[:, None] * points.values,
+            numbers,
+            used,
+            self.facets.outward,
+            nodes.size_global,
+        )
         return distributed(rows, 3 * nodes.size_local, self.comm)
 
     @cached_property
@@ -300,6 +301,29 @@ class LoadedFace:
         whole = np.abs(self.areas - patches.areas) <= _WHOLE * patches.areas
         x, y = np.where(whole, patches.centres.T, means[:2])
         return x, y, means[2]
+
+
+def normal_rows(
+    weights: Array,
+    numbers: NDArray[np.int64],
+    used: NDArray[np.bool_],
+    outward: Array,
+    nodes: int,
+) -> csr_matrix:
+    """Return −w φ n for the three displacements of every node, shape (points, 3 nodes) [mm²].
+
+    Args:
+        weights: w φ at every point for the nodes of its cell, shape (points, m) [mm²].
+        numbers: Global numbers of these nodes, shape (points, m).
+        used: Which of them take part, shape (points, m).
+        outward: Normal n out of the body, shape (3,).
+        nodes: Number of all nodes.
+    """
+    axes = np.flatnonzero(np.abs(outward) > _ALONG_AXIS)
+    columns = (3 * numbers[used][:, None] + axes).ravel()
+    starts = len(axes) * np.concatenate([[0], np.cumsum(used.sum(axis=1))])
+    entries = (-weights[used][:, None] * outward[axes]).ravel()
+    return csr_matrix((entries, columns, starts), shape=(len(weights), 3 * nodes))
 
 
 def patch_compliance_matrix(face: Loadable) -> Array:

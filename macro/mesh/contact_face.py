@@ -51,15 +51,17 @@ class ContactFacets:
     """Facets of a contact face whose cells this rank owns: triangles, or quadrilaterals.
 
     Args:
-        frame: Frame of the face.
+        frame: Frame of the face, or of the one that it is pressed on.
+        outward: Unit normal out of the body, shape (3,): that of the frame, or its opposite.
         cell: Rank-local cell that the facet belongs to, shape (n,).
         side: Index of the facet in its cell, shape (n,).
         reference: Vertices on the reference cell, shape (n, 3 or 4, 3).
         corners: Vertices in the plane, shape (n, 3 or 4, 2) [mm].
-        depth: Depths of the vertices below the plane, shape (n, 3 or 4) [mm].
+        depth: Depths of the vertices below the plane, into the body, shape (n, 3 or 4) [mm].
     """
 
     frame: FaceFrame
+    outward: Array
     cell: NDArray[np.int32]
     side: NDArray[np.intp]
     reference: Array
@@ -150,14 +152,19 @@ def facet_quadrature(
     )
 
 
-def contact_facets(mesh: Any, facets: NDArray[np.int32], frame: FaceFrame) -> ContactFacets:
+def contact_facets(
+    mesh: Any, facets: NDArray[np.int32], frame: FaceFrame, *, opposed: bool = False
+) -> ContactFacets:
     """Return those of this rank's outer facets whose cells it owns; there may be none.
 
     Args:
         mesh: dolfinx mesh of tetrahedra or hexahedra.
         facets: Rank-local facets of the contact face, shape (n,).
         frame: Frame of the face.
+        opposed: Whether the frame is that of the face of another body, which this one is pressed
+            on: its normal points into this body.
     """
+    side_of_body = -1.0 if opposed else 1.0
     topology = mesh.topology
     topology.create_connectivity(2, 3)
     topology.create_connectivity(3, 2)
@@ -173,11 +180,12 @@ def contact_facets(mesh: Any, facets: NDArray[np.int32], frame: FaceFrame) -> Co
     corners = mesh.geometry.x[rows]
     return ContactFacets(
         frame=frame,
+        outward=side_of_body * frame.normal,
         cell=cell,
         side=side,
         reference=vertices[at],
         corners=frame.in_plane(corners),
-        depth=-frame.height(corners),
+        depth=-side_of_body * frame.height(corners),
     )
 
 

@@ -1,0 +1,262 @@
+"""The contact faces of two elastic bodies that are pressed on each other.
+
+Meshes need not match. Laws at points are evaluated at the quadrature points of the first body's
+face; the basis functions of the counter-body are evaluated where these points lie on its face.
+What lies on one face alone carries no pressure.
+
+Theory: section 11 of ``demos/theory.md``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.sparse import csr_matrix, vstack
+from scipy.spatial import cKDTree
+
+from geometry.errors import InputError
+from geometry.patches import PatchGrid
+from macro import compat
+from macro.body_pair import BodyPair
+from macro.contact.loaded_face import LoadedFace, Mode, Sampling, normal_rows
+from macro.linear_solvers.node_matrices import distributed
+from macro.mesh.contact_face import ContactFacets
+
+Array = NDArray[np.float64]
+
+_NEAREST = 12
+"""Facets of the nearest middles that a point is looked for in first."""
+_SLACK = 1e-8
+"""Distance beyond a facet, in its own coordinates, at which a point still counts as on it."""
+_UNLIKE = 1e-6
+"""Difference of a patch's areas on both faces, relative to the patch, that is rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class FacePair:
+    """Patches on the contact faces of a body and its counter-body.
+
+    Args:
+        first: The face of the body with its patches.
+        second: The face of the counter-body with the same patches, its facets in the frame of the
+            first (``opposed``).
+        bodies: Both bodies.
+
+    Note:
+        Everything here is collective.
+    """
+
+    first: LoadedFace
+    second: LoadedFace
+    bodies: BodyPair
+
+    @property
+    def body(self) -> BodyPair:
+        """Both bodies."""
+        return self.bodies
+
+    @property
+    def comm(self) -> Any:
+        """Communicator of both meshes."""
+        return self.first.comm
+
+    @property
+    def patches(self) -> PatchGrid:
+        """Patches on both faces."""
+        return self.first.patches
+
+    @property
+    def areas(self) -> Array:
+        """Areas of the patches on the first face, shape (N,) [mm²]."""
+        return self.first.areas
+
+    def sampling(self, mode: Mode) -> Sampling:
+        """Return the samples of a mode, see `LoadedFace.sampling`.
+
+        Raises:
+            InputError: When the faces do not cover the patches alike, or there is no such mode.
+        """
+        return self.pointwise if mode == "pointwise" else self.patchwise
+
+    @cached_property
+    def patchwise(self) -> Sampling:
+        """Laws at the mean closures of the patches."""
+        one, other = self.first.sampling("patchwise"), self.second.patchwise
+        if np.any(np.abs(self.first.areas - self.second.areas) > _UNLIKE * self.patches.areas):
+            raise InputError(
+                "the two faces do not cover the patches alike",
+                value=float(np.abs(self.first.areas / self.second.areas - 1.0).max()),
+                allowed="patches that lie on both faces, or laws at points",
+            )
+        return self._both(one, _local_rows(one.operator), _local_rows(other.operator), other.depth)
+
+    @cached_property
+    def pointwise(self) -> Sampling:
+        """Laws at the quadrature points of the first face that lie on the second."""
+        one = self.first.pointwise
+        rows, depth, found = self._counter_rows
+        own = _local_rows(self.first.points_by_dofs)[found]
+        kept = Sampling(
+            operator=one.operator,
+            weight=one.weight[found],
+            x=one.x[found],
+            y=one.y[found],
+            depth=one.depth[found],
+            patch=one.patch[found],
+            count=one.count,
+        )
+        both = []
+        for points_by_dofs, face in ((own, self.first), (rows[found], self.second)):
+            unknowns = 3 * face.space.dofmap.index_map.size_local
+            matrix, transposed = distributed(points_by_dofs, unknowns, self.comm), PETSc.Mat()
+            matrix.transpose(transposed)
+            both.append(_local_rows(transposed))
+        return self._both(kept, both[0], both[1], depth[found])
+
+    @property
+    def on_both(self) -> NDArray[np.bool_]:
+        """Which of this rank's quadrature points of the first face lie on the second one, too."""
+        return self._counter_rows[2]
+
+    def load(self, pressures: Array) -> PETSc.Vec:
+        """Return the nodal load of both under pressures that are uniform on every patch.
+
+        Args:
+            pressures: Pressures of all patches, on every rank, shape (N,) [MPa].
+        """
+        parts = [face.load(pressures).array_r for face in (self.first, self.second)]
+        load = self.bodies.stiffness.createVecRight()
+        load.array[:] = np.concatenate(parts)
+        return load
+
+    def patch_displacements(self, displacement: PETSc.Vec) -> Array:
+        """Return the sums of the displacements of the patches into both bodies, (N,) [mm]."""
+        sampling = self.patchwise
+        return sampling.patch_sums(sampling.displacements(displacement)) / self.areas
+
+    def _both(self, one: Sampling, own: csr_matrix, other: csr_matrix, depth: Array) -> Sampling:
+        """Return samples of both faces, from the rows of both bodies in their operators."""
+        rows = vstack([own, other]).tocsr()
+        return Sampling(
+            operator=distributed(rows, len(one.weight), self.comm),
+            weight=one.weight,
+            x=one.x,
+            y=one.y,
+            depth=one.depth + depth,
+            patch=one.patch,
+            count=one.count,
+        )
+
+    @cached_property
+    def _counter_rows(self) -> tuple[csr_matrix, Array, NDArray[np.bool_]]:
+        """The counter-body's −w φ n at this rank's points, its depths, and which points it has."""
+        points, space = self.first.quadrature, self.second.space
+        whole = _gathered(self.second.facets, space, self.comm)
+        facet, local = _located(whole.facets, np.column_stack([points.x, points.y]))
+        found = facet >= 0
+        facet, local = np.where(found, facet, 0), np.where(found[:, None], local, 0.0)
+        if not len(whole.nodes):
+            raise InputError("the counter-body has no contact face")
+        values = compat.lagrange_values(
+            space.mesh.topology.cell_name(),
+            compat.lagrange_degree(space),
+            whole.facets.pull_back(facet, local),
+        )
+        rows = normal_rows(
+            points.weight[:, None] * values,
+            whole.nodes[facet],
+            np.abs(values) > 1e-12,
+            self.second.facets.outward,
+            space.dofmap.index_map.size_global,
+        )
+        return rows, whole.facets.depths(facet, local), found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _WholeFace:
+    """Facets of all ranks, and the global numbers of their cells' nodes, shape (facets, m)."""
+
+    facets: ContactFacets
+    nodes: NDArray[np.int64]
+
+
+def _gathered(facets: ContactFacets, space: Any, comm: Any) -> _WholeFace:
+    """Return the facets of all ranks on every rank."""
+    cells, index_map = compat.cell_nodes(space)[facets.cell], space.dofmap.index_map
+    nodes = index_map.local_to_global(cells.ravel()).reshape(cells.shape).astype(np.int64)
+    parts = (facets.cell, facets.side, facets.reference, facets.corners, facets.depth, nodes)
+    shared = zip(*comm.allgather(parts), strict=True)
+    cell, side, reference, corners, depth, numbers = (np.concatenate(part) for part in shared)
+    whole = ContactFacets(
+        frame=facets.frame,
+        outward=facets.outward,
+        cell=cell,
+        side=side,
+        reference=reference,
+        corners=corners,
+        depth=depth,
+    )
+    return _WholeFace(whole, numbers)
+
+
+def _located(facets: ContactFacets, points: Array) -> tuple[NDArray[np.intp], Array]:
+    """Return the facet that each point lies on, −1 for none, and its coordinates there.
+
+    Args:
+        facets: Facets in the plane.
+        points: Points in the plane, shape (n, 2) [mm].
+    """
+    count, corners = len(facets.corners), facets.corners
+    facet, local = np.full(len(points), -1), np.zeros_like(points)
+    if not count or not len(points):
+        return facet, local
+    middles = corners.mean(axis=1)
+    tree = cKDTree(middles)
+    reach = float(np.linalg.norm(corners - middles[:, None], axis=2).max())
+    nearest = min(_NEAREST, count)
+    neighbours = tree.query(points, k=nearest)[1].reshape(len(points), nearest)
+    for candidates in neighbours.T:
+        left = np.flatnonzero(facet < 0)
+        _try(facets, points, left, candidates[left], facet, local)
+    for point in np.flatnonzero(facet < 0):  # near large facets, or beside the face
+        around = np.array(tree.query_ball_point(points[point], reach), dtype=np.intp)
+        for candidate in around[:, None]:
+            if facet[point] < 0:
+                _try(facets, points, np.array([point]), candidate, facet, local)
+    return facet, local
+
+
+def _try(
+    facets: ContactFacets,
+    points: Array,
+    wanted: NDArray[np.intp],
+    candidates: NDArray[np.intp],
+    facet: NDArray[np.intp],
+    local: Array,
+) -> None:
+    """Write the facets and coordinates of those points that lie on the facets tried for them.
+
+    Args:
+        facets: Facets in the plane.
+        points: All points, shape (n, 2) [mm].
+        wanted: Indices of the points that are looked for, shape (m,).
+        candidates: The facet that is tried for each of them, shape (m,).
+        facet: The facet of every point, shape (n,).
+        local: Its coordinates there, shape (n, 2).
+    """
+    at = facets.local(candidates, points[wanted])
+    beyond = at.sum(axis=1) if facets.corners.shape[1] == 3 else at.max(axis=1, initial=0.0)
+    inside = (at.min(axis=1, initial=0.0) >= -_SLACK) & (beyond <= 1.0 + _SLACK)
+    facet[wanted[inside]], local[wanted[inside]] = candidates[inside], at[inside]
+
+
+def _local_rows(matrix: PETSc.Mat) -> csr_matrix:
+    """Return this rank's rows of a distributed matrix, columns numbered through all ranks."""
+    starts, columns, entries = matrix.getValuesCSR()
+    shape = (len(starts) - 1, matrix.getSize()[1])
+    return csr_matrix((entries, columns, starts), shape=shape)

@@ -1,0 +1,45 @@
+"""Boxes with marked faces as bodies on meshes, for tests."""
+
+import numpy as np
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+
+from geometry.face_frame import FaceFrame
+from macro import LoadedFace, MeshedBody, Support, TaggedMesh, contact_facets
+
+CELLS = {"hexahedron": dmesh.CellType.hexahedron, "tetrahedron": dmesh.CellType.tetrahedron}
+LOW, HIGH = 1, 2
+"""Markers of the lowest and highest face across z."""
+
+
+def box(lower, upper, cells, cell="hexahedron", comm=MPI.COMM_SELF):
+    """Return a box whose faces across z are marked."""
+    mesh = dmesh.create_box(
+        comm, [np.array(lower, float), np.array(upper, float)], cells, CELLS[cell]
+    )
+    found = [
+        dmesh.locate_entities_boundary(mesh, 2, lambda x, z=z: np.isclose(x[2], z))
+        for z in (lower[2], upper[2])
+    ]
+    facets = np.concatenate(found).astype(np.int32)
+    markers = np.repeat([LOW, HIGH], [len(part) for part in found]).astype(np.int32)
+    order = np.argsort(facets)
+    tags = dmesh.meshtags(mesh, 2, facets[order], markers[order])
+    return TaggedMesh(mesh=mesh, facet_tags=tags, facet_names={"low": LOW, "high": HIGH})
+
+
+def standing(mesh, material, patches, order=1, **loads):
+    """Return the upper face of a box that stands on its lower face."""
+    body = MeshedBody(mesh, material, [Support(tag=LOW)], order=order, **loads)
+    upper = mesh.mesh.geometry.x[:, 2].max(initial=-np.inf)
+    upper = mesh.comm.allreduce(upper, op=MPI.MAX)
+    frame = FaceFrame(origin=np.array([0.0, 0.0, upper]), axes=np.eye(3))
+    return LoadedFace(body, contact_facets(mesh.mesh, mesh.facet_tags.find(HIGH), frame), patches)
+
+
+def hanging(mesh, material, patches, order=1):
+    """Return the lower face of a box that hangs at its upper face, above the plane z = 0."""
+    body = MeshedBody(mesh, material, [Support(tag=HIGH)], order=order, normal=(0, 0, -1))
+    frame = FaceFrame(origin=np.zeros(3), axes=np.eye(3))
+    facets = contact_facets(mesh.mesh, mesh.facet_tags.find(LOW), frame, opposed=True)
+    return LoadedFace(body, facets, patches)

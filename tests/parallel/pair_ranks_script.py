@@ -1,0 +1,55 @@
+"""Press two meshed bodies on each other on all ranks, print as JSON; for test_pair_ranks.py."""
+
+import json
+import sys
+from pathlib import Path
+
+from mpi4py import MPI
+
+from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
+from macro import BodyPair, FacePair, LawContactProblem, Material
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from body_meshes import box, hanging, standing
+
+COMM = MPI.COMM_WORLD
+PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
+
+
+class Square:
+    """A law p = k c²."""
+
+    def __init__(self, k):
+        self.k = k
+
+    def pressure(self, closure):
+        return self.k * closure.clip(0.0) ** 2
+
+    def stiffness(self, closure):
+        return 2.0 * self.k * closure.clip(0.0)
+
+
+def pressed(mode, order):
+    """Return force, moment, reaction and pressures of two load steps."""
+    below = box((0, 0, -0.7), (1, 1, 0), (4, 3, 3), "tetrahedron", COMM)
+    above = box((0, 0, 0), (1, 1, 1), (3, 5, 2), "hexahedron", COMM)
+    soft, hard = (Material(young_modulus=e, poisson_ratio=0.3) for e in (2e3, 5e3))
+    first = standing(below, soft, PATCHES, order)
+    second = hanging(above, hard, PATCHES, order)
+    faces = FacePair(first, second, BodyPair(first.body, second.body))
+    problem = LawContactProblem(faces, [Square(1e7 * (1 + i)) for i in range(4)], mode)
+    found = []
+    for control in (Control(approach=2e-3, tilt=(1e-3, 0.0)), Control(force=3.0, tilt=None)):
+        state = problem.solve(control)
+        found += [state.force, state.reaction, state.approach, *state.pressure]
+    return found
+
+
+if __name__ == "__main__":
+    result = {
+        f"{mode} {order}": pressed(mode, order)
+        for mode, order in (("patchwise", 1), ("pointwise", 1), ("pointwise", 2))
+    }
+    if COMM.rank == 0:
+        sys.stdout.write(json.dumps(result) + "\n")

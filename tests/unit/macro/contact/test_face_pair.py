@@ -1,0 +1,127 @@
+"""Two elastic bodies on each other: halves of one another's compliance, and columns in series."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from body_meshes import HIGH, box, hanging, standing
+
+from geometry.errors import InputError
+from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
+from macro import LawContactProblem, Material, MeshedBody, Support, Traction
+from macro.body_pair import BodyPair
+from macro.contact.face_pair import FacePair
+
+SOFT = Material(young_modulus=2000.0, poisson_ratio=0.3)
+HARD = Material(young_modulus=4000.0, poisson_ratio=0.3)
+SLIDING = Material(young_modulus=3000.0, poisson_ratio=0.0)
+PATCHES = PatchGrid(grid=(3, 2), lengths=(1.0, 1.0))
+WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
+
+
+class Power:
+    """A law p = k c^(3/2)."""
+
+    def __init__(self, k, touch=0.0):
+        self.k, self.touch = k, touch
+
+    def pressure(self, closure):
+        return self.k * np.maximum(closure - self.touch, 0.0) ** 1.5
+
+    def stiffness(self, closure):
+        return 1.5 * self.k * np.sqrt(np.maximum(closure - self.touch, 0.0))
+
+
+class Spring:
+    """A law p = k c."""
+
+    def __init__(self, k):
+        self.k = k
+
+    def pressure(self, closure):
+        return self.k * closure
+
+    def stiffness(self, closure):
+        return np.full_like(closure, self.k)
+
+
+def pair(first, second):
+    return FacePair(first, second, BodyPair(first.body, second.body))
+
+
+def laws_of(patches):
+    return [Power(1e5 * (1 + i), touch=1e-4 * i) for i in range(patches.count)]
+
+
+@pytest.mark.parametrize(("order", "mode"), [(1, "patchwise"), (1, "pointwise"), (2, "pointwise")])
+def test_two_equal_bodies_are_one_of_half_the_modulus(order, mode):
+    """Mirror images on each other: the plane between them stays where a rigid plane would be."""
+    below, above = box((0, 0, -1), (1, 1, 0), (4, 4, 3)), box((0, 0, 0), (1, 1, 1), (4, 4, 3))
+    control = Control(approach=2e-3, tilt=(1e-4, -2e-4))
+    both = pair(standing(below, HARD, PATCHES, order), hanging(above, HARD, PATCHES, order))
+    found = LawContactProblem(both, laws_of(PATCHES), mode).solve(control)
+    single = LawContactProblem(standing(below, SOFT, PATCHES, order), laws_of(PATCHES), mode)
+    expected = single.solve(control)
+    assert found.force == pytest.approx(expected.force, rel=1e-9)
+    np.testing.assert_allclose(found.pressure, expected.pressure, rtol=1e-8)
+    np.testing.assert_allclose(found.closure, expected.closure, rtol=1e-8)
+    assert found.reaction == pytest.approx(found.force, rel=1e-8)
+
+
+def series(first, second, mode, finer=1):
+    """Return the relative error of two columns on each other, whose meshes do not match.
+
+    Without lateral strain δ = p/k + p h₁/E₁ + p h₂/E₂.
+    """
+    stiff = Material(young_modulus=9000.0, poisson_ratio=0.0)
+    below = box((0, 0, -0.5), (1, 1, 0), (3 * finer, 4 * finer, 2), first)
+    above = box((0, 0, 0.1), (1, 1, 1.1), (5 * finer, 3 * finer, 2), second)
+    faces = pair(standing(below, SLIDING, WHOLE), hanging(above, stiff, WHOLE))
+    faces.second.facets.depth[:] -= 0.1  # the bodies stand apart, and approach from first touch
+    state = LawContactProblem(faces, [Spring(2e4)], mode).solve(Control(approach=3e-3))
+    return state.force / (3e-3 / (1 / 2e4 + 0.5 / 3000.0 + 1.0 / 9000.0)) - 1.0
+
+
+@pytest.mark.parametrize(
+    ("first", "second"), product(["hexahedron", "tetrahedron"], ["tetrahedron", "hexahedron"])
+)
+def test_columns_in_series(first, second):
+    assert abs(series(first, second, "patchwise")) < 1e-9
+    # points of one face do not integrate the basis functions of the other exactly
+    coarse, fine = (abs(series(first, second, "pointwise", finer)) for finer in (1, 2))
+    assert fine < 0.6 * coarse < 1e-3
+
+
+def test_only_common_parts_of_the_faces_touch():
+    """A counter-body over half of the face presses on that half, whatever the law elsewhere."""
+    below, above = box((0, 0, -1), (1, 1, 0), (4, 4, 2)), box((0.5, 0, 0), (1, 1, 1), (3, 3, 2))
+    faces = pair(standing(below, SLIDING, WHOLE), hanging(above, SLIDING, WHOLE))
+    state = LawContactProblem(faces, [Spring(1e-3)], "pointwise").solve(Control(approach=1e-3))
+    assert state.force == pytest.approx(0.5 * 1e-6, rel=1e-6)  # no deformation to speak of
+    with pytest.raises(InputError, match="do not cover the patches alike"):
+        LawContactProblem(faces, [Spring(1e-3)], "patchwise")
+
+
+def test_force_on_both_with_a_free_tilt():
+    below, above = box((0, 0, -1), (1, 1, 0), (4, 4, 3)), box((0, 0, 0), (1, 1, 1), (3, 5, 2))
+    faces = pair(standing(below, HARD, PATCHES), hanging(above, SOFT, PATCHES))
+    problem = LawContactProblem(faces, laws_of(PATCHES), "pointwise")
+    state = problem.solve(Control(force=2.0, tilt=None))
+    assert state.force == pytest.approx(2.0, rel=1e-9)
+    np.testing.assert_allclose(state.moment, 0.0, atol=1e-9)
+    assert state.reaction == pytest.approx(2.0, rel=1e-7)
+
+
+def test_tractions_and_moved_supports_close_the_gap():
+    """A column pulled by σ at its upper face, and lifted by a moved support, meets the plane."""
+    mesh = box((0, 0, -0.5), (1, 1, 0), (3, 3, 2))
+    pulled = standing(mesh, SLIDING, WHOLE, tractions=[Traction(tag=HIGH, stress=(0, 0, 6.0))])
+    state = LawContactProblem(pulled, [Spring(2e4)]).solve(Control(approach=0.0))
+    assert state.force == pytest.approx(1e-3 / (1 / 2e4 + 0.5 / 3000.0), rel=1e-8)
+    supports = [Support(tag=1, displacement=(0.0, 0.0, 1e-3))]
+    lifted = standing(mesh, SLIDING, WHOLE)
+    body = MeshedBody(lifted.body.mesh, SLIDING, supports)
+    face = type(lifted)(body, lifted.facets, WHOLE)
+    state = LawContactProblem(face, [Spring(2e4)]).solve(Control(approach=0.0))
+    assert state.force == pytest.approx(1e-3 / (1 / 2e4 + 0.5 / 3000.0), rel=1e-8)
