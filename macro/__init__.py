@@ -11,10 +11,14 @@ A file → read_mesh → TaggedMesh makes a MeshedBody of any shape, which takes
 from geometry.materials import Material
 from macro.block import Block
 from macro.body_pair import BodyPair
+from macro.compat import vector_space
 from macro.compliance.face_compliance import FaceCompliance, face_compliance
 from macro.contact.contact_forces import ContactLaw
+from macro.contact.contact_problem import ContactProblem
 from macro.contact.face_pair import FacePair
 from macro.contact.face_regions import FaceRegions
+from macro.contact.interface import Interface
+from macro.contact.law_operator import LawOperator, LawsAtPoints
 from macro.contact.law_problem import LawContactProblem, LawContactState
 from macro.contact.loaded_face import (
     LoadedFace,
@@ -47,12 +51,16 @@ __all__ = [
     "BodyPair",
     "ContactFacets",
     "ContactLaw",
+    "ContactProblem",
     "ElasticBody",
     "FaceCompliance",
     "FacePair",
     "FaceRegions",
+    "Interface",
     "LawContactProblem",
     "LawContactState",
+    "LawOperator",
+    "LawsAtPoints",
     "LoadedFace",
     "Material",
     "MeshQuality",
@@ -73,6 +81,7 @@ __all__ = [
     "planar_face",
     "read_mesh",
     "rough_block_mesh",
+    "vector_space",
     "write_fields",
     "write_rough_fields",
 ]
