@@ -25,7 +25,7 @@ FACETS = {
 }
 """Corners of the facets of tetrahedra and of hexahedra, in XDMF's order."""
 
-VIEWS = {"brake_pad": (42, -60, 1.2), "flange": (32, -60, 1.3), "seal_ring": (30, -25, 1.2)}
+VIEWS = {"brake_pad": (42, -60, 1.45), "flange": (32, -60, 1.3), "seal_ring": (30, -25, 1.2)}
 """Elevation and azimuth of the views [degrees], and their zoom."""
 
 GREY, LIGHT = np.array([0.78, 0.82, 0.88]), np.array([0.35, -0.35, 0.87])
@@ -86,7 +86,7 @@ def draw(name: str, folder: Path, out: Path) -> None:
     body.set_box_aspect(upper - lower, zoom=zoom)
     body.view_init(elevation, azimuth)
     body.set_axis_off()
-    figure.savefig(out / f"{name}.png", dpi=110)
+    figure.savefig(out / f"{name}.png", dpi=90)
 
 
 def main() -> None:

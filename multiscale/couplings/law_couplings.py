@@ -243,7 +243,12 @@ def beyond_law(
         table: The laws.
         falls: Whether closure falls somewhere in a law, where the mesh cannot follow.
     """
-    if table.made_by.get("coupling") != "consistent":
+    if table.made_by.get("coupling") == "representative":
+        remedy = (
+            "somewhere on the face the pressure is larger than the laws were made for: state "
+            "law.largest_pressure, which is ten times the mean one otherwise, or take a smaller load"
+        )
+    elif table.made_by.get("coupling") != "consistent":
         remedy = (
             "near full contact a patch taken alone has no pressure as a function of closure: take "
             "coupling.newton = 'condensed', which goes on, coupling.kind = 'consistent' or "
