@@ -31,6 +31,7 @@ FILES = (
     "history.csv", "patches.csv", "reference.csv", "laws.h5", "provenance.json", "report.html",
     "contacts.csv", "contact.h5", "surface.png", "curves.png", "pressures.png", "contact.png",
     "laws.png", "block.png", "fields.xdmf", "fields.h5", "fields.bp",
+    "counter_fields.xdmf", "counter_fields.h5", "counter_fields.bp", "face.png",
 )  # fmt: skip
 """All files that a run may write."""
 

@@ -217,3 +217,40 @@ def test_faces_that_do_not_face_each_other_are_refused(folder):
     upside = body(folder, "above", contact="left", supports=[{"surface": "top"}])
     with pytest.raises(InputError, match=r"counter_body.contact: does not face the body"):
         Run(Scene.from_dict({**PATCHES, "body": body(folder), "counter_body": upside}))
+
+
+SMALL = BlockShape(interface=(1.0, 1.0), height=HEIGHT, cells=(4, 4, 3))
+CONTACT = {**PATCHES, "load": {"approach": "6 um", "steps": 1, "tilt": [1e-3, 2e-3]}}
+TABLE = {"table_tolerance": 5e-3}
+
+
+@pytest.fixture(scope="module")
+def small(folder):
+    """Folder with a cube of few cells, and its mirror image above it."""
+    x, y, z = SMALL.ticks
+    write_box(folder / "small.msh", SMALL.ticks)
+    write_box(folder / "small_above.msh", (x, y, -z[::-1]))
+    return folder
+
+
+@pytest.mark.long  # quadratic elements of the body, for every mode
+def test_contact_problems_know_the_mesh(small):
+    concurrent, sections = {"coupling": {"kind": "concurrent"}}, {"body": body(small, "small")}
+    expected = forces(done(**CONTACT, **concurrent, block=CONSTANTS))
+    found = forces(done(**CONTACT, **concurrent, **sections))
+    assert found == pytest.approx(expected, rel=1e-3)  # 16 × 3 quadratic elements a side
+    for way in WAYS.values():
+        coupling = {"coupling": {"kind": "consistent", **way, **TABLE}}
+        laws = forces(done(**CONTACT, **coupling, **sections))
+        assert laws == pytest.approx(found, rel=3e-3)  # between the rows of the laws
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", ["concurrent", "consistent"])
+def test_contact_problems_know_both_meshes(small, kind):
+    coupling = {"coupling": {"kind": kind, **(TABLE if kind == "consistent" else {})}}
+    one = done(**CONTACT, **coupling, body=body(small, "small", young_modulus=0.5 * E))
+    other = above(small)
+    other["mesh"] = str(small / "small_above.msh")
+    two = done(**CONTACT, **coupling, body=body(small, "small"), counter_body=other)
+    assert forces(two) == pytest.approx(forces(one), rel=1e-8)
