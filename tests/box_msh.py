@@ -58,4 +58,4 @@ def write_box(path, ticks, *, turn=None, shift=(0, 0, 0), top="top", halves=Fals
         for k, (kind, tag, corner) in enumerate(lines)
     ]
     Path(path).write_text("\n".join([*text, "$EndElements", ""]), encoding="utf-8")
-    return path
+    return Path(path)

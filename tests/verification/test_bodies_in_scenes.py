@@ -238,7 +238,7 @@ def test_contact_problems_know_the_mesh(small):
     concurrent, sections = {"coupling": {"kind": "concurrent"}}, {"body": body(small, "small")}
     expected = forces(done(**CONTACT, **concurrent, block=CONSTANTS))
     found = forces(done(**CONTACT, **concurrent, **sections))
-    assert found == pytest.approx(expected, rel=1e-3)  # 16 × 3 quadratic elements a side
+    assert found == pytest.approx(expected, rel=2e-3)  # four quadratic elements along a side
     for way in WAYS.values():
         coupling = {"coupling": {"kind": "consistent", **way, **TABLE}}
         laws = forces(done(**CONTACT, **coupling, **sections))
