@@ -257,7 +257,12 @@ def beyond_law(
         table: The laws.
         falls: Whether closure falls somewhere in a law, where the mesh cannot follow.
     """
-    if table.made_by.get("coupling") != "consistent":
+    if table.made_by.get("coupling") == "representative":
+        remedy = (
+            "a point of the face is pressed harder than the law was made for: take a larger "
+            "law.largest_pressure"
+        )
+    elif table.made_by.get("coupling") != "consistent":
         remedy = (
             "near full contact a patch taken alone has no pressure as a function of closure: take "
             "coupling.newton = 'condensed', which goes on, coupling.kind = 'consistent' or "
