@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from geometry import InputError
 from multiscale.exports.places import Place
 from multiscale.laws.interpolation import LawPoint
-from multiscale.laws.law_table import repaired_law
-from multiscale.laws.patch_law import PatchLaw
+from multiscale.laws.patch_law import PatchLaw, repaired_law
 
 Array = NDArray[np.float64]
 

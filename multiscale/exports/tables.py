@@ -18,7 +18,10 @@ CSV_COLUMNS = (
     "approach_mm", "closure_mm", "pressure_MPa", "stiffness_MPa_per_mm",
     "contact_area_fraction", "separation_mm", "contacts",
 )  # fmt: skip
-"""Columns of ``laws.csv`` after those that say where the law holds: ix and iy, or the region."""
+"""Columns of ``laws.csv`` after those that say where the law holds: ix and iy, or the region.
+
+Laws of regions have the scatter of pressures between their samples as a last column.
+"""
 
 
 def csv_text(table: LawTable, tolerance: float) -> str:
@@ -34,10 +37,13 @@ def csv_text(table: LawTable, tolerance: float) -> str:
     text = StringIO()
     writer = csv.writer(text)
     regions = isinstance(table.patches, Regions)
-    writer.writerow((*(("region",) if regions else ("ix", "iy")), *CSV_COLUMNS))
+    where, scatter = (("region",), ("pressure_scatter_MPa",)) if regions else (("ix", "iy"), ())
+    writer.writerow((*where, *CSV_COLUMNS, *scatter))
     for index, law in enumerate(table.laws):
         place = _place(table, index)
-        writer.writerows((*place, *row) for row in _rows_of(law, tolerance))
+        for row in _rows_of(law, tolerance):
+            more = (float(law.pressure_scatter(row[1])),) if regions else ()  # over the closure
+            writer.writerow((*place, *row, *more))
     return text.getvalue()
 
 
