@@ -112,6 +112,13 @@ def raised(body: ElasticBody) -> ElasticBody:
     return body
 
 
+def lowered(body: ElasticBody) -> ElasticBody | None:
+    """Return the body with linear elements, where it has quadratic ones on a mesh of its own."""
+    if isinstance(body, MeshedBody) and body.degree == 2:
+        return replace(body, order=1)
+    return None
+
+
 def mesh_face_compliance(
     body: ElasticBody,
     facets: ContactFacets,

@@ -1,4 +1,4 @@
-"""Fields below Legendre modes of pressure, against Love's closed form and the modes' own moments."""
+"""Fields below modes of pressure, against Love's closed form and the modes' own moments."""
 
 import numpy as np
 import pytest
