@@ -119,7 +119,9 @@ class ContactProblem:
         self._inner = self._contact.duplicate()
         usual = _FACTORISED if self._matrix.getSize()[0] <= _SMALL else ALGEBRAIC_DEFAULTS
         given = dict(petsc_options or {})
-        self._options = {**KRYLOV_DEFAULTS, **NONLINEAR_DEFAULTS, **usual, **given}
+        # multigrid smooths with the shell otherwise, whose tangent moves on
+        apart = {"pc_use_amat": False}
+        self._options = {**KRYLOV_DEFAULTS, **NONLINEAR_DEFAULTS, **usual, **apart, **given}
         self._forcing = not given.keys() & {"ksp_rtol", "snes_ksp_ew"}
         self._snes = self._solver()
 
