@@ -2,7 +2,7 @@
 
 BlockShape → block_mesh → Block (with a Material) → LoadedFace (with a PatchGrid)
 → LawContactProblem (with one ContactLaw per patch) → LawContactState for every load step.
-A TaggedMesh makes a MeshedBody of any shape, which takes the place of the Block.
+A file → read_mesh → TaggedMesh makes a MeshedBody of any shape, which takes the place of the Block.
 
 `face_compliance` is the displacement of the contact face in smooth modes; rough_block_mesh → Block
 → UnilateralContactProblem meshes the roughness itself, as a reference.
@@ -34,7 +34,10 @@ from macro.elastic_body import ElasticBody
 from macro.fields import AtPoints, write_fields, write_rough_fields
 from macro.mesh.block import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
 from macro.mesh.contact_face import ContactFacets, contact_facets
+from macro.mesh.from_file import read_mesh
+from macro.mesh.planar_face import PlanarFace, planar_face
 from macro.mesh.rough_surface import MeshQuality, rough_block_mesh
+from macro.mesh.supports import check_supports
 from macro.mesh.tagged import TaggedMesh
 from macro.meshed_body import MeshedBody, Support, Traction
 
@@ -62,17 +65,21 @@ __all__ = [
     "Material",
     "MeshQuality",
     "MeshedBody",
+    "PlanarFace",
     "Support",
     "TaggedMesh",
     "Traction",
     "UnilateralContactProblem",
     "UnilateralContactState",
     "block_mesh",
+    "check_supports",
     "contact_facets",
     "displacements_under",
     "face_compliance",
     "nodal_contact",
     "patch_compliance_matrix",
+    "planar_face",
+    "read_mesh",
     "rough_block_mesh",
     "vector_space",
     "write_fields",
