@@ -14,28 +14,31 @@ os.environ["OMP_NUM_THREADS"] = "1"
 
 import argparse
 import ctypes
-import tempfile
+import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from body_meshes import HEIGHTS, Part, write_part
 from mpi4py import MPI
 from petsc4py import PETSc
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from machine_parts import STEEL, Part, part_body, read_part
+
 from geometry import PatchGrid
-from geometry.collective import on_root
 from geometry.rigid_plane import Control
 from macro import LawContactProblem, LoadedFace, Material, compat
 from macro.linear_solvers.options import PREFIX
+from macro.mesh.contact_face import contact_facets
 from macro.mesh.from_file import read_mesh
 from macro.mesh.planar_face import planar_face
-from macro.meshed_body import MeshedBody, Support
 
 COMM = MPI.COMM_WORLD
-STEEL, LINING, SOFT, RUBBERY = (
+LINING, SOFT, RUBBERY = (
     Material(young_modulus=modulus, poisson_ratio=ratio)
-    for modulus, ratio in ((210e3, 0.3), (5e3, 0.3), (500.0, 0.3), (500.0, 0.45))
+    for modulus, ratio in ((5e3, 0.3), (500.0, 0.3), (500.0, 0.45))
 )
 PARTS = {
     # part, element degree, material of the second volume, whether on rollers
@@ -89,18 +92,6 @@ def timed(work):
     return found, *(COMM.allreduce(part, op=MPI.MAX) for part in spent), memory() - before
 
 
-def body_of(tagged, degree, second, rollers):
-    """Return a part's body, clamped, or on rollers on three planes."""
-    names = tagged.facet_names
-    materials = dict(zip(sorted(tagged.cell_names.values()), (STEEL, second), strict=False))
-    held = [Support(tag=names["support"], displacement=(None if rollers else 0.0,) * 2 + (0.0,))]
-    if rollers:
-        held.append(Support(tag=names["x"], displacement=(0.0, None, None)))
-        held.append(Support(tag=names["y"], displacement=(None, 0.0, None)))
-    only = next(iter(materials.values()))
-    return MeshedBody(tagged, materials if len(materials) > 1 else only, held, order=degree)
-
-
 def iterations(body, solver):
     """Solve to 1e-8 under random forces."""
     load = body.stiffness.createVecRight()
@@ -112,7 +103,7 @@ def iterations(body, solver):
     return solver.its if solver.reason > 0 else -1
 
 
-def solve(name, tagged, body, *, aggregation):
+def solve(name, body, *, aggregation):
     """Print one line of the table."""
     assembly = timed(lambda: body.stiffness)
     setup = timed(lambda: body.solver)
@@ -135,7 +126,8 @@ def solve(name, tagged, body, *, aggregation):
 
 def press(name, tagged, body, steps):
     """Press the part step by step, and print the time and memory of every phase."""
-    face = planar_face(tagged, tagged.facet_names["contact"])
+    tag = tagged.facet_names["contact"]
+    face, facets = planar_face(tagged, tag), tagged.facet_tags.find(tag)
 
     def solved():
         for step in range(1, steps + 1):
@@ -145,7 +137,9 @@ def press(name, tagged, body, steps):
     patches = PatchGrid(grid=(1, 1), lengths=face.lengths)
     problem, *spent = timed(
         lambda: LawContactProblem(
-            LoadedFace(body, face.facets_of(body), face.frame, patches), [Law()], "pointwise"
+            LoadedFace(body, contact_facets(tagged.mesh, facets, face.frame), patches),
+            [Law()],
+            "pointwise",
         )
     )
     lines.append(("law on the face", (None, *spent)))
@@ -155,8 +149,9 @@ def press(name, tagged, body, steps):
         print(f"{name}, {body.dofs} unknowns")
         for phase, (_, cpu, wall, used) in lines:
             print(f"  {phase:16s} {cpu:7.2f} s CPU {wall:7.2f} s   {used / 1e9} GB")
-        print("  Newton", [s.newton_iterations for s in states],
-              "linear", [s.linear_iterations for s in states], "force", states[-1].force)  # fmt: skip
+        newton = [state.newton_iterations for state in states]
+        linear = [state.linear_iterations for state in states]
+        print(f"  Newton {newton}, linear {linear}, force {states[-1].force:.3f} N")
 
 
 def main():
@@ -167,22 +162,22 @@ def main():
     parser.add_argument("--aggregation", action="store_true", help="beside PETSc's GAMG")
     choice = parser.parse_args()
     if COMM.rank == 0 and not choice.steps:
-        print("part                   unknowns  iter. set-up[s] solve[s]  matrix, set-up [B]   GAMG")
+        print(
+            "part                   unknowns  iter. set-up[s] solve[s]  matrix, set-up [B]   GAMG"
+        )
     for name in choice.parts or PARTS:
         part, *rest = PARTS[name]
-        part = Part(name=part.name, cells=part.cells, size=part.size / choice.scale, flat=part.flat)
-        with tempfile.TemporaryDirectory() as folder:
-            path = COMM.bcast(Path(folder) / "part.msh")
-            on_root(COMM, lambda part=part, path=path: write_part(part, path))
-            tagged, cpu, wall, used = timed(lambda path=path: read_mesh(path, COMM))
-            COMM.Barrier()
+        part = replace(part, size=part.size / choice.scale, fast=part.cells == "tet")
+        tagged, cpu, wall, used = read_part(
+            part, COMM, lambda path, comm: timed(lambda: read_mesh(path, comm))
+        )
         if COMM.rank == 0:
-            print(f"# {name}: read in {wall:.1f} s, {used / 1e9} GB", flush=True)
-        body = body_of(tagged, *rest)
+            print(f"# {name}: read in {cpu:.1f} s CPU, {wall:.1f} s, {used / 1e9} GB", flush=True)
+        body = part_body(tagged, *rest)
         if choice.steps:
             press(name, tagged, body, choice.steps)
         else:
-            solve(name, tagged, body, aggregation=choice.aggregation)
+            solve(name, body, aggregation=choice.aggregation)
         compat.collect_garbage(PETSc.COMM_WORLD)
 
 
