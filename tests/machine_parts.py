@@ -47,11 +47,11 @@ class Part:
     fast: bool = False
 
 
-def read_part(part, comm, reading=read_mesh):
-    """Mesh a part on rank 0, and read its file on all ranks."""
+def read_part(part, comm, reading=read_mesh, file=None):
+    """Mesh a part on rank 0, and read its file on all ranks; a file that exists is taken."""
     with tempfile.TemporaryDirectory() as folder:
-        path = comm.bcast(Path(folder) / "part.msh")
-        on_root(comm, lambda: write_part(part, path))
+        path = comm.bcast(Path(folder) / "part.msh" if file is None else Path(file))
+        on_root(comm, lambda: path.exists() or write_part(part, path))
         found = reading(path, comm)
         comm.Barrier()
     return found

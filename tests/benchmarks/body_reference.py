@@ -82,10 +82,14 @@ def compare(seed, edges, added, flat):
     found, problem, state = pressed(reference)
     bars = found.error / found.value.max()
     print(
-        "  reference  " + " ".join(f"{value:.4f}" for value in found.value) + " N ± "
+        "  reference  "
+        + " ".join(f"{value:.4f}" for value in found.value)
+        + " N ± "
         + " ".join(f"{bar:.2%}" for bar in bars)
-        + "\n  concurrent " + percent([s.force for s in concurrent], found.value)
-        + "\n  consistent " + percent([s.force for s in laws], found.value)
+        + "\n  concurrent "
+        + percent([s.force for s in concurrent], found.value)
+        + "\n  consistent "
+        + percent([s.force for s in laws], found.value)
         + "\n  small slopes "
         + percent(
             [s.force for s in embedded(embedded_model(surface, added, slopes=False), APPROACHES)],

@@ -4,7 +4,8 @@ Run by hand: `.venv/bin/python tests/benchmarks/body_solvers.py [PART …] [--sc
 mpirun; ``--scale 2`` halves the cells. Every part is written by gmsh, read, assembled and solved to
 1e-8 under a load of all frequencies. Iterations with the options of the body and with PETSc's
 smoothed aggregation; times are CPU seconds of the slowest rank; memory is that of all ranks, per
-unknown, beyond what they had before. ``--steps 8`` presses the part instead, under a plane and one
+unknown, beyond what they had before each phase, and in the whole (once with ``--file`` to make the
+mesh, once more to measure). ``--steps 8`` presses the part instead, under a plane and one
 pointwise law, and prints the time of every phase.
 """
 
@@ -73,6 +74,10 @@ class Law:
         return 2e4 * np.maximum(closure, 0.0)
 
 
+PEAKS = []
+"""Memory of every rank before every phase of a part, and the largest during it [B]."""
+
+
 def memory(*, restart=False):
     """Return the largest memory of all ranks together, since a restart [B]."""
     if restart:
@@ -89,7 +94,14 @@ def timed(work):
     began = time.process_time(), time.perf_counter()
     found = work()
     spent = time.process_time() - began[0], time.perf_counter() - began[1]
-    return found, *(COMM.allreduce(part, op=MPI.MAX) for part in spent), memory() - before
+    largest = memory()
+    PEAKS.append((before, largest))
+    return found, *(COMM.allreduce(part, op=MPI.MAX) for part in spent), largest - before
+
+
+def whole_memory():
+    """Return the largest memory since the first phase, beyond what was there, per rank [B]."""
+    return np.max([largest for _, largest in PEAKS], axis=0) - PEAKS[0][0]
 
 
 def iterations(body, solver):
@@ -108,7 +120,7 @@ def solve(name, body, *, aggregation):
     assembly = timed(lambda: body.stiffness)
     setup = timed(lambda: body.solver)
     run = timed(lambda: iterations(body, body.solver))
-    other = ""
+    other, whole = "", whole_memory()
     if aggregation:
         vars(body).pop("solver")
         PETSc.Options(PREFIX)["pc_type"] = "gamg"
@@ -117,7 +129,8 @@ def solve(name, body, *, aggregation):
         other = f"{third[0]:7d} {second[1]:7.2f} {third[1]:7.2f}"
         PETSc.Options(PREFIX).delValue("pc_type")
     if COMM.rank == 0:
-        sizes = " ".join(f"{part[3].sum() / body.dofs:6.0f}" for part in (assembly, setup))
+        used = (assembly[3], setup[3], whole)
+        sizes = " ".join(f"{part.sum() / body.dofs:6.0f}" for part in used)
         print(
             f"{name:22s} {body.dofs:8d} {run[0]:6d} {setup[1]:7.2f} {run[1]:7.2f}   {sizes}{other}",
             flush=True,
@@ -145,12 +158,14 @@ def press(name, tagged, body, steps):
     lines.append(("law on the face", (None, *spent)))
     states, *spent = timed(lambda: list(solved()))
     lines.append((f"{steps} load steps", (None, *spent)))
+    whole = whole_memory()
     if COMM.rank == 0:
         print(f"{name}, {body.dofs} unknowns")
         for phase, (_, cpu, wall, used) in lines:
             print(f"  {phase:16s} {cpu:7.2f} s CPU {wall:7.2f} s   {used / 1e9} GB")
         newton = [state.newton_iterations for state in states]
         linear = [state.linear_iterations for state in states]
+        print(f"  whole {whole / 1e9} GB, {whole.sum() / body.dofs:.0f} B per unknown")
         print(f"  Newton {newton}, linear {linear}, force {states[-1].force:.3f} N")
 
 
@@ -160,16 +175,18 @@ def main():
     parser.add_argument("--scale", type=float, default=1.0)
     parser.add_argument("--steps", type=int, default=0)
     parser.add_argument("--aggregation", action="store_true", help="beside PETSc's GAMG")
+    parser.add_argument("--file", help="keep the mesh here, or take it: memory without gmsh's")
     choice = parser.parse_args()
     if COMM.rank == 0 and not choice.steps:
         print(
-            "part                   unknowns  iter. set-up[s] solve[s]  matrix, set-up [B]   GAMG"
+            "part                   unknowns  iter. set-up[s] solve[s]  matrix, set-up, whole [B]   GAMG"
         )
     for name in choice.parts or PARTS:
+        PEAKS.clear()
         part, *rest = PARTS[name]
         part = replace(part, size=part.size / choice.scale, fast=part.cells == "tet")
         tagged, cpu, wall, used = read_part(
-            part, COMM, lambda path, comm: timed(lambda: read_mesh(path, comm))
+            part, COMM, lambda path, comm: timed(lambda: read_mesh(path, comm)), choice.file
         )
         if COMM.rank == 0:
             print(f"# {name}: read in {cpu:.1f} s CPU, {wall:.1f} s, {used / 1e9} GB", flush=True)

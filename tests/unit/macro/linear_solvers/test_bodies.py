@@ -33,7 +33,12 @@ CASES = {
     "seal ring of flat tetrahedra": (("ring", "layers", 1.2, 8.0), {"rollers": True}, 28),
     "seal ring of flat hexahedra": (("ring", "hex", 1.2, 8.0), {"rollers": True}, 29),
     "seal ring of very flat hexahedra": (("ring", "hex", 1.6, 20.0), {"rollers": True}, 30),
-    "seal ring, quadratic": (("ring", "layers", 1.6, 4.0), {"rollers": True, "degree": 2}, 34),
+    "seal ring, quadratic": (("ring", "layers", 1.8, 8.0), {"rollers": True, "degree": 2}, 34),
+    "seal ring of quadratic hexahedra": (
+        ("ring", "hex", 2.4, 8.0),
+        {"rollers": True, "degree": 2},
+        0,
+    ),
     "L": (("L", "hex", 4.0), {}, 13),
 }
 
