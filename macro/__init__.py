@@ -21,6 +21,7 @@ from macro.contact.loaded_face import (
     displacements_under,
     patch_compliance_matrix,
 )
+from macro.contact.rough_face import RoughFace
 from macro.contact.unilateral_problem import (
     UnilateralContactProblem,
     UnilateralContactState,
@@ -31,6 +32,7 @@ from macro.fields import AtPoints, write_fields, write_rough_fields
 from macro.mesh.block import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
 from macro.mesh.contact_face import ContactFacets, contact_facets
 from macro.mesh.rough_surface import MeshQuality, rough_block_mesh
+from macro.mesh.stepped import rough_stepped_mesh, stepped_mesh
 from macro.mesh.tagged import TaggedMesh
 from macro.meshed_body import MeshedBody, Support, Traction
 
@@ -54,6 +56,7 @@ __all__ = [
     "Material",
     "MeshQuality",
     "MeshedBody",
+    "RoughFace",
     "Support",
     "TaggedMesh",
     "Traction",
@@ -66,6 +69,8 @@ __all__ = [
     "nodal_contact",
     "patch_compliance_matrix",
     "rough_block_mesh",
+    "rough_stepped_mesh",
+    "stepped_mesh",
     "write_fields",
     "write_rough_fields",
 ]
