@@ -93,12 +93,13 @@ def draw(picture, path):
     nearest = cKDTree(corners[on_top][..., :2].mean(axis=1)).query(spots)[1]
     x, y, z = deformed[on_top][nearest].mean(axis=1).T
     space.scatter(x, y, z, s=5, c=RED, depthshade=False, zorder=3)
-    space.set(xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]", xlim=(0, 1.6), ylim=(-0.3, 1.3))
+    space.set(xlabel="x [mm]", ylabel="y [mm]", xlim=(0, 1.6), ylim=(-0.3, 1.3))
+    space.set(xticks=(0, 0.5, 1, 1.5), yticks=(0, 0.5, 1), zticks=(-1.5, -1, -0.5, 0))
     space.set(zlim=(-1.8, 0.1), box_aspect=(1.6, 1.6, 1.9))
     space.view_init(elev=38.0, azim=-62.0)
     space.set_title(f"displacements × {MAGNIFIED}; contact in red")
     figure.colorbar(ScalarMappable(norm, "viridis"), ax=space, label="sunk by [µm]", shrink=0.6)
-    face, curve = figure.add_subplot(1, 3, 2), figure.add_subplot(1, 3, 3)
+    face = figure.add_subplot(1, 3, 2)
     image = face.tripcolor(
         *corners[on_top][..., :2].reshape(-1, 2).T,
         np.arange(3 * on_top.sum()).reshape(-1, 3),
@@ -110,15 +111,27 @@ def draw(picture, path):
     face.set(xlabel="x [mm], the arm goes on to the right", ylabel="y [mm]", aspect="equal")
     face.legend(loc="upper left")
     figure.colorbar(image, ax=face, label="the face sinks by [µm]", shrink=0.8)
-    curves = dict(picture["curves"])
-    approach, value, bar = curves.pop("reference")
-    curve.errorbar(1e3 * approach, value, bar, color="k", lw=2.5, capsize=4, label="reference")
-    for (name, (at, force)), look in zip(curves.items(), ("--", "o", "x", ":"), strict=True):
-        curve.plot(1e3 * at, force, look, ms=9, mfc="none", label=name)
-    curve.set(xlabel="approach [µm]", ylabel="force [N]")
-    curve.legend(frameon=False)
-    curve.grid(alpha=0.3)
+    _draw_curves(figure.add_subplot(1, 3, 3), dict(picture["curves"]))
     figure.savefig(path, dpi=110)
+
+
+def _draw_curves(axes, curves):
+    """Draw forces over the approach, and in a corner what they miss of the reference."""
+    approach, value, bar = curves.pop("reference")
+    axes.errorbar(1e3 * approach, value, bar, color="k", lw=2.5, capsize=4, label="reference")
+    apart = axes.inset_axes((0.1, 0.46, 0.36, 0.22))
+    band = [100 * side * bar / value.max() for side in (-1, 1)]
+    apart.fill_between(1e3 * approach, *band, color="0.7")
+    for (name, (at, force)), look in zip(curves.items(), ("--", "o", "x", ":"), strict=True):
+        (line,) = axes.plot(1e3 * at, force, look, ms=9, mfc="none", label=name)
+        if not name.startswith("a block"):
+            part = 100 * (force - value) / value.max()
+            apart.plot(1e3 * at, part, look, color=line.get_color(), ms=6, mfc="none")
+    apart.set_title("off the reference [%]", fontsize=9)
+    axes.set(xlabel="approach [µm]", ylabel="force [N]", ylim=(0.0, None))
+    axes.legend(frameon=False)
+    for each in (axes, apart):
+        each.grid(alpha=0.3)
 
 
 def compare(seed, edges, foot):

@@ -167,7 +167,9 @@ def main():
     parser.add_argument("--aggregation", action="store_true", help="beside PETSc's GAMG")
     choice = parser.parse_args()
     if COMM.rank == 0 and not choice.steps:
-        print("part                   unknowns  iter. set-up[s] solve[s]  matrix, set-up [B]   GAMG")
+        print(
+            "part                   unknowns  iter. set-up[s] solve[s]  matrix, set-up [B]   GAMG"
+        )
     for name in choice.parts or PARTS:
         part, *rest = PARTS[name]
         part = Part(name=part.name, cells=part.cells, size=part.size / choice.scale, flat=part.flat)
