@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from geometry import Control
-from geometry.collective import on_root
+from geometry.collective import on_root_alone
 from micro import BodyModes, HalfSpaceModel, HalfSpaceState
 from multiscale.couplings.contact import SLOPES, OnBody
 from multiscale.loading.load_step import LoadStep
@@ -236,7 +236,7 @@ def checked(step: LoadStep, setup: ProblemSetup, body: OnBody, comm: Any) -> Loa
     load_history, probe = setup.scene.loading.load_history, error_probe(setup, body)
     by_force, turns = load_history.quantity == "force", load_history.tilt is None
     plane = step.force_N, step.approach_mm, step.tilt
-    found = on_root(comm, lambda: probe.measure(*plane, turns=turns, stiffness=by_force))
+    found = on_root_alone(comm, lambda: probe.measure(*plane, turns=turns, stiffness=by_force))
     return replace(
         step,
         force_error_N=0.0 if by_force else found.force,
