@@ -45,8 +45,8 @@ error."""
 _FEWER_MODES = 0.75
 """Modes of the body along a side that it is compared with, relative to those it has."""
 _LINEAR = 0.15
-"""Error by the quadratic elements of a meshed body over what linear ones on the same mesh change. On
-cubes of 8³ hexahedra, and of as many cut into tetrahedra, it was LINEAR_FIGURES of that."""
+"""Error by quadratic elements of a meshed body over what linear ones on the same mesh change. On
+cubes of 6³ hexahedra, and of as many cut into tetrahedra, it was 0.03 to 0.11 of that."""
 _SECOND_ORDER, _ON_BODY = 0.1, 0.1
 """Error by finite slopes over what their second order adds to the force, and over what they add on
 the body instead of on a half-space, where free sides cut contacts."""
