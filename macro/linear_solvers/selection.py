@@ -5,7 +5,7 @@ Towards ν = ½ the resistance to volume changes grows beside that to shear as
 does not smooth the other, and iterations grow with (1 − 2ν)^-½. On lattices a Chebyshev smoother of
 higher degree over a wider range of eigenvalues compensates for that up to ν = 0.495. Beyond, and on
 other meshes, a factorisation is used where it fits into memory. Iterations to 1e-8, measured from
-10⁴ to 2·10⁵ unknowns on lattices, and to 3·10⁶ on other meshes:
+10⁴ to 2·10⁵ unknowns on lattices, and to 5·10⁶ on other meshes:
 
     lattices        7 to 10 with tetrahedra; at ν = 0.49 13 (Q1), 14 (P1), 16 to 23 (Q2)
     other meshes    10 to 18 up to ν = 0.3 on cells of even lengths, 20 at 0.45, whatever the shape,

@@ -26,8 +26,8 @@ BYTES_PER_STATE, BYTES_PER_STEP = 24, 1000
 
 BYTES_PER_BODY_UNKNOWN = {"P1": 2400, "P2": 2500, "Q1": 4200, "Q2": 3500}
 """Memory of a body on a mesh per unknown, over all ranks: mesh, stiffness, multigrid and solve [B].
-Brake pads of 4·10⁴ to 3·10⁶ unknowns took 2350 with P1 and 2400 with P2; the stiffness alone takes
-920, 1250, 1120 (Q1) and 2300 (Q2), multigrid 1070, 850, 2400 and 590."""
+Brake pads took 2350 (2.5·10⁵ unknowns), 2290 (4.9·10⁶), 4000 (1.9·10⁵) and 3140 (1.8·10⁵); the
+stiffness alone takes 920, 1260, 1100 and 2380, multigrid 1070, 850, 2590 and 590."""
 BYTES_READ_PER_UNKNOWN = {"P1": 800, "P2": 120, "Q1": 500, "Q2": 80}
 """Memory that rank 0 takes besides, per unknown, while gmsh reads the mesh of a body [B]."""
 _BYTES_PER_EARLIER_STATE, _MOST_STATES, _WORK_VECTORS = 32, 32, 100
