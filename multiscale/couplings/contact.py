@@ -195,7 +195,7 @@ def on_body(
         if body is not None and face is not None:
             model = replace(model, body=body.term(face, higher=higher))
             if body.side_term is not None:
-                share = model.contact_modulus / material.contact_modulus
+                share = body.side_share(model.contact_modulus)
                 model = replace(model, sides=replace(body.side_term, share=share))
         if not order:
             return model
