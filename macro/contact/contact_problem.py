@@ -18,6 +18,7 @@ from macro.contact.contact_tangent import ContactTangent
 from macro.contact.interface import Interface
 from macro.contact.newton import NONLINEAR_DEFAULTS, NewtonReport, newton_tolerance
 from macro.contact.user_equations import UserEquations
+from macro.linear_solvers.algebraic import algebraic_options
 from macro.linear_solvers.options import (
     ALGEBRAIC_DEFAULTS,
     KRYLOV_DEFAULTS,
@@ -61,9 +62,9 @@ class ContactProblem:
         interfaces: The interfaces; their conditions are set to `bcs`.
         tangent: Derivative of the residual as UFL; None: `ufl.derivative`.
         petsc_options: Options of the solvers without a prefix, such as ``{"pc_type": "lu"}``. By
-            default conjugate gradients with smoothed aggregation and rigid body modes, or with a
-            factorisation of small problems. What stands behind ``-patchlaw_`` on the command line
-            wins.
+            default conjugate gradients with algebraic multigrid, hypre's for linear elements and
+            PETSc's for quadratic ones, or with a factorisation of small problems. What stands
+            behind ``-patchlaw_`` on the command line wins.
         in_matrix: Whether the tangents of pointwise interfaces are assembled too, so that the
             preconditioner knows them: needed where only contact holds the body. The preconditioner
             is made anew in every Newton step then.
@@ -106,7 +107,7 @@ class ContactProblem:
         self._norms: list[float] = []
         self._contact = matrix.createVecRight()
         self._inner = self._contact.duplicate()
-        usual = _FACTORISED if matrix.getSize()[0] <= _SMALL else ALGEBRAIC_DEFAULTS
+        usual = _FACTORISED if matrix.getSize()[0] <= _SMALL else _multigrid(space)
         # multigrid smooths with the shell otherwise, whose tangent moves on
         apart = {"pc_use_amat": False}
         given = dict(petsc_options or {})
@@ -230,3 +231,10 @@ class ContactProblem:
                     iterations=self.report.iterations,
                     remedy="make the laws up to a larger approach",
                 ) from error
+
+
+def _multigrid(space: Any) -> Mapping[str, object]:
+    """Return PETSc's options of algebraic multigrid for a space of displacements."""
+    if compat.lagrange_degree(space) == 2:
+        return ALGEBRAIC_DEFAULTS
+    return algebraic_options(hexahedral=space.mesh.topology.cell_name() == "hexahedron")

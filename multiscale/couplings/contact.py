@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, PatchGrid, overlaps
-from geometry.collective import on_root
+from geometry.collective import on_root, on_root_alone
 from micro import START_KINDS, FiniteSlopes, HalfSpaceModel, MicroModel, SlopesOfBodies
 from micro.contact_detail import ContactDetail
 from micro.model import SolvedContact
@@ -85,7 +85,7 @@ class ContactCoupling:
                 peak_pressure_MPa=self.latest.peak_pressure,
             )
 
-        return on_root(self._comm, solve)
+        return on_root_alone(self._comm, solve)
 
     def pressures_on(self, parts: PatchGrid) -> Array:
         """Return the mean pressures of parts of the contact face at the latest load step.
@@ -118,7 +118,9 @@ class ContactCoupling:
 
     def stiffness(self) -> tuple[float | None, int]:
         """Return dF/dδ at the latest load step, and its iterations; see `HasStiffness`."""
-        return on_root(self._comm, lambda: self._model.stiffness(self.latest, turns=self._turns))
+        return on_root_alone(
+            self._comm, lambda: self._model.stiffness(self.latest, turns=self._turns)
+        )
 
     def detail(self, latest: Any) -> ContactDetail:
         """Return the contact of a load step in detail; see `HasContact`."""
