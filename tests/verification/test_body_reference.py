@@ -17,7 +17,7 @@ def test_concurrent_and_calibrated_laws_are_within_the_bar_of_the_meshed_foot(tm
     foot = write_foot(tmp_path / "foot.msh", 0.25)
 
     def go(kind, mesh=foot):
-        return run(scene(SEED, APPROACH, 2, foot=mesh, cells=CELLS, coupling={"kind": kind}))
+        return run(scene(SEED, APPROACH, 1, foot=mesh, cells=CELLS, coupling={"kind": kind}))
 
     concurrent, consistent, cuboid = go("concurrent"), go("consistent"), go("concurrent", None)
     spectrum = Spectrum(**SPECTRUM, seed=SEED)
@@ -36,8 +36,8 @@ def test_concurrent_and_calibrated_laws_are_within_the_bar_of_the_meshed_foot(tm
         assert abs(history.force_N[-1] - value) < bar + ALLOWED * value
     np.testing.assert_allclose(consistent.force_N, concurrent.force_N, rtol=1e-3)
     # the arm matters: the face sinks, and turns by what a plane would tilt
-    assert cuboid.force_N[-1] > 1.3 * value
-    assert abs(reach(concurrent)[1][0]) > 1e-3
+    assert cuboid.force_N[-1] > 1.1 * value
+    assert abs(reach(concurrent)[1][0]) > 5e-4
     problem, (state,) = solved[-1]
     assert state.reaction == pytest.approx(state.force, rel=1e-8)
     assert problem.top.area.sum() == pytest.approx(1.0, rel=1e-9)
