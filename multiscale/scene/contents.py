@@ -168,6 +168,8 @@ class SceneSections(Section):
             yield "accuracy", f"does not go with {law} (allowed: coupling.table_tolerance)"
         if self.micro.model != "half-space":
             yield "micro.model", f"does not go with {law} (allowed: 'half-space')"
+        if self.output.contact in ("last", "all"):
+            yield "output.contact", f"does not go with {law}, which has no spots {out}"
         if self.law.seeds and self.surface.spectrum is None:
             yield "law.seeds", "needs surface.spectrum (allowed: leave it out for a measured map)"
         if self.block is not None and self.law.regions:

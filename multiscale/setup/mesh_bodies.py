@@ -259,7 +259,7 @@ class _Reader:
             poisson_ratio=body.poisson_ratio,
             above=highest > _SAME_PLANE * max(face.lengths),
             digest=on_root(self._comm, lambda: _digest(self._path)),
-            notes=(*filter(None, [note]), *self._curved(face.deviation)),
+            notes=(*filter(None, [note]), *self._curved(face)),
         )
         return SceneBody(body=body, facets=facets, frame=frame, facts=facts)
 
@@ -335,10 +335,10 @@ class _Reader:
         lowest, highest = zip(*parts, strict=True)
         return float(min(lowest)), float(max(highest))
 
-    def _curved(self, deviation: float) -> Iterator[str]:
-        if deviation > _SAME_PLANE * 1e3:
+    def _curved(self, face: _Face) -> Iterator[str]:
+        if face.deviation > _SAME_PLANE * max(face.lengths):
             yield (
-                f"the contact face of {self._key} is up to {2.0 * deviation:.3g} mm below its "
+                f"the contact face of {self._key} is up to {2.0 * face.deviation:.3g} mm below its "
                 "highest point; that gap closes before laws act there"
             )
 
