@@ -259,8 +259,8 @@ def beyond_law(
     """
     if table.made_by.get("coupling") == "representative":
         remedy = (
-            "a point of the face is pressed harder than the law was made for: take a larger "
-            "law.largest_pressure"
+            "somewhere on the face the pressure is larger than the laws were made for: state "
+            "law.largest_pressure, which is ten times the mean one otherwise, or take a smaller load"
         )
     elif table.made_by.get("coupling") != "consistent":
         remedy = (
