@@ -268,7 +268,7 @@ class MicroSection(Section):
     """Whether a summit's curvature is taken at its top, or over the size of its contact."""
     finite_slopes: Flag | None = None
     """Whether the slopes of the roughness, where they are not small, count to second order. When
-    not given they do with half-space contacts, unless laws are isolated."""
+    not given they do with half-space contacts, unless laws are isolated or those of samples."""
     border: Literal["ignore", "include"] = "ignore"
     """Whether maxima on the surface's border carry load."""
 
