@@ -26,13 +26,15 @@ _BOTH: Mapping[str, object] = {
     "pc_hypre_boomeramg_P_max": 4,
 }
 
-_BY_NODES: Mapping[str, object] = _BOTH | {
+_BY_NODES: Mapping[str, object] = {
+    **_BOTH,
     "pc_hypre_boomeramg_nodal_coarsen": 4,
     "pc_hypre_boomeramg_coarsen_type": "PMIS",
     "pc_hypre_boomeramg_strong_threshold": 0.25,
 }
 
-_BY_COMPONENTS: Mapping[str, object] = _BOTH | {
+_BY_COMPONENTS: Mapping[str, object] = {
+    **_BOTH,
     "pc_hypre_boomeramg_coarsen_type": "HMIS",
     "pc_hypre_boomeramg_strong_threshold": 0.7,
 }

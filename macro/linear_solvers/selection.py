@@ -107,10 +107,10 @@ def body_solver(
     requested = PETSc.Options(PREFIX).getString("pc_type", "")
     if not requested and poisson_ratio > COMPRESSIBLE and matrix.getSize()[0] <= FACTORISED:
         return linear_solver(matrix, preconditioner=DIRECT_DEFAULTS)
-    hexahedral = space.mesh.topology.cell_name() == "hexahedron"
     if degree == 2 and requested in ("", "mg"):
-        options = quadratic_options(hexahedral=hexahedral)
-        return linear_solver(matrix, vertex_grid(matrix, space, free), options)
+        grid = vertex_grid(matrix, space, free)
+        return linear_solver(matrix, grid, quadratic_options(space.mesh))
+    hexahedral = space.mesh.topology.cell_name() == "hexahedron"
     return linear_solver(matrix, preconditioner=algebraic_options(hexahedral=hexahedral))
 
 

@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, PatchGrid, overlaps
-from geometry.collective import on_root
+from geometry.collective import on_root, on_root_alone
 from micro import START_KINDS, FiniteSlopes, HalfSpaceModel, MicroModel, SlopesOfBodies
 from micro.contact_detail import ContactDetail
 from micro.model import SolvedContact
 from multiscale.couplings.body import has_body_term, scene_body
-from multiscale.couplings.counter_term import counter_term, with_counter_term
 from multiscale.loading.load_step import LoadStep
 from multiscale.setup.problem import ProblemSetup
 from multiscale.storage import Arrays, packed, unpacked
@@ -86,7 +85,7 @@ class ContactCoupling:
                 peak_pressure_MPa=self.latest.peak_pressure,
             )
 
-        return on_root(self._comm, solve)
+        return on_root_alone(self._comm, solve)
 
     def pressures_on(self, parts: PatchGrid) -> Array:
         """Return the mean pressures of parts of the contact face at the latest load step.
@@ -119,7 +118,9 @@ class ContactCoupling:
 
     def stiffness(self) -> tuple[float | None, int]:
         """Return dF/dδ at the latest load step, and its iterations; see `HasStiffness`."""
-        return on_root(self._comm, lambda: self._model.stiffness(self.latest, turns=self._turns))
+        return on_root_alone(
+            self._comm, lambda: self._model.stiffness(self.latest, turns=self._turns)
+        )
 
     def detail(self, latest: Any) -> ContactDetail:
         """Return the contact of a load step in detail; see `HasContact`."""
@@ -154,8 +155,7 @@ def contact_model(setup: ProblemSetup, comm: Any, put_on_body: OnBody | None = N
     if isolated or not has_body_term(setup):
         return model
     body = scene_body(setup)
-    term = with_counter_term(body.term(body.face(comm)), counter_term(setup, comm))
-    return replace(model, body=term)  # type: ignore[type-var]
+    return replace(model, body=body.term(body.face(comm)))  # type: ignore[type-var]
 
 
 def on_body(
@@ -183,25 +183,21 @@ def on_body(
     body = None if half_space or not has_body_term(setup) else scene_body(setup)
     if body is not None and face is None:
         face = body.face(comm)
-    above = None if body is None else counter_term(setup, comm, body.side_term)
     material, counter = setup.materials.first, setup.counter_surface
 
     def put(model: HalfSpaceModel, order: int) -> HalfSpaceModel:
-        model, facing = replace(model, tolerance=_RESIDUAL), None
+        model, above = replace(model, tolerance=_RESIDUAL), None
         surface = model.surface
         if counter is not None:  # each body has slopes of its own
-            facing = counter.on_grid(surface.grid)
-            surface = replace(surface, heights=surface.heights - facing.heights)
+            above = counter.on_grid(surface.grid)
+            surface = replace(surface, heights=surface.heights - above.heights)
         # With finite slopes heights count from the highest point, near the loads, where slopes add
         # least. The flat body then ends at it, while the block's height is that of the mean plane.
         higher = surface.highest - surface.mean_height if order else 0.0
         if body is not None and face is not None:
-            term = with_counter_term(body.term(face, higher=higher), above)
-            model = replace(model, body=term)
+            model = replace(model, body=body.term(face, higher=higher))
             if body.side_term is not None:
-                share = model.contact_modulus / material.contact_modulus
-                if above is not None and above.same_sides:
-                    share = 1.0
+                share = body.side_share(model.contact_modulus)
                 model = replace(model, sides=replace(body.side_term, share=share))
         if not order:
             return model
@@ -216,9 +212,9 @@ def on_body(
             edge_stresses=stresses,
         )
         second = setup.materials.second
-        if facing is None or second is None:
+        if above is None or second is None:
             return replace(model, slopes=slopes)
-        others = FiniteSlopes(facing, second, order=order, periodic=model.periodic)
+        others = FiniteSlopes(above, second, order=order, periodic=model.periodic)
         return replace(model, slopes=SlopesOfBodies((slopes, others)))
 
     return put

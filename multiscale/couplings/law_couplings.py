@@ -260,8 +260,7 @@ def beyond_law(
     if table.made_by.get("coupling") == "representative":
         remedy = (
             "somewhere on the face the pressure is larger than the laws were made for: state "
-            "law.largest_pressure, which is ten times the mean one otherwise, or take a smaller "
-            "load"
+            "law.largest_pressure, ten times the mean one otherwise, or take a smaller load"
         )
     elif table.made_by.get("coupling") != "consistent":
         remedy = (

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from micro import influence_matrix
 from multiscale.couplings.body import scene_body
-from multiscale.couplings.counter_term import counter_compliance
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.surface_and_block import block_section
 
@@ -63,11 +63,12 @@ def patch_compliance(setup: ProblemSetup, comm: Any) -> Array:
     Note:
         Collective.
     """
-    first = _of_first(setup, comm)
-    # two meshes are loaded together
-    if setup.both_give_way or (setup.counter_face is not None and setup.scene.decomposed):
-        return np.asarray(first + counter_compliance(setup, comm))
-    return first
+    first, second = _of_first(setup, comm), setup.materials.second
+    # two meshes are loaded together; decomposed, they are two half-spaces and what bodies add
+    decomposed = setup.counter_face is not None and setup.scene.decomposed
+    if second is None or not (setup.both_give_way or decomposed):
+        return first
+    return np.asarray(first + influence_matrix(setup.patches) * second.surface_compliance / np.pi)
 
 
 def _of_first(setup: ProblemSetup, comm: Any) -> Array:
