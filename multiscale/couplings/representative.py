@@ -67,7 +67,7 @@ def _model(setup: ProblemSetup, region: RegionSamples, sample: Surface) -> HalfS
     """Return the periodic model of a sample, with the slopes of its body where they count."""
     pair = region.materials
     model = HalfSpaceModel(sample, contact_modulus=pair.contact_modulus, periodic=True)
-    if setup.scene.micro.finite_slopes is not True:
+    if not setup.finite_slopes:
         return model
     slopes = FiniteSlopes(sample, pair.first, periodic=True)
     return HalfSpaceModel(
