@@ -192,7 +192,7 @@ def test_a_crown_is_a_gap_of_the_face(folder):
     assert forces(found)[-1] < 0.95 * forces(flat)[-1]
     assert forces(found) == pytest.approx(forces(key), rel=2e-3)  # chords of the parabola
     assert "below its highest point" in found.setup.face.notes[0]
-    with pytest.raises(InputError, match="is not planar: its nodes are up to 0.000625 mm off"):
+    with pytest.raises(InputError, match=r"is not planar: its nodes are up to 0\.000625 mm off"):
         Run(Scene.from_dict({**PATCHES, "body": crowned}))
 
 
