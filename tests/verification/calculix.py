@@ -45,9 +45,8 @@ class NodalFace(LoadedFace):
         patch = self.patches.index_of(*middle.T)
         order = np.argsort(patch, kind="stable")
         cell = facets.cell[facet]
-        values = compat.lagrange_values(
-            self.space.mesh.topology.cell_name(), 1, facets.pull_back(facet, local)
-        )
+        reference = facets.pull_back(facet, local)
+        values = compat.lagrange_values(self.space.mesh.topology.cell_name(), 1, reference)
         return FacetQuadrature(
             x=points[order, 0],
             y=points[order, 1],
@@ -57,6 +56,7 @@ class NodalFace(LoadedFace):
             cell=cell[order],
             nodes=compat.cell_nodes(self.space)[cell][order],
             values=values[order],
+            reference=reference[order],
         )
 
 

@@ -57,7 +57,7 @@ def test_nothing_touches_before_first_touch(model, patches):
         surface = make_surface(given)
         grid = PatchGrid(grid=patches, lengths=surface.lengths)
         means = patch_means(surface, grid)
-        whole = stated_model(given, surface)
+        whole = stated_model(given, surface, MODULUS)
         parts = [(whole, grid, means)]
         for index in range(grid.count):
             parts.append((*whole.of_patch(grid, index), means[index : index + 1]))

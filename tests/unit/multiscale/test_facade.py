@@ -6,11 +6,12 @@ import sys
 import pytest
 
 import geometry
+import macro
 import micro
 import multiscale
 import patchlaw
 
-PACKAGES = {"geometry": geometry, "micro": micro, "multiscale": multiscale}
+PACKAGES = {"geometry": geometry, "micro": micro, "multiscale": multiscale, "macro": macro}
 
 
 @pytest.mark.parametrize("name", [name for name in patchlaw.__all__ if name != "main"])
