@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from geometry import Control, PatchGrid, overlaps
 from geometry.collective import on_root
-from micro import START_KINDS, FiniteSlopes, HalfSpaceModel, MicroModel
+from micro import START_KINDS, FiniteSlopes, HalfSpaceModel, HalfSpaceState, MicroModel
 from micro.contact_detail import ContactDetail
 from micro.model import SolvedContact
 from multiscale.couplings.body import scene_body
@@ -84,9 +84,29 @@ class ContactCoupling:
                 newton_iterations=int(response.iterations[0]),
                 warnings=response.warnings,
                 peak_pressure_MPa=self.latest.peak_pressure,
+                **self._energies(),
             )
 
         return on_root(self._comm, solve)
+
+    def _energies(self) -> dict[str, float | None]:
+        """Return elastic energy and plastic work at the latest load step, where they are known."""
+        state = self.latest
+        if not isinstance(state, HalfSpaceState):
+            return {}
+        return {
+            "elastic_energy_mJ": state.elastic_energy,
+            "plastic_work_mJ": state.plastic_work,
+        }
+
+    @property
+    def past(self) -> Any:
+        """What the next load step starts from; under a hardness it depends on it."""
+        return self._start, self.latest
+
+    @past.setter
+    def past(self, value: Any) -> None:
+        self._start, self.latest = value
 
     def pressures_on(self, parts: PatchGrid) -> Array:
         """Return the mean pressures of parts of the contact face at the latest load step.
@@ -107,7 +127,7 @@ class ContactCoupling:
         def pressures() -> Array:
             assert self.latest is not None
             if isinstance(self._model, HalfSpaceModel):
-                (pressure, _), surface = self._start, self._model.surface
+                pressure, surface = self._start[0], self._model.surface
                 borders = parts.borders_x, parts.borders_y
                 x, y = map(overlaps, borders, surface.lengths, surface.grid)
                 return np.asarray((x @ pressure @ y.T).ravel() / parts.area)

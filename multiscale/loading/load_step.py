@@ -64,6 +64,12 @@ class LoadStep:
         stiffness_N_per_mm: Interfacial stiffness, the derivative dF/dδ of the force by the
             approach, under fixed slopes or, where the plane turns, without moment [N/mm]; None
             where it was not found.
+        elastic_energy_mJ: Energy of the elastic deformation of all bodies; None where it is not
+            known [mJ].
+        plastic_work_mJ: Work of the hardness on the plastic depth, since the start [mJ]; None where
+            it is not known.
+        work_mJ: Work of the forces on the plane, since the start [mJ]; None where no energy is
+            known.
         errors: Causes of the error, and how much each may change the force at this approach [N];
             empty where they were not measured.
     """
@@ -89,6 +95,9 @@ class LoadStep:
     approach_error_mm: float | None = None
     peak_pressure_MPa: float | None = None
     stiffness_N_per_mm: float | None = None
+    elastic_energy_mJ: float | None = None
+    plastic_work_mJ: float | None = None
+    work_mJ: float | None = None
     errors: tuple[tuple[str, float], ...] = ()
 
     @classmethod
@@ -143,7 +152,10 @@ class LoadStep:
         """
         mx, my = self.moment_N_mm
         patches = replace(self.patches, pressure_MPa=ratio * self.patches.pressure_MPa)
-        names = "force_error_N", "peak_pressure_MPa", "stiffness_N_per_mm"
+        names = (
+            *("force_error_N", "peak_pressure_MPa", "stiffness_N_per_mm"),
+            *("elastic_energy_mJ", "plastic_work_mJ", "work_mJ"),
+        )
         known = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
         return replace(
             self,

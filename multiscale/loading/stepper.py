@@ -94,6 +94,18 @@ class HasContact(Protocol):
         """
 
 
+@runtime_checkable
+class PathDependent(Protocol):
+    """A coupling whose next load step depends on those before it, beyond initial guesses."""
+
+    @property
+    def past(self) -> Any:
+        """What the load steps so far left behind; set it to take load steps back."""
+
+    @past.setter
+    def past(self, value: Any) -> None: ...
+
+
 class BeyondLaws(NotConverged):
     """A patch is outside the range of its law, where smaller load steps do not help."""
 
@@ -232,8 +244,13 @@ class LoadStepper:
         by_force = self._load_history.quantity == "force"
         if divisible and by_force and self._exceeds_limit(target):
             return None
+        past = self._coupling.past if isinstance(self._coupling, PathDependent) else None
         step = self._reached(target)
-        return None if divisible and self._exceeds_limit(step.force_N) else step
+        if divisible and self._exceeds_limit(step.force_N):
+            if past is not None and isinstance(self._coupling, PathDependent):
+                self._coupling.past = past
+            return None
+        return step
 
     def _exceeds_limit(self, force: float) -> bool:
         limit = self._load_history.force_change

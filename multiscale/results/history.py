@@ -126,6 +126,9 @@ class History:
     approach_error_mm = Column("Error of the approach; 0 where it is prescribed", "mm")
     peak_pressure_MPa = Column("Largest contact pressure", "MPa")
     stiffness_N_per_mm = Column("Interfacial stiffness dF/dδ, force over approach", "N/mm")
+    elastic_energy_mJ = Column("Energy of the elastic deformation", "mJ")
+    plastic_work_mJ = Column("Work of the hardness on the plastic depth", "mJ")
+    work_mJ = Column("Work of the forces on the plane", "mJ")
 
     steps: tuple[LoadStep, ...]
     patches: PatchGrid
