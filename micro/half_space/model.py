@@ -249,6 +249,10 @@ class HalfSpaceModel:
         """Return dF/dδ of a solution with one more linear one; see `MicroModel.stiffness`."""
         return self._contact.stiffness(state, turns=turns)
 
+    def interface_stiffness(self, state: HalfSpaceState) -> float:
+        """Return dF/dδ of a solution's contacts on half-spaces alone, for conductances [N/mm]."""
+        return self._contact.interface_stiffness(state)
+
     @cached_property
     def _contact(self) -> PlaneContact:
         return PlaneContact(

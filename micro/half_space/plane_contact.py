@@ -110,6 +110,15 @@ class PlaneContact:
         rate, products = approach_stiffness(problem, state.pressure / modulus)
         return rate * modulus * float(np.prod(self.surface.spacing)), products
 
+    def interface_stiffness(self, state: HalfSpaceState) -> float:
+        """Return dF/dδ of the contacts on half-spaces, without finite body and slopes [N/mm].
+
+        Args:
+            state: A solution.
+        """
+        alone = replace(self.compliance, sides=None, body=None, slopes=None)
+        return replace(self, compliance=alone).stiffness(state, turns=False)[0]
+
     @property
     def _units(self) -> Array:
         """Motions of the plane, approach and slopes, that move its corners by 1 mm, shape (3,)."""

@@ -38,9 +38,10 @@ def with_work(step: LoadStep, before: LoadStep | None) -> LoadStep:
     """
     if step.elastic_energy_mJ is None:
         return step
+    stiffness: float | None
     if before is None:
         motion, load = np.array([step.approach_mm, *step.tilt]), np.zeros(3)
-        done, stiffness = 0.0, 0.0
+        done, stiffness = 0.0, 0.0  # nothing is touched
         if step.force_N == 0.0:
             motion[:] = 0.0
     else:
