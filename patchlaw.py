@@ -33,6 +33,7 @@ if TYPE_CHECKING:  # what `_HOMES` says, for editors and type checkers
         Run,
         Scene,
         compare,
+        export_laws,
         make_setup,
         read_history,
         read_laws,
@@ -44,8 +45,8 @@ _NAMES = {
     "geometry": "Control InputError NotConverged PatchGrid Spectrum Surface read_surface "
     "synthesise",
     "micro": "HalfSpaceModel",
-    "multiscale": "Comparison History LawTable LoadStep Run Scene compare make_setup read_history "
-    "read_laws run sweep",
+    "multiscale": "Comparison History LawTable LoadStep Run Scene compare export_laws make_setup "
+    "read_history read_laws run sweep",
 }
 _HOMES = {name: package for package, names in _NAMES.items() for name in names.split()}
 

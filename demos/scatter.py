@@ -22,8 +22,9 @@ from mpi4py import MPI
 
 from geometry import Control
 from multiscale import CondensedCoupling, Scene, consistent_laws, load_steps, make_setup, run
-from multiscale.couplings.body import patch_compliance, scene_body
+from multiscale.couplings.body import scene_body
 from multiscale.couplings.contact import on_body
+from multiscale.couplings.patch_compliance import patch_compliance
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -7,6 +7,7 @@ contact modulus, and block shapes the mesh of the body under the surface.
 
 from geometry.asperities import Asperities, find_asperities
 from geometry.errors import InputError, NotConverged, PatchlawError
+from geometry.facing import facing, turned_over
 from geometry.files.reading import read_surface
 from geometry.materials import Material, MaterialPair
 from geometry.meshes.block import BlockShape, misalignment
@@ -14,6 +15,7 @@ from geometry.meshes.expected_contact import places_in_reach
 from geometry.meshes.families import characteristic_size, reference_shapes, suggested_fine
 from geometry.meshes.refined_block import RefinedShape
 from geometry.patches import Partition, PatchGrid, UnevenPartition, overlaps, patch_means
+from geometry.regions import Regions
 from geometry.rigid_plane import Control, RigidPlane
 from geometry.spectrum import Spectrum
 from geometry.statistics import PowerSpectrum, Roughness, power_spectrum, roughness
@@ -33,12 +35,14 @@ __all__ = [
     "PatchlawError",
     "PowerSpectrum",
     "RefinedShape",
+    "Regions",
     "RigidPlane",
     "Roughness",
     "Spectrum",
     "Surface",
     "UnevenPartition",
     "characteristic_size",
+    "facing",
     "find_asperities",
     "misalignment",
     "overlaps",
@@ -50,4 +54,5 @@ __all__ = [
     "roughness",
     "suggested_fine",
     "synthesise",
+    "turned_over",
 ]

@@ -103,8 +103,7 @@ class FaceFrame:
             raise InputError("a face without points has no frame")
         frame = cls.across(normal)
         local = places @ frame.axes.T
-        lower, upper = local.min(axis=0), local.max(axis=0)
-        corner = np.array([lower[0], lower[1], upper[2]])
+        corner = np.array([*local[:, :2].min(axis=0), local[:, 2].max()])
         return cls(origin=corner @ frame.axes, axes=frame.axes)
 
     @property
@@ -130,6 +129,10 @@ class FaceFrame:
         lifted = np.multiply.outer(np.asarray(height, dtype=float), self.axes[2])
         return self.origin + np.asarray(places, dtype=float) @ self.axes[:2] + lifted
 
+    def moved(self, x: float, y: float) -> FaceFrame:
+        """Return the same frame with its origin at a point of the plane [mm]."""
+        return FaceFrame(origin=self.in_space([x, y]), axes=self.axes)
+
 
 UPWARD = FaceFrame(origin=np.zeros(3), axes=np.eye(3))
-"""Frame of a block's top, whose coordinates are x and y themselves."""
+"""The frame of a block's top: the coordinates x and y themselves."""

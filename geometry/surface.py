@@ -221,6 +221,19 @@ class Surface:
         vars(part)["interpolant"] = interpolant
         return part
 
+    def on_grid(self, grid: tuple[int, int]) -> Surface:
+        """Return the interpolant on other cells of the same rectangle.
+
+        Args:
+            grid: Cells in x and y.
+        """
+        if grid == self.grid:
+            return self
+        x, y = (
+            (np.arange(n) + 0.5) * (size / n) for n, size in zip(grid, self.lengths, strict=True)
+        )
+        return replace(self, heights=self.height_at(*np.meshgrid(x, y, indexing="ij")))
+
     def shifted(self, i: int, j: int) -> Surface:
         """Move a periodic surface by whole cells.
 

@@ -14,6 +14,7 @@ from macro.body_pair import BodyPair
 from macro.compliance.face_compliance import FaceCompliance, face_compliance
 from macro.contact.contact_forces import ContactLaw
 from macro.contact.face_pair import FacePair
+from macro.contact.face_regions import FaceRegions
 from macro.contact.law_problem import LawContactProblem, LawContactState
 from macro.contact.loaded_face import (
     LoadedFace,
@@ -26,7 +27,7 @@ from macro.contact.unilateral_problem import (
     nodal_contact,
 )
 from macro.elastic_body import ElasticBody
-from macro.fields import write_fields, write_rough_fields
+from macro.fields import AtPoints, write_fields, write_rough_fields
 from macro.mesh.block import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
 from macro.mesh.contact_face import ContactFacets, contact_facets
 from macro.mesh.rough_surface import MeshQuality, rough_block_mesh
@@ -37,6 +38,7 @@ __all__ = [
     "BOTTOM",
     "SIDES",
     "TOP",
+    "AtPoints",
     "Block",
     "BlockMesh",
     "BodyPair",
@@ -45,6 +47,7 @@ __all__ = [
     "ElasticBody",
     "FaceCompliance",
     "FacePair",
+    "FaceRegions",
     "LawContactProblem",
     "LawContactState",
     "LoadedFace",

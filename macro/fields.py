@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -31,8 +31,18 @@ _ZERO = 1e-9
 """Value below which a basis function counts as zero at a node."""
 
 
+class AtPoints(NamedTuple):
+    """Pressures at this rank's quadrature points of a face, shape (points,) [MPa]."""
+
+    values: Array
+
+
+Pressures = Array | AtPoints | None
+"""Mean pressures of the N patches, shape (N,), or those at points [MPa]; None leaves them out."""
+
+
 def write_fields(
-    path: Path | str, face: LoadedFace, steps: Iterable[tuple[int, Array, Array]]
+    path: Path | str, face: LoadedFace, steps: Iterable[tuple[int, Array, Pressures]]
 ) -> None:
     """Write displacements [mm], stresses and contact pressures [MPa] of load steps as XDMF.
 
@@ -46,8 +56,8 @@ def write_fields(
     Args:
         path: File to write, ending in ``.xdmf``; an HDF5 file goes beside it.
         face: Patches on the contact face of a body.
-        steps: Number of each load step, this rank's owned displacements, dof by dof [mm], and mean
-            pressures of the N patches, shape (N,) [MPa].
+        steps: Number of each load step, this rank's owned displacements, dof by dof [mm], and the
+            pressures.
 
     Note:
         Collective.
@@ -58,7 +68,8 @@ def write_fields(
         for number, displacement, pressure in steps:
             moved = body.function(displacement)
             vtx.write(number, moved)
-            yield number, [*_of_body(body, moved), _facet_pressures(face, pressure)]
+            shown = [] if pressure is None else [_facet_pressures(face, pressure)]
+            yield number, [*_of_body(body, moved), *shown]
 
     with compat.VtxFile(str(Path(path).with_suffix(".bp"))) as vtx:
         _write_xdmf(str(path), body.mesh.mesh, functions())
@@ -136,12 +147,13 @@ def _of_body(body: ElasticBody, displacement: Any) -> list[Any]:
     return [shown, stress, equivalent]
 
 
-def _facet_pressures(face: LoadedFace, pressure: Array) -> Any:
+def _facet_pressures(face: LoadedFace, pressure: Array | AtPoints) -> Any:
     """Return the mean pressures over the facets of the face, on their cells [MPa]."""
     facets, points = face.facets, face.quadrature
     pressures = fem.Function(compat.scalar_space(face.space.mesh, 0, "DG"), name="pressure")
     cells = compat.cell_nodes(pressures.function_space)[:, 0]
-    force = points.weight * pressure[points.patch]
+    values = pressure.values if isinstance(pressure, AtPoints) else pressure[points.patch]
+    force = points.weight * values
     total = np.bincount(cells[points.cell], force, minlength=len(pressures.x.array))
     loaded = cells[facets.cell]
     pressures.x.array[loaded] = total[loaded] / facets.area

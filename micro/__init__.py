@@ -30,6 +30,7 @@ from micro.compliance.rectangle_modes import (
     side_stress_modes,
 )
 from micro.compliance.side_cells import SideStresses, side_stresses
+from micro.compliance.slopes_of_bodies import SlopesOfBodies
 from micro.half_space.contact_spots import Contacts, find_contacts
 from micro.half_space.model import HalfSpaceModel
 from micro.half_space.plane_contact import HalfSpaceState
@@ -60,6 +61,7 @@ __all__ = [
     "RigidPlane",
     "ScaledModel",
     "SideStresses",
+    "SlopesOfBodies",
     "SurfaceStress",
     "choose",
     "coarse_grid",

@@ -4,6 +4,7 @@ from multiscale.comparison.compare import compare as compare
 from multiscale.comparison.comparison import Comparison as Comparison
 from multiscale.couplings.condensed import CondensedCoupling as CondensedCoupling
 from multiscale.couplings.reference import ReferenceCoupling as ReferenceCoupling
+from multiscale.exports.export import export_laws as export_laws
 from multiscale.laws.consistent import consistent_laws as consistent_laws
 from multiscale.laws.isolated import isolated_laws as isolated_laws
 from multiscale.laws.law_table import LawTable as LawTable
@@ -11,6 +12,8 @@ from multiscale.laws.law_table import read_laws as read_laws
 from multiscale.laws.law_table import write_laws as write_laws
 from multiscale.laws.patch_law import PatchLaw as PatchLaw
 from multiscale.laws.patch_law import PatchLaws as PatchLaws
+from multiscale.laws.representative import representative_law as representative_law
+from multiscale.laws.representative import representative_laws as representative_laws
 from multiscale.loading.load_step import LoadStep as LoadStep
 from multiscale.loading.stepper import LoadHistory as LoadHistory
 from multiscale.loading.stepper import load_steps as load_steps

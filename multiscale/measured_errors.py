@@ -27,7 +27,7 @@ from typing import Any
 
 from geometry import Control
 from geometry.collective import on_root
-from micro import BodyModes, FiniteSlopes, HalfSpaceModel, HalfSpaceState
+from micro import BodyModes, HalfSpaceModel, HalfSpaceState
 from multiscale.couplings.contact import SLOPES, OnBody
 from multiscale.loading.load_step import LoadStep
 from multiscale.setup.problem import ProblemSetup
@@ -152,11 +152,11 @@ class _Problems:
             return abs(known.force - self._force(self._half, 0))
         error = _SECOND_ORDER * abs(known.force - self._force(self._half, 1))
         model, flat = self._model(self._half, 2), self._model(self._half, 0)
-        if not isinstance(model.slopes, FiniteSlopes) or model.body is None:
+        if model.slopes is None or model.body is None:
             return error
-        slopes = FiniteSlopes(flat.surface, model.slopes.material)
-        alone = replace(flat, slopes=slopes).equilibrium(self._control, start=known)
-        return error + _ON_BODY * abs(known.force - alone.force)
+        alone = replace(flat, slopes=model.slopes.on_half_space())
+        found = alone.equilibrium(self._control, start=known)
+        return error + _ON_BODY * abs(known.force - found.force)
 
     def grid_error(self, force: float, others: float) -> float:
         """Return the error by the cells [N].

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from geometry import NotConverged
-from geometry.collective import on_root
 from micro import HalfSpaceModel, MicroModel
 from multiscale.contact_recorder import ContactRecorder
 from multiscale.couplings import assembly
@@ -20,10 +19,10 @@ from multiscale.couplings.fields import FieldRecord
 from multiscale.laws.law_table import LawTable, law_bytes, read_laws
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling, LoadPosition, LoadStepper, Restorable
-from multiscale.machine import cluster_nodes, large_object_comm
+from multiscale.machine import cluster_nodes
 from multiscale.measured_errors import checked, error_notes
 from multiscale.planning.auto_keys import resolved_sections
-from multiscale.planning.problem_setup import make_setup
+from multiscale.planning.set_up import set_up
 from multiscale.readable import Observer
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
@@ -69,8 +68,8 @@ class Run:
         self._notes: list[str] = []
         self._on_body: OnBody | None = None
         assembly.load_finite_elements(scene, comm)
-        nodes, large = cluster_nodes(comm), large_object_comm(comm)
-        self.setup: ProblemSetup = on_root(large, lambda: make_setup(scene, resolved, nodes))
+        nodes = cluster_nodes(comm)
+        self.setup: ProblemSetup = set_up(scene, comm, resolved=resolved, nodes=nodes)
         self.scene, self.seconds = self.setup.scene, dict(self.setup.seconds)
         self.fields = FieldRecord(self.setup, comm)
         self._recorder = ContactRecorder(self.setup, comm)
@@ -78,14 +77,15 @@ class Run:
 
     def make_body(self) -> OnBody | None:
         """Make what puts the half-space model on its body, once; None for other micro models."""
-        if self._on_body is None and isinstance(self.setup.micro, HalfSpaceModel):
+        on_cells = isinstance(self.setup.micro, HalfSpaceModel) and not self.setup.samples
+        if self._on_body is None and on_cells:
             with self.phase("block"):
                 self._on_body = on_body(self.setup, self.comm)
         return self._on_body
 
     def make_model(self) -> MicroModel:
         """Make the micro model that contacts are solved with, on the body unless isolated."""
-        body = None if self.scene.coupling.kind == "isolated" else self.make_body()
+        body = None if self.scene.kind == "isolated" else self.make_body()
         with self.phase("block"):
             return contact_model(self.setup, self.comm, body)
 
@@ -96,7 +96,7 @@ class Run:
     def make_laws(self) -> LawTable:
         """Tabulate the laws of all patches, once."""
         if self.table is None:
-            model = self.make_model()
+            model = None if self.setup.samples else self.make_model()
             with self.phase("laws"):
                 self.table = assembly.make_table(self.setup, model, self.comm, self.observe)
         return self.table
@@ -233,7 +233,7 @@ class Run:
         notes += self._recorder.notes
         return History(
             steps=steps,
-            patches=self.setup.patches,
+            patches=self.setup.regions or self.setup.patches,
             seconds=self.times,
             notes=(*notes, *error_notes(self.steps, self.given.accuracy), *mesh_notes),
             reference=record,
@@ -243,8 +243,7 @@ class Run:
     @property
     def unknowns(self) -> int | None:
         """Degrees of freedom of the mesh that load steps are solved on, where there is one."""
-        meshed = assembly.meshed_blocks(self.coupling)
-        return meshed[-1].dofs if meshed else None
+        return assembly.unknowns(self.coupling)
 
     def write_fields(self, path: Path) -> None:
         """Write the fields of the load steps that the scene names, see `FieldRecord.write`.
@@ -267,6 +266,7 @@ class Run:
         """
         meshed, self.coupling = assembly.meshed_blocks(self.coupling), None
         self._recorder.release()
+        self.setup.bodies.release()
         assembly.free_blocks(meshed)
 
     @contextmanager

@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 Table = NDArray[np.uint64]
 
 NO_GROUP = 0
-"""Tag of cells without a physical group, where other cells have one."""
+"""Tag of cells without a physical group, where other cells have one; its name is the number."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,6 +69,8 @@ def elements_of(gmsh: Any, dimension: int) -> Elements:
             nodes.setdefault(kind, []).append(np.reshape(table, (-1, count)))
             tag = np.full(len(table) // count, own[0] if own else NO_GROUP, np.int32)
             tags.setdefault(kind, []).append(tag)
+    if any(np.any(part == NO_GROUP) for parts in tags.values() for part in parts):
+        names[str(NO_GROUP)] = NO_GROUP
     return Elements(
         nodes={kind: np.concatenate(parts) for kind, parts in nodes.items()},
         tags={kind: np.concatenate(parts) for kind, parts in tags.items()},

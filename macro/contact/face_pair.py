@@ -118,6 +118,11 @@ class FacePair:
             both.append(_local_rows(transposed))
         return self._both(kept, both[0], both[1], depth[found])
 
+    @property
+    def on_both(self) -> NDArray[np.bool_]:
+        """Which of this rank's quadrature points of the first face lie on the second one, too."""
+        return self._counter_rows[2]
+
     def load(self, pressures: Array) -> PETSc.Vec:
         """Return the nodal load of both under pressures that are uniform on every patch.
 

@@ -170,6 +170,28 @@ class LawContactProblem:
         values = together(self._face.comm, lambda: sampling.by_patch(functions, self._closure))
         return sampling.patch_sums(values) / self._face.areas
 
+    @property
+    def pressures(self) -> Array:
+        """Pressures at this rank's samples at the latest equilibrium, shape (n,) [MPa]."""
+        return self.forces.pressure(self._closure)
+
+    def patch_largest(self, functions: Sequence[Callable[[Array], Array]]) -> Array:
+        """Return the largest values of functions of closure on the patches, as `patch_means` does.
+
+        Args:
+            functions: One function of closures (n,) [mm] per patch; not below zero.
+
+        Returns:
+            The largest values at the samples of each patch, shape (N,).
+
+        Note:
+            Collective.
+        """
+        sampling, found = self._sampling, np.zeros(self._sampling.count)
+        np.maximum.at(found, sampling.patch, sampling.by_patch(functions, self._closure))
+        parts = self._face.comm.allgather(found)
+        return np.asarray(np.max(parts, axis=0))
+
     def _state(self, solution: PETSc.Vec, report: NewtonReport) -> LawContactState:
         body, contact, sampling = self.equilibrium.body, self.forces, self._sampling
         self._closure = closure = contact.closure(solution)

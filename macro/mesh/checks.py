@@ -145,10 +145,8 @@ def size_note(tagged: TaggedMesh) -> str | None:
     Note:
         Collective.
     """
-    x = tagged.mesh.geometry.x
-    boxes = tagged.comm.allgather((x.min(axis=0), x.max(axis=0)) if len(x) else None)
-    lower, upper = (np.array([box[k] for box in boxes if box is not None]) for k in (0, 1))
-    lengths = upper.max(axis=0) - lower.min(axis=0)
+    lower, upper = tagged.bounding_box()
+    lengths = upper - lower
     if _SMALL <= np.linalg.norm(lengths) <= _LARGE:
         return None
     size = " × ".join(f"{length:.4g}" for length in lengths)

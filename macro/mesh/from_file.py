@@ -48,7 +48,7 @@ def read_mesh(path: str | Path, comm: Any, *, unit: float = 1.0) -> TaggedMesh:
             "meshes in this format are not read",
             value=path.suffix,
             file=str(path),
-            allowed=".msh of gmsh, .xdmf of dolfinx; meshio converts others to them",
+            allowed=".msh of gmsh, .xdmf of dolfinx",
         )
     on_root(comm, lambda: _check_there(path))
     try:

@@ -7,7 +7,12 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from geometry.errors import InputError
+
+Array = NDArray[np.float64]
 
 _SHOWN = 12
 """Names that a message lists."""
@@ -55,6 +60,17 @@ class TaggedMesh:
     def comm(self) -> Any:
         """Communicator of the mesh."""
         return self.mesh.comm
+
+    def bounding_box(self) -> tuple[Array, Array]:
+        """Return the lower and the upper corner of the box around all nodes, shapes (3,) [mm].
+
+        Note:
+            Collective.
+        """
+        x = self.mesh.geometry.x
+        boxes = self.comm.allgather((x.min(axis=0), x.max(axis=0)) if len(x) else None)
+        lower, upper = (np.array([box[k] for box in boxes if box is not None]) for k in (0, 1))
+        return lower.min(axis=0), upper.max(axis=0)
 
     def facet_tag(self, wanted: str | int, *, key: str | None = None) -> int:
         """Return the tag of facets by its name or number.

@@ -58,10 +58,11 @@ def read_xdmf(path: Path, comm: Any) -> TaggedMesh:
         raise InputError(f"dolfinx cannot read it: {line}", allowed=_ALLOWED) from error
     if facets is None:
         facets = dmesh.meshtags(mesh, 2, np.empty(0, np.int32), np.empty(0, np.int32))
+    cells = cells and filled(mesh, cells)
     return TaggedMesh(
         mesh=mesh,
         facet_tags=of_owned_cells(mesh, facets),
-        cell_tags=cells and filled(mesh, cells),
+        cell_tags=cells,
         facet_names=_numbers(facets, comm),
         cell_names={} if cells is None else _numbers(cells, comm),
     )

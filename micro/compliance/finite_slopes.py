@@ -119,7 +119,7 @@ class FiniteSlopes:
         if periodic and not surface.periodic:
             raise InputError("periodic slopes need a periodic surface", value=surface.source)
         self.material, self.order, self.edge_stresses = material, order, tuple(edge_stresses)
-        self._periodic = periodic
+        self._surface, self._periodic = surface, periodic
         self.grid = grid or coarse_grid(surface)
         around: Around = "copies" if periodic else "nothing" if edge_stresses else "mirrored"
         self._waves = Waves(surface.grid, surface.spacing, coarse=self.grid, around=around)
@@ -160,6 +160,10 @@ class FiniteSlopes:
             total[0, 0] = 0.0
         cx, cy = self.grid
         return waves.refined(waves.fields(total)[:cx, :cy])
+
+    def on_half_space(self) -> FiniteSlopes:
+        """Return the same slopes on a half-space, without edge stresses."""
+        return FiniteSlopes(self._surface, self.material, order=self.order, periodic=self._periodic)
 
     def _second(self, loads: Spectrum, stresses: Array) -> tuple[float, Array, Spectrum]:
         """Return the value of the second-order form and the two parts of its displacement.

@@ -50,6 +50,8 @@ class FreeSides:
         lengths: Sides (Lx, Ly) of the rectangle [mm].
         poisson_ratio: ν.
         decay_length: λ [mm].
+        share: E* of the contact over that of the block alone; less than 1 where a second body gives
+            way too. Displacements are those for pressures over E* of the contact.
 
     Raises:
         InputError: When a length is not positive, or ν out of its range.
@@ -58,6 +60,7 @@ class FreeSides:
     lengths: tuple[float, float]
     poisson_ratio: float
     decay_length: float
+    share: float = 1.0
 
     def __post_init__(self) -> None:
         given = (*self.lengths, self.decay_length)
@@ -80,7 +83,8 @@ class FreeSides:
             Shape (w, n, n); symmetric.
         """
         nu, numbers = self.poisson_ratio, self._wave_numbers(axis, waves, self.decay_length)
-        return np.stack([side_compliance(nu, distances, number) for number in numbers])
+        found = np.stack([side_compliance(nu, distances, number) for number in numbers])
+        return self.share * found
 
     def stresses(self, axis: int, distances: Array, waves: Indices) -> Array:
         """Return the stresses that one side adds at distances by line loads at distances.

@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from micro.compliance.body_modes import BodyModes, ModesOnCells
-from micro.compliance.finite_slopes import FiniteSlopes
 from micro.compliance.free_sides import FreeSides
 from micro.compliance.half_space_grid import Cells, HalfSpaceGrid
 from micro.compliance.side_cells import side_cells
+from micro.compliance.slopes_of_bodies import SlopeTerm
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -123,7 +123,7 @@ class Compliance:
     modulus: float = 1.0
     sides: FreeSides | None = None
     body: BodyModes | None = None
-    slopes: FiniteSlopes | None = None
+    slopes: SlopeTerm | None = None
     _last: tuple[Array, Array] | None = field(default=None, init=False)
 
     def __getstate__(self) -> dict[str, Any]:

@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from geometry import Control, Partition, PatchGrid, Surface
 from geometry.errors import InputError
 from micro.compliance.body_modes import BodyModes
-from micro.compliance.finite_slopes import FiniteSlopes
 from micro.compliance.free_sides import FreeSides
 from micro.compliance.grid_compliance import Compliance
+from micro.compliance.slopes_of_bodies import SlopeTerm
 from micro.half_space.plane_contact import LEVEL, HalfSpaceState, PlaneContact
 from micro.model import Pressed, Response, checked_approaches, checked_patches, whole_patch
 
@@ -68,7 +68,7 @@ class HalfSpaceModel:
     highest: float | None = None
     sides: FreeSides | None = None
     body: BodyModes | None = None
-    slopes: FiniteSlopes | None = None
+    slopes: SlopeTerm | None = None
     upper: float = np.inf
 
     def __post_init__(self) -> None:
@@ -124,14 +124,7 @@ class HalfSpaceModel:
         Args:
             grid: Cells in x and y.
         """
-        surface = self.surface
-        if grid != surface.grid:
-            x, y = (
-                (np.arange(n) + 0.5) * (size / n)
-                for n, size in zip(grid, surface.lengths, strict=True)
-            )
-            heights = surface.height_at(*np.meshgrid(x, y, indexing="ij"))
-            surface = replace(surface, heights=heights)
+        surface = self.surface.on_grid(grid)
         return replace(self, surface=surface, highest=self.reference_height, slopes=None)
 
     def solve(

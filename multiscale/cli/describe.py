@@ -15,20 +15,21 @@ from geometry.errors import InputError
 from geometry.statistics import roughness
 from multiscale.cli.execution import scene_and_folder
 from multiscale.couplings.assembly import check_has_laws, load_finite_elements
+from multiscale.exports.export import export_texts, remove_exports
 from multiscale.laws.law_table import write_laws
-from multiscale.machine import cluster_nodes, large_object_comm
+from multiscale.machine import cluster_nodes
 from multiscale.output import terminal
 from multiscale.output.results import write_figure
 from multiscale.planning import plan
 from multiscale.planning.block_plan import memory_warnings
 from multiscale.planning.costs import predicted_cost
-from multiscale.planning.problem_setup import make_setup
+from multiscale.planning.set_up import set_up
 from multiscale.restart.results_folder import locked, refuse_other_results
 from multiscale.run import Run
 from multiscale.scene.keys import Key, scene_keys
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
-from multiscale.storage import write_whole
+from multiscale.storage import write_text, write_whole
 
 
 def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -49,12 +50,13 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
 
 def _setup(scene: Scene, comm: Any) -> ProblemSetup:
     """Set the problem up, as if these nodes had any memory that it may take."""
-    nodes = replace(cluster_nodes(comm), extensible=True)
-    return on_root(large_object_comm(comm), lambda: make_setup(scene, nodes=nodes))
+    return set_up(scene, comm, nodes=replace(cluster_nodes(comm), extensible=True))
 
 
 def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
-    """Tabulate the patch laws of a scene; write and draw them.
+    """Tabulate the patch laws of a scene; write and draw them, and export them when asked to.
+
+    Exports of earlier laws in the folder are removed.
 
     Args:
         choice: Parsed words of the command line.
@@ -75,8 +77,15 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         def write() -> list[Path]:
             from multiscale.output.figures import law_figure
 
+            exports: dict[str, str] = {}
+            for name in choice.export:
+                exports |= export_texts(table, name)
             laws = write_whole(folder / "laws.h5", lambda path: write_laws(path, table))
-            return [laws, write_figure(folder / "laws.png", law_figure(table))]
+            files = [laws, write_figure(folder / "laws.png", law_figure(table))]
+            remove_exports(folder)
+            for name, text in exports.items():
+                write_text(folder / name, text)
+            return files + [folder / name for name in {Path(path).parts[0]: 0 for path in exports}]
 
         terminal.show_files(comm, on_root(comm, write))
     for note in run.history().notes:

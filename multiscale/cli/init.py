@@ -23,7 +23,7 @@ from multiscale.scene.new_scene import (
 )
 from multiscale.scene.scene import Scene
 from multiscale.scene.scene_file import changed, overridden
-from multiscale.setup.surface_and_block import block_material, make_surface
+from multiscale.setup.surface_and_block import block_material, block_section, make_surface
 from multiscale.storage import write_text
 
 _KEYS = {
@@ -70,7 +70,7 @@ def _write(choice: argparse.Namespace) -> tuple[Path, list[str]]:
         )
     loaded = choice.force is not None or choice.approach is not None
     scene, surface, remarks = _with_surface(_given(choice), loaded)
-    height = quantity(scene.block.height_under(surface.lengths), "mm", digits=6)
+    height = quantity(block_section(scene).height_under(surface.lengths), "mm", digits=6)
     scene = scene.with_({"block.height": height.replace("µ", "u")})
     if not loaded:
         force = sensible_force(surface, block_material(scene))

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from multiscale.comparison import AGAINST
+from multiscale.exports import FORMATS
 
 SWEEP_ENDING = "-sweep"
 """What the results folder of a sweep is called after the scene's name."""
@@ -159,7 +160,11 @@ def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser
     unused = "accepted so that the words of a run can be reused: a plan writes nothing"
     _add_scene(command("plan", "describe.plan_scene", plan), folder=unused)
     laws = "Tabulate the patch laws of a scene; write and draw them."
-    _add_scene(command("laws", "describe.tabulate_laws", laws))
+    tabulate = command("laws", "describe.tabulate_laws", laws)
+    _add_scene(tabulate)
+    forms = f"write them for other programs too: {', '.join(FORMATS)}; may be given several times"
+    choices: dict[str, Any] = {"choices": FORMATS, "metavar": "FORMAT", "default": []}
+    tabulate.add_argument("--export", action="append", help=forms, **choices)
     surface = "Describe and draw the surface of a scene."
     _add_scene(command("surface", "describe.describe_surface", surface))
     command("schema", "describe.print_schema", "Print the JSON Schema of scene files.")
@@ -169,9 +174,9 @@ def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser
     checks = "Check versions, MPI, threads, form compiler and memory; solve a small block."
     doctor = command("doctor", "doctor.examine_machine", checks)
     doctor.add_argument("--json", action="store_true", help="results as JSON, for scripts")
-    forms = "Compile all finite element forms now, so that later runs need no compiler."
+    compiled = "Compile all finite element forms now, so that later runs need no compiler."
     names: dict[str, Any] = {"nargs": "+", "default": [], "metavar": "NAME"}
-    warm = command("warm", "doctor.compile_ahead", forms)
+    warm = command("warm", "doctor.compile_ahead", compiled)
     warm.add_argument("--element", help="Q1, Q2, P1, P2; all by default", **names)
 
 

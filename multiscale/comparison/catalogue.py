@@ -34,7 +34,12 @@ from multiscale.planning.costs import predicted_cost
 from multiscale.planning.problem_setup import make_setup
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
-from multiscale.setup.surface_and_block import LAW_BLOCK_CELLS, make_surface, patch_grid
+from multiscale.setup.surface_and_block import (
+    LAW_BLOCK_CELLS,
+    block_section,
+    make_surface,
+    patch_grid,
+)
 
 LAW_HEIGHTS = 128
 """Heights along a side, at most, of half-spaces behind laws of several numbers of patches."""
@@ -105,8 +110,9 @@ class _Catalogue:
         self._accuracy = content.pop("accuracy", None)
         # Only laws need a mesh of the block.
         content["block"].pop("cells", None)
-        stated = scene.block.cells if isinstance(scene.block.cells, tuple) else None
-        self._own_cells = stated if scene.coupling.on_mesh else None
+        cells = block_section(scene).cells
+        stated = cells if isinstance(cells, tuple) else None
+        self._own_cells = stated if scene.on_mesh else None
         self._cells = stated or LAW_BLOCK_CELLS
         self._base = content | {"patches": {"grid": list(pressure_grid(scene))}}
         nx, ny = content["surface"].get("grid") or make_surface(scene).grid

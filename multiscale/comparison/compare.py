@@ -69,12 +69,15 @@ def compare(
     Raises:
         InputError: When the scene, an argument or the MPI job does not allow it.
     """
-    if scene.surface.heights is not None:
+    counter = scene.counter_surface
+    if scene.surface.heights is not None or (counter and counter.heights is not None):
         raise InputError(
             "heights in memory cannot be handed to the processes of a comparison",
             key="surface.heights",
             allowed="surface.file: save them, as by numpy.save",
         )
+    if scene.body is not None:
+        raise InputError("is a mesh, and a comparison makes its own", key="body", allowed="[block]")
     if against is not None and against not in AGAINST:
         allowed = ", ".join(AGAINST)
         raise InputError("is nothing to compare against", value=against, allowed=allowed)

@@ -82,9 +82,10 @@ class Configuration:
     def key(self) -> str:
         """Hash of everything that the results depend on."""
         parts = {"scene": self.content, "version": version("patchlaw"), "ranks": self.ranks}
-        file = self.content["surface"].get("file")
-        if file is not None:
-            parts["heights"] = _checksum(Path(file).read_bytes())
+        for name, key in (("surface", "heights"), ("counter_surface", "counter_heights")):
+            file = self.content.get(name, {}).get("file")
+            if file is not None:
+                parts[key] = _checksum(Path(file).read_bytes())
         return _checksum(json.dumps(parts, sort_keys=True).encode())[:20]
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from geometry.collective import on_root
 from geometry.errors import PatchlawError
+from geometry.patches import PatchGrid
 from multiscale.comparison.configuration import (
     Configuration,
     Curves,
@@ -143,6 +144,7 @@ def _curves(history: History, scale: float) -> Curves:
         finest, ratio = history.force_N, np.ones(len(history))
         np.divide(values[1], finest, out=ratio, where=finest > 0.0)
         pressure = pressure * ratio[:, None]
+    assert isinstance(history.patches, PatchGrid)
     curves = Curves(
         patches=history.patches,
         separation=history.mean_separation_mm,

@@ -48,8 +48,10 @@ def pressure_grid(scene: Scene) -> Grid:
 def content_of(scene: Scene) -> Content:
     """Return a scene as it would stand in a file, without output and without halved load steps."""
     content = scene.model_dump(by_alias=True, mode="json", exclude_none=True)
-    if scene.surface_path is not None:
-        content["surface"]["file"] = str(scene.surface_path.resolve())
+    for name in ("surface", "counter_surface"):
+        path = scene.path_of(content.get(name, {}).get("file"))
+        if path is not None:
+            content[name]["file"] = str(path.resolve())
     content["load"].pop("force_change", None)
     return content | {"output": _NO_OUTPUT}
 
@@ -76,10 +78,10 @@ def scaled(content: Content) -> Content:
 def coarser_grids(heights: Grid, scene: Scene) -> list[Grid]:
     """Return the grids that the surface can be made on, the coarsest first and its own last.
 
-    Heights from a file have their own grid only.
+    Heights from a file have their own grid only, and so have those of two rough sides.
     """
     grids, spectrum = [heights], scene.surface.spectrum
-    if spectrum is None:
+    if spectrum is None or scene.counter_surface is not None:
         return grids
     bands = (spectrum.waves_x or spectrum.waves, spectrum.waves_y or spectrum.waves)
     least = [max(FEWEST_HEIGHTS, HEIGHTS_PER_WAVE * band[1]) for band in bands if band]

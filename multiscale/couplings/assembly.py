@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from geometry import InputError
 from micro import MicroModel
-from multiscale.couplings.body import embedding, patch_compliance, patch_displacements
 from multiscale.couplings.condensed import CondensedCoupling
 from multiscale.couplings.contact import ContactCoupling
 from multiscale.couplings.law_couplings import EmbeddedCoupling, FreePlaneCoupling
+from multiscale.couplings.patch_compliance import embedding, patch_compliance, patch_displacements
 from multiscale.couplings.reference import ReferenceCoupling, make_reference
+from multiscale.couplings.representative import face_coupling, face_laws
 from multiscale.laws.consistent import consistent_laws
 from multiscale.laws.isolated import isolated_laws
 from multiscale.laws.law_table import LawTable
@@ -77,7 +78,9 @@ def newton_choice(setup: ProblemSetup, table: LawTable | None = None) -> NewtonC
         table: The laws, once made; flat patches rule out the full Newton.
     """
     coupling = setup.scene.coupling
-    if coupling.decomposed:
+    if setup.samples:
+        return NewtonChoice(False, "laws of samples hold at the points of the mesh")
+    if setup.scene.decomposed:
         return NewtonChoice(True, "the decomposed block is its compliance")
     flat = 0 if table is None else sum(law.is_flat for law in table.laws)
     if flat and coupling.newton == "auto" and coupling.interface == "patchwise":
@@ -88,6 +91,8 @@ def newton_choice(setup: ProblemSetup, table: LawTable | None = None) -> NewtonC
         return NewtonChoice(True, why)
     if coupling.interface == "pointwise":
         return NewtonChoice(False, "laws at points need the whole mesh")
+    if setup.both_give_way and coupling.newton == "auto":
+        return NewtonChoice(True, "the counter-body, a half-space, is in the compliance of patches")
     if coupling.newton != "auto":
         return NewtonChoice(coupling.newton == "condensed", "as the scene asks")
     patches, steps = setup.patches.count, setup.scene.loading.load_history.count
@@ -110,8 +115,8 @@ def check_has_laws(scene: Scene) -> None:
     Raises:
         InputError: When the coupling has no laws.
     """
-    kind = scene.coupling.kind
-    if kind not in ("isolated", "consistent", "auto"):
+    kind = scene.kind
+    if kind not in ("isolated", "consistent", "representative", "auto"):
         raise InputError(
             "has no laws",
             key="coupling.kind",
@@ -122,13 +127,14 @@ def check_has_laws(scene: Scene) -> None:
 
 
 def make_table(
-    setup: ProblemSetup, model: MicroModel, comm: Any, observe: Observer | None = None
+    setup: ProblemSetup, model: MicroModel | None, comm: Any, observe: Observer | None = None
 ) -> LawTable:
     """Tabulate the laws of all patches, each alone or all from the whole surface on its block.
 
     Args:
         setup: The problem set up from the scene.
-        model: Its micro model on the body, see `contact_model`.
+        model: Its micro model on the body, see `contact_model`; None for laws of samples, which
+            have their own.
         comm: MPI communicator; None for this process alone.
         observe: Called as rows or laws are made.
 
@@ -140,7 +146,9 @@ def make_table(
         Collective.
     """
     check_has_laws(setup.scene)
-    kind = setup.scene.coupling.kind
+    kind = setup.scene.kind
+    if model is None:
+        return face_laws(setup, comm, observe)
     common: dict[str, Any] = {
         "mean_heights": setup.mean_heights,
         "tolerance": setup.table_tolerance,
@@ -178,6 +186,8 @@ def assemble(setup: ProblemSetup, made: LawTable | MicroModel | None, comm: Any)
         return make_reference(setup, comm)
     if not isinstance(made, LawTable):
         return ContactCoupling(made, setup.patches, setup.mean_heights, comm)
+    if setup.samples:
+        return face_coupling(setup, made, comm)
     condensed = newton_choice(setup, made).condensed
     mode, tilt = setup.scene.coupling.interface, setup.scene.loading.load_history.tilt
     if made.path is not None and mode == "patchwise" and tilt is None:
@@ -200,6 +210,18 @@ def meshed_blocks(coupling: Coupling | None) -> list[ElasticBody]:
     if isinstance(coupling, ReferenceCoupling | EmbeddedCoupling):
         return [*coupling.blocks]
     return []
+
+
+def unknowns(coupling: Coupling | None) -> int | None:
+    """Return the degrees of freedom of the mesh that load steps are solved on, if there is one.
+
+    Args:
+        coupling: The coupling; None before it is made.
+    """
+    if isinstance(coupling, EmbeddedCoupling):
+        return coupling.face.body.dofs
+    meshed = meshed_blocks(coupling)
+    return meshed[-1].dofs if meshed else None
 
 
 def free_blocks(blocks: list[ElasticBody]) -> None:
@@ -239,7 +261,8 @@ def load_finite_elements(scene: Scene, comm: Any) -> None:
     Note:
         Collective.
     """
-    if comm is not None and scene.coupling.kind != "analytic":
+    meshed = scene.body is not None or (scene.counter_body and scene.counter_body.mesh)
+    if comm is not None and (scene.kind != "analytic" or meshed):
         import macro  # noqa: F401
 
 

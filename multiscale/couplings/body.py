@@ -1,4 +1,4 @@
-"""The block of a scene: its terms in the contact problem, its compliance, its mesh.
+"""The block of a scene: its terms in the contact problem, and its compliance.
 
 The body correction is what the block adds to the compliance of a half-space. In Legendre modes of
 the block's top it is the compliance of the block, from finite elements, less that of the
@@ -10,7 +10,6 @@ Theory: demos/theory.md, sections 5, 6 and 11.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -34,16 +33,14 @@ from micro import (
     side_stresses,
 )
 from multiscale.setup.problem import ProblemSetup
-from multiscale.setup.surface_and_block import block_material
+from multiscale.setup.surface_and_block import block_section
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from geometry import BlockShape, PatchGrid
-    from macro import FaceCompliance, LoadedFace
+    from macro import FaceCompliance
     from macro.block import Sides
 
 Array = NDArray[np.float64]
-Displacements = Callable[[Array], Array]
-"""From pressures of N patches at m load steps to their mean displacements, [MPa] to [mm]."""
 
 _DECAY_LENGTH = 0.25
 """Decay length of the effect of free sides in the micro model, relative to the shortest side of
@@ -219,7 +216,7 @@ def scene_body(setup: ProblemSetup, *, side_term: bool | None = None) -> Body:
         side_term: Whether free sides that bound the interface are a term of their own; by default
             they are in half-space models.
     """
-    block, lengths, shape = setup.scene.block, setup.surface.lengths, setup.shape
+    block, lengths, shape = block_section(setup.scene), setup.surface.lengths, setup.shape
     if side_term is None:
         side_term = isinstance(setup.micro, HalfSpaceModel)
     sides = None
@@ -229,76 +226,5 @@ def scene_body(setup: ProblemSetup, *, side_term: bool | None = None) -> Body:
             poisson_ratio=block.poisson_ratio,
             decay_length=_DECAY_LENGTH * min(*lengths, shape.height),
         )
-    material = block_material(setup.scene)
+    material = setup.materials.first
     return Body(shape=shape, material=material, sides=block.sides, side_term=sides)
-
-
-def patch_displacements(setup: ProblemSetup, comm: Any, *, dense: bool) -> Displacements:
-    """Return what gives the mean displacements of patches in the macro model of a scene.
-
-    Args:
-        setup: The problem set up from the scene.
-        comm: MPI communicator; None for this process alone.
-        dense: Whether the macro model is the compliance of the patches, or the mesh itself.
-
-    Returns:
-        A function from pressures of N patches at m load steps to displacements, (m, N) both, [MPa]
-        to [mm]. It is collective.
-
-    Note:
-        Collective.
-    """
-    # with fewer patches than rows of laws the compliance takes fewer solutions of the mesh
-    if dense or setup.patches.count <= setup.table_rows:
-        compliance = patch_compliance(setup, comm)
-        return lambda pressures: np.asarray(pressures @ compliance.T)
-    from macro import displacements_under
-
-    face = embedding(setup, comm)
-    return lambda pressures: displacements_under(face, pressures)
-
-
-def patch_compliance(setup: ProblemSetup, comm: Any) -> Array:
-    """Return the compliance of a scene's block under its patches, shape (N, N) [mm/MPa].
-
-    Args:
-        setup: The problem set up from the scene.
-        comm: MPI communicator; None for this process alone.
-
-    Note:
-        Collective.
-    """
-    if setup.scene.coupling.decomposed:
-        return scene_body(setup, side_term=True).patch_compliance(setup.patches, comm)
-    from mpi4py import MPI
-
-    from macro import patch_compliance_matrix
-    from macro.compliance.cache import cached
-    from macro.linear_solvers.options import users_options
-
-    def compute() -> dict[str, Array]:
-        return {"compliance": patch_compliance_matrix(embedding(setup, comm))}
-
-    sides = setup.scene.block.sides
-    key = (setup.shape, block_material(setup.scene), sides, setup.patches, users_options())
-    return cached("plain", key, compute, comm or MPI.COMM_SELF)["compliance"]
-
-
-def embedding(setup: ProblemSetup, comm: Any) -> LoadedFace:
-    """Mesh the block of a scene, and return the patches on its top.
-
-    Args:
-        setup: The problem set up from the scene.
-        comm: MPI communicator; None for this process alone.
-
-    Note:
-        Collective.
-    """
-    from mpi4py import MPI
-
-    from macro import Block, LoadedFace, block_mesh
-
-    section = setup.scene.block
-    mesh = block_mesh(setup.shape, comm or MPI.COMM_SELF)
-    block = Block(mesh, block_material(setup.scene), sides=section.sides)
-    return LoadedFace.of_block(block, setup.patches)

@@ -50,7 +50,7 @@ class CondensedCoupling:
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `Coupling.press`."""
-        patches, end = self._table.patches, self._laws.end
+        patches, end = self._table.grid, self._laws.end
         state = equilibrium(self._laws, self._compliance, patches, control, self._last)
         worst = int(np.argmax(state.local - end * (1.0 + ROUNDING)))
         if state.local[worst] > end[worst] * (1.0 + ROUNDING):
@@ -76,7 +76,7 @@ class CondensedCoupling:
         """Return dF/dδ at the latest load step, and its linear solutions; see `HasStiffness`."""
         if self._last is None:
             return None, 0
-        problem = LoadedPatches(self._laws, self._compliance, self._table.patches, self._control)
+        problem = LoadedPatches(self._laws, self._compliance, self._table.grid, self._control)
         return normal_stiffness(problem.stiffness(self._last), turns=self._control.tilt is None), 1
 
     def state(self) -> Arrays:

@@ -14,13 +14,19 @@ from numpy.typing import NDArray
 
 from geometry import Control, PatchGrid, overlaps
 from geometry.collective import on_root
-from micro import START_KINDS, FiniteSlopes, HalfSpaceModel, HalfSpaceState, MicroModel
+from micro import (
+    START_KINDS,
+    FiniteSlopes,
+    HalfSpaceModel,
+    HalfSpaceState,
+    MicroModel,
+    SlopesOfBodies,
+)
 from micro.contact_detail import ContactDetail
 from micro.model import SolvedContact
 from multiscale.couplings.body import scene_body
 from multiscale.loading.load_step import LoadStep
 from multiscale.setup.problem import ProblemSetup
-from multiscale.setup.surface_and_block import block_material
 from multiscale.storage import Arrays, packed, unpacked
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
@@ -167,7 +173,7 @@ def contact_model(setup: ProblemSetup, comm: Any, put_on_body: OnBody | None = N
         Collective.
     """
     model = setup.model
-    isolated = setup.scene.coupling.kind == "isolated"
+    isolated = setup.scene.kind == "isolated"
     if isinstance(model, HalfSpaceModel):
         put_on_body = put_on_body or on_body(setup, comm, half_space=isolated)
         return put_on_body(model, SLOPES if setup.finite_slopes else 0)
@@ -202,15 +208,22 @@ def on_body(
     body = None if half_space or not setup.has_block else scene_body(setup)
     if body is not None and face is None:
         face = body.face(comm)
-    material = block_material(setup.scene)
+    material, counter = setup.materials.first, setup.counter_surface
 
     def put(model: HalfSpaceModel, order: int) -> HalfSpaceModel:
-        surface, model = model.surface, replace(model, tolerance=_RESIDUAL)
+        model, above = replace(model, tolerance=_RESIDUAL), None
+        surface = model.surface
+        if counter is not None:  # each body has slopes of its own
+            above = counter.on_grid(surface.grid)
+            surface = replace(surface, heights=surface.heights - above.heights)
         # With finite slopes heights count from the highest point, near the loads, where slopes add
         # least. The flat body then ends at it, while the block's height is that of the mean plane.
         higher = surface.highest - surface.mean_height if order else 0.0
         if body is not None and face is not None:
-            model = replace(model, sides=body.side_term, body=body.term(face, higher=higher))
+            model = replace(model, body=body.term(face, higher=higher))
+            if body.side_term is not None:
+                share = model.contact_modulus / material.contact_modulus
+                model = replace(model, sides=replace(body.side_term, share=share))
         if not order:
             return model
         stresses = [] if body is None or face is None else body.stresses(face, surface)
@@ -223,6 +236,10 @@ def on_body(
             plane=plane,
             edge_stresses=stresses,
         )
-        return replace(model, slopes=slopes)
+        second = setup.materials.second
+        if above is None or second is None:
+            return replace(model, slopes=slopes)
+        others = FiniteSlopes(above, second, order=order, periodic=model.periodic)
+        return replace(model, slopes=SlopesOfBodies((slopes, others)))
 
     return put

@@ -18,16 +18,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, PatchGrid
-from multiscale.couplings.body import embedding
 from multiscale.couplings.contact import ContactCoupling
 from multiscale.couplings.law_couplings import EmbeddedCoupling
+from multiscale.couplings.patch_compliance import embedding
 from multiscale.couplings.reference import ReferenceCoupling
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling
 from multiscale.setup.problem import ProblemSetup
+from multiscale.setup.surface_and_block import FIELD_CELLS
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import LoadedFace
+    from macro import FacePair, LoadedFace
+    from macro.fields import Pressures
 
 Array = NDArray[np.float64]
 
@@ -66,7 +68,9 @@ class FieldRecord:
         if isinstance(coupling, ReferenceCoupling):
             self.kept[step.step] = coupling.latest
         elif isinstance(coupling, EmbeddedCoupling):
-            self.kept[step.step] = coupling.displacement
+            moved = coupling.displacement
+            at_points = self._setup.samples
+            self.kept[step.step] = (moved, coupling.point_pressures) if at_points else moved
         elif isinstance(coupling, ContactCoupling):
             self.kept[step.step] = coupling.pressures_on(self._parts(coupling))
         else:
@@ -106,15 +110,20 @@ class FieldRecord:
             return
         face, fields = self.on_body(coupling, steps)
         macro.write_fields(path, face, fields)
+        counter = self._setup.bodies.counter
+        if counter is not None:
+            face, fields = self.on_body(coupling, steps, counter=True)
+            macro.write_fields(path.with_name(f"counter_{path.name}"), face, fields)
 
     def on_body(
-        self, coupling: Coupling | None, steps: Sequence[LoadStep]
-    ) -> tuple[LoadedFace, Iterator[tuple[int, Array, Array]]]:
-        """Return the flat body, meshed where it was not yet, and its fields of the load steps.
+        self, coupling: Coupling | None, steps: Sequence[LoadStep], *, counter: bool = False
+    ) -> tuple[LoadedFace, Iterator[tuple[int, Array, Pressures]]]:
+        """Return a flat body, meshed where it was not yet, and its fields of the load steps.
 
         Args:
             coupling: What found the load steps; not a reference.
             steps: The load steps.
+            counter: Whether it is the counter-body, of two bodies on meshes.
 
         Returns:
             The parts of the contact face of the body, and by load step its number, this rank's
@@ -125,21 +134,55 @@ class FieldRecord:
         """
         kept = sorted(self.kept.items())
         if isinstance(coupling, EmbeddedCoupling):
+            if self._setup.samples:
+                return _one(coupling.face, counter), self._of_samples(coupling, kept, counter)
             pressures = {step.step: step.patches.pressure_MPa for step in steps}
-            fields = ((number, u, pressures[number]) for number, u in kept)
-            return coupling.face, fields
-        face = replace(embedding(self._setup, self._comm), patches=self._parts(coupling))
+            moved = ((k, _half(coupling.face, u, counter), pressures[k]) for k, u in kept)
+            return _one(coupling.face, counter), moved
+        whole = _one(embedding(self._setup, self._comm), counter)
+        face = replace(whole, patches=self._parts(coupling))
 
-        def solved() -> Iterator[tuple[int, Array, Array]]:
+        def solved() -> Iterator[tuple[int, Array, Pressures]]:
             for number, pressure in kept:
                 found = face.body.solve(face.load(pressure))
                 yield number, found.x.array[: face.body.owned_dofs].copy(), pressure
 
         return face, solved()
 
+    def _of_samples(
+        self, coupling: EmbeddedCoupling, kept: Sequence[tuple[int, Any]], counter: bool
+    ) -> Iterator[tuple[int, Array, Pressures]]:
+        """Yield the fields under laws of samples; the first body alone has the pressures."""
+        from macro import AtPoints
+
+        for number, (displacement, pressure) in kept:
+            shown = None if counter else AtPoints(pressure)
+            yield number, _half(coupling.face, displacement, counter), shown
+
     def _parts(self, coupling: Coupling | None) -> PatchGrid:
         """Return the parts of the contact face: facets of the mesh where contacts are known."""
         if not isinstance(coupling, ContactCoupling):
             return self._setup.patches
+        if self._setup.block_shape is None:
+            x, y = map(min, self._setup.surface.grid, FIELD_CELLS[:2])
+            return PatchGrid(grid=(x, y), lengths=self._setup.surface.lengths)
         nx, ny, _ = self._setup.shape.cells
         return PatchGrid(grid=(nx, ny), lengths=self._setup.surface.lengths)
+
+
+def _one(face: LoadedFace | FacePair, counter: bool) -> LoadedFace:
+    """Return the face of one of two bodies, or that of the only one."""
+    from macro import FacePair
+
+    if isinstance(face, FacePair):
+        return face.second if counter else face.first
+    return face
+
+
+def _half(face: LoadedFace | FacePair, displacement: Array, counter: bool) -> Array:
+    """Return the displacements of one of two bodies, or those of the only one."""
+    from macro import FacePair
+
+    if isinstance(face, FacePair):
+        return face.bodies.split(displacement)[counter]
+    return displacement

@@ -5,13 +5,13 @@ Theory: demos/theory.md, section 11.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Control, InputError, NotConverged, RigidPlane
-from multiscale.couplings.body import Displacements
+from geometry import Control, InputError, NotConverged, PatchGrid, RigidPlane
+from multiscale.couplings.patch_compliance import Displacements
 from multiscale.laws.interpolation import LawPoint
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaws
@@ -20,7 +20,7 @@ from multiscale.loading.stepper import BeyondLaws
 from multiscale.storage import Arrays, packed, unpacked
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import ElasticBody, LawContactProblem, LawContactState, LoadedFace
+    from macro import FacePair, LawContactProblem, LawContactState, LoadedFace
 
 Array = NDArray[np.float64]
 
@@ -41,14 +41,17 @@ class EmbeddedCoupling:
         face: The patches on its contact face.
     """
 
-    def __init__(self, problem: LawContactProblem, table: LawTable, face: LoadedFace) -> None:
+    def __init__(
+        self, problem: LawContactProblem, table: LawTable, face: LoadedFace | FacePair
+    ) -> None:
         self._problem, self._table, self.face = problem, table, face
         self._last: LawContactState | None = None
 
     @property
-    def blocks(self) -> list[ElasticBody]:
-        """The body, as a list of one."""
-        return [self.face.body]
+    def blocks(self) -> list[Any]:
+        """The body, and the counter-body where that is a mesh."""
+        body = self.face.body
+        return [body.body, body.counter] if hasattr(body, "counter") else [body]
 
     @property
     def displacement(self) -> Array:
@@ -60,6 +63,16 @@ class EmbeddedCoupling:
         if self._last is None:
             raise ValueError("no load step has been accepted yet")
         return self._last.displacement
+
+    @property
+    def point_pressures(self) -> Array:
+        """Pressures at this rank's quadrature points of the face at the latest load step [MPa]."""
+        pressure, face = self._problem.pressures, self.face
+        if not hasattr(face, "on_both"):
+            return pressure
+        whole = np.zeros(len(face.on_both))
+        whole[face.on_both] = pressure
+        return whole
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `Coupling.press`."""
@@ -86,7 +99,8 @@ class EmbeddedCoupling:
         """
         if state:
             approach, tilt, pressure = unpacked(state, ())
-            self._problem.start_from(pressure)
+            if isinstance(self._table.patches, PatchGrid) or len(self.blocks) == 1:
+                self._problem.start_from(pressure)
             self._last = self._problem.solve(Control(approach=approach, tilt=tilt))
 
     def _step(self, control: Control, state: LawContactState) -> LoadStep:
@@ -102,8 +116,6 @@ class EmbeddedCoupling:
         except InputError as error:
             falls = not all(law.is_function for law in laws)
             raise beyond_law(control, str(error), self._table, falls=falls) from error
-        mean_closures = zip(laws, state.closure, strict=True)
-        contacts = [law.at(closure, extend=True).contacts for law, closure in mean_closures]
         return LoadStep.of_patches(
             self._table.patches,
             plane=(state.approach, *state.tilt),
@@ -112,12 +124,33 @@ class EmbeddedCoupling:
             pressure=state.pressure,
             area_fraction=area_fraction,
             separation=separation,
-            contacts=contacts,
+            **self._of_contacts(state),
             newton_iterations=state.newton_iterations,
             linear_iterations=state.linear_iterations,
             reason=state.reason,
             imbalance=(state.force - state.reaction) / state.force if state.force else 0.0,
         )
+
+    def _of_contacts(self, state: LawContactState) -> dict[str, Any]:
+        """Return the numbers of contacts in the patches, and what else regions have.
+
+        Where laws are those of samples, contacts are counted on the area of the samples, and the
+        pressure has a largest value on the face.
+        """
+        laws = self._table.laws
+        if isinstance(self._table.patches, PatchGrid):
+            mean_closures = zip(laws, state.closure, strict=True)
+            return {"contacts": [law.at(c, extend=True).contacts for law, c in mean_closures]}
+        areas = self.face.areas
+        density = [
+            lambda closure, law=law: law.at(closure).contacts / law.sample_area for law in laws
+        ]
+        peaks = self._problem.patch_largest([law.pressure for law in laws])
+        return {
+            "contacts": round(float(self._problem.patch_means(density) @ areas)),
+            "areas": areas,
+            "peak_pressure_MPa": float(peaks.max()),
+        }
 
 
 class FreePlaneCoupling:
@@ -150,7 +183,7 @@ class FreePlaneCoupling:
         Raises:
             NotConverged: Also when the laws were made for another macro model.
         """
-        path, patches = self._path, self._table.patches
+        path, patches = self._path, self._table.grid
         approach, evaluations = control.approach, 0
         if approach is None:
             approach, evaluations = path.approach_under(control.force or 0.0, self._force)
@@ -190,13 +223,13 @@ class FreePlaneCoupling:
         if self._approach is None:
             return None, 0
         rates = self._along(self._approach).dpressure
-        return self._table.patches.area * float(rates.sum()), 0
+        return self._table.grid.area * float(rates.sum()), 0
 
     def _force(self, approach: float) -> float:
-        return self._table.patches.area * float(self._along(approach).pressure.sum())
+        return self._table.grid.area * float(self._along(approach).pressure.sum())
 
     def _along(self, approach: float) -> LawPoint:
-        return self._laws.along(np.full(self._table.patches.count, approach))
+        return self._laws.along(np.full(self._table.grid.count, approach))
 
 
 def beyond_law(

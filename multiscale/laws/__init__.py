@@ -6,5 +6,6 @@
     LawTable              the laws of all patches, and their file                   `law_table`
 
 `consistent` makes rows from contact problems of the whole surface, `isolated` from each patch
-alone; `refinement` asks them for more rows where the error between rows is largest.
+alone, `representative` from periodic samples of a large face (`periodic_sample`, `mean_law`);
+`refinement` asks them for more rows where the error between rows is largest.
 """

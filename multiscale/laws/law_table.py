@@ -1,4 +1,4 @@
-"""The laws of all patches of an interface, what they say of themselves, and their file.
+"""The laws of all patches or regions of an interface, what they say of themselves, their file.
 
 Theory: demos/theory.md, section 10.
 """
@@ -16,7 +16,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import InputError, PatchGrid
+from geometry import InputError, PatchGrid, Regions
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.rows import LawRows, PlanePath
 from multiscale.storage import checksummed, stored_numbers, verified
@@ -44,11 +44,11 @@ _PATH_UNITS = {"approach": "mm", "tilt": "1", "force": "N", "moment": "N mm"}
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LawTable:
-    """The laws of all patches of an interface.
+    """The laws of all patches of an interface, or of all regions of a face.
 
     Attributes:
-        patches: The partition.
-        laws: One law per patch, in the order of the flat patch index.
+        patches: The partition: patches, or regions where the laws stand for faces of any outline.
+        laws: One law per patch, in the order of the flat patch index, or per region in theirs.
         made_by: How they were made: coupling, micro model, Love's displacement, tolerance, and the
             slopes of the plane that pressed the whole surface.
         force_error: Estimated error of the force between the rows, see
@@ -61,7 +61,7 @@ class LawTable:
         InputError: When there is not one law per patch.
     """
 
-    patches: PatchGrid
+    patches: PatchGrid | Regions
     laws: tuple[PatchLaw, ...]
     made_by: dict[str, str]
     force_error: float = float("nan")
@@ -71,8 +71,21 @@ class LawTable:
         if len(self.laws) != self.patches.count:
             raise InputError("needs one law per patch", value=len(self.laws))
 
-    def __getitem__(self, index: int) -> PatchLaw:
-        return self.laws[index]
+    def __getitem__(self, index: int | str) -> PatchLaw:
+        if isinstance(index, str) and isinstance(self.patches, Regions):
+            return self.laws[self.patches.index(index)]
+        return self.laws[int(index)]
+
+    @property
+    def grid(self) -> PatchGrid:
+        """The patches of a rectangle.
+
+        Raises:
+            InputError: When the laws are those of regions.
+        """
+        if isinstance(self.patches, Regions):
+            raise InputError("these laws are not those of patches", value=self.patches.names)
+        return self.patches
 
     def notes(self, tolerance: float) -> Iterator[str]:
         """Yield what a report says of the laws: their errors, and whether they were repaired.
@@ -98,6 +111,8 @@ class LawTable:
                 "pressure or closure fell as the plane came nearer; evened out, by up to "
                 f"{max(changes):.1e} of their largest"
             )
+        if isinstance(self.patches, Regions):
+            yield from filter(None, map(_scatter_note, self.patches.names, self.laws))
 
 
 def write_laws(path: Path, table: LawTable) -> None:
@@ -114,9 +129,9 @@ def write_laws(path: Path, table: LawTable) -> None:
 def law_bytes(table: LawTable) -> bytes:
     """Return the content of a law file.
 
-    It has a group ``patch_IX_IY`` per patch with a dataset per column, and a group for the path of
-    the plane where there is one. A checksum stands before the content; see
-    `multiscale.storage`.
+    It has a group ``patch_IX_IY`` per patch, or ``region_I`` per region, with a dataset per column,
+    and a group for the path of the plane where there is one. A checksum stands before the content;
+    see `multiscale.storage`.
 
     Args:
         table: The laws.
@@ -124,19 +139,26 @@ def law_bytes(table: LawTable) -> bytes:
 
     def fill(file: Any) -> None:
         file.attrs["format"] = FORMAT
-        file.attrs["patch_grid"] = table.patches.grid
-        file.attrs["lengths_mm"] = table.patches.lengths
-        file.attrs["origin_mm"] = table.patches.origin
+        if isinstance(table.patches, Regions):
+            file.attrs["regions"] = table.patches.names
+        else:
+            file.attrs["patch_grid"] = table.patches.grid
+            file.attrs["lengths_mm"] = table.patches.lengths
+            file.attrs["origin_mm"] = table.patches.origin
         file.attrs["force_error"] = table.force_error
         for name, text in table.made_by.items():
             file.attrs[f"made_by_{name}"] = text
         for index, law in enumerate(table.laws):
             group = file.create_group(_group_name(table.patches, index))
             for name, column in _COLUMNS.items():
-                stored = group.create_dataset(name, data=getattr(law.rows, column.name))
-                stored.attrs["unit"] = column.metadata["unit"]
+                values = getattr(law.rows, column.name)
+                if values.any() or not column.metadata.get("optional"):
+                    stored = group.create_dataset(name, data=values)
+                    stored.attrs["unit"] = column.metadata["unit"]
             for name, attribute in _SCALARS.items():
                 group.attrs[name] = getattr(law, attribute)
+            if np.isfinite(law.sample_area):
+                group.attrs["sample_area_mm2"] = law.sample_area
         if table.path is not None:
             group = file.create_group(_PATH)
             for name, unit in _PATH_UNITS.items():
@@ -186,7 +208,24 @@ def repaired_law(law: PatchLaw) -> PatchLaw:
     return replace(law, rows=rows, repaired=max(change, law.repaired))
 
 
-def _table(file: Any) -> LawTable:
+def _scatter_note(region: str, law: PatchLaw) -> str | None:
+    """Return what is said of the scatter among the samples of a law."""
+    rows = law.rows
+    if not rows.pressure_scatter.any():
+        return None
+    half = int(np.searchsorted(rows.pressure, 0.5 * rows.pressure[-1]))
+    pressure, scatter = rows.pressure[half], rows.pressure_scatter[half]
+    stiffness = float(law.along(rows.approach[half]).stiffness)
+    return (
+        f"{region}: where the mean pressure is {pressure:.3g} MPa, that of single samples scatters "
+        f"by {scatter / pressure:.1%} (standard deviation), as by {1e3 * scatter / stiffness:.2g} "
+        "µm of closure; larger samples scatter less"
+    )
+
+
+def _partition(file: Any) -> PatchGrid | Regions:
+    if "regions" in file.attrs:
+        return Regions(tuple(file.attrs["regions"]))
     patches = PatchGrid(
         grid=tuple(file.attrs["patch_grid"]),
         lengths=tuple(file.attrs["lengths_mm"]),
@@ -194,6 +233,11 @@ def _table(file: Any) -> LawTable:
     )
     if math.prod(patches.grid) > len(file):
         raise InputError("lacks laws", value=patches.grid, allowed=f"{len(file)} groups")
+    return patches
+
+
+def _table(file: Any) -> LawTable:
+    patches = _partition(file)
     made_by = {
         name.removeprefix("made_by_"): str(text)
         for name, text in file.attrs.items()
@@ -213,11 +257,18 @@ def _table(file: Any) -> LawTable:
 
 
 def _law(group: Any) -> PatchLaw:
-    rows = LawRows(**{one.name: stored_numbers(group[name]) for name, one in _COLUMNS.items()})
+    found = {
+        one.name: stored_numbers(group[name])
+        for name, one in _COLUMNS.items()
+        if name in group or not one.metadata.get("optional")
+    }
     scalars = {attribute: float(group.attrs[name]) for name, attribute in _SCALARS.items()}
-    return PatchLaw(rows=rows, **scalars)
+    scalars["sample_area"] = float(group.attrs.get("sample_area_mm2", np.nan))
+    return PatchLaw(rows=LawRows(**found), **scalars)
 
 
-def _group_name(patches: PatchGrid, index: int) -> str:
+def _group_name(patches: PatchGrid | Regions, index: int) -> str:
+    if isinstance(patches, Regions):
+        return f"region_{index}"
     ix, iy = patches.unravel(index)
     return f"patch_{ix}_{iy}"

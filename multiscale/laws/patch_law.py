@@ -6,7 +6,7 @@ Theory: demos/theory.md, section 10.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -46,6 +46,7 @@ class PatchLaw:
         warning_pressure: Mean pressure from which on the micro model warned that it is outside
             its range of validity [MPa]; infinite when it never did.
         repaired: Largest change that made falling rows rise, see `LawRows.rising`.
+        sample_area: Nominal area that contacts are counted on [mm²]; NaN where that is the patch.
 
     Raises:
         InputError: When the rows are no law.
@@ -58,6 +59,7 @@ class PatchLaw:
     stiffness_error: float = float("nan")
     warning_pressure: float = np.inf
     repaired: float = 0.0
+    sample_area: float = float("nan")
 
     @classmethod
     def of(cls, rows: SolvedRows, first_touch: float, initial_separation: float) -> PatchLaw:
@@ -93,7 +95,7 @@ class PatchLaw:
     @property
     def is_function(self) -> bool:
         """Whether the pressure is a function of closure in the whole range of the law."""
-        return self._rising == len(self.rows)
+        return self.rising_rows == len(self.rows)
 
     @property
     def is_flat(self) -> bool:
@@ -101,7 +103,7 @@ class PatchLaw:
 
         Then the pressure is a function of closure nowhere.
         """
-        return not self.is_open and self._rising == 1
+        return not self.is_open and self.rising_rows == 1
 
     @property
     def range(self) -> tuple[float, float]:
@@ -109,7 +111,7 @@ class PatchLaw:
 
         The first is that of first touch.
         """
-        end = self.first_touch if self.is_open else float(self.rows.closure[self._rising - 1])
+        end = self.first_touch if self.is_open else float(self.rows.closure[self.rising_rows - 1])
         return self.first_touch, end
 
     @cached_property
@@ -138,7 +140,7 @@ class PatchLaw:
         closures = np.asarray(closure, dtype=float)
         if not extend:
             self._check_range(closures)
-        return self._rising_curves.at_closure(closures)
+        return self.rising_curves.at_closure(closures)
 
     def pressure(self, closure: ArrayLike) -> Array:
         """Return the pressure at any closure, as an iteration needs it [MPa].
@@ -152,16 +154,45 @@ class PatchLaw:
         """Return the derivative of `pressure` over the closure [MPa/mm]."""
         return self.at(closure, extend=True).stiffness
 
+    def pressure_scatter(self, closure: ArrayLike) -> Array:
+        """Return the standard deviation of the pressure among the samples of the law [MPa].
+
+        Args:
+            closure: Closures of any shape [mm]; beyond the rows it stays that of the last one.
+        """
+        closures = np.asarray(closure, dtype=float)
+        if self.is_open:
+            return np.zeros(closures.shape)
+        rows = self.rows[: self._rising]
+        return np.interp(closures, rows.closure, rows.pressure_scatter, left=0.0)
+
+    def shifted(self, distance: float) -> PatchLaw:
+        """Return the law with approach and closure counted from a plane that is higher.
+
+        Args:
+            distance: How much higher it is [mm].
+        """
+        return replace(
+            self,
+            rows=replace(
+                self.rows,
+                approach=self.rows.approach + distance,
+                closure=self.rows.closure + distance,
+            ),
+            first_touch=self.first_touch + distance,
+            initial_separation=self.initial_separation + distance,
+        )
+
     @cached_property
-    def _rising(self) -> int:
+    def rising_rows(self) -> int:
         """Number of rows before closure stops rising."""
         stops = np.flatnonzero(np.diff(self.rows.closure) <= 0.0)
         return int(stops[0]) + 1 if stops.size else len(self.rows)
 
     @cached_property
-    def _rising_curves(self) -> LawCurves:
+    def rising_curves(self) -> LawCurves:
         """The curves up to where closure stops rising, and their tangents there."""
-        return self.curves if self.is_function else self.curves.cut(self._rising)
+        return self.curves if self.is_function else self.curves.cut(self.rising_rows)
 
     def _check_range(self, closures: Array) -> None:
         start, end = self.range

@@ -40,6 +40,8 @@ class LawRows:
         contacts: Number of contacts in the patch.
         unresolved_displacement: Mean displacement of the patch in the contact problem, less its
             displacement in the macro model [mm].
+        pressure_scatter: Standard deviation of the pressure among the samples whose mean the law
+            is, at the same closure [MPa]; zero of one sample.
 
     Raises:
         InputError: When the columns have different shapes, or a number is not finite.
@@ -51,8 +53,14 @@ class LawRows:
     contact_area_fraction: Array = field(metadata={"unit": "1"})
     contacts: NDArray[np.int64] = field(metadata={"unit": "1", "kind": np.int64})
     unresolved_displacement: Array = field(metadata={"unit": "mm", "stored": "relief"})
+    pressure_scatter: Array = field(
+        default=None,  # type: ignore[arg-type]
+        metadata={"unit": "MPa", "optional": True},
+    )
 
     def __post_init__(self) -> None:
+        if self.pressure_scatter is None:
+            object.__setattr__(self, "pressure_scatter", np.zeros_like(self.pressure))
         for name, column in self.columns():
             if column.shape != self.closure.shape:
                 raise InputError("a patch law needs columns of one length", value=name)

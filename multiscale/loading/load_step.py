@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry import PatchGrid
+from geometry import PatchGrid, Regions
 
 Array = NDArray[np.float64]
 
@@ -103,7 +103,7 @@ class LoadStep:
     @classmethod
     def of_patches(
         cls,
-        grid: PatchGrid,
+        grid: PatchGrid | Regions,
         *,
         plane: Sequence[float] | Array,
         load: Sequence[float] | Array,
@@ -112,12 +112,13 @@ class LoadStep:
         area_fraction: Array,
         separation: Array | float,
         contacts: ArrayLike,
+        areas: Array | None = None,
         **other: Any,
     ) -> LoadStep:
         """Return the load step that patches make together.
 
         Args:
-            grid: The partition.
+            grid: The partition, or regions.
             plane: Approach at the middle of the interface [mm], and slopes of the approach.
             load: Force [N], and first moments of the forces about the middle [N mm].
             closure: Mean closures of the patches, shape (N,) [mm].
@@ -125,15 +126,23 @@ class LoadStep:
             area_fraction: Real over nominal contact areas of the patches, shape (N,).
             separation: Mean gaps of the patches, or their mean [mm].
             contacts: Numbers of contacts in the patches, or their sum.
+            areas: Areas of the patches, shape (N,) [mm²]; needed of regions.
             **other: Other fields of the load step.
         """
         (approach, tx, ty), (force, mx, my) = map(float, plane), map(float, load)
+        whole, weights = 0.0, areas
+        if isinstance(grid, PatchGrid):
+            whole, weights = grid.area * grid.count, None
+        elif areas is not None:
+            whole = float(areas.sum())
         return cls(
             approach_mm=approach,
             force_N=force,
-            mean_pressure_MPa=force / (grid.area * grid.count),
-            contact_area_fraction=float(np.mean(area_fraction)),
-            mean_separation_mm=float(np.mean(separation)),
+            mean_pressure_MPa=force / whole,
+            contact_area_fraction=float(np.average(area_fraction, weights=weights)),
+            mean_separation_mm=float(
+                np.average(np.broadcast_to(separation, np.shape(closure)), weights=weights)
+            ),
             contacts=int(np.sum(contacts)),
             patches=PatchState(
                 closure_mm=closure, pressure_MPa=pressure, contact_area_fraction=area_fraction

@@ -80,6 +80,7 @@ def pressure_figure(history: History) -> Figure:
     figure = new_figure(5.6, 4.8)
     axes = figure.add_subplot()
     last, record = history.steps[-1], history.reference
+    assert isinstance(history.patches, PatchGrid)
     draw_pressures(figure, axes, history.patches, last.patches.pressure_MPa)
     error = "" if record is None else f" ({record.label})"
     axes.set_title(f"approach {1e3 * last.approach_mm:.3g} µm, force {last.force_N:.4g} N{error}")
@@ -135,7 +136,7 @@ def block_figure_of(setup: ProblemSetup, record: ContactRecord) -> Figure:
         f"load step {record.step}: approach {1e3 * record.approach_mm:.3g} µm, "
         f"force {record.force_N:.4g} N, {len(record.spots)} spots"
     )
-    poisson_ratio = setup.scene.block.poisson_ratio
+    poisson_ratio = setup.materials.first.poisson_ratio
     return block_figure(setup.surface, pressure, poisson_ratio, title=title)
 
 

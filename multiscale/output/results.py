@@ -11,7 +11,7 @@ from geometry.collective import on_root, shared
 from multiscale.laws.law_table import write_laws
 from multiscale.output.report import provenance, report_html
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
-from multiscale.results.history import COLUMNS, PATCH_COLUMNS, History
+from multiscale.results.history import COLUMNS, History
 from multiscale.run import Run
 from multiscale.storage import (
     checksummed,
@@ -57,7 +57,7 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
     """
     pictures: dict[str, bytes] = {}
     if run.scene.output.figures and run.steps:
-        names = ["surface", "curves", "pressures"]
+        names = ["surface", "curves"] + ["pressures"] * (not run.setup.samples)
         names += ["block"] * (run.scene.output.figures == "all" and has_block_figure(run))
         names += ["contact"] * bool(run.contacts) + ["laws"] * (run.table is not None)
         with run.phase("output"):
@@ -96,7 +96,7 @@ def write_tables(folder: Path, history: History) -> list[Path]:
     rows = [list(record.values()) for record in history.records()]
     files = [
         write_csv(folder / "history.csv", header, rows),
-        write_csv(folder / "patches.csv", PATCH_COLUMNS, history.patch_rows()),
+        write_csv(folder / "patches.csv", history.patch_columns, history.patch_rows()),
     ]
     if history.reference is not None:
         columns = history.reference.columns(history.steps)
@@ -161,7 +161,7 @@ def _figure(run: Run, name: str) -> Figure:
         summits = setup.asperities if setup.uses_summits else None
         return figures.surface_figure(setup.surface, summits, setup.patches)
     if name == "curves":
-        return run.history().plot(run.scene.coupling.kind)
+        return run.history().plot(run.scene.kind)
     if name == "block":
         return figures.block_figure_of(setup, run.contacts[-1])
     if name == "contact":

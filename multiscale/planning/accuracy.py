@@ -194,7 +194,7 @@ def _seconds(setup: ProblemSetup) -> float:
 
 def _alternative(setup: ProblemSetup) -> Alternative:
     """Return a problem as one of the ways to compute its scene."""
-    kind = setup.scene.coupling.kind
+    kind = setup.scene.kind
     if setup.meshes is not None:
         size = 1e3 * float(setup.meshes.sizes[-1])
         label = f"reference, meshed with edges of {size:.3g} µm"

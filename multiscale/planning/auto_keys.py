@@ -38,12 +38,14 @@ def auto_keys(scene: Scene) -> frozenset[str]:
     for key in _KEYS:
         name, _, field = key.partition(".")
         section = getattr(scene, name)
+        if section is None or scene.law.representative:
+            continue
         unstated = scene.accuracy is not None and field not in section.model_fields_set
         if name == "micro":  # its other keys belong to a model that is stated
             unstated = unstated and not section.model_fields_set
         if getattr(section, field) == "auto" or (unstated and name != "surface"):
             found.add(key)
-    return frozenset(found if scene.coupling.on_mesh else found - {"block.cells"})
+    return frozenset(found if scene.on_mesh else found - {"block.cells"})
 
 
 def accuracy_of(scene: Scene) -> float:
@@ -68,7 +70,7 @@ def is_measured(scene: Scene) -> bool:
     if scene.accuracy is None:
         return not auto <= {"micro.model", "patches.grid", "block.cells"}
     return bool(auto & {"surface.grid", "micro.model", "coupling.kind"}) or (
-        scene.coupling.kind == "reference"
+        scene.kind == "reference"
     )
 
 

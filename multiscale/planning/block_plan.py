@@ -6,14 +6,12 @@ from collections.abc import Iterable, Iterator
 
 from geometry.meshes.block import BlockShape, misalignment
 from multiscale.machine import ClusterNodes
+from multiscale.planning.body_plan import LOCKING_FROM, body_statement, body_warnings
 from multiscale.planning.costs import run_memory_requests
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import ReferenceMeshes
+from multiscale.setup.surface_and_block import block_section
 
-LOCKING_FROM = 0.45
-"""Poisson's ratio above which linear elements lock. Two by two patches on 8 × 8 × 6 trilinear
-cells are 1.6 % too stiff there, 6 % at 0.49 and 57 % at 0.4999. As many nodes of quadratic cells
-are 0.5, 1.1 and 1.5 % too stiff."""
 LEAST_ACROSS = {1: 12.0, 2: 3.0}
 """Edges across a typical contact below which the force is wrong by several per cent, by the
 element's degree."""
@@ -29,14 +27,17 @@ def block_statement(setup: ProblemSetup) -> str:
     Args:
         setup: The problem, with a block.
     """
+    if setup.face is not None:
+        return body_statement(setup)
     if setup.meshes is not None:
-        return f"{_meshes(setup.meshes)}; {setup.scene.block.sides} sides"
+        return f"{_meshes(setup.meshes)}; {block_section(setup.scene).sides} sides"
     (lx, ly), shape = setup.surface.lengths, setup.shape
+    sides, modulus = block_section(setup.scene).sides, setup.materials.contact_modulus
     text = (
         "decomposed: the half-space's own near field, and what the finite block adds to it in "
         "smooth modes of its contact face, from finite elements of high order"
     )
-    if not setup.scene.coupling.decomposed:
+    if not setup.scene.decomposed:
         split = "" if shape.hexahedral else " split into tetrahedra"
         margin = f", {shape.margin:g} mm beyond it in {shape.margin_cells} cells"
         text = (
@@ -46,7 +47,7 @@ def block_statement(setup: ProblemSetup) -> str:
         )
     return (
         f"{text}, {lx:g} × {ly:g} mm and {shape.height:g} mm high, "
-        f"{setup.scene.block.sides} sides, contact modulus {setup.model.contact_modulus:.6g} MPa"
+        f"{sides} sides, contact modulus {modulus:.6g} MPa"
     )
 
 
@@ -56,11 +57,14 @@ def block_warnings(setup: ProblemSetup) -> Iterator[str]:
     Args:
         setup: The problem, with a block.
     """
+    if setup.face is not None:
+        yield from body_warnings(setup)
+        return
     yield from _proportions(setup)
     yield from _patch_warnings(setup)
     if setup.meshes is not None:
         yield from _mesh_warnings(setup.meshes)
-    elif setup.scene.coupling.decomposed:
+    elif setup.scene.decomposed:
         return
     else:
         counts = zip(setup.shape.cells[:2], setup.patches.grid, strict=True)
@@ -71,7 +75,7 @@ def block_warnings(setup: ProblemSetup) -> Iterator[str]:
                 "make the block stiffer by several per cent under a patch's pressure; refine "
                 "block.cells"
             )
-    mesh, poisson_ratio = setup.meshes or setup.shape, setup.scene.block.poisson_ratio
+    mesh, poisson_ratio = setup.meshes or setup.shape, setup.materials.first.poisson_ratio
     if mesh.degree == 1 and poisson_ratio > LOCKING_FROM:
         yield (
             f"linear elements lock as Poisson's ratio comes near 0.5 (here {poisson_ratio:g}): the "
@@ -117,7 +121,7 @@ def _proportions(setup: ProblemSetup) -> Iterator[str]:
 
 
 def _patch_warnings(setup: ProblemSetup) -> Iterator[str]:
-    if setup.scene.coupling.kind != "isolated":
+    if setup.scene.kind != "isolated":
         return
     grids = zip(setup.surface.grid, setup.patches.grid, strict=True)
     if setup.model.name == "islands" and any(cells % patches for cells, patches in grids):

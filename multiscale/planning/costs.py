@@ -11,7 +11,6 @@ import math
 import sys
 from dataclasses import dataclass
 
-from geometry.meshes.block import BlockShape
 from micro import HalfSpaceModel, ScaledModel
 from micro.choice.models import contact_box_share, solution_seconds
 from multiscale.couplings.assembly import CYCLES_PER_PATCH, full_cycles, newton_choice
@@ -20,7 +19,12 @@ from multiscale.machine import MemoryRequest, peak_memory
 from multiscale.planning.machine_speed import THIS_MACHINE, Machine
 from multiscale.setup.memory import memory_requests
 from multiscale.setup.problem import ProblemSetup
-from multiscale.setup.reference_meshes import ReferenceMeshes, mesh_unknowns, reference_requests
+from multiscale.setup.reference_meshes import (
+    BYTES_PER_UNKNOWN,
+    ReferenceMeshes,
+    mesh_unknowns,
+    reference_requests,
+)
 
 # contact problems
 ROWS = {"cells": 56, "summits": 70}
@@ -118,7 +122,7 @@ def predicted_cost(setup: ProblemSetup, machine: Machine = THIS_MACHINE) -> Cost
         seconds["check"] = machine.arrays * solutions * solution_time(setup)
     if output.fields and setup.has_block and not (on_mesh or setup.meshes):
         fields = sum(output.wants_fields(one, last=one == steps) for one in range(1, steps + 1))
-        seconds["field"] = _mesh_seconds(setup.shape, machine, CYCLES_PER_PATCH * fields)
+        seconds["field"] = _mesh_seconds(setup, machine, CYCLES_PER_PATCH * fields)
     if output.figures:
         figures = (4 if setup.uses_laws else 3) * _FIGURE
         figures += (output.figures == "all") * _BLOCK_FIGURE
@@ -190,7 +194,7 @@ def step_count(load_history: LoadHistory) -> int:
 def _law_seconds(setup: ProblemSetup) -> float:
     """Return the time of tabulating laws [s], on the machine where it was measured."""
     rows = ROWS["summits" if setup.uses_summits else "cells"]
-    if setup.scene.coupling.kind == "isolated":
+    if setup.scene.kind == "isolated":
         return rows * setup.interfering_patches * solution_time(setup, one_patch=True)
     return rows * (_ROW * solution_time(setup) + _PATCH_SUMS * setup.patches.count)
 
@@ -199,15 +203,15 @@ def _contact_seconds(
     setup: ProblemSetup, steps: int, machine: Machine, *, on_mesh: bool
 ) -> dict[str, float]:
     """Return the time of making a flat block and of its load steps, by phase [s]."""
-    shape, patches, block = setup.shape, setup.patches.count, 0.0
+    patches, block = setup.patches.count, 0.0
     if setup.has_block:
         block = machine.arrays * _unless_imported("dolfinx", _IMPORT)
-        if setup.scene.coupling.decomposed:
+        if setup.scene.decomposed:
             block += machine.arrays * _BODY
         else:
-            block += _mesh_seconds(shape, machine, 0 if on_mesh else CYCLES_PER_PATCH * patches)
+            block += _mesh_seconds(setup, machine, 0 if on_mesh else CYCLES_PER_PATCH * patches)
     if on_mesh:
-        load_steps = _mesh_seconds(shape, machine, full_cycles(setup, steps), made=False)
+        load_steps = _mesh_seconds(setup, machine, full_cycles(setup, steps), made=False)
     elif setup.uses_laws:
         dense = 0.3e-3 + 33e-9 * patches**2 + 14e-12 * patches**3  # a dense factorisation
         load_steps = machine.arrays * _NEWTON_STEPS * steps * dense
@@ -216,9 +220,16 @@ def _contact_seconds(
     return {"block": block, "load steps": load_steps}
 
 
-def _mesh_seconds(shape: BlockShape, machine: Machine, cycles: int, *, made: bool = True) -> float:
+def _mesh_seconds(
+    setup: ProblemSetup, machine: Machine, cycles: int, *, made: bool = True
+) -> float:
     """Return the time of multigrid cycles on a mesh, and of making it and its multigrid [s]."""
-    product = machine.sparse * _ENTRY * _ENTRIES[shape.element] * mesh_unknowns(shape)
+    product = 0.0
+    for face in filter(None, (setup.face, setup.counter_face)):
+        product += machine.sparse * _ENTRY * _ENTRIES[face.element] * face.unknowns
+    if setup.face is None:
+        shape = setup.shape
+        product += machine.sparse * _ENTRY * _ENTRIES[shape.element] * mesh_unknowns(shape)
     seconds = cycles * (machine.arrays * _CYCLE_OVERHEAD + _CYCLE * product)
     return seconds + made * (machine.arrays * _MESH + _SET_UP * product)
 
@@ -235,7 +246,18 @@ def run_memory_requests(setup: ProblemSetup) -> list[MemoryRequest]:
         setup: The problem.
     """
     meshes, scene = setup.meshes, setup.scene
-    return [*memory_requests(scene), *(reference_requests(scene, meshes) if meshes else ())]
+    of_bodies = [
+        MemoryRequest(
+            key=f"{key}.mesh",
+            value=None,
+            purpose=f"the mesh of [{key}], its stiffness and multigrid,",
+            shared=float(face.unknowns) * BYTES_PER_UNKNOWN[face.degree],
+        )
+        for key, face in (("body", setup.face), ("counter_body", setup.counter_face))
+        if face is not None and face.digest
+    ]
+    of_meshes = reference_requests(scene, meshes) if meshes else ()
+    return [*memory_requests(scene), *of_bodies, *of_meshes]
 
 
 def _memory(setup: ProblemSetup) -> float:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from geometry.materials import Material
 from geometry.statistics import roughness
 from micro import MODELS, AsperityModel, HalfSpaceModel
 from multiscale.couplings.assembly import newton_choice
 from multiscale.planning.auto_keys import heights_per_wave
 from multiscale.planning.block_plan import block_statement, block_warnings
+from multiscale.planning.body_plan import body_term_statement, sample_statement
 from multiscale.planning.costs import Cost
 from multiscale.readable import duration, quantity
 from multiscale.scene.keys import bare_quantities
@@ -30,7 +32,9 @@ def statements(setup: ProblemSetup, cost: Cost | None = None) -> Iterator[tuple[
     yield "micro model", _model(setup)
     yield "coupling", _coupling(setup)
     if setup.has_block:
-        yield "block", block_statement(setup)
+        yield "block" if setup.face is None else "body", block_statement(setup)
+        if setup.bodies.first is not None and not setup.samples:
+            yield "body term", body_term_statement(setup)
     if setup.uses_laws:
         choice = newton_choice(setup)
         way = "condensed to the patches" if choice.condensed else "full, on the mesh"
@@ -102,13 +106,19 @@ def inputs_statement(setup: ProblemSetup) -> str:
     Args:
         setup: The problem.
     """
-    block, (lx, ly) = setup.scene.block, (quantity(side, "mm") for side in setup.surface.lengths)
-    height = quantity(setup.shape.height, "mm")
-    solid = f"a block {height} high" if setup.has_block else "a half-space"
-    return (
-        f"E = {quantity(block.young_modulus, 'MPa')}, ν = {block.poisson_ratio:g}; a surface "
-        f"of {lx} × {ly} on {solid}"
-    )
+    lx, ly = (quantity(side, "mm") for side in setup.surface.lengths)
+    high = setup.face.depth if setup.face else setup.shape.height
+    what, second = "block" if setup.block_shape else "body", setup.materials.second
+    solid = f"a {what} {quantity(high, 'mm')} high" if setup.has_block else "a half-space"
+    other = "a half-space" if setup.both_give_way else "a body"
+    against = f", against {other} with {_constants(second)}" if second else ""
+    if setup.samples:
+        solid = f"{solid} as sample"
+    return f"{_constants(setup.materials.first)}; a surface of {lx} × {ly} on {solid}{against}"
+
+
+def _constants(material: Material) -> str:
+    return f"E = {quantity(material.young_modulus, 'MPa')}, ν = {material.poisson_ratio:g}"
 
 
 def surface_statement(setup: ProblemSetup) -> str:
@@ -154,6 +164,8 @@ def _model(setup: ProblemSetup) -> str:
 
 
 def _coupling(setup: ProblemSetup) -> str:
+    if setup.samples:
+        return sample_statement(setup)
     coupling, patches = setup.scene.coupling, setup.patches
     grid = f"{patches.grid[0]} × {patches.grid[1]} patches"
     if setup.meshes is not None:
@@ -212,6 +224,8 @@ def _slopes(tilt: tuple[float, float]) -> str:
 def _error(setup: ProblemSetup) -> str:
     """Say how the run will know its error."""
     check = setup.scene.output.check
+    if setup.samples:
+        return "not measured; the notes have that of the laws between rows, and their scatter"
     if setup.meshes is not None:
         if len(setup.meshes.shapes) > 1:
             return "the meshes of the reference tell it, at every load step"

@@ -31,16 +31,19 @@ from multiscale.planning.auto_keys import (
     with_value,
 )
 from multiscale.planning.mesh_accuracy import MeshError, measured_mesh_error
+from multiscale.planning.representative_setup import representative_setup
 from multiscale.scene.scene import Scene
 from multiscale.setup.memory import check_memory
+from multiscale.setup.mesh_bodies import Faces, materials_in_contact, scene_bodies
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import reference_meshes
 from multiscale.setup.surface_and_block import (
-    block_material,
+    Bulk,
     check_load,
     check_patches,
     make_shape,
     make_surface,
+    make_surfaces,
     patch_grid,
 )
 
@@ -58,6 +61,7 @@ def make_setup(
     *,
     like: ProblemSetup | None = None,
     mesh_error: MeshError = measured_mesh_error,
+    faces: Faces | None = None,
 ) -> ProblemSetup:
     """Set up the problem of a scene: make the surface, resolve auto values, check that all fits.
 
@@ -67,6 +71,7 @@ def make_setup(
         nodes: The nodes of the run; None for this process alone.
         like: A problem that was set up before and has the same surface, which is taken from it.
         mesh_error: Measures the relative error of a reference's meshes at the largest load.
+        faces: What is known of the meshes of the scene's bodies; by default they are read.
 
     Raises:
         InputError: When something cannot be made or does not fit; names file, key and value.
@@ -75,60 +80,83 @@ def make_setup(
     began, nodes, known = time.perf_counter(), nodes or ClusterNodes(), resolved or {}
     auto = frozenset() if known else auto_keys(scene)
     start = provisional(with_resolved(scene, known), auto)
+    faces = scene_bodies(scene, None).facts if faces is None else faces
+    if scene.law.representative:
+        return representative_setup(scene, nodes, faces)
     if auto and is_measured(scene):
-        found = setup_by_accuracy(scene, start, lambda stated: _setup(stated, nodes), mesh_error)
+        found = setup_by_accuracy(
+            scene, start, lambda stated: _setup(stated, nodes, faces), mesh_error
+        )
         return replace(found, seconds={"surface": 0.0, "choice": time.perf_counter() - began})
     if "patches.grid" in auto:
         start = with_value(start, "patches.grid", map_grid(make_surface(start)))
-    return _setup(start, nodes, known.get("micro"), like)
+    return _setup(start, nodes, faces, known.get("micro"), like)
 
 
 def _setup(
-    scene: Scene, nodes: ClusterNodes, known: Any = None, like: ProblemSetup | None = None
+    scene: Scene,
+    nodes: ClusterNodes,
+    faces: Faces,
+    known: Any = None,
+    like: ProblemSetup | None = None,
 ) -> ProblemSetup:
     """Set up the problem of a scene of which the micro model alone may have an auto value.
 
     Args:
         scene: The scene.
         nodes: The nodes of the run.
+        faces: What is known of the meshes of its bodies.
         known: What the micro model became when the run began, a label or cells; None when that is
             not known.
         like: As in `make_setup`.
     """
     began = time.perf_counter()
     check_memory(scene, nodes)
-    surface = like.surface if like else make_surface(scene)
+    if like:
+        surface, counter_surface = like.surface, like.counter_surface
+    else:
+        surface, counter_surface = make_surfaces(scene)
     check_patches(scene, surface)
-    check_load(scene, surface)
+    materials, face = materials_in_contact(scene, faces), faces[0]
+    shape = make_shape(scene, surface) if face is None else None
+    height = shape.height if shape else face.depth if face else 0.0
+    check_load(scene, surface, Bulk(surface.area, height, materials.first.young_modulus))
     patches = PatchGrid(grid=patch_grid(scene), lengths=surface.lengths)
+    modulus = materials.contact_modulus
     setup = partial(
         ProblemSetup,
         scene=scene,
         surface=surface,
+        counter_surface=counter_surface,
+        materials=materials,
         # the block's sides are free
         asperities=like.asperities if like else find_asperities(surface, periodic=False),
         patches=patches,
         mean_heights=patch_means(surface, patches),
-        shape=make_shape(scene, surface),
+        block_shape=shape,
+        face=face,
+        counter_face=faces[1],
     )
     made = time.perf_counter()
     seconds = {"surface": made - began}
-    if scene.coupling.kind == "reference":
-        plane = _estimated_plane(scene, surface)
+    if scene.kind == "reference":
+        plane = estimated_plane(scene, surface, modulus)
         seconds["load estimate"] = time.perf_counter() - made
         meshes = reference_meshes(scene, surface, plane, nodes)
         return setup(micro=None, plane_at_largest_load=plane, meshes=meshes, seconds=seconds)
     choice = None
     if scene.micro.model == "auto":
-        choice = _chosen_model(scene, surface, patches, known)
+        choice = _chosen_model(scene, surface, patches, known, modulus)
         seconds["micro choice"] = time.perf_counter() - made
-    model = choice.model if choice else stated_model(scene, surface)
+    model = choice.model if choice else stated_model(scene, surface, modulus)
     if isinstance(known, list) and isinstance(model, HalfSpaceModel):
         model = model.resampled((int(known[0]), int(known[1])))
     _refuse_without_summits(scene, model)
     chosen = time.perf_counter()
-    if isinstance(model, HalfSpaceModel) and scene.coupling.kind in ("analytic", "concurrent"):
-        plane = _estimated_plane(scene, surface)  # its load steps need no plane ahead of them
+    if isinstance(model, HalfSpaceModel) and scene.kind in ("analytic", "concurrent"):
+        plane = estimated_plane(
+            scene, surface, modulus
+        )  # its load steps need no plane ahead of them
     else:
         coupling = ContactCoupling(model, patches, patch_means(surface, patches))
         plane = plane_at_largest_load(scene.loading.load_history, coupling, surface)
@@ -147,17 +175,18 @@ def _refuse_without_summits(scene: Scene, model: MicroModel) -> None:
         )
 
 
-def stated_model(scene: Scene, surface: Surface) -> MicroModel:
+def stated_model(scene: Scene, surface: Surface, contact_modulus: float) -> MicroModel:
     """Return the micro model that a scene names.
 
     Args:
         scene: The scene.
         surface: Its surface.
+        contact_modulus: E* of its pair of materials [MPa].
     """
     model = micro_model(
         scene.micro.model,
         surface,
-        contact_modulus=_modulus(scene),
+        contact_modulus=contact_modulus,
         solver=scene.micro.solver,
         curvature=scene.micro.curvature,
         border=scene.micro.border,
@@ -187,20 +216,28 @@ def plane_at_largest_load(
     return RigidPlane.above(surface, step.approach_mm, step.tilt)
 
 
-def _estimated_plane(scene: Scene, surface: Surface) -> RigidPlane:
-    """Return the rigid plane at the largest load on a half-space of few cells."""
+def estimated_plane(scene: Scene, surface: Surface, contact_modulus: float) -> RigidPlane:
+    """Return the rigid plane at the largest load on a half-space of few cells.
+
+    Args:
+        scene: The scene.
+        surface: Its surface.
+        contact_modulus: E* of its pair of materials [MPa].
+    """
     x, y = surface.grid
     periodic = scene.surface.periodic
-    fine = HalfSpaceModel(surface, contact_modulus=_modulus(scene), periodic=periodic)
+    fine = HalfSpaceModel(surface, contact_modulus=contact_modulus, periodic=periodic)
     model = fine.resampled((min(x, _ESTIMATE_CELLS), min(y, _ESTIMATE_CELLS)))
     whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
     coupling = ContactCoupling(model, whole, patch_means(surface, whole))
     return plane_at_largest_load(scene.loading.load_history, coupling, surface)
 
 
-def _chosen_model(scene: Scene, surface: Surface, patches: PatchGrid, label: str | None) -> Choice:
+def _chosen_model(
+    scene: Scene, surface: Surface, patches: PatchGrid, label: str | None, modulus: float
+) -> Choice:
     """Choose the micro model for the largest approach anywhere, or take the one of a label."""
-    kind, plane = scene.coupling.kind, _estimated_plane(scene, surface)
+    kind, plane = scene.kind, estimated_plane(scene, surface, modulus)
     solutions = scene.loading.load_history.count
     if kind in ("isolated", "consistent"):
         solutions = SOLUTIONS_OF_LAWS
@@ -208,14 +245,10 @@ def _chosen_model(scene: Scene, surface: Surface, patches: PatchGrid, label: str
     tilted = 0.5 * float(np.abs(np.multiply(surface.lengths, plane.tilt)).sum())
     return choose(
         surface,
-        contact_modulus=_modulus(scene),
+        contact_modulus=modulus,
         approach=plane.approach + tilted,
         tolerance=scene.micro.tolerance or accuracy_of(scene),
         patches=patches if kind != "analytic" else None,
         solutions=solutions,
         label=label,
     )
-
-
-def _modulus(scene: Scene) -> float:
-    return block_material(scene).contact_modulus

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.patches import PatchGrid
+from geometry.regions import Regions
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.results.contact_record import ContactRecord
@@ -88,7 +89,7 @@ class History:
 
     Attributes:
         steps: The load steps.
-        patches: The partition of the interface.
+        patches: The partition of the interface, or regions of a contact face.
         seconds: Wall time of each phase of the run [s].
         notes: Remarks of the run on its own approximations.
         reference: Results of all meshes of a reference; None with other couplings.
@@ -131,7 +132,7 @@ class History:
     work_mJ = Column("Work of the forces on the plane", "mJ")
 
     steps: tuple[LoadStep, ...]
-    patches: PatchGrid
+    patches: PatchGrid | Regions
     seconds: dict[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     reference: ReferenceRecord | None = None
@@ -164,14 +165,26 @@ class History:
 
     def patch_records(self) -> list[dict[str, Any]]:
         """Return the rows of ``patches.csv``, each as a dictionary by column."""
-        return [dict(zip(PATCH_COLUMNS, row, strict=True)) for row in self.patch_rows()]
+        return [dict(zip(self.patch_columns, row, strict=True)) for row in self.patch_rows()]
 
     def patch_rows(self) -> Iterator[tuple]:
         """Yield the rows of ``patches.csv``."""
         for step in self.steps:
             for index in range(self.patches.count):
                 values = (getattr(step.patches, name)[index] for name in PATCH_COLUMNS[3:])
-                yield (step.step, *self.patches.unravel(index), *values)
+                yield (step.step, *self._place(index), *values)
+
+    @property
+    def patch_columns(self) -> tuple[str, ...]:
+        """Columns of ``patches.csv``: of regions their names instead of places on a grid."""
+        places = PATCH_COLUMNS[1:3] if isinstance(self.patches, PatchGrid) else ("region",)
+        return (PATCH_COLUMNS[0], *places, *PATCH_COLUMNS[3:])
+
+    def _place(self, index: int) -> tuple[int | str, ...]:
+        """Return a patch's place on the grid, or the name of a region."""
+        if isinstance(self.patches, PatchGrid):
+            return self.patches.unravel(index)
+        return (self.patches.names[index],)
 
     def to_dataframe(self) -> Any:
         """Return the rows of ``history.csv`` as a pandas data frame.

@@ -70,8 +70,10 @@ def scene_keys() -> dict[str, Key]:
 def _keys(section: Mapping[str, Any], parts: Mapping[str, Any], prefix: str) -> Iterator[Key]:
     """Yield the keys of a section and of the sections in it."""
     for name, stated in section["properties"].items():
-        options = (stated, *stated.get("anyOf", ()))
-        references = [option["$ref"] for option in options if "$ref" in option]
+        options = [stated, *stated.get("anyOf", ())]
+        # sections in a list, or by names of the user's
+        options += [stated.get(several, {}) for several in ("items", "additionalProperties")]
+        references = [option["$ref"] for option in options if option and "$ref" in option]
         part = parts[references[0].rpartition("/")[2]] if references else {}
         required = name in section.get("required", ())
         yield Key(prefix + name, {**part, **stated}, required)
@@ -91,6 +93,8 @@ def _values(schema: Mapping[str, Any]) -> str:
     if options := schema.get("anyOf"):
         return "; or ".join(_values(one) for one in options if one.get("type") != "null")
     kind = schema.get("type")
+    if "properties" in schema or "$ref" in schema:
+        return "section"
     if kind == "array":
         items = schema.get("prefixItems", ())
         if not items:
@@ -140,5 +144,12 @@ def bare_quantities(scene: Scene) -> Iterator[str]:
     for name, value in dotted(scene.written):
         numbers = value if isinstance(value, list | tuple) else [value]
         bare = any(isinstance(one, int | float) and one for one in numbers)
-        if bare and (unit := scene_keys()[name].unit):
+        if bare and (unit := _key_of(name).unit):
             yield f"{name} = {value} taken in {unit}"
+
+
+def _key_of(name: str) -> Key:
+    """Return the key of a dotted name, of which one part may be a name of the user's."""
+    parts, keys = name.split("."), scene_keys()
+    names = [name, *(".".join(parts[:i] + parts[i + 1 :]) for i in range(len(parts)))]
+    return next(keys[one] for one in names if one in keys)

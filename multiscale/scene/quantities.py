@@ -84,6 +84,8 @@ def parse_quantity(value: Any, unit: str) -> float:
 
 def _with_unit(text: str, unit: str) -> float:
     """Convert a string with a unit, by pint unless its unit is a common one."""
+    if text.strip() == "0":  # is the same in all units
+        return 0.0
     target, common = _UNITS[unit], _COMMON.fullmatch(text)
     if common and common[2] in target.common and len(text) <= _LONGEST:
         return float(common[1]) * target.common[common[2]]

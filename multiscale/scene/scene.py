@@ -6,22 +6,16 @@ import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Any, get_origin
 
-from pydantic import BaseModel, Field, ValidationError, model_validator
+from pydantic import BaseModel, ValidationError
 
 from geometry.errors import InputError
-from multiscale.scene.coupling_sections import CouplingSection, LoadSection, ReferenceSection
+from multiscale.scene.contents import SceneSections
 from multiscale.scene.scene_file import changed, overridden, read_scene_file
-from multiscale.scene.sections import (
-    BlockSection,
-    MicroSection,
-    Number,
-    OutputSection,
-    PatchesSection,
-    Section,
-    SurfaceSection,
-)
+
+_OF_TYPES = ("str", "int", "constrained-int", "float", "constrained-float")
+"""Names of types that stand at the end of a key's place where it may have several."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,49 +29,11 @@ class Written:
     data: dict[str, Any] = field(default_factory=dict, compare=False)
 
 
-class Scene(Section):
-    """A complete scene. Lengths in mm, pressures in MPa.
+class Scene(SceneSections):
+    """A complete scene: its sections, and the file that it was read from."""
 
-    The section ``[load]`` is the attribute `loading`, because `Scene.load` reads a file.
-    """
-
-    accuracy: Annotated[Number, Field(gt=0, lt=0.5)] | None = None
-    """Allowed relative error of the force. Keys that are ``"auto"`` or, with an accuracy, not
-    stated (``surface.grid``, ``micro.model``, ``coupling.kind``, ``patches.grid`` and, under laws
-    on a mesh, ``block.cells``) get the values that are predicted to keep it at the least cost.
-    Without it, ``auto`` means 2 %."""
-    surface: SurfaceSection
-    """The rough surface."""
-    block: BlockSection
-    """The elastic block below it."""
-    patches: PatchesSection = PatchesSection()
-    """The partition of the interface."""
-    micro: MicroSection = MicroSection()
-    """How contacts are solved."""
-    coupling: CouplingSection = CouplingSection()
-    """How contacts and block are put together."""
-    reference: ReferenceSection = ReferenceSection()
-    """The meshes of ``coupling.kind = "reference"``."""
-    loading: Annotated[LoadSection, Field(alias="load")]
-    """The motion of the rigid plane, or the force on it."""
-    output: OutputSection = OutputSection()
-    """What is written beside the tables of results."""
     _source: Path | None = None
     _written: Written = Written()
-
-    @model_validator(mode="after")
-    def _continues_periodically(self) -> Self:
-        """Refuse a periodic contact where something ends or turns."""
-        kind, model, tilt = self.coupling.kind, self.micro.model, self.loading.tilt
-        if self.surface.periodic and (
-            kind != "analytic" or model != "half-space" or tilt != (0, 0)
-        ):
-            raise ValueError(
-                "surface.periodic = true: a body or a plane that turns does not continue "
-                "periodically (allowed: coupling.kind = 'analytic', micro.model = 'half-space', "
-                "a level plane)"
-            )
-        return self
 
     @classmethod
     def load(cls, path: str | Path, overrides: Sequence[str] = ()) -> Scene:
@@ -152,10 +108,17 @@ class Scene(Section):
     @property
     def surface_path(self) -> Path | None:
         """Path of the heights, relative paths taken from the scene's folder."""
-        if self.surface.file is None:
+        return self.path_of(self.surface.file)
+
+    def path_of(self, file: str | None) -> Path | None:
+        """Return the path of a file that the scene names; relative ones start in its folder.
+
+        Args:
+            file: The name, or None.
+        """
+        if file is None:
             return None
-        folder = self._source.parent if self._source else Path()
-        return folder / self.surface.file
+        return (self._source.parent if self._source else Path()) / file
 
 
 def _first_problem(error: ValidationError, model: type[BaseModel]) -> InputError:
@@ -173,7 +136,10 @@ def _first_problem(error: ValidationError, model: type[BaseModel]) -> InputError
     if problem["type"] == "extra_forbidden":
         return _unknown_key(path, model)
     # of a key with several types pydantic names the type, and has a problem for each
+    if path and path[-1] in _OF_TYPES:
+        path.pop()
     key = ".".join(part for part in path if "[" not in part and part != "bool") or None
+    key = key or problem.get("ctx", {}).get("key")
     if problem["type"] == "missing":
         return InputError("is required and missing", key=key)
     if problem["type"] == "model_type":
@@ -196,9 +162,14 @@ def _unknown_key(path: list[str], model: type[BaseModel]) -> InputError:
 
 def _known_keys(model: Any, sections: list[str]) -> list[str]:
     """Return the keys of the section that a path leads to."""
+    several = False
     for section in sections:
+        if several:  # the number or the name of one of several
+            several = False
+            continue
         fields = {field.alias or name: field for name, field in model.model_fields.items()}
         annotation = fields[section].annotation
+        several = get_origin(annotation) in (tuple, dict)
         options = getattr(annotation, "__args__", (annotation,))
         model = next(option for option in options if hasattr(option, "model_fields"))
     return [field.alias or name for name, field in model.model_fields.items()]

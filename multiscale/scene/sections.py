@@ -190,6 +190,9 @@ class BlockSection(Section):
 
     height: PositiveLength | None = None
     """Height of the block; the shorter side of the surface when not given."""
+    lengths: tuple[PositiveLength, PositiveLength] | None = None
+    """Sides of the contact face along x and y under a law of a sample
+    (``law.kind = "representative"``); otherwise they are those of the surface."""
     young_modulus: Annotated[Pressure, Field(gt=0)]
     """Young's modulus of the block."""
     poisson_ratio: Annotated[Number, Field(gt=-1, lt=0.5)]

@@ -10,7 +10,7 @@ from geometry import InputError
 from geometry.files.content import BYTES_PER_HEIGHT
 from multiscale.machine import ClusterNodes, MemoryRequest
 from multiscale.scene.scene import Scene
-from multiscale.setup.surface_and_block import block_cells, meshes_block
+from multiscale.setup.surface_and_block import block_cells, block_section, meshes_block
 
 BYTES_PER_CELL = 5000
 """Memory that mesh, stiffness and multigrid take per cell, roughly, over all ranks [B]."""
@@ -63,17 +63,17 @@ def memory_requests(scene: Scene) -> Iterator[MemoryRequest]:
     def request(key: str, value: Any, purpose: str = "", **sizes: Any) -> MemoryRequest:
         return MemoryRequest(key=key, value=value, purpose=purpose, **sizes)
 
-    grid, patches, kind = scene.surface.grid, scene.patches.grid, scene.coupling.kind
+    grid, patches, kind = scene.surface.grid, scene.patches.grid, scene.kind
     for key, heights in (("surface.grid", grid), ("surface.resample", scene.surface.resample)):
         if isinstance(heights, tuple):
             sent = math.prod(heights) * BYTES_PER_SENT_HEIGHT
             made = math.prod(heights) * BYTES_PER_HEIGHT - sent
             yield request(key, heights, per_rank=sent, root_only=made)
-    if meshes_block(scene):
+    if scene.block is not None and meshes_block(scene):
         nx, ny, nz = block_cells(scene)
         yield request("block.cells", (nx, ny, nz), shared=nx * ny * nz * BYTES_PER_CELL)
-        if scene.block.margin:
-            margin = scene.block.margin_cells
+        if block_section(scene).margin:
+            margin = block_section(scene).margin_cells
             cells = (nx + 2 * margin) * (ny + 2 * margin) * nz
             yield request("block.margin_cells", margin, shared=cells * BYTES_PER_CELL)
     if not isinstance(patches, tuple):

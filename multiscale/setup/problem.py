@@ -9,12 +9,22 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Asperities, BlockShape, PatchGrid, RigidPlane, Surface
+from geometry import (
+    Asperities,
+    BlockShape,
+    MaterialPair,
+    PatchGrid,
+    Regions,
+    RigidPlane,
+    Surface,
+)
 from micro import AsperityModel, Choice, HalfSpaceModel, MicroModel, ScaledModel
 from multiscale.laws.refinement import MOST_ROWS
 from multiscale.readable import duration
 from multiscale.scene.scene import Scene
+from multiscale.setup.mesh_bodies import FaceFacts, SceneBodies
 from multiscale.setup.reference_meshes import ReferenceMeshes
+from multiscale.setup.samples import RegionSamples
 
 Array = NDArray[np.float64]
 
@@ -105,15 +115,22 @@ class ProblemSetup:
 
     Attributes:
         scene: The scene with its auto values resolved, but for ``micro.model``.
-        surface: Its rough surface.
+        surface: Its rough surface, with the heights of both sides where both are rough.
         asperities: The surface's summits.
         micro: Micro model of the whole surface; None in a reference, which has none.
         patches: Partition of the interface.
         mean_heights: Mean height of each patch, shape (N,) [mm].
-        shape: Shape and mesh of the block.
+        block_shape: Shape and mesh of the block; None where the body is a mesh of its own.
+        materials: The materials on both sides of the interface.
         plane_at_largest_load: The rigid plane at the largest load. Where the force or the moment is
             prescribed, it is the plane in equilibrium on a half-space, estimated on few of its
             cells where load steps solve the half-space model itself and need no plane before.
+        counter_surface: What of the surface is the counter-body's; None where that is smooth.
+        face: What is known of the body and its contact face where the surface does not say it: of
+            a mesh, and under laws of samples; None otherwise.
+        counter_face: The same of a counter-body on a mesh.
+        samples: Under laws of samples those of every region; empty otherwise.
+        bodies: The bodies on meshes, on every rank; empty without any.
         choice: Why this micro model was chosen, where the scene says ``auto``.
         meshes: The meshes of a reference; None with other couplings.
         decision: Why the auto values became what they are, where measured errors decided.
@@ -126,12 +143,36 @@ class ProblemSetup:
     micro: MicroModel | None
     patches: PatchGrid
     mean_heights: Array
-    shape: BlockShape
+    block_shape: BlockShape | None
+    materials: MaterialPair
     plane_at_largest_load: RigidPlane
+    counter_surface: Surface | None = None
+    face: FaceFacts | None = None
+    counter_face: FaceFacts | None = None
+    samples: tuple[RegionSamples, ...] = ()
+    bodies: SceneBodies = field(default_factory=SceneBodies)
     choice: Choice | None = None
     meshes: ReferenceMeshes | None = None
     decision: Decision | None = None
     seconds: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def shape(self) -> BlockShape:
+        """Shape and mesh of the block.
+
+        Raises:
+            ValueError: When the body is a mesh of its own.
+        """
+        if self.block_shape is None:
+            raise ValueError("a body on a mesh of its own has no shape")
+        return self.block_shape
+
+    @property
+    def regions(self) -> Regions | None:
+        """The regions of a face under laws of samples; None with other laws."""
+        if not self.samples:
+            return None
+        return Regions(tuple(region.name for region in self.samples))
 
     @property
     def model(self) -> MicroModel:
@@ -145,20 +186,25 @@ class ProblemSetup:
         return self.micro
 
     @property
+    def both_give_way(self) -> bool:
+        """Whether the counter-body is an elastic half-space."""
+        return self.materials.second is not None and self.counter_face is None
+
+    @property
     def has_block(self) -> bool:
         """Whether the surface is on a block instead of a half-space."""
-        return self.scene.coupling.kind != "analytic"
+        return self.scene.kind != "analytic"
 
     @property
     def uses_laws(self) -> bool:
         """Whether the load steps use patch laws."""
-        return self.scene.coupling.kind in ("isolated", "consistent")
+        return self.scene.kind in ("isolated", "consistent", "representative")
 
     @property
     def finite_slopes(self) -> bool:
         """Whether the micro model takes finite slopes into account."""
         stated = self.scene.micro.finite_slopes
-        able = self.scene.coupling.kind != "isolated" and isinstance(self.micro, HalfSpaceModel)
+        able = self.scene.kind != "isolated" and isinstance(self.micro, HalfSpaceModel)
         return able if stated is None else stated and able
 
     @property
@@ -241,7 +287,7 @@ class ProblemSetup:
         """
         plane, loading = self.plane_at_largest_load, self.scene.loading
         ends = plane.means(self.patches)
-        isolated_force = self.scene.coupling.kind == "isolated" and loading.force is not None
+        isolated_force = self.scene.kind == "isolated" and loading.force is not None
         if self.scene.coupling.interface == "pointwise" or isolated_force:
             ends = ends + 0.5 * float(np.abs(np.multiply(self.patches.size, plane.tilt)).sum())
         if loading.tilt == "free":

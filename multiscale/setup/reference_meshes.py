@@ -18,7 +18,7 @@ from geometry.meshes.families import Shape, characteristic_size, reference_shape
 from multiscale.machine import ClusterNodes, MemoryRequest
 from multiscale.scene.scene import Scene
 from multiscale.setup.memory import check_memory
-from multiscale.setup.surface_and_block import located
+from multiscale.setup.surface_and_block import block_section, located
 
 Array = NDArray[np.float64]
 
@@ -105,7 +105,7 @@ def reference_meshes(
         InputError: When they cannot be made or would not fit into memory; names file and key.
     """
     _check_block(scene)
-    block, reference = scene.block, scene.reference
+    block, reference = block_section(scene), scene.reference
     hexahedral, fine = reference.hexahedral, reference.fine
     approach, tilt = plane_at_largest_load.approach, plane_at_largest_load.tilt
     prescribed = scene.loading.force is None and scene.loading.tilt != "free"
@@ -171,7 +171,7 @@ def _key(hexahedral: bool) -> str:
 
 def _check_block(scene: Scene) -> None:
     """Refuse keys of the block that do not go with a reference."""
-    block = scene.block
+    block = block_section(scene)
     if block.margin > 0.0:
         raise InputError(
             "does not go with coupling.kind = 'reference', whose rough surface is the whole top",

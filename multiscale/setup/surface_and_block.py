@@ -6,14 +6,24 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from geometry import BlockShape, InputError, Material, Surface, read_surface, synthesise
+from geometry import (
+    BlockShape,
+    InputError,
+    Material,
+    Surface,
+    facing,
+    read_surface,
+    synthesise,
+    turned_over,
+)
 from geometry.files.reading import surface_of
 from geometry.preparation import prepared
 from multiscale.scene.scene import Scene
+from multiscale.scene.sections import BlockSection, SurfaceSection
 
 LAW_BLOCK_CELLS, FIELD_CELLS = (40, 40, 25), (20, 20, 12)
 """Cells of a block that carries laws on its mesh, those of Waddad et al. 2016, or contacts, and of
@@ -25,20 +35,50 @@ PROVISIONAL_PATCHES = (4, 4)
 
 
 def make_surface(scene: Scene) -> Surface:
-    """Make or read the surface of a scene.
+    """Return the surface of a scene, with the heights of both sides where both are rough.
 
     Raises:
         InputError: When it cannot be made or read; names file and key.
     """
-    section = scene.surface
+    return make_surfaces(scene)[0]
+
+
+def make_surfaces(scene: Scene) -> tuple[Surface, Surface | None]:
+    """Return the surface of a scene, and what of it is the counter-body's, turned over.
+
+    Returns:
+        The heights of both sides, and those of the counter-body; None where it is smooth.
+
+    Raises:
+        InputError: When one cannot be made or read, or they do not fit; names file and key.
+    """
+    own = sample_surface(scene, scene.surface, "surface")
+    if scene.counter_surface is None:
+        return own, None
+    counter = turned_over(sample_surface(scene, scene.counter_surface, "counter_surface"))
+    with located(scene, "counter_surface"):
+        return facing(own, counter), counter
+
+
+def sample_surface(scene: Scene, section: SurfaceSection, key: str) -> Surface:
+    """Make or read the surface of one section of a scene.
+
+    Args:
+        scene: The scene.
+        section: The section.
+        key: Its dotted name, for errors.
+
+    Raises:
+        InputError: When it cannot be made or read; names file and key.
+    """
     extent: dict[str, Any] = {"grid": section.grid, "lengths": section.lengths}
     if section.spectrum is not None:
-        with located(scene, "surface.spectrum"):
+        with located(scene, f"{key}.spectrum"):
             surface = synthesise(section.spectrum.spectrum(), **extent)
-        with located(scene, "surface"):
+        with located(scene, key):
             surface = prepared(surface, section.preparation)
     elif section.heights is not None:
-        with located(scene, "surface.heights"):
+        with located(scene, f"{key}.heights"):
             return surface_of(
                 section.heights.values,
                 lengths=section.lengths or (0.0, 0.0),
@@ -49,8 +89,8 @@ def make_surface(scene: Scene) -> Surface:
     else:
         extent |= {"height_unit": section.height_unit, "channel": section.channel}
         extent |= {"periodic": section.periodic, **asdict(section.preparation)}
-        with located(scene, "surface.file"):
-            surface = read_surface(scene.surface_path or Path(), **extent)
+        with located(scene, f"{key}.file"):
+            surface = read_surface(scene.path_of(section.file) or Path(), **extent)
     if section.periodic and not surface.periodic:  # it continues so, whatever was removed of it
         return replace(surface, periodic=True)
     return surface
@@ -62,11 +102,12 @@ def make_shape(scene: Scene, surface: Surface) -> BlockShape:
     Raises:
         InputError: When they do not fit together or the coupling; names file and key.
     """
-    block = scene.block
+    block = block_section(scene)
+    lengths = block.lengths or surface.lengths
     with located(scene, "block"):
         return BlockShape(
-            interface=surface.lengths,
-            height=block.height_under(surface.lengths),
+            interface=lengths,
+            height=block.height_under(lengths),
             cells=block_cells(scene),
             element=block.element,
             grading=block.grading,
@@ -78,8 +119,19 @@ def make_shape(scene: Scene, surface: Surface) -> BlockShape:
 
 def block_material(scene: Scene) -> Material:
     """Return the elastic constants of a scene's block."""
-    block = scene.block
+    block = block_section(scene)
     return Material(young_modulus=block.young_modulus, poisson_ratio=block.poisson_ratio)
+
+
+def block_section(scene: Scene) -> BlockSection:
+    """Return the section on the block of a scene that has one.
+
+    Raises:
+        ValueError: When its body is a mesh.
+    """
+    if scene.block is None:
+        raise ValueError("a scene with a body of its own has no block")
+    return scene.block
 
 
 def block_cells(scene: Scene) -> tuple[int, int, int]:
@@ -88,17 +140,17 @@ def block_cells(scene: Scene) -> tuple[int, int, int]:
     Laws need a fine mesh under every patch, and contacts are to be seen in fields; the mean
     pressures of patches need less.
     """
-    cells = scene.block.cells
+    cells = block_section(scene).cells
     if cells is None or cells == "auto":
-        fine = scene.coupling.on_mesh or scene.coupling.kind == "concurrent"
+        fine = scene.on_mesh or scene.kind == "concurrent"
         return LAW_BLOCK_CELLS if fine else FIELD_CELLS
     return cells
 
 
 def meshes_block(scene: Scene) -> bool:
     """Tell whether the flat block is meshed: under laws, or for fields after the load."""
-    flat = scene.coupling.kind not in ("analytic", "reference")
-    return scene.coupling.on_mesh or (flat and bool(scene.output.fields))
+    flat = scene.kind not in ("analytic", "reference")
+    return scene.on_mesh or (flat and bool(scene.output.fields))
 
 
 def patch_grid(scene: Scene) -> tuple[int, int]:
@@ -107,10 +159,24 @@ def patch_grid(scene: Scene) -> tuple[int, int]:
     return PROVISIONAL_PATCHES if grid == "auto" else grid
 
 
+class Bulk(NamedTuple):
+    """What is compared with loads of a body.
+
+    Attributes:
+        area: Area of its contact face [mm²].
+        height: Its extent below the contact face [mm].
+        young_modulus: Young's modulus at the contact face [MPa].
+    """
+
+    area: float
+    height: float
+    young_modulus: float
+
+
 def check_patches(scene: Scene, surface: Surface) -> None:
     """Refuse more patches than heights of the surface or cells of the interface."""
     limits: dict[str, Sequence[int]] = {"heights of the surface": surface.grid}
-    if meshes_block(scene):
+    if scene.block is not None and meshes_block(scene):
         limits["cells of the interface (block.cells)"] = block_cells(scene)[:2]
     grid = patch_grid(scene)
     for what, limit in limits.items():
@@ -124,12 +190,17 @@ def check_patches(scene: Scene, surface: Surface) -> None:
             )
 
 
-def check_load(scene: Scene, surface: Surface) -> None:
-    """Refuse loads lost in the rounding of heights, or that press the block to nothing.
+def check_load(scene: Scene, surface: Surface, body: Bulk) -> None:
+    """Refuse loads lost in the rounding of heights, or that press the body to nothing.
 
     Numbers of load steps that there will not be are refused, too.
+
+    Args:
+        scene: The scene.
+        surface: Its surface.
+        body: Size and stiffness of its body.
     """
-    block, loading, fields = scene.block, scene.loading, scene.output.fields
+    loading, fields = scene.loading, scene.output.fields
     count = loading.load_history.count
     if isinstance(fields, list) and loading.force_change is None and max(fields) > count:
         raise InputError(
@@ -148,17 +219,17 @@ def check_load(scene: Scene, surface: Surface) -> None:
             allowed=f"at least {resolved:.3g} mm, for heights of this size",
             file=scene.file,
         )
-    if scene.coupling.kind == "analytic":
+    if scene.kind == "analytic":
         return
     if loading.force is not None:
         key, points = "load.force", loading.force
-        most, named, unit = block.young_modulus * surface.area, "E times area", "N"
+        most, named, unit = body.young_modulus * body.area, "E times area", "N"
     else:
         key, points = "load.approach", loading.approach or ()
-        most, named, unit = block.height_under(surface.lengths), "the block's height", "mm"
+        most, named, unit = body.height, "the body's height", "mm"
     if max(points) > most:
         raise InputError(
-            "presses the block to nothing",
+            "presses the body to nothing",
             key=key,
             value=list(points),
             allowed=f"at most {named}, {most:.6g} {unit}",

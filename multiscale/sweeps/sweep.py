@@ -92,7 +92,7 @@ def _run_groups(
         steps, notes, failure = _load_steps(first.scene)
         for case in group:
             if case.name not in done:
-                ratio = case.scene.block.young_modulus / first.scene.block.young_modulus
+                ratio = _modulus(case.scene) / _modulus(first.scene)
                 scaled = steps if ratio == 1.0 else [step.with_modulus(ratio) for step in steps]
                 rows = [[_plain(column.of(step)) for column in COLUMNS] for step in scaled]
                 yield case, CaseResult(case=case.name, rows=rows, notes=notes, failure=failure)
@@ -115,6 +115,11 @@ def _identity(scene: Scene) -> str:
     """Return a short text that differs between scenes whose load steps may differ."""
     drawn = {"output": {"figures", "report", "fields"}}
     return hashlib.sha256(scene.model_dump_json(by_alias=True, exclude=drawn).encode()).hexdigest()
+
+
+def _modulus(scene: Scene) -> float:
+    """Return Young's modulus of the block; any number where the body is a mesh."""
+    return scene.block.young_modulus if scene.block else 1.0
 
 
 def _plain(value: Any) -> Any:

@@ -20,9 +20,9 @@ FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 FLOORS = {
     "geometry": [
         "blocked_spline collective errors legendre_modes slope_search",
-        "checks interpolant materials missing",
+        "checks interpolant materials missing regions",
         "face_frame filters spectrum surface",
-        "patches statistics summits synthesis",
+        "facing patches statistics summits synthesis",
         "plausibility preparation rigid_plane",
         "files",
         "asperities meshes plane_equilibrium",
@@ -49,7 +49,7 @@ FLOORS = {
         "readable",
         "figures installation machine storage",
         "doctor laws loading",
-        "compiled_forms results scene",
+        "compiled_forms exports results scene",
         "setup",
         "couplings",
         "contact_recorder measured_errors",

@@ -1,7 +1,8 @@
-"""Make consistent laws on all ranks; print how many contact problems each solved, and the laws."""
+"""Make laws on all ranks; print how many contact problems of consistent ones each solved."""
 
 import hashlib
 import json
+from dataclasses import replace
 
 from mpi4py import MPI
 
@@ -9,6 +10,7 @@ from geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
 from micro import micro_model
 from multiscale.laws.consistent import consistent_laws
 from multiscale.laws.law_table import law_bytes
+from multiscale.laws.representative import representative_laws
 
 COMM = MPI.COMM_WORLD
 
@@ -28,7 +30,7 @@ class Counted:
 
 
 def main():
-    """Tabulate the laws of sixteen patches of a small surface."""
+    """Tabulate the laws of sixteen patches of a small surface, and of two regions of a face."""
     spectrum = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=3)
     surface = synthesise(spectrum, grid=(64, 64), lengths=(1.0, 1.0))
     patches = PatchGrid(grid=(4, 4), lengths=surface.lengths)
@@ -41,7 +43,14 @@ def main():
         comm=COMM,
     )
     laws = hashlib.sha256(law_bytes(table)).hexdigest()
-    found = COMM.gather((model.solved, laws))
+    samples = [
+        synthesise(replace(spectrum, waves=(2, 5), seed=k), grid=(16, 16), lengths=(1.0, 1.0))
+        for k in (1, 2, 3)
+    ]
+    regions = {"inner": samples[:1], "outer": samples}
+    table = representative_laws(regions, 4000.0, largest_pressure=1500.0, comm=COMM)
+    representative = hashlib.sha256(law_bytes(table)).hexdigest()
+    found = COMM.gather((model.solved, laws, representative))
     if COMM.rank == 0:
         print(json.dumps(found))
 

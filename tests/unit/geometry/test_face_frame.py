@@ -55,9 +55,10 @@ def test_turned_face_keeps_lengths_and_comes_back():
     np.testing.assert_allclose(np.cross(frame.axes[0], frame.axes[1]), frame.normal, atol=1e-15)
 
 
-def test_plane_touches_the_highest_point():
+def test_plane_goes_through_the_highest_point():
     frame = FaceFrame.through([[1, 1, 0.0], [2, 1, 0.0], [1, 2, 0.0], [2, 2, 0.2]], [0, 0, 1])
     assert frame.origin.tolist() == [1.0, 1.0, 0.2]
+    assert frame.moved(0.5, 0.25).origin.tolist() == [1.5, 1.25, 0.2]
 
 
 @pytest.mark.parametrize("normal", [[0, 0, 0], [np.nan, 0, 1], [1, 0]])

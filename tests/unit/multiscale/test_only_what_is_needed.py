@@ -106,7 +106,7 @@ def test_a_contact_is_worked_out_for_the_last_load_step_alone(monkeypatch):
 def test_a_plan_solves_nothing_of_the_scene(monkeypatch, kind):
     for solution in ("solve", "solve_force", "equilibrium", "respond", "press"):
         monkeypatch.setattr(HalfSpaceModel, solution, never)
-    monkeypatch.setattr("multiscale.couplings.body.embedding", never)
+    monkeypatch.setattr("multiscale.couplings.patch_compliance.embedding", never)
     monkeypatch.setattr("multiscale.couplings.body.Body.face", never)
     monkeypatch.setattr("multiscale.couplings.contact.on_body", never)
     monkeypatch.setattr("multiscale.couplings.assembly.make_table", never)

@@ -8,8 +8,9 @@ import pytest
 from geometry.errors import InputError
 from micro import BodyModes, FiniteSlopes, FreeSides
 from multiscale import Scene, make_setup
-from multiscale.couplings.body import patch_displacements, scene_body
+from multiscale.couplings.body import scene_body
 from multiscale.couplings.contact import contact_model
+from multiscale.couplings.patch_compliance import patch_displacements
 from multiscale.planning.costs import solution_time
 
 

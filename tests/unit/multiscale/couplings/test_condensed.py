@@ -9,7 +9,7 @@ from petsc4py import PETSc
 from geometry.errors import NotConverged
 from multiscale import Run, Scene, run
 from multiscale.couplings.assembly import newton_choice
-from multiscale.couplings.body import patch_compliance
+from multiscale.couplings.patch_compliance import patch_compliance
 from multiscale.planning.plan import statements
 from multiscale.planning.problem_setup import make_setup
 

@@ -55,7 +55,7 @@ class EasyBlock:
 
 def embedded(*laws):
     table = LawTable(patches=PATCHES, laws=laws or (law(), law()), made_by={})
-    return EmbeddedCoupling(EasyBlock(), table, interface=None)
+    return EmbeddedCoupling(EasyBlock(), table, face=None)
 
 
 def test_steps_read_the_laws_at_their_closures():
@@ -90,4 +90,4 @@ def test_remedy_beyond_a_consistent_law_fits_what_is_wrong(falls, remedy):
     bent = law(0.5, **falling)
     table = LawTable(patches=PATCHES, laws=(law(), bent), made_by={"coupling": "consistent"})
     with pytest.raises(BeyondLaws, match=f"LAW_RANGE: .*: take coupling.{remedy}"):
-        EmbeddedCoupling(EasyBlock(), table, interface=None).press(Control(approach=0.8))
+        EmbeddedCoupling(EasyBlock(), table, face=None).press(Control(approach=0.8))

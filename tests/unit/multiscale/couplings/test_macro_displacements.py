@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from multiscale import Scene, make_setup, run
-from multiscale.couplings.body import patch_displacements
+from multiscale.couplings.patch_compliance import patch_displacements
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 SMALL = [

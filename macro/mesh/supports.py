@@ -1,0 +1,165 @@
+"""Motions of a rigid body that supports leave free."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.errors import InputError
+from macro.mesh.facet_nodes import facet_nodes
+from macro.mesh.tagged import TaggedMesh
+
+Array = NDArray[np.float64]
+
+_FREE = 1e-12
+"""Square of a support's movement, relative to the largest in a motion of the same size, that is
+rounding: supports over a part in 10⁶ of the body's length still hold rotations."""
+
+_SHARP = 1e-6
+"""Component of a motion's direction that is rounding."""
+
+
+class Held(Protocol):
+    """A surface with prescribed displacements, such as a `Support`."""
+
+    @property
+    def tag(self) -> int:
+        """Tag of its facets."""
+
+    @property
+    def displacement(self) -> tuple[float | None, float | None, float | None]:
+        """Displacement along x, y and z [mm]; None where it is free."""
+
+
+def check_supports(
+    tagged: TaggedMesh,
+    supports: Sequence[Held],
+    contact: int | None = None,
+    *,
+    key: str | None = None,
+) -> None:
+    """Refuse supports that do not hold the body, or that are on the contact face.
+
+    Args:
+        tagged: The mesh.
+        supports: Surfaces with prescribed displacements.
+        contact: Tag of the contact face.
+        key: Key of the scene that the supports come from, for errors.
+
+    Raises:
+        InputError: On all ranks, when a support has no facets, when one is the contact face, when
+            two prescribe different displacements of one surface, and when a rigid motion is left;
+            the error says which.
+
+    Note:
+        Collective.
+    """
+    names = {tag: name for name, tag in tagged.facet_names.items()}
+    held: dict[tuple[int, int], float] = {}
+    for support in supports:
+        name = names.get(support.tag, str(support.tag))
+        if support.tag == contact:
+            raise InputError(
+                f"the surface {name!r} is the contact face and cannot be held too", key=key
+            )
+        if not any(tagged.comm.allgather(len(tagged.facet_tags.find(support.tag)))):
+            raise InputError(f"the surface {name!r} has no facets that belong to cells", key=key)
+        for axis, value in enumerate(support.displacement):
+            if value is not None and held.setdefault((support.tag, axis), value) != value:
+                raise InputError(
+                    f"the surface {name!r} is held twice along {'xyz'[axis]}, with displacements "
+                    f"{held[support.tag, axis]:g} and {value:g} mm",
+                    key=key,
+                )
+    left = free_motions(tagged, supports)
+    if left:
+        raise InputError(
+            f"the supports leave the body free to move: {'; '.join(left)}",
+            key=key,
+            allowed="supports that hold all rigid motions, without help of the contact",
+        )
+
+
+def free_motions(tagged: TaggedMesh, supports: Sequence[Held]) -> list[str]:
+    """Return in words which rigid motions the supports leave free.
+
+    A motion t + ω × r is free when it moves no node of a support along a direction that is held.
+
+    Args:
+        tagged: The mesh.
+        supports: Surfaces with prescribed displacements.
+
+    Note:
+        Collective.
+    """
+    comm = tagged.comm
+    mesh = tagged.mesh
+    lower, upper = tagged.bounding_box()
+    centre, size = 0.5 * (lower + upper), float(np.linalg.norm(upper - lower))
+    square = np.zeros((6, 6))
+    for support in supports:
+        nodes = np.unique(facet_nodes(mesh, tagged.facet_tags.find(support.tag)).corners)
+        arms = (mesh.geometry.x[nodes] - centre) / size
+        for axis, value in enumerate(support.displacement):
+            if value is not None:
+                along = np.eye(3)[axis]
+                rows = np.concatenate([np.tile(along, (len(arms), 1)), np.cross(arms, along)], 1)
+                square += rows.T @ rows
+    square = comm.allreduce(square)
+    values, vectors = np.linalg.eigh(square)
+    free = vectors[:, values <= _FREE * max(float(values[-1]), 1.0)].T
+    return _in_words(free, centre, size)
+
+
+def _in_words(free: Array, centre: Array, size: float) -> list[str]:
+    """Describe a space of motions (m, 6): translations, then rotations in units of 1/size."""
+    if not len(free):
+        return []
+    mixed, turning, _ = np.linalg.svd(free[:, 3:])
+    turns = int((turning > _SHARP).sum())
+    apart = mixed.T @ free
+    slides = _reduced(apart[turns:, :3])
+    words = [f"translation along {_direction(slide)}" for slide in slides]
+    for motion in _reduced(np.roll(apart[:turns], 3, axis=1)):
+        turn, slide = motion[:3], motion[3:]
+        if len(slides):
+            words.append(f"rotation about {_direction(turn)}")
+            continue
+        through = centre + size * np.cross(turn, slide) / (turn @ turn)
+        shift = "" if abs(turn @ slide) < _SHARP else ", with a shift along it"
+        line = f"the line along {_direction(turn)} through {_place(through)}"
+        words.append(f"rotation about {line}{shift}")
+    return words
+
+
+def _reduced(rows: Array) -> Array:
+    """Return the same space spanned by rows whose first three columns are in echelon form."""
+    rows = np.array(rows)
+    done = 0
+    for column in range(3):
+        below = np.abs(rows[done:, column])
+        if not len(below) or below.max() < _SHARP:
+            continue
+        pivot = done + int(np.argmax(below))
+        rows[[done, pivot]] = rows[[pivot, done]]
+        rows[done] /= rows[done, column]
+        others = np.arange(len(rows)) != done
+        rows[others] -= np.outer(rows[others, column], rows[done])
+        done += 1
+    return rows
+
+
+def _direction(vector: Array) -> str:
+    """Return the name of an axis, or the components of a direction."""
+    unit = vector / np.linalg.norm(vector)
+    axis = int(np.argmax(np.abs(unit)))
+    if abs(unit[axis]) > 1.0 - _SHARP**2:
+        return "xyz"[axis]
+    return "(" + ", ".join(f"{part + 0.0:.3g}" for part in np.round(unit, 6)) + ")"
+
+
+def _place(point: Array) -> str:
+    return "(" + ", ".join(f"{value + 0.0:.4g}" for value in np.round(point, 9)) + ") mm"

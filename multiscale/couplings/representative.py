@@ -1,0 +1,177 @@
+"""Laws of periodic samples on the contact face of a scene's body.
+
+Theory: demos/theory.md, sections 10 and 11.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry import Surface
+from micro import FiniteSlopes, HalfSpaceModel
+from multiscale.couplings.law_couplings import EmbeddedCoupling
+from multiscale.couplings.patch_compliance import embedding
+from multiscale.laws.law_table import LawTable
+from multiscale.laws.representative import representative_laws
+from multiscale.readable import Observer
+from multiscale.setup.problem import ProblemSetup
+from multiscale.setup.samples import RegionSamples
+
+Array = NDArray[np.float64]
+
+_CONCENTRATION = 10.0
+"""Largest local pressure that laws are made for, over the mean one on the face."""
+_CROWNED = 2.0
+"""The same over the largest pressure of smooth crowned bodies (Hertz), which roughness lowers."""
+_RESERVE = 0.15
+"""Closure that laws are made for beyond the largest approach on the face, relative to it."""
+
+
+def face_laws(setup: ProblemSetup, comm: Any, observe: Observer | None = None) -> LawTable:
+    """Tabulate the laws of the samples of a scene, one for each region of its face.
+
+    Args:
+        setup: The problem set up from the scene, with laws of samples.
+        comm: MPI communicator; None for this process alone.
+        observe: Called as rows are made.
+
+    Raises:
+        NotConverged: When the micro model does not converge.
+
+    Note:
+        Collective.
+    """
+    pressure, closure = largest_loads(setup, comm)
+    models = {
+        id(one): _model(setup, region, one) for region in setup.samples for one in region.surfaces
+    }
+    return representative_laws(
+        {region.name: region.surfaces for region in setup.samples},
+        setup.materials.contact_modulus,
+        largest_pressure=pressure,
+        largest_closure=closure,
+        tolerance=setup.table_tolerance,
+        most_rows=setup.table_rows,
+        make_model=lambda sample: models[id(sample)],
+        comm=comm,
+        observe=observe,
+    )
+
+
+def _model(setup: ProblemSetup, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
+    """Return the periodic model of a sample, with the slopes of its body where they count."""
+    pair = region.materials
+    model = HalfSpaceModel(sample, contact_modulus=pair.contact_modulus, periodic=True)
+    if setup.scene.micro.finite_slopes is not True:
+        return model
+    slopes = FiniteSlopes(sample, pair.first, periodic=True)
+    return HalfSpaceModel(
+        sample, contact_modulus=pair.contact_modulus, periodic=True, slopes=slopes
+    )
+
+
+def largest_loads(setup: ProblemSetup, comm: Any) -> tuple[float, float | None]:
+    """Return the largest local pressure that laws are made for [MPa], and closure [mm].
+
+    The closure is None where only a force, or other loads of the body, would tell it.
+
+    Args:
+        setup: The problem set up from the scene, with laws of samples.
+        comm: MPI communicator; None for this process alone.
+
+    Note:
+        Collective.
+    """
+    assert setup.face is not None
+    stated, face = setup.scene.law.largest_pressure, setup.face
+    history, body = setup.scene.loading.load_history, setup.bodies.first
+    if history.quantity == "force":
+        force = history.largest
+        mean = force / face.area
+        return stated or max(_CONCENTRATION * mean, _hertz(setup, force=force)), None
+    tilt = history.tilt or (0.0, 0.0)
+    approach = history.largest + 0.5 * float(np.abs(np.multiply(face.lengths, tilt)).sum())
+    mean = approach / mean_compliance(setup, comm)
+    pressure = stated or max(_CONCENTRATION * mean, _hertz(setup, approach=approach))
+    preloaded = body is not None and body.body.preload is not None
+    return pressure, None if preloaded else (1.0 + _RESERVE) * approach
+
+
+def mean_compliance(setup: ProblemSetup, comm: Any) -> float:
+    """Return the mean displacement of a face by a uniform unit pressure [mm/MPa].
+
+    Args:
+        setup: The problem set up from the scene, with laws of samples.
+        comm: MPI communicator; None for this process alone.
+
+    Note:
+        Collective.
+    """
+    from macro import FacePair, displacements_under
+
+    face = embedding(setup, comm)
+    total = 0.0
+    for one in (face.first, face.second) if isinstance(face, FacePair) else (face,):
+        found = displacements_under(one, np.ones((1, one.patches.count)))[0]
+        total += float(found @ one.areas / one.areas.sum())
+    return total
+
+
+def _hertz(setup: ProblemSetup, *, force: float = 0.0, approach: float = 0.0) -> float:
+    """Return a bound of the pressure between smooth crowned bodies; 0 without a crown [MPa].
+
+    Source:
+        Johnson, Contact Mechanics (1985), eq. 4.24, 4.25 and 4.45.
+    """
+    radii = [one for one in setup.scene.law.crown or () if one != "inf"]
+    if not radii:
+        return 0.0
+    assert setup.face is not None
+    modulus, radius = setup.materials.contact_modulus, math.sqrt(math.prod(radii))
+    if len(radii) == 1:
+        radius, length = radii[0], min(setup.face.lengths)
+        line = math.sqrt(force / length * modulus / (math.pi * radius))
+        return _CROWNED * max(line, modulus * math.sqrt(0.5 * approach / radius))
+    point = (6.0 * force * modulus**2 / (math.pi**3 * radius**2)) ** (1.0 / 3.0)
+    return _CROWNED * max(point, 2.0 / math.pi * modulus * math.sqrt(approach / radius))
+
+
+def face_coupling(setup: ProblemSetup, table: LawTable, comm: Any) -> EmbeddedCoupling:
+    """Return the body with laws of samples at the points of its contact face.
+
+    Args:
+        setup: The problem set up from the scene, with laws of samples.
+        table: The laws.
+        comm: MPI communicator; None for this process alone.
+
+    Note:
+        Collective.
+    """
+    from macro import LawContactProblem
+
+    face = embedding(setup, comm)
+    problem = LawContactProblem(face, table.laws, mode="pointwise", crown=crown(setup))
+    return EmbeddedCoupling(problem, table, face)
+
+
+def crown(setup: ProblemSetup) -> Callable[[Array, Array], Array] | None:
+    """Return the depth of a crowned face at points of its plane [mm]; None where it has none.
+
+    Args:
+        setup: The problem set up from the scene, with laws of samples.
+    """
+    radii = setup.scene.law.crown
+    if radii is None or setup.face is None:
+        return None
+    middle = 0.5 * np.asarray(setup.face.lengths)
+    curvature = [0.0 if one == "inf" else 1.0 / float(one) for one in radii]
+
+    def depth(x: Array, y: Array) -> Array:
+        return 0.5 * (curvature[0] * (x - middle[0]) ** 2 + curvature[1] * (y - middle[1]) ** 2)
+
+    return depth

@@ -1,0 +1,107 @@
+"""Patch laws as surface interactions of Abaqus and CalculiX: tables of pressure over overclosure.
+
+Both programs take rows of pressure and overclosure, the first without pressure, and interpolate
+linearly. Beyond the last row Abaqus continues the last line. CalculiX (2.20) keeps the last
+pressure, so that a last row continues the tangent there; it stores 200 rows at most.
+
+A table of gap conductance belongs to the same surface interaction, under a keyword of its own: see
+`_interaction`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from multiscale.exports.sampling import LEAST_PRESSURE, LawSample, sample_patch
+from multiscale.laws.law_table import LawTable
+from multiscale.laws.patch_law import PatchLaw
+
+_CALCULIX_ROWS = 200
+
+_HEAD = f"""\
+Contact laws of the patches of a rough surface, written by patchlaw.
+Units: mm, N, MPa. One surface interaction per patch, pressure [MPa] over overclosure [mm].
+Overclosure 0: a rigid plane at the height of the highest point of the surface. Flat faces of
+the mesh that just touch stand for this state; the mean plane of a patch lies below, as stated.
+The tables lie on the laws at their rows. Straight lines between them are within the stated error
+of the pressure, or of {LEAST_PRESSURE:g} of the largest pressure of the law where that is more."""
+_ABAQUS = "Beyond the last row Abaqus continues the last line: the laws are not known there."
+_CALCULIX = """\
+The last row of each table continues the tangent beyond the end of the law, because CalculiX keeps
+the last pressure: overclosures beyond the stated end are outside the law.
+Use *CONTACT PAIR, TYPE=NODE TO SURFACE, linear elements, and the rough face as the first surface.
+With the other types CalculiX 2.20 finds no pressure in such a table, and says nothing."""
+_OPEN = "It stays open up to {:.9g} mm: no surface interaction, leave it out of contact."
+
+
+def abaqus_text(table: LawTable, tolerance: float) -> str:
+    """Return the surface interactions of all patches for Abaqus.
+
+    Args:
+        table: The laws.
+        tolerance: Largest error of straight lines between rows, as in `LawSample`.
+
+    Raises:
+        InputError: When the pressure of a patch is a function of closure nowhere.
+    """
+    return _text(table, tolerance, _ABAQUS, most=None)
+
+
+def calculix_text(table: LawTable, tolerance: float) -> str:
+    """Return the surface interactions of all patches for CalculiX.
+
+    Args:
+        table: The laws.
+        tolerance: Error of straight lines between rows; larger where 199 rows do not suffice.
+
+    Raises:
+        InputError: When the pressure of a patch is a function of closure nowhere.
+    """
+    return _text(table, tolerance, _CALCULIX, most=_CALCULIX_ROWS - 1)
+
+
+def _text(table: LawTable, tolerance: float, remarks: str, *, most: int | None) -> str:
+    made_by = ", ".join(f"{name} {value}" for name, value in table.made_by.items())
+    lines = _comments(f"{_HEAD}\n{remarks}\nMade by: {made_by}")
+    for index, law in enumerate(table.laws):
+        lines += _comments("", *_facts(table, index))
+        sample = sample_patch(table, index, tolerance=tolerance, most=most)
+        if not len(sample):
+            lines += _comments(_OPEN.format(law.first_touch))
+            continue
+        name = "PATCH_{}_{}".format(*table.patches.unravel(index))
+        lines += _interaction(name, law, sample, extended=most is not None)
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _facts(table: LawTable, index: int) -> Iterator[str]:
+    """Yield what is known of a patch."""
+    (x0, x1), (y0, y1) = table.patches.bounds(index)
+    law = table[index]
+    ix, iy = table.patches.unravel(index)
+    yield f"Patch ({ix}, {iy}): {x0:.9g} < x < {x1:.9g}, {y0:.9g} < y < {y1:.9g} [mm]"
+    yield f"mean plane {law.initial_separation:.9g} mm below the highest point of the surface"
+
+
+def _interaction(name: str, law: PatchLaw, sample: LawSample, *, extended: bool) -> Iterator[str]:
+    """Yield the lines of a surface interaction; further behaviour of the interface goes last."""
+    start, end = float(sample.closure[0]), float(sample.closure[-1])
+    yield from _comments(f"first touch at {start:.9g} mm, end of the law at {end:.9g} mm")
+    yield from _comments(f"largest error of straight lines between the rows: {sample.error:.1e}")
+    if not law.is_function:
+        yield from _comments("The law ends where pressure stops being a function of closure.")
+    if sample.repair:
+        yield from _comments(f"falling pressures evened out by {sample.repair:.1e} of the largest")
+    yield f"*SURFACE INTERACTION, NAME={name}"
+    yield "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR"
+    rows = list(zip(sample.pressure.tolist(), sample.closure.tolist(), strict=True))
+    if extended:
+        further = 2.0 * end - start
+        slope = float(law.stiffness(end))
+        rows.append((rows[-1][0] + max(slope, 0.0) * (further - end), further))
+    yield from (f"{pressure:.12e}, {closure:.12e}" for pressure, closure in rows)
+
+
+def _comments(*texts: str) -> list[str]:
+    """Return lines of comment."""
+    return [f"** {line}".rstrip() for text in texts for line in text.split("\n")]

@@ -1,0 +1,163 @@
+"""Rows of a patch law between which straight lines are close enough to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry import InputError
+from multiscale.laws.interpolation import LawPoint
+from multiscale.laws.law_table import LawTable, repaired_law
+from multiscale.laws.patch_law import PatchLaw
+
+Array = NDArray[np.float64]
+
+LEAST_PRESSURE = 0.01
+"""Pressures below this part of the law's largest count as that much in relative errors."""
+
+NO_FUNCTION = "the pressure of patch ({}, {}) is no function of closure from first touch on"
+REMEDY = "csv, or other laws: coupling.kind = consistent, larger patches"
+
+_CANDIDATES = 128  # per interval between two rows of the law
+_FIRST_CANDIDATES = 1024  # in the first, where the pressure grows as the power 3/2
+_CHECKS = 3  # between two candidates, where the error is measured
+_SHARE = 0.98  # of the tolerance, for what errors exceed those at the candidates by
+_RELAXATION = 1.1  # of the tolerance at least, until the rows are few enough
+_LEAST_RISE = 1e-9  # of a pressure from row to row, relative to the largest
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LawSample:
+    """Rows of a law in the range where its pressure is a function of closure.
+
+    Attributes:
+        approach: Local approaches of the rows, ascending, shape (m,) [mm].
+        closure: Closures, strictly ascending; the first is that of first touch, shape (m,) [mm].
+        pressure: Pressures, strictly ascending from zero, shape (m,) [MPa].
+        error: Largest difference between straight lines through the rows and the law, relative to
+            the pressure, or to `LEAST_PRESSURE` of the largest where that is more.
+        repair: Largest change that made falling pressures rise, relative to the largest pressure.
+    """
+
+    approach: Array
+    closure: Array
+    pressure: Array
+    error: float
+    repair: float
+
+    def __len__(self) -> int:
+        return len(self.closure)
+
+
+def sample_patch(
+    table: LawTable, index: int, *, tolerance: float, most: int | None = None
+) -> LawSample:
+    """Choose rows on the law of a patch, see `sample_law`.
+
+    Args:
+        table: The laws.
+        index: Flat index of the patch.
+        tolerance: Largest error, as in `LawSample`.
+        most: Rows at most; the tolerance is raised until they suffice.
+
+    Raises:
+        InputError: When the pressure is a function of closure nowhere; names the patch.
+    """
+    try:
+        return sample_law(table[index], tolerance=tolerance, most=most)
+    except InputError:
+        problem = NO_FUNCTION.format(*table.patches.unravel(index))
+        raise InputError(problem, allowed=REMEDY) from None
+
+
+def sample_law(law: PatchLaw, *, tolerance: float, most: int | None = None) -> LawSample:
+    """Choose rows on a law, as far apart as a tolerance lets them be.
+
+    A row follows the one before it at the largest distance at which the chord is within the
+    tolerance. Contact programs take tables that rise; where a consistent law falls, because
+    neighbours take load over, the nearest rising one is sampled, and the error counts the change.
+
+    Args:
+        law: The law. A patch that stays open has no rows.
+        tolerance: Largest error, as in `LawSample`.
+        most: Rows at most; the tolerance is raised until they suffice.
+
+    Raises:
+        InputError: When the pressure is a function of closure nowhere.
+    """
+    if not law.rows.pressure.any():
+        nothing = np.zeros(0)
+        return LawSample(approach=nothing, closure=nothing, pressure=nothing, error=0.0, repair=0.0)
+    rising = repaired_law(law)
+    if law.is_flat or rising.is_flat:
+        raise InputError("the pressure is no function of closure from first touch on")
+    approach, closure, pressure = _candidates(rising)
+    scale = np.maximum(pressure, LEAST_PRESSURE * pressure[-1])
+    scale *= _SHARE
+    chosen = _chords(closure, pressure, tolerance * scale)
+    while most is not None and len(chosen) > most:
+        tolerance *= max(_RELAXATION, (len(chosen) / most) ** 2)  # rows go as its root
+        chosen = _chords(closure, pressure, tolerance * scale)
+    rows = approach[chosen], closure[chosen], _strictly_rising(pressure[chosen])
+    return LawSample(
+        approach=rows[0],
+        closure=rows[1],
+        pressure=rows[2],
+        error=_error(law, closure, *rows[1:]),
+        repair=max(rising.repaired, law.repaired),
+    )
+
+
+def _candidates(law: PatchLaw) -> tuple[Array, Array, Array]:
+    """Return approaches, closures and pressures on the law, closures strictly ascending."""
+    knots = law.rows.approach[: law.rising_rows]
+    first = np.linspace(0.0, 1.0, _FIRST_CANDIDATES, endpoint=False) ** 2
+    steps = np.linspace(0.0, 1.0, _CANDIDATES, endpoint=False)
+    within = knots[1:-1, None] + np.diff(knots[1:])[:, None] * steps
+    begun = knots[0] + (knots[1] - knots[0]) * first
+    approach = np.concatenate((begun, within.ravel(), knots[-1:]))
+    point: LawPoint = law.along(approach)
+    ascends = np.append(True, point.closure[1:] > np.maximum.accumulate(point.closure)[:-1])
+    return approach[ascends], point.closure[ascends], point.pressure[ascends]
+
+
+def _chords(x: Array, y: Array, allowed: Array) -> NDArray[np.intp]:
+    """Return the indices of points whose chords pass all points between within what is allowed."""
+
+    def holds(start: int, end: int) -> bool:
+        between = slice(start + 1, end)
+        slope = (y[end] - y[start]) / (x[end] - x[start])
+        chord = y[start] + slope * (x[between] - x[start])
+        return bool(np.all(np.abs(chord - y[between]) <= allowed[between]))
+
+    chosen, last = [0], len(x) - 1
+    while (start := chosen[-1]) < last:
+        good, step = start + 1, 2
+        while start + step <= last and holds(start, start + step):
+            good, step = start + step, 2 * step
+        bad = min(start + step, last + 1)
+        while bad - good > 1:
+            middle = (good + bad) // 2
+            good, bad = (middle, bad) if holds(start, middle) else (good, middle)
+        chosen.append(good)
+    return np.array(chosen)
+
+
+def _strictly_rising(pressure: Array) -> Array:
+    """Return pressures that rise from row to row; the same ones where they do."""
+    least = _LEAST_RISE * pressure[-1]
+    if np.all(np.diff(pressure) >= least):
+        return pressure
+    ramp = least * np.arange(len(pressure))
+    return np.asarray(np.maximum.accumulate(pressure - ramp) + ramp)
+
+
+def _error(law: PatchLaw, candidates: Array, closure: Array, pressure: Array) -> float:
+    """Return the largest error of straight lines through rows, between the candidates too."""
+    steps = np.linspace(0.0, 1.0, _CHECKS + 1, endpoint=False)
+    checks = (candidates[:-1, None] + np.diff(candidates)[:, None] * steps).ravel()
+    exact = law.pressure(checks)
+    scale = np.maximum(exact, LEAST_PRESSURE * pressure[-1])
+    return float(np.max(np.abs(np.interp(checks, closure, pressure) - exact) / scale))

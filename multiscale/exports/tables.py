@@ -1,0 +1,63 @@
+"""Patch laws as a table of numbers, for spreadsheets and scripts."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from io import StringIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry import InputError
+from multiscale.exports.sampling import sample_law
+from multiscale.laws.law_table import LawTable
+from multiscale.laws.patch_law import PatchLaw
+
+CSV_COLUMNS = (
+    "ix", "iy", "approach_mm", "closure_mm", "pressure_MPa", "stiffness_MPa_per_mm",
+    "contact_area_fraction", "separation_mm", "contacts",
+)  # fmt: skip
+"""Columns of ``laws.csv``."""
+
+
+def csv_text(table: LawTable, tolerance: float) -> str:
+    """Return the text of ``laws.csv``: points on the laws, patch by patch, along the approach.
+
+    Where the pressure is a function of closure, rows are chosen as for contact programs; beyond,
+    they are the rows of the law. A patch that stays open has none.
+
+    Args:
+        table: The laws.
+        tolerance: Largest error of straight lines between rows, as in `LawSample`.
+    """
+    text = StringIO()
+    writer = csv.writer(text)
+    writer.writerow(CSV_COLUMNS)
+    for index, law in enumerate(table.laws):
+        writer.writerows((*table.patches.unravel(index), *row) for row in _rows_of(law, tolerance))
+    return text.getvalue()
+
+
+def _rows_of(law: PatchLaw, tolerance: float) -> Iterator[tuple[float, ...]]:
+    """Yield the rows of one law, from the approach on."""
+    approach = np.union1d(_chosen(law, tolerance), law.rows.approach[law.rising_rows :])
+    point = law.along(approach)
+    columns = (
+        approach,
+        point.closure,
+        point.pressure,
+        point.stiffness,
+        point.contact_area_fraction,
+        point.separation,
+        point.contacts,
+    )
+    yield from zip(*(column.tolist() for column in columns), strict=True)
+
+
+def _chosen(law: PatchLaw, tolerance: float) -> NDArray[np.float64]:
+    """Return the approaches of the rows where the pressure is a function of closure [mm]."""
+    try:
+        return sample_law(law, tolerance=tolerance).approach
+    except InputError:  # it is a function nowhere
+        return law.rows.approach[:1]

@@ -1,0 +1,219 @@
+"""The mean law of periodic samples of a rough face, at equal separations of their mean planes.
+
+Theory: demos/theory.md, section 10.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import bisect
+
+from geometry.collective import shared
+from multiscale.laws.patch_law import PatchLaw
+from multiscale.laws.periodic_sample import PeriodicSample, SampleRow
+from multiscale.laws.refinement import refined
+from multiscale.laws.rows import SolvedRows
+
+Array = NDArray[np.float64]
+
+FULL_CONTACT = 0.01
+"""Compliance of a law in full contact, relative to its mean one up to there. The interface itself
+has none left; without any, the pressure would be no function of closure."""
+
+_ROWS_TOGETHER = 2
+"""Rows of a sample that one rank solves in sequence, each starting from the one before, so that
+results do not depend on the number of ranks."""
+
+_CLOSE = 0.01  # of the way to full contact: further than needed that the last row may lie
+_FULL_ROWS = 4  # of a law that goes on in full contact
+
+
+class Limit(NamedTuple):
+    """How far a law is tabulated: to the first of the two that is reached.
+
+    Attributes:
+        pressure: Largest mean pressure [MPa].
+        closure: Largest closure [mm].
+    """
+
+    pressure: float = np.inf
+    closure: float = np.inf
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PeriodicSamples:
+    """Periodic samples of one face, each under a plane at the same mean separation.
+
+    The rows' parameter t runs from first touch, 0, to full contact, 1: the separation is
+    g = (1 − t)² of that at first touch. Towards full contact the pressure of a wave rises as √g
+    (Westergaard 1939), and so linearly in t.
+
+    Args:
+        samples: The samples.
+        comm: MPI communicator, whose ranks share samples and rows; None for this process alone.
+        observe: Called with the number of rows that are solved.
+    """
+
+    samples: tuple[PeriodicSample, ...]
+    comm: Any = None
+    observe: Callable[[int], None] | None = None
+    _solved: list[int] = field(default_factory=lambda: [0], init=False)
+
+    @property
+    def shares(self) -> Array:
+        """Shares of the samples in the area of all, shape (n,)."""
+        areas = np.array([sample.area for sample in self.samples])
+        return np.asarray(areas / areas.sum())
+
+    @cached_property
+    def reference(self) -> float:
+        """Separation that closure counts from, z_M − mean height of the highest sample [mm]."""
+        return max(sample.reference for sample in self.samples)
+
+    @cached_property
+    def first_touch(self) -> float:
+        """Separation at first touch of a cell [mm]."""
+        return max(sample.first_touch for sample in self.samples)
+
+    @cached_property
+    def full_contact(self) -> list[float]:
+        """Mean pressures that just close the samples [MPa]; collective."""
+        samples = self.samples
+        return shared(self.comm, len(samples), lambda k: samples[k].full_contact_pressure())
+
+    def law(self, limit: Limit, tolerance: float, most_rows: int) -> PatchLaw:
+        """Tabulate the mean law of the samples up to a limit; collective.
+
+        Args:
+            limit: Where it ends.
+            tolerance: Interpolation error of the pressure.
+            most_rows: Rows that are solved at most, for each sample.
+        """
+        touch = self.reference - self.first_touch
+        area = sum(sample.area for sample in self.samples)
+        if limit.closure <= touch:
+            open_law = PatchLaw.of(SolvedRows.none(), touch, self.reference)
+            return replace(open_law, sample_area=area)
+        end = self.end(limit)
+        last = self.rows(np.array([end]), 0.0)[:, 0]
+        compliance = float((last.closure[0] - touch) / last.pressure[0])
+
+        def make(rows: SolvedRows) -> list[PatchLaw]:
+            rising, change = rows[:, 0].rising()
+            if end == 1.0:
+                rising = self._in_full_contact(rising, limit, compliance)
+            return [replace(PatchLaw.of(rising, touch, self.reference), repaired=change)]
+
+        (law,), _ = refined(
+            lambda parameters: self.rows(parameters, compliance),
+            make,
+            0.0,
+            end,
+            compliance=np.array([[compliance]]),
+            tolerance=tolerance,
+            most_rows=most_rows,
+        )
+        return replace(law, sample_area=area)
+
+    def end(self, limit: Limit) -> float:
+        """Return the parameter of the last row, in full contact at most; collective.
+
+        Args:
+            limit: What that row reaches.
+        """
+        by_closure = self._parameter(max(self.reference - limit.closure, 0.0))
+        if not np.isfinite(limit.pressure):
+            return by_closure
+        samples, pressure = self.samples, limit.pressure
+        under = shared(self.comm, len(samples), lambda k: samples[k].separation_under(pressure))
+        low, high = self._parameter(max(under)), self._parameter(min(under))
+
+        def excess(parameter: float) -> float:
+            return float(self.rows(np.array([parameter]), 0.0).pressure[0, 0]) - pressure
+
+        if high - low > _CLOSE and excess(low) < 0.0 < excess(high):
+            high = min(high, float(bisect(excess, low, high, xtol=0.5 * _CLOSE)) + 0.5 * _CLOSE)
+        return min(by_closure, high)
+
+    def _parameter(self, separation: float) -> float:
+        return 1.0 - float(np.sqrt(separation / self.first_touch))
+
+    def rows(self, parameters: Array, compliance: float) -> SolvedRows:
+        """Return rows of the mean law, columns of shape (m, 1); collective.
+
+        Args:
+            parameters: Values of t, increasing, shape (m,).
+            compliance: Λ of the rows' approach, s = c + Λ p [mm/MPa].
+        """
+        separations = self.first_touch * (1.0 - parameters) ** 2
+        found = self._solve(separations)
+        shares = self.shares
+
+        def mean(name: str) -> Array:
+            return np.array([[getattr(row, name) for row in rows] for rows in found]).T @ shares
+
+        pressure = mean("pressure")
+        scatter = np.zeros(len(pressure))
+        if len(self.samples) > 1:
+            each = np.array([[row.pressure for row in rows] for rows in found])
+            variance = shares @ (each - pressure) ** 2 / (1.0 - shares @ shares)
+            scatter = np.sqrt(variance)
+        closure = self.reference - separations
+        columns = SolvedRows(
+            approach=closure + compliance * pressure,
+            closure=closure,
+            pressure=pressure,
+            contact_area_fraction=mean("contact_area_fraction"),
+            contacts=np.sum([[row.contacts for row in rows] for rows in found], axis=0),
+            unresolved_displacement=np.zeros(len(pressure)),
+            pressure_scatter=scatter,
+            outside_range=np.any([[row.outside_range for row in rows] for rows in found], axis=0),
+        )
+        return columns[:, None]
+
+    def _solve(self, separations: Array) -> list[list[SampleRow]]:
+        """Return the rows of all samples at separations that fall, shared by the ranks."""
+        count = _ROWS_TOGETHER
+        parts = [separations[k : k + count] for k in range(0, len(separations), count)]
+        tasks = len(self.samples) * len(parts)
+        full = self.full_contact if separations[-1] == 0.0 else [np.inf] * len(self.samples)
+
+        def solve(task: int) -> list[SampleRow]:
+            sample, part = divmod(task, len(parts))
+            return self.samples[sample].rows(parts[part], full[sample])
+
+        def solved(done: int) -> None:
+            if self.observe is not None:
+                self.observe(self._solved[0] + done * len(separations) // tasks)
+
+        found = shared(self.comm, tasks, solve, observe=solved)
+        self._solved[0] += len(separations)
+        each = len(parts)
+        return [
+            [row for rows in found[k * each : (k + 1) * each] for row in rows]
+            for k in range(len(self.samples))
+        ]
+
+    def _in_full_contact(self, rows: SolvedRows, limit: Limit, compliance: float) -> SolvedRows:
+        """Return the rows of a law with others in full contact, up to a limit."""
+        last, least = rows[-1:], FULL_CONTACT * compliance
+        full = float(last.pressure[0])
+        pressure = min(limit.pressure, full + (limit.closure - self.reference) / least)
+        if not pressure > full:
+            return rows
+        more = np.linspace(0.0, pressure - full, _FULL_ROWS + 1)[1:]
+        repeated = last.mapped(lambda column: np.repeat(column, _FULL_ROWS))
+        beyond = replace(
+            repeated,
+            approach=last.approach + (least + compliance) * more,
+            closure=last.closure + least * more,
+            pressure=full + more,
+            unresolved_displacement=least * more,
+        )
+        return rows.joined(beyond)

@@ -1,0 +1,115 @@
+"""One periodic sample of a rough face under planes at prescribed mean separations.
+
+Theory: demos/theory.md, section 10.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry import Control
+from micro import HalfSpaceModel
+
+Array = NDArray[np.float64]
+
+
+class SampleRow(NamedTuple):
+    """What one sample gives at one separation.
+
+    Attributes:
+        pressure: Mean pressure [MPa].
+        contact_area_fraction: Real over nominal contact area.
+        contacts: Number of contacts.
+        outside_range: Whether the model warned that it is outside its range of validity.
+    """
+
+    pressure: float = 0.0
+    contact_area_fraction: float = 0.0
+    contacts: int = 0
+    outside_range: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodicSample:
+    """A sample that continues periodically on a half-space.
+
+    Its displacements count from their mean, so that the mean separation is z_M less the mean height
+    and the approach.
+
+    Args:
+        model: Its periodic model.
+    """
+
+    model: HalfSpaceModel
+
+    @property
+    def area(self) -> float:
+        """Nominal area [mm²]."""
+        return self.model.surface.area
+
+    @property
+    def reference(self) -> float:
+        """Separation at zero approach, z_M less the mean height [mm]."""
+        return self.model.reference_height - self.model.surface.mean_height
+
+    @property
+    def first_touch(self) -> float:
+        """Separation at first touch of a cell [mm]."""
+        return self.reference - self.model.first_touch
+
+    def full_contact_pressure(self) -> float:
+        """Return the mean pressure that just closes the sample [MPa].
+
+        In full contact pressures differ from their mean by what flattens the sample, whatever the
+        mean.
+        """
+        surface = self.model.surface
+        slopes = np.gradient(surface.heights, *surface.spacing)
+        pressure = self.model.contact_modulus * float(np.sqrt(np.mean(np.square(slopes))))
+        while True:
+            pressure *= 2.0
+            found = self.model.solve_force(pressure * self.area).pressure
+            if found.min() > 0.0:
+                return float(found.mean() - found.min())
+
+    def separation_under(self, pressure: float) -> float:
+        """Return the mean separation under a mean pressure [mm]; exactly 0 in full contact.
+
+        Args:
+            pressure: The mean pressure [MPa].
+        """
+        state = self.model.solve_force(pressure * self.area)
+        if state.pressure.min() > 0.0:  # what is left is rounding
+            return 0.0
+        return max(self.reference - state.approach, 0.0)
+
+    def rows(self, separations: Array, full: float) -> list[SampleRow]:
+        """Return rows at separations, each solved from the one before.
+
+        Args:
+            separations: Mean separations, falling [mm].
+            full: Mean pressure that just closes the sample, for a separation of 0 [MPa].
+        """
+        rows, start = [], None
+        for separation in separations:
+            if separation == 0.0:
+                rows.append(SampleRow(full, 1.0, 1))
+            elif separation >= self.first_touch:
+                rows.append(SampleRow())
+            else:
+                approach = float(self.reference - separation)
+                pressed = self.model.press(Control(approach=approach), start=start)
+                start, response = pressed.start, pressed.response
+                rows.append(
+                    SampleRow(
+                        pressure=float(response.mean_pressure[0]),
+                        contact_area_fraction=float(response.contact_area_fraction[0]),
+                        contacts=int(response.contacts[0]),
+                        outside_range=bool(response.warning[0]),
+                    )
+                )
+        return rows

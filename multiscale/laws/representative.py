@@ -1,0 +1,141 @@
+"""Makes representative laws: pressure over closure of periodic samples of a large face.
+
+Theory: demos/theory.md, section 10.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry import InputError, Regions, Surface
+from micro import HalfSpaceModel
+from multiscale.laws.law_table import LawTable
+from multiscale.laws.mean_law import Limit, PeriodicSamples
+from multiscale.laws.patch_law import PatchLaw
+from multiscale.laws.periodic_sample import PeriodicSample
+from multiscale.laws.refinement import MOST_ROWS
+from multiscale.readable import Observer
+
+Array = NDArray[np.float64]
+MakeModel = Callable[[Surface], HalfSpaceModel]
+
+
+def representative_law(
+    samples: Sequence[Surface],
+    contact_modulus: float,
+    *,
+    largest_pressure: float | None = None,
+    largest_closure: float | None = None,
+    tolerance: float = 1e-3,
+    most_rows: int = MOST_ROWS,
+    make_model: MakeModel | None = None,
+    comm: Any = None,
+    observe: Observer | None = None,
+) -> PatchLaw:
+    """Tabulate the law of a face that is much larger than the samples of its roughness.
+
+    The samples continue periodically on a half-space whose displacements count from their mean:
+    p over z_M − mean height − mean separation is the law of the interface alone, and all long waves
+    are left to the body that uses it. The law of several samples is the mean of their pressures at
+    equal separations of their mean planes. Closure counts from the height z_M of the sample that
+    rises highest above its mean plane.
+
+    Args:
+        samples: Periodic surfaces; they count by their areas.
+        contact_modulus: E* [MPa].
+        largest_pressure: Largest local pressure that the law will be used for [MPa].
+        largest_closure: Largest local closure [mm]. Of both, what is reached first ends the law.
+        tolerance: Interpolation error of the pressure, see `refinement.refined`.
+        most_rows: Rows that are solved at most, for each sample.
+        make_model: Makes the model of a sample; by default the periodic half-space.
+        comm: MPI communicator, whose ranks share samples and rows. The law does not depend on
+            their number.
+        observe: Called as rows are solved.
+
+    Returns:
+        The law, on every rank, parametrised by s = c + Λ p with its mean compliance Λ: the plane's
+        approach where a layer of that compliance lies under the interface. The contacts are those
+        of all samples together, on `sample_area`. In full contact, where the interface has no
+        compliance left, the law goes on with a hundredth of its mean one.
+
+    Raises:
+        InputError: When there is no sample, one is not periodic or flat, or no largest load is
+            given.
+        NotConverged: When the micro model does not converge.
+
+    Note:
+        Collective.
+    """
+    limits = {"largest_pressure": largest_pressure, "largest_closure": largest_closure}
+    for key, value in limits.items():
+        if value is not None and not value > 0.0:
+            raise InputError("the largest load must be positive", key=key, value=value)
+    given = [np.inf if value is None else float(value) for value in limits.values()]
+    if not np.isfinite(given).any():
+        raise InputError(
+            "a representative law needs an end",
+            value=list(limits.values()),
+            allowed="largest_pressure, largest_closure or both",
+        )
+    if not samples:
+        raise InputError("a representative law needs a sample", value=[])
+    make = make_model or (
+        lambda sample: HalfSpaceModel(sample, contact_modulus=contact_modulus, periodic=True)
+    )
+    face = PeriodicSamples(
+        samples=tuple(_checked(sample, make) for sample in samples),
+        comm=comm,
+        observe=(lambda rows: observe("rows of laws", rows, most_rows)) if observe else None,
+    )
+    return face.law(Limit(*given), tolerance, most_rows)
+
+
+def representative_laws(
+    regions: Mapping[str, Sequence[Surface]], contact_modulus: float, **options: Any
+) -> LawTable:
+    """Tabulate the laws of all regions of a face, whose mean planes are one plane.
+
+    Args:
+        regions: Samples of each region, by its name; a face in one piece is one region.
+        contact_modulus: E* [MPa].
+        options: As for `representative_law`.
+
+    Returns:
+        One law per region. Closures of all count from the height of the region that rises highest
+        above the common mean plane.
+
+    Raises:
+        InputError: When there is no region, or as for `representative_law`.
+        NotConverged: When the micro model does not converge.
+
+    Note:
+        Collective.
+    """
+    names = Regions(tuple(regions))
+    laws = [representative_law(regions[name], contact_modulus, **options) for name in names.names]
+    highest = max(law.initial_separation for law in laws)
+    return LawTable(
+        patches=names,
+        laws=tuple(law.shifted(highest - law.initial_separation) for law in laws),
+        made_by={
+            "coupling": "representative",
+            "model": "half-space-periodic",
+            "love": "none",
+            "tolerance": f"{options.get('tolerance', 1e-3):g}",
+            "samples": ", ".join(str(len(regions[name])) for name in names.names),
+        },
+        force_error=max(law.interpolation_error for law in laws),
+    )
+
+
+def _checked(sample: Surface, make: MakeModel) -> PeriodicSample:
+    if np.ptp(sample.heights) == 0.0:
+        raise InputError("a flat sample has no law", value=sample.source or "flat")
+    model = make(sample)
+    if not model.periodic:
+        raise InputError("a representative law needs periodic models", value=model.name)
+    return PeriodicSample(model)

@@ -1,0 +1,111 @@
+"""Sets up the problem of a scene whose laws are those of periodic samples."""
+
+from __future__ import annotations
+
+import time
+
+from geometry.asperities import find_asperities
+from geometry.meshes.block import BlockShape
+from geometry.patches import PatchGrid, patch_means
+from geometry.rigid_plane import RigidPlane
+from micro import HalfSpaceModel
+from multiscale.machine import ClusterNodes
+from multiscale.scene.scene import Scene
+from multiscale.setup.memory import check_memory
+from multiscale.setup.mesh_bodies import FaceFacts, Faces, second_material
+from multiscale.setup.problem import ProblemSetup
+from multiscale.setup.reference_meshes import mesh_unknowns
+from multiscale.setup.samples import region_samples
+from multiscale.setup.surface_and_block import (
+    Bulk,
+    block_material,
+    check_load,
+    make_shape,
+    sample_surface,
+)
+
+_ESTIMATE_CELLS = 96
+"""Cells along a side, at most, of the sample that estimates the approach under a force."""
+
+
+def representative_setup(scene: Scene, nodes: ClusterNodes, faces: Faces) -> ProblemSetup:
+    """Set up the problem of a scene whose laws are those of periodic samples.
+
+    The surface of the setup is the first sample, and its micro model the periodic half-space.
+
+    Args:
+        scene: The scene.
+        nodes: The nodes of the run.
+        faces: What is known of the meshes of its bodies.
+
+    Raises:
+        InputError: When something cannot be made or does not fit; names file, key and value.
+    """
+    began, shape = time.perf_counter(), None
+    check_memory(scene, nodes)
+    face, counter = faces
+    if face is None:
+        shape = make_shape(scene, sample_surface(scene, scene.surface, "surface"))
+        face = face_of_block(scene, shape)
+    samples = region_samples(scene, face.materials, second_material(scene, counter))
+    surface, materials = samples[0].surfaces[0], samples[0].materials
+    check_load(scene, surface, Bulk(face.area, face.depth, materials.first.young_modulus))
+    model = HalfSpaceModel(surface, contact_modulus=materials.contact_modulus, periodic=True)
+    made = time.perf_counter()
+    plane = _sample_plane(scene, model, face.area)
+    patches = PatchGrid(grid=(1, 1), lengths=surface.lengths)
+    return ProblemSetup(
+        scene=scene,
+        surface=surface,
+        counter_surface=None,
+        asperities=find_asperities(surface, periodic=False),
+        micro=model,
+        patches=patches,
+        mean_heights=patch_means(surface, patches),
+        block_shape=shape,
+        materials=materials,
+        face=face,
+        counter_face=counter,
+        samples=samples,
+        plane_at_largest_load=plane,
+        seconds={"surface": made - began, "load estimate": time.perf_counter() - made},
+    )
+
+
+def face_of_block(scene: Scene, shape: BlockShape) -> FaceFacts:
+    """Return what is known of the contact face of a block.
+
+    Args:
+        scene: The scene.
+        shape: Shape and mesh of its block.
+    """
+    x, y = (length + 2.0 * shape.margin for length in shape.interface)
+    material = block_material(scene)
+    kind = "hexahedra" if shape.hexahedral else "tetrahedra"
+    return FaceFacts(
+        lengths=shape.interface,
+        area=shape.interface[0] * shape.interface[1],
+        depth=shape.height,
+        cells=f"{' × '.join(map(str, shape.cells))} {kind}",
+        unknowns=mesh_unknowns(shape),
+        element=shape.element,
+        materials=(material,),
+        poisson_ratio=material.poisson_ratio,
+        above=False,
+        notes=(f"its sides are {x:g} × {y:g} mm",) if shape.margin else (),
+    )
+
+
+def _sample_plane(scene: Scene, model: HalfSpaceModel, area: float) -> RigidPlane:
+    """Return the plane on a sample at the largest load, as if that were uniform on the face.
+
+    Under a prescribed approach the body takes part of it, and the plane is an upper bound.
+    """
+    surface, history = model.surface, scene.loading.load_history
+    mean = model.reference_height - surface.mean_height
+    if history.quantity == "approach":
+        return RigidPlane.above(surface, min(history.largest, mean))
+    nx, ny = surface.grid
+    coarse = model.resampled((min(nx, _ESTIMATE_CELLS), min(ny, _ESTIMATE_CELLS)))
+    state = coarse.solve_force(history.largest / area * surface.area)
+    return RigidPlane.above(surface, state.plane.approach)

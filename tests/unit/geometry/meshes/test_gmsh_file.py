@@ -1,0 +1,228 @@
+"""Meshes in gmsh's own files."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from mesh_files import gmsh_boxes, write_boxes, write_msh2
+
+from geometry.errors import InputError
+from geometry.meshes.gmsh_elements import elements_of
+from geometry.meshes.gmsh_file import read_gmsh_file
+from geometry.meshes.gmsh_session import gmsh_session
+
+CUBE = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)
+SQUARES = [0, 1, 3, 2, 4, 5, 7, 6]  # around the lower, then the upper square, as gmsh counts
+TWO = [(0, 1, 2, 4), (1, 3, 2, 7)]  # two tetrahedra of the cube's corners
+NAMES = [(3, 4, "body"), (2, 9, "pad face")]
+
+
+def write(path, elements, points=CUBE, names=NAMES, **options):
+    return write_msh2(path / "part.msh", points, elements, names, **options)
+
+
+@pytest.fixture(scope="module")
+def boxes(tmp_path_factory):
+    """Return the same mesh in all forms of gmsh's files."""
+    folder = tmp_path_factory.mktemp("boxes")
+    forms = [(2.2, False), (2.2, True), (4.0, False), (4.1, False), (4.1, True)]
+    return [
+        read_gmsh_file(write_boxes(folder / f"{version}_{binary}.msh", version, binary))
+        for version, binary in forms
+    ]
+
+
+def test_formats_hold_the_same_mesh(boxes):
+    for other in boxes[1:]:
+        for name in ("points", "cells", "cell_tags", "facets", "facet_tags"):
+            one, two = getattr(boxes[0], name), getattr(other, name)
+            # text has 16 digits
+            np.testing.assert_allclose(np.sort(one, axis=0), np.sort(two, axis=0), rtol=1e-15)
+    for mesh in boxes:
+        assert mesh.cell_names == {"plate": 10, "lining": 11}
+        assert mesh.facet_names == {"pad face": 5, "back": 6}
+
+
+def test_groups_are_those_of_the_model(boxes):
+    mesh = boxes[-1]
+    corners = mesh.points[mesh.cells]
+    volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6.0
+    for tag, size, lower, upper in ((10, 1.0, 0.0, 1.0), (11, 0.5, 1.0, 1.5)):
+        of_tag = mesh.cell_tags == tag
+        assert volume[of_tag].sum() == pytest.approx(size, rel=1e-13)  # sums of products
+        height = corners[of_tag][:, :, 2]
+        assert (height.min(), height.max()) == (lower, upper)
+    for tag, height in ((5, 1.5), (6, 0.0)):
+        x = mesh.points[mesh.facets[mesh.facet_tags == tag]]
+        assert (x[:, :, 2] == height).all()
+        normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+        assert 0.5 * np.linalg.norm(normal, axis=1).sum() == pytest.approx(1.0, rel=1e-13)
+
+
+def test_nodes_may_have_gaps_and_no_cells(tmp_path):
+    points = np.vstack([[[9.0, 9.0, 9.0]], CUBE])
+    elements = [(4, 4, 1, np.add(cell, 1)) for cell in TWO] + [(2, 9, 1, [1, 2, 3])]
+    elements += [(2, 9, 1, [0, 1, 2])]  # has the node that no cell has
+    mesh = read_gmsh_file(write(tmp_path, elements, points, first=77))
+    used = sorted({row for cell in TWO for row in cell})
+    assert mesh.points.tolist() == CUBE[used].tolist()
+    assert mesh.points[mesh.cells].tolist() == CUBE[np.array(TWO)].tolist()
+    assert mesh.facets.tolist() == [[0, 1, 2], [-1, 0, 1]]
+    assert mesh.facet_tags.tolist() == [9, 9] and mesh.cell_tags.tolist() == [4, 4]
+    assert (mesh.cell_names, mesh.facet_names) == ({"body": 4}, {"pad face": 9})
+
+
+def test_hexahedra_become_tensor_products(tmp_path):
+    elements = [(5, 4, 1, SQUARES), (3, 9, 1, [4, 5, 7, 6])]
+    mesh = read_gmsh_file(write(tmp_path, elements))
+    assert mesh.points[mesh.cells[0]].tolist() == CUBE.tolist()
+    assert sorted(mesh.points[mesh.facets[0]].tolist()) == sorted(CUBE[4:].tolist())
+
+
+def test_groups_without_name_have_their_number(tmp_path):
+    mesh = read_gmsh_file(write(tmp_path, [(4, 4, 1, TWO[0]), (2, 9, 3, [0, 1, 2])], names=[]))
+    assert (mesh.cell_names, mesh.facet_names) == ({"4": 4}, {"9": 9})
+
+
+def test_without_groups_entities_give_the_numbers(tmp_path):
+    with gmsh_boxes() as gmsh:
+        gmsh.model.removePhysicalGroups()
+        gmsh.write(str(tmp_path / "plain.msh"))
+        centres = {
+            tag: gmsh.model.occ.getCenterOfMass(2, tag) for _, tag in gmsh.model.getEntities(2)
+        }
+    mesh = read_gmsh_file(tmp_path / "plain.msh")
+    assert mesh.cell_names == {"1": 1, "2": 2} and set(mesh.cell_tags) == {1, 2}
+    assert set(mesh.facet_names.values()) == set(centres)
+    for tag, centre in centres.items():
+        x = mesh.points[mesh.facets[mesh.facet_tags == tag]]
+        across = int(np.argmin(np.ptp(x.reshape(-1, 3), axis=0)))
+        np.testing.assert_allclose(x[..., across], centre[across], atol=1e-12)  # on its plane
+
+
+def test_volume_without_a_group_is_part_of_the_body(tmp_path):
+    with gmsh_boxes() as gmsh:
+        gmsh.model.removePhysicalGroups([(3, 11)])
+        gmsh.option.setNumber("Mesh.SaveAll", 1)
+        gmsh.write(str(tmp_path / "part.msh"))
+    mesh = read_gmsh_file(tmp_path / "part.msh")
+    assert mesh.cell_names == {"plate": 10, "0": 0}
+    heights = mesh.points[mesh.cells].mean(axis=1)[:, 2]
+    assert (mesh.cell_tags == np.where(heights > 1.0, 0, 10)).all()
+
+
+def test_things_are_in_one_group(tmp_path):
+    for dimension, entity, match in (
+        (3, 2, "volume 2 of the mesh is in several physical groups: 'lining' and 'all'"),
+        (2, None, "surface .* 'pad face' and 'all'|surface .* 'back' and 'all'"),
+    ):
+        with gmsh_boxes() as gmsh:
+            entities = [tag for _, tag in gmsh.model.getEntities(dimension)]
+            gmsh.model.addPhysicalGroup(dimension, [entity] if entity else entities, 40)
+            gmsh.model.setPhysicalName(dimension, 40, "all")
+            gmsh.write(str(tmp_path / "two.msh"))
+        with pytest.raises(InputError, match=match):
+            read_gmsh_file(tmp_path / "two.msh")
+    cells = [(4, 4, 1, TWO[0]), (4, 4, 1, TWO[1]), (4, 5, 2, [4, 2, 0, 1])]
+    with pytest.raises(InputError, match="1 cells stand in the mesh more than once"):
+        read_gmsh_file(write(tmp_path, cells))
+
+
+def test_groups_have_names_of_their_own():
+    # gmsh 4.8 drops the second name, later releases keep both
+    model = SimpleNamespace(
+        getEntities=lambda dimension: [(dimension, 1), (dimension, 2)],
+        getPhysicalGroups=lambda dimension: [(dimension, 4), (dimension, 5)],
+        getPhysicalGroupsForEntity=lambda _, tag: [tag + 3],
+        getPhysicalName=lambda *_: "body",
+    )
+    with pytest.raises(InputError, match="'body': physical groups 4 and 5 have the same name"):
+        elements_of(SimpleNamespace(model=model), 3)
+
+
+@pytest.mark.parametrize("kind", ["tetrahedra", "hexahedra"])
+def test_cells_of_second_order_with_straight_edges_lose_their_middles(tmp_path, kind):
+    with gmsh_session("second order") as gmsh:
+        if kind == "hexahedra":
+            square = gmsh.model.occ.addRectangle(0, 0, 0, 1, 2)
+            gmsh.model.occ.extrude([(2, square)], 0, 0, 0.5, [2], recombine=True)
+            gmsh.model.occ.synchronize()
+            gmsh.model.mesh.setTransfiniteSurface(square)
+            gmsh.model.mesh.setRecombine(2, square)
+        else:
+            gmsh.model.occ.addBox(0, 0, 0, 1, 2, 0.5)
+            gmsh.model.occ.synchronize()
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 1.0)
+        gmsh.model.mesh.generate(3)
+        corners = len(gmsh.model.mesh.getNodes()[0])
+        gmsh.model.mesh.setOrder(2)
+        gmsh.write(str(tmp_path / "second.msh"))
+    mesh = read_gmsh_file(tmp_path / "second.msh")
+    assert mesh.cells.shape[1] == {"tetrahedra": 4, "hexahedra": 8}[kind]
+    assert len(mesh.points) == corners
+    x = mesh.points[mesh.facets]
+    assert x.shape[1] == {"tetrahedra": 3, "hexahedra": 4}[kind]
+
+
+def test_cells_with_bent_edges_are_refused(tmp_path):
+    with gmsh_session("ball") as gmsh:
+        gmsh.model.occ.addSphere(0, 0, 0, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 0.8)
+        gmsh.option.setNumber("Mesh.ElementOrder", 2)
+        gmsh.model.mesh.generate(3)
+        gmsh.write(str(tmp_path / "ball.msh"))
+    with pytest.raises(InputError, match=r'with curved edges; .* element = "quadratic" gives'):
+        read_gmsh_file(tmp_path / "ball.msh")
+
+
+@pytest.mark.parametrize(
+    ("elements", "match"),
+    [
+        ([(2, 9, 1, [0, 1, 2])], "is two-dimensional, it has surfaces only"),
+        ([(6, 4, 1, [0, 1, 2, 4, 5, 6])], "cells of another kind: 1 × prism"),
+        (
+            [(4, 4, 1, TWO[0]), (5, 4, 2, SQUARES)],
+            r"several kinds: 1 × (tetra|hexa)hedron, 1 × .*allowed: tetrahedra alone",
+        ),
+        ([], "the mesh has no cells"),
+    ],
+    ids=["flat", "prism", "mixed", "none"],
+)
+def test_other_meshes_are_refused(tmp_path, elements, match):
+    path = write(tmp_path, elements)
+    with pytest.raises(InputError, match=match) as raised:
+        read_gmsh_file(path)
+    assert raised.value.file == str(path)
+
+
+@pytest.mark.parametrize(
+    ("content", "match"),
+    [
+        (b"", "the file is empty"),
+        (b'Point(1) = {0, 0, 0};\nSystemCall "touch ran";\n', "this is no mesh of gmsh"),
+        (b"// $MeshFormat\nx\n", "this is no mesh of gmsh"),
+        (b"$NOD\n1\n1 0 0 0\n$ENDNOD\n", "this is no mesh of gmsh"),
+        (b"$MeshFormat\n3.0 0 8\n$EndMeshFormat\n", "'3.0': unknown format"),
+        (b"$MeshFormat", "unknown format"),
+        (b"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n5\n1 0 0", "gmsh cannot read it"),
+        (bytes(range(256)) * 20, "this is no mesh of gmsh"),
+    ],
+    ids=["empty", "script", "comment", "old", "version", "cut", "truncated", "binary"],
+)
+def test_what_is_no_mesh_is_refused(tmp_path, monkeypatch, content, match):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "part.msh"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=match) as raised:
+        read_gmsh_file(path)
+    assert raised.value.file == str(path)
+    assert not Path("ran").exists()
+
+
+def test_missing_files_and_folders_are_refused(tmp_path):
+    with pytest.raises(InputError, match="cannot be read: No such file"):
+        read_gmsh_file(tmp_path / "none.msh")
+    with pytest.raises(InputError, match="cannot be read: Is a directory"):
+        read_gmsh_file(tmp_path)

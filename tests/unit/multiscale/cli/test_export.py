@@ -1,0 +1,55 @@
+"""``patchlaw laws --export``: files beside the laws; wrong words are refused beforehand."""
+
+import csv
+
+import numpy as np
+import pytest
+from small_scene import SMALL_SCENE
+
+from multiscale.cli.command_line import main
+from multiscale.exports import FORMATS
+from multiscale.laws.law_table import read_laws
+
+FILES = {"laws.csv", "laws_4c", "laws_abaqus.inp", "laws_calculix.inp"}
+LAWS = ("laws", "scene.toml", "--set", "coupling.kind=isolated", "patches.grid=[1, 2]", "--out")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.toml").write_text(SMALL_SCENE, encoding="utf-8")
+    return tmp_path / "out"
+
+
+def test_laws_are_exported_beside_their_file(folder, capsys):
+    words = [word for name in FORMATS for word in ("--export", name)]
+    assert main([*LAWS, "out", *words]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert {path.name for path in folder.iterdir()} == {"laws.h5", "laws.png", *FILES}
+    assert "laws.h5, laws.png, laws.csv, laws_4c, laws_abaqus.inp, laws_calculix.inp" in shown
+    assert len(list((folder / "laws_4c").iterdir())) == 2
+    table = read_laws(folder / "laws.h5")
+    with (folder / "laws.csv").open(encoding="utf-8", newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["iy"] == "0"]
+    closure, pressure = (
+        np.array([float(row[name]) for row in rows]) for name in ("closure_mm", "pressure_MPa")
+    )
+    np.testing.assert_allclose(pressure, table[0].pressure(closure), rtol=1e-9, atol=1e-12)
+    # laws made anew take the exports of earlier ones with them
+    assert main([*LAWS, "out"]) == 0
+    assert FILES & {path.name for path in folder.rglob("*.*")} == set()
+
+
+def test_unknown_formats_are_refused_with_those_there_are(folder, capsys):
+    assert main([*LAWS, "out", "--export", "ansys"]) == 2
+    error = capsys.readouterr().err
+    assert "--export: invalid choice: 'ansys' (choose from" in error
+    assert all(name in error for name in FORMATS)
+    assert not folder.exists()
+
+
+def test_a_scene_without_laws_has_nothing_to_export(folder, capsys):
+    words = ["laws", "scene.toml", "--out", "out", "--export", "csv"]
+    assert main([*words, "--set", "coupling.kind=concurrent"]) == 2
+    assert "has no laws (allowed: isolated, consistent)" in capsys.readouterr().err
+    assert not folder.exists()

@@ -1,0 +1,241 @@
+"""Exported laws, read as the programs read them, against the laws themselves and closed forms."""
+
+import csv
+import importlib.util
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from geometry import InputError, PatchGrid
+from multiscale.exports import FORMATS
+from multiscale.exports.export import export_laws, remove_exports
+from multiscale.exports.sampling import LEAST_PRESSURE, sample_law
+from multiscale.laws.law_table import LawTable
+from multiscale.laws.patch_law import PatchLaw
+from multiscale.laws.rows import LawRows
+
+TOUCH = 1e-3
+
+
+def law_of(closure, pressure, approach=None):
+    """Return a law through rows."""
+    closure, pressure = np.asarray(closure, float), np.asarray(pressure, float)
+    columns = {
+        "closure": closure,
+        "pressure": pressure,
+        "approach": closure if approach is None else np.asarray(approach, float),
+        "contact_area_fraction": np.linspace(0.0, 0.2, len(closure)),
+        "contacts": np.arange(len(closure)),
+        "unresolved_displacement": np.zeros(len(closure)),
+    }
+    touch = closure[0] if len(closure) else 8e-3
+    return PatchLaw(rows=LawRows(**columns), first_touch=float(touch), initial_separation=0.02)
+
+
+def hertz(closure):
+    return 4e3 * np.maximum(closure - TOUCH, 0.0) ** 1.5
+
+
+def hertzian(rows=12):
+    """A single asperity: its law is exact between rows, whatever their number."""
+    closure = np.linspace(TOUCH, 9e-3, rows)
+    return law_of(closure, hertz(closure))
+
+
+def rough(rows=40):
+    """Contacts that join one after the other, on a patch that yields: closure < approach."""
+    approach = np.linspace(TOUCH, 1.2e-2, rows)
+    depth = approach - TOUCH
+    pressure = 3e3 * depth**1.5 + 9e3 * np.maximum(depth - 4e-3, 0.0) ** 1.5
+    return law_of(approach - 2e-4 * pressure, pressure, approach)
+
+
+def table_of(*laws):
+    patches = PatchGrid(grid=(len(laws), 1), lengths=(1.0 * len(laws), 1.0))
+    return LawTable(patches=patches, laws=laws, made_by={"coupling": "consistent"})
+
+
+def tables_in(text):
+    """Return the tables of a keyword file by name: pressures and overclosures."""
+    found, name = {}, None
+    assert text.isascii()
+    for line in text.splitlines():
+        if line.startswith("**"):
+            continue
+        if line.startswith("*SURFACE INTERACTION"):
+            name = line.rpartition("NAME=")[2]
+        elif line.startswith("*SURFACE BEHAVIOR"):
+            assert line.endswith("PRESSURE-OVERCLOSURE=TABULAR")
+            found[name] = []
+        else:
+            words = line.split(",")
+            assert all(len(word.strip()) <= 20 for word in words)  # CalculiX reads no more
+            found[name].append([float(word) for word in words])
+    return {name: np.array(rows).T for name, rows in found.items()}
+
+
+def module_at(path):
+    """Import a module as 4C does."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+LAWS = {"one asperity": hertzian, "rough": rough, "two rows": lambda: hertzian(2)}
+
+
+@pytest.mark.parametrize("program", ["abaqus", "calculix"])
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_tables_of_contact_programs_are_within_their_stated_error(tmp_path, law, program):
+    law = law()
+    (path,) = export_laws(table_of(law), tmp_path, program)
+    text = path.read_text(encoding="ascii")
+    pressure, closure = tables_in(text)["PATCH_0_0"]
+    assert pressure[0] == 0.0 and closure[0] == pytest.approx(law.first_touch, rel=1e-12)
+    assert np.all(np.diff(pressure) > 0.0) and np.all(np.diff(closure) > 0.0)
+    end = law.range[1]
+    known = closure <= end * (1 + 1e-12)
+    assert np.count_nonzero(~known) == (program == "calculix")  # which would keep the pressure
+    # exact at the rows, to the 13 digits written
+    np.testing.assert_allclose(pressure[known], law.pressure(closure[known]), rtol=1e-9, atol=1e-12)
+    points = np.linspace(0.0, end, 1000)
+    exact = law.pressure(points)
+    scale = np.maximum(exact, LEAST_PRESSURE * exact[-1])
+    error = np.max(np.abs(np.interp(points, closure, pressure) - exact) / scale)
+    (stated,) = [float(line.split(":")[1]) for line in text.splitlines() if "largest error" in line]
+    assert error <= 1.05 * stated <= 1.1e-4  # stated with two digits
+
+
+def test_rows_for_a_closed_form_are_as_few_as_its_curvature_lets_them_be():
+    # chords of d^1.5 err by 0.75 h² / (8 d² ) of the pressure: h = d √(8 tol / 0.75) from row to
+    # row, down to the depth with 1 % of the pressure; below, as many again as 1 % takes: h ~ d^¼
+    law, tolerance = hertzian(400), 1e-3
+    sample = sample_law(law, tolerance=tolerance)
+    step = np.sqrt(8 * tolerance / 0.75)
+    expected = np.log(100.0 ** (2 / 3)) / step + (4 / 3) / step
+    assert len(sample) == pytest.approx(expected, rel=0.1)
+    assert 0.7 * tolerance < sample.error <= tolerance
+
+
+def test_calculix_gets_no_more_rows_than_it_stores(tmp_path):
+    closure = np.linspace(TOUCH, 9e-3, 97)
+    waves = law_of(closure, hertz(closure) * (1.0 + 0.02 * np.sin(6e3 * closure)))
+    (path,) = export_laws(table_of(waves), tmp_path, "calculix", tolerance=1e-6)
+    pressure, _ = tables_in(text := path.read_text())["PATCH_0_0"]
+    assert 150 < len(pressure) <= 200
+    (stated,) = [float(line.split(":")[1]) for line in text.splitlines() if "largest error" in line]
+    assert 1e-5 < stated < 1e-3
+
+
+def test_falling_pressures_are_evened_out_for_contact_programs_and_said(tmp_path):
+    closure = np.linspace(TOUCH, 9e-3, 30)
+    pressure = hertz(closure)
+    pressure[20:24] = 0.97 * pressure[19]
+    (path,) = export_laws(table_of(law_of(closure, pressure)), tmp_path, "abaqus")
+    found, _ = tables_in(text := path.read_text())["PATCH_0_0"]
+    assert np.all(np.diff(found) > 0.0)
+    assert "falling pressures evened out by" in text
+    (stated,) = [float(line.split(":")[1]) for line in text.splitlines() if "largest error" in line]
+    assert 5e-3 < stated < 5e-2  # of the change, not of the straight lines
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_module_for_4c_is_the_interpolant(tmp_path, law):
+    law = law()
+    (path,) = export_laws(table_of(law), tmp_path, "4c")
+    module, offset = module_at(path), 2e-4
+    closures = np.concatenate([np.linspace(0.0, 1.3 * law.range[1], 1000), law.rows.closure])
+    found = [module.evaluate(-closure - offset, offset) for closure in closures]
+    np.testing.assert_allclose(found, -law.pressure(closures), rtol=1e-11, atol=1e-13)
+    slopes = [module.evaluate_derivative(-closure - offset, offset) for closure in closures]
+    np.testing.assert_allclose(slopes, law.stiffness(closures), rtol=1e-9, atol=1e-9)
+    # 4C's other laws: negative in compression, the derivative over the gap positive
+    gap, h = -0.6 * law.range[1], 1e-9
+    difference = (module.evaluate(gap + h, 0.0) - module.evaluate(gap - h, 0.0)) / (2 * h)
+    assert module.evaluate(gap, 0.0) < 0.0
+    assert module.evaluate_derivative(gap, 0.0) == pytest.approx(difference, rel=1e-4)
+
+
+def test_module_for_4c_needs_nothing_else(tmp_path):
+    (path,) = export_laws(table_of(rough()), tmp_path, "4c")
+    code = "import sys; import law_0_0; print(law_0_0.evaluate(-5e-3, 0.0), 'numpy' in sys.modules)"
+    shown = subprocess.run(
+        [sys.executable, "-S", "-c", code], cwd=path.parent, capture_output=True, text=True
+    )
+    pressure, numpy_is_loaded = shown.stdout.split()
+    assert float(pressure) == pytest.approx(-rough().pressure(5e-3), rel=1e-11)
+    assert numpy_is_loaded == "False"
+
+
+def test_csv_has_all_columns_of_every_touched_patch(tmp_path):
+    law = rough()
+    (path,) = export_laws(table_of(law, law_of([], []), hertzian()), tmp_path, "csv")
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["ix"] for row in rows} == {"0", "2"}
+    first = [row for row in rows if row["ix"] == "0"]
+    columns = {name: np.array([float(row[name]) for row in first]) for name in first[0]}
+    point = law.along(columns["approach_mm"])
+    for name, expected in (
+        ("closure_mm", point.closure),
+        ("pressure_MPa", point.pressure),
+        ("stiffness_MPa_per_mm", point.stiffness),
+        ("contact_area_fraction", point.contact_area_fraction),
+        ("separation_mm", point.separation),
+        ("contacts", point.contacts),
+    ):
+        np.testing.assert_array_equal(columns[name], expected)
+    assert columns["closure_mm"][-1] == law.range[1]
+
+
+def test_closures_that_fall_end_the_tables_but_not_the_csv_file(tmp_path):
+    approach = np.linspace(TOUCH, 9e-3, 20)
+    pressure = hertz(approach)
+    closure = np.where(approach < 6e-3, approach, 1.2e-2 - approach)  # near full contact
+    law = law_of(closure, pressure, approach)
+    (path,) = export_laws(table_of(law), tmp_path, "abaqus")
+    assert "The law ends where pressure stops being a function of closure." in path.read_text()
+    _, overclosure = tables_in(path.read_text())["PATCH_0_0"]
+    assert overclosure[-1] == pytest.approx(law.range[1], rel=1e-12)
+    (path,) = export_laws(table_of(law), tmp_path, "csv")
+    lines = path.read_text().splitlines()
+    assert float(lines[-1].split(",")[2]) == approach[-1]
+
+
+def test_a_pressure_that_is_a_function_nowhere_is_refused(tmp_path):
+    closure = TOUCH - np.linspace(0.0, 1e-3, 5)
+    flat = law_of(closure, np.linspace(0.0, 3.0, 5), np.linspace(TOUCH, 9e-3, 5))
+    table = table_of(hertzian(), flat)
+    for program in ("4c", "abaqus", "calculix"):
+        with pytest.raises(InputError, match=r"pressure of patch \(1, 0\) is no function of"):
+            export_laws(table, tmp_path, program)
+    assert not list(tmp_path.iterdir())
+    assert export_laws(table, tmp_path, "csv") == [tmp_path / "laws.csv"]
+
+
+def test_open_patches_have_no_interaction_and_no_pressure(tmp_path):
+    table = table_of(law_of([], []), hertzian())
+    (path,) = export_laws(table, tmp_path, "calculix")
+    assert list(tables_in(path.read_text())) == ["PATCH_1_0"]
+    assert "stays open up to 0.008 mm" in path.read_text()
+    module = module_at(export_laws(table, tmp_path, "4c")[0])
+    assert (module.evaluate(-0.5, 0.0), module.evaluate_derivative(-0.5, 0.0)) == (0.0, 0.0)
+
+
+def test_unknown_formats_are_refused(tmp_path):
+    with pytest.raises(InputError, match="allowed: csv, 4c, abaqus, calculix"):
+        export_laws(table_of(hertzian()), tmp_path, "ansys")
+
+
+def test_exports_of_earlier_laws_go(tmp_path):
+    for name in FORMATS:
+        export_laws(table_of(hertzian(), rough()), tmp_path, name)
+    (tmp_path / "laws_4c" / "mine.py").write_text("")
+    assert len(list(tmp_path.rglob("*.*"))) == 3 + 2 + 1
+    export_laws(table_of(rough()), tmp_path, "4c")
+    assert not (tmp_path / "laws_4c" / "law_1_0.py").exists()
+    remove_exports(tmp_path)
+    assert [path.name for path in tmp_path.rglob("*.*")] == ["mine.py"]

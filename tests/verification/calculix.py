@@ -1,0 +1,177 @@
+"""CalculiX solves our meshes under exported laws: input decks, runs, results."""
+
+import os
+import re
+import shutil
+import subprocess
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from macro import LoadedFace, compat
+from macro.mesh.contact_face import FacetQuadrature
+
+PROGRAM = shutil.which("ccx")
+_HEIGHT, _MARGIN = 0.25, 0.25  # of the plate that stands for the rigid plane [mm]
+_TOP = 1e-9  # distance from a face that is rounding [mm]
+_SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+# per cell: CalculiX' element, its order of our nodes, its faces by its own vertices
+_ELEMENTS = {
+    "tetrahedron": ("C3D4", [0, 1, 2, 3], [(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)]),
+    "hexahedron": (
+        "C3D8",
+        [0, 1, 3, 2, 4, 5, 7, 6],
+        [(0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)],
+    ),
+}
+
+
+class NodalFace(LoadedFace):
+    """A contact face with laws at its nodes, as CalculiX' node-to-face contact has them.
+
+    Every node has its share of the area of every facet around it: the trapezoidal rule.
+    """
+
+    @cached_property
+    def quadrature(self):
+        """Quadrature points at the vertices of the facets."""
+        facets, vertices = self.facets, self.facets.corners.shape[1]
+        facet = np.repeat(np.arange(len(facets.corners)), vertices)
+        local = np.tile(np.array([[0, 0], [1, 0], [0, 1], [1, 1]])[:vertices], (len(facet), 1))
+        local = local[: len(facet)].astype(float)
+        points = facets.corners.reshape(-1, 2)
+        middle = facets.corners.mean(axis=1)[facet]
+        patch = self.patches.index_of(*middle.T)
+        order = np.argsort(patch, kind="stable")
+        cell = facets.cell[facet]
+        values = compat.lagrange_values(
+            self.space.mesh.topology.cell_name(), 1, facets.pull_back(facet, local)
+        )
+        return FacetQuadrature(
+            x=points[order, 0],
+            y=points[order, 1],
+            depth=facets.depth.ravel()[order],
+            weight=(facets.area / vertices)[facet][order],
+            patch=patch[order],
+            cell=cell[order],
+            nodes=compat.cell_nodes(self.space)[cell][order],
+            values=values[order],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """What CalculiX found.
+
+    Attributes:
+        force: Force on the plane [N].
+        reaction: Force that the bottom bears [N].
+        displacement: Displacements of the block's nodes, in our order, shape (n, 3) [mm].
+        pressure: Pressures at the nodes in contact, by our number of the node [MPa].
+    """
+
+    force: float
+    reaction: float
+    displacement: np.ndarray
+    pressure: dict
+
+
+def solve(folder, face, laws, control, crown=None):
+    """Press a block under exported laws with CalculiX.
+
+    Args:
+        folder: Folder for the files.
+        face: The block's contact face with its patches; linear elements.
+        laws: File of surface interactions, as exported; included as it is.
+        control: Approach and tilt of the plane.
+        crown: Depth of the face at (x, y) [mm], by which its nodes are lowered; None: flat.
+    """
+    (folder / "block.inp").write_text("\n".join(_deck(face, laws, control, crown)) + "\n")
+    done = subprocess.run(
+        [PROGRAM, "-i", "block"],
+        cwd=folder,
+        env=os.environ | {"OMP_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+    assert done.returncode == 0 and "*ERROR" not in done.stdout, done.stdout[-2000:]
+    return _read((folder / "block.dat").read_text())
+
+
+def _deck(face, laws, control, crown):
+    """Yield the lines of the input deck."""
+    block, nodes = face.body, face.space.tabulate_dof_coordinates().copy()
+    top = np.abs(nodes[:, 2]) < _TOP
+    kind, order, sides = _ELEMENTS[face.space.mesh.topology.cell_name()]
+    cells = _oriented(compat.cell_nodes(face.space)[:, order], nodes)
+    plate = len(nodes) + 1 + np.arange(8).reshape(2, 4)
+    corner = np.array(face.patches.lengths) * _SQUARE + _MARGIN * (2 * _SQUARE - 1)
+    nodes[top, 2] = 0.0 if crown is None else -crown(*nodes[top, :2].T)
+    yield "*NODE, NSET=BODY"
+    yield from (f"{i + 1}, {x:.12g}, {y:.12g}, {z:.12g}" for i, (x, y, z) in enumerate(nodes))
+    yield "*NODE, NSET=PLANE"
+    for z, row in zip((0.0, _HEIGHT), plate, strict=True):
+        yield from (f"{i}, {x:.12g}, {y:.12g}, {z}" for i, (x, y) in zip(row, corner, strict=True))
+    yield f"*ELEMENT, TYPE={kind}, ELSET=BODY"
+    yield from (f"{i + 1}, " + ", ".join(map(str, cell + 1)) for i, cell in enumerate(cells))
+    yield "*ELEMENT, TYPE=C3D8, ELSET=PLANE"
+    yield f"{len(cells) + 1}, " + ", ".join(map(str, plate.ravel()))
+    yield from ("*MATERIAL, NAME=ELASTIC", "*ELASTIC")
+    yield f"{block.material.young_modulus:.12g}, {block.material.poisson_ratio:.12g}"
+    yield from (f"*SOLID SECTION, ELSET={name}, MATERIAL=ELASTIC" for name in ("BODY", "PLANE"))
+    yield f"*INCLUDE, INPUT={laws}"
+    yield from ("*SURFACE, NAME=MASTER, TYPE=ELEMENT", f"{len(cells) + 1}, S1")
+    faces = [
+        (cell, side, face.patches.index_of(*nodes[at, :2].mean(axis=0)))
+        for cell, numbers in enumerate(cells)
+        for side, corners in enumerate(sides)
+        if np.all(top[at := numbers[list(corners)]])
+    ]
+    for index in range(face.patches.count):
+        name = "{}_{}".format(*face.patches.unravel(index))
+        yield f"*SURFACE, NAME=FACE_{name}, TYPE=ELEMENT"
+        yield from (f"{cell + 1}, S{side + 1}" for cell, side, patch in faces if patch == index)
+        yield f"*CONTACT PAIR, INTERACTION=PATCH_{name}, TYPE=NODE TO SURFACE"
+        yield f"FACE_{name}, MASTER"
+    yield "*NSET, NSET=BOTTOM"
+    yield from (f"{i + 1}," for i in np.flatnonzero(nodes[:, 2] < nodes[:, 2].min() + _TOP))
+    # residuals and corrections of 1e-8 instead of 5e-3: what is compared is the discretisation
+    yield from ("*STEP", "*STATIC", "1., 1.", "*CONTROLS, PARAMETERS=FIELD", "1e-8, 1e-8, , , 1e-8")
+    yield from ("*BOUNDARY", "BOTTOM, 1, 3, 0.", "PLANE, 1, 2, 0.")
+    approach = control.approach + (corner - face.patches.middle) @ np.array(control.tilt)
+    for row in plate:
+        yield from (f"{i}, 3, 3, {-down:.12e}" for i, down in zip(row, approach, strict=True))
+    yield from ("*NODE PRINT, NSET=BODY", "U")
+    yield from ("*NODE PRINT, NSET=PLANE, TOTALS=ONLY", "RF")
+    yield from ("*NODE PRINT, NSET=BOTTOM, TOTALS=ONLY", "RF", "*CONTACT PRINT", "CSTR")
+    yield "*END STEP"
+
+
+def _oriented(cells, nodes):
+    """Return tetrahedra whose fourth vertex lies above the other three, as CalculiX wants it."""
+    if cells.shape[1] == 4:
+        edges = nodes[cells[:, 1:]] - nodes[cells[:, :1]]
+        turned = np.linalg.det(edges) < 0.0
+        cells[turned] = cells[turned][:, [0, 2, 1, 3]]
+    return cells
+
+
+def _read(text):
+    """Read the results that were printed."""
+    blocks = re.split(r"\n\s*\n", text)
+    tables = dict(zip(blocks[::2], blocks[1::2], strict=False))
+
+    def rows(start):
+        (body,) = [body for title, body in tables.items() if title.strip().startswith(start)]
+        return np.array([[float(word) for word in line.split()] for line in body.splitlines()])
+
+    contact = rows("contact stress")
+    return Solution(
+        force=-float(rows("total force (fx,fy,fz) for set PLANE")[0, 2]),
+        reaction=float(rows("total force (fx,fy,fz) for set BOTTOM")[0, 2]),
+        displacement=rows("displacements")[:, 1:],
+        pressure={int(node) - 1: pressure for node, pressure in contact[:, :2]},
+    )

@@ -1,0 +1,134 @@
+"""Another program finds our forces and pressures: CalculiX, with our mesh and our exported laws.
+
+The witness has linear elements, contact at the nodes of the face (its trapezoidal rule), and a
+stiff plate with prescribed nodes for the rigid plane. With laws at the nodes we solve the same
+discrete problem. Approaches are 1e-5 of the block's height, so that its large rotations of the
+plane and ours, which are none, agree. Moduli of 1e9 MPa keep its forces above the absolute
+tolerances of its Newton iteration.
+"""
+
+import tomllib
+
+import calculix
+import numpy as np
+import pytest
+from block_cases import block_of
+from small_scene import SMALL_SCENE
+
+from geometry.rigid_plane import Control
+from macro import LawContactProblem, LoadedFace
+from multiscale.exports.export import export_laws
+from multiscale.run import Run
+from multiscale.scene.scene import Scene
+
+pytestmark = pytest.mark.skipif(calculix.PROGRAM is None, reason="CalculiX is not installed")
+
+APPROACH, LOAD = 8e-6, 1e9
+CONTROLS = {
+    "level": Control(approach=APPROACH),
+    "tilted": Control(approach=APPROACH, tilt=(0.1 * APPROACH, -0.2 * APPROACH)),
+}
+
+
+class Lines:
+    """A law through rows as CalculiX reads it: straight lines between them."""
+
+    def __init__(self, pressure, closure):
+        self._pressure, self._closure = pressure, closure
+
+    def pressure(self, closure):
+        return np.interp(closure, self._closure, self._pressure)
+
+    def stiffness(self, closure):
+        slopes = np.diff(self._pressure) / np.diff(self._closure)
+        slopes = np.concatenate([[0.0], slopes, [0.0]])  # before the table, and beyond
+        return slopes[np.searchsorted(self._closure, closure, side="right")]
+
+
+@pytest.fixture(scope="module", params=[(1, 1), (2, 1)], ids=["one law", "two laws"])
+def exported(request, tmp_path_factory):
+    """Laws of a rough surface, the file that CalculiX reads, and its lines as laws."""
+    scene = tomllib.loads(SMALL_SCENE)
+    scene["coupling"]["kind"] = "isolated"
+    scene["patches"]["grid"] = list(request.param)
+    scene["surface"]["spectrum"]["rms_slope"] = 2e-4
+    scene["block"]["young_modulus"] = 4.0 * LOAD
+    scene["load"]["approach"] = 1.2 * APPROACH
+    table = Run(Scene.from_dict(scene)).make_laws()
+    (path,) = export_laws(table, tmp_path_factory.mktemp("laws"), "calculix")
+    rows, error = [], []
+    for line in path.read_text(encoding="ascii").splitlines():
+        if line.startswith("*SURFACE BEHAVIOR"):
+            rows.append([])
+        elif not line.startswith("*"):
+            rows[-1].append([float(word) for word in line.split(",")])
+        elif "largest error" in line:
+            error.append(float(line.split(":")[1]))
+    assert len(rows) == table.patches.count and max(error) < 1.1e-4
+    return table, path, [Lines(*np.transpose(one)) for one in rows]
+
+
+def faces_of(table, element, cells):
+    """Return the same face with laws at the nodes, and at our quadrature points."""
+    block = block_of(element=element, cells=cells, young_modulus=LOAD)
+    face = LoadedFace.of_block(block, table.patches)
+    return calculix.NodalFace(block, face.facets, table.patches), face
+
+
+def pressed(face, laws, control, **crown):
+    return LawContactProblem(face, laws, "pointwise", **crown).solve(control)
+
+
+@pytest.mark.parametrize("control", CONTROLS.values(), ids=CONTROLS)
+@pytest.mark.parametrize("element", ["P1", "Q1"])
+def test_same_mesh_same_table_same_answer(tmp_path, exported, element, control):
+    table, path, lines = exported
+    face, _ = faces_of(table, element, (6, 6, 4))
+    found = calculix.solve(tmp_path, face, path, control)
+    ours = pressed(face, lines, control)
+    # seven digits are printed; iterations of both end at 1e-8 of the load
+    assert found.force == pytest.approx(ours.force, rel=2e-6)
+    assert found.reaction == pytest.approx(ours.force, rel=2e-6)
+    moved = ours.displacement.reshape(-1, 3)
+    np.testing.assert_allclose(found.displacement, moved, atol=1e-4 * np.abs(moved).max())
+    assert len(found.pressure) == 49
+
+
+@pytest.mark.parametrize("control", CONTROLS.values(), ids=CONTROLS)
+def test_force_and_pressures_are_within_the_interpolation_of_the_table(tmp_path, exported, control):
+    table, path, _ = exported
+    face, _ = faces_of(table, "Q1", (6, 6, 4))
+    found = calculix.solve(tmp_path, face, path, control)
+    ours = pressed(face, table.laws, control)
+    assert found.force == pytest.approx(ours.force, rel=1e-4)
+    if table.patches.count > 1:
+        return  # nodes between two patches have two pressures
+    nodes = np.array(sorted(found.pressure))
+    place = face.space.tabulate_dof_coordinates()[nodes, :2] - table.patches.middle
+    sunk = ours.displacement.reshape(-1, 3)[nodes, 2]
+    expected = table[0].pressure(control.approach + place @ np.array(control.tilt) + sunk)
+    np.testing.assert_allclose([found.pressure[i] for i in nodes], expected, rtol=1.1e-4)
+
+
+@pytest.mark.parametrize("element", ["P1", "Q1"])
+def test_crowned_face_laws_at_nodes_and_at_quadrature_points_approach_each_other(
+    tmp_path, exported, element
+):
+    table, path, _ = exported
+    if table.patches.count > 1:
+        pytest.skip("one law is enough for a rate")
+
+    def crown(x, y):
+        return 0.4 * APPROACH * ((2.0 * x - 1.0) ** 2 + 0.5 * (2.0 * y - 1.0) ** 2)
+
+    control, differences = CONTROLS["tilted"], []
+    for n in (4, 8):
+        nodal, face = faces_of(table, element, (n, n, n))
+        found = calculix.solve(tmp_path, nodal, path, control, crown)
+        ours = pressed(nodal, table.laws, control, crown=crown)
+        assert found.force == pytest.approx(ours.force, rel=1e-4)
+        better = pressed(face, table.laws, control, crown=crown)
+        differences.append(found.force / better.force - 1.0)
+    # the trapezoidal rule errs by h²
+    assert abs(differences[1]) < 0.02
+    assert differences[0] / differences[1] == pytest.approx(4.0, abs=0.2)
