@@ -14,6 +14,7 @@ from geometry.meshes.block import BlockShape, misalignment
 from geometry.meshes.expected_contact import places_in_reach
 from geometry.meshes.families import characteristic_size, reference_shapes, suggested_fine
 from geometry.meshes.refined_block import RefinedShape
+from geometry.mirroring import mirrored
 from geometry.patches import Partition, PatchGrid, UnevenPartition, overlaps, patch_means
 from geometry.regions import Regions
 from geometry.rigid_plane import Control, RigidPlane
@@ -44,6 +45,7 @@ __all__ = [
     "characteristic_size",
     "facing",
     "find_asperities",
+    "mirrored",
     "misalignment",
     "overlaps",
     "patch_means",

@@ -7,9 +7,9 @@ from multiscale.couplings.reference import ReferenceCoupling as ReferenceCouplin
 from multiscale.exports.export import export_laws as export_laws
 from multiscale.laws.consistent import consistent_laws as consistent_laws
 from multiscale.laws.isolated import isolated_laws as isolated_laws
+from multiscale.laws.law_file import read_laws as read_laws
+from multiscale.laws.law_file import write_laws as write_laws
 from multiscale.laws.law_table import LawTable as LawTable
-from multiscale.laws.law_table import read_laws as read_laws
-from multiscale.laws.law_table import write_laws as write_laws
 from multiscale.laws.patch_law import PatchLaw as PatchLaw
 from multiscale.laws.patch_law import PatchLaws as PatchLaws
 from multiscale.laws.representative import representative_law as representative_law

@@ -16,7 +16,8 @@ from multiscale.contact_recorder import ContactRecorder
 from multiscale.couplings import assembly
 from multiscale.couplings.contact import OnBody, contact_model, on_body
 from multiscale.couplings.fields import FieldRecord
-from multiscale.laws.law_table import LawTable, law_bytes, read_laws
+from multiscale.laws.law_file import law_bytes, read_laws
+from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling, LoadPosition, LoadStepper, Restorable
 from multiscale.machine import cluster_nodes
@@ -218,8 +219,17 @@ class Run:
 
     @cached_property
     def heights(self) -> str:
-        """SHA-256 of the surface's heights."""
-        return digest({"heights": self.setup.surface.heights})
+        """SHA-256 of the surface's heights, or of those of all samples."""
+        arrays = {"heights": self.setup.surface.heights}
+        for k, region in enumerate(self.setup.samples):
+            arrays |= {f"{k} {j}": one.heights for j, one in enumerate(region.surfaces)}
+        return digest(arrays)
+
+    @property
+    def meshes(self) -> list[str]:
+        """SHA-256 of the meshes of the bodies; empty without meshes."""
+        faces = self.setup.face, self.setup.counter_face
+        return [face.digest for face in faces if face is not None and face.digest]
 
     @property
     def law_bytes(self) -> bytes:

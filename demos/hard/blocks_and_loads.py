@@ -14,8 +14,7 @@ from geometry.rigid_plane import Control
 from macro import Block, Material, block_mesh
 from micro import influence_matrix
 from multiscale.couplings.condensed import equilibrium
-from multiscale.laws.law_table import repaired_law
-from multiscale.laws.patch_law import PatchLaw, PatchLaws
+from multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
 from multiscale.laws.rows import LawRows
 
 LAPS, MODULI, UNITS = 10, (4e9, 1e3, 1e12), {"m": 1e3, "um": 1e-3}

@@ -16,7 +16,7 @@ from geometry.statistics import roughness
 from multiscale.cli.execution import scene_and_folder
 from multiscale.couplings.assembly import check_has_laws, load_finite_elements
 from multiscale.exports.export import export_texts, remove_exports
-from multiscale.laws.law_table import write_laws
+from multiscale.laws.law_file import write_laws
 from multiscale.machine import cluster_nodes
 from multiscale.output import terminal
 from multiscale.output.results import write_figure

@@ -64,7 +64,7 @@ def patch_compliance(setup: ProblemSetup, comm: Any) -> Array:
         Collective.
     """
     first, second = _of_first(setup, comm), setup.materials.second
-    if second is None:
+    if second is None or not setup.both_give_way:
         return first
     return np.asarray(first + influence_matrix(setup.patches) * second.surface_compliance / np.pi)
 

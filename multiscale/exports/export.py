@@ -29,8 +29,8 @@ def export_laws(
     """Write patch laws in the form that another program reads.
 
     ``"csv"`` writes ``laws.csv``; ``"abaqus"`` and ``"calculix"`` write ``laws_abaqus.inp`` and
-    ``laws_calculix.inp``, with a surface interaction per patch; ``"4c"`` writes a Python module per
-    patch, ``laws_4c/law_IX_IY.py``. Units are mm, N and MPa.
+    ``laws_calculix.inp``, with a surface interaction per law; ``"4c"`` writes a Python module per
+    law, ``laws_4c/law_IX_IY.py`` or ``laws_4c/law_REGION.py``. Units are mm, N and MPa.
 
     Args:
         table: The laws.
@@ -43,7 +43,7 @@ def export_laws(
         The files written.
 
     Raises:
-        InputError: When there is no such format, or the pressure of a patch is a function of
+        InputError: When there is no such format, or the pressure of a law is a function of
             closure nowhere, which a csv file alone can say.
         NotWritten: When the system refuses.
     """
@@ -84,7 +84,7 @@ def remove_exports(folder: Path, formats: tuple[str, ...] = FORMATS) -> None:
     """
     paths = [folder / _TABLES[format][0] for format in formats if format in _TABLES]
     if "4c" in formats:
-        paths += (folder / _MODULES).glob("law_*_*.py")
+        paths += (folder / _MODULES).glob("law_*.py")
     for path in paths:
         with written(path):
             remove(path)

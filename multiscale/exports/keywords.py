@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from multiscale.exports.places import made_by, places
 from multiscale.exports.sampling import LEAST_PRESSURE, LawSample, sample_patch
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
@@ -19,10 +20,10 @@ from multiscale.laws.patch_law import PatchLaw
 _CALCULIX_ROWS = 200
 
 _HEAD = f"""\
-Contact laws of the patches of a rough surface, written by patchlaw.
-Units: mm, N, MPa. One surface interaction per patch, pressure [MPa] over overclosure [mm].
-Overclosure 0: a rigid plane at the height of the highest point of the surface. Flat faces of
-the mesh that just touch stand for this state; the mean plane of a patch lies below, as stated.
+Contact laws of a rough surface, written by patchlaw.
+Units: mm, N, MPa. One surface interaction per law, pressure [MPa] over overclosure [mm].
+Overclosure 0: a rigid plane at the height of the highest point of the roughness. Flat faces of
+the mesh that just touch stand for this state; the mean plane of the heights lies below, as stated.
 The tables lie on the laws at their rows. Straight lines between them are within the stated error
 of the pressure, or of {LEAST_PRESSURE:g} of the largest pressure of the law where that is more."""
 _ABAQUS = "Beyond the last row Abaqus continues the last line: the laws are not known there."
@@ -31,56 +32,47 @@ The last row of each table continues the tangent beyond the end of the law, beca
 the last pressure: overclosures beyond the stated end are outside the law.
 Use *CONTACT PAIR, TYPE=NODE TO SURFACE, linear elements, and the rough face as the first surface.
 With the other types CalculiX 2.20 finds no pressure in such a table, and says nothing."""
-_OPEN = "It stays open up to {:.9g} mm: no surface interaction, leave it out of contact."
+_OPEN = "It stays open: no surface interaction, leave it out of contact. First touch: {:.9g} mm."
 
 
 def abaqus_text(table: LawTable, tolerance: float) -> str:
-    """Return the surface interactions of all patches for Abaqus.
+    """Return the surface interactions of all laws for Abaqus.
 
     Args:
         table: The laws.
         tolerance: Largest error of straight lines between rows, as in `LawSample`.
 
     Raises:
-        InputError: When the pressure of a patch is a function of closure nowhere.
+        InputError: When the pressure of a law is a function of closure nowhere.
     """
     return _text(table, tolerance, _ABAQUS, most=None)
 
 
 def calculix_text(table: LawTable, tolerance: float) -> str:
-    """Return the surface interactions of all patches for CalculiX.
+    """Return the surface interactions of all laws for CalculiX.
 
     Args:
         table: The laws.
         tolerance: Error of straight lines between rows; larger where 199 rows do not suffice.
 
     Raises:
-        InputError: When the pressure of a patch is a function of closure nowhere.
+        InputError: When the pressure of a law is a function of closure nowhere.
     """
     return _text(table, tolerance, _CALCULIX, most=_CALCULIX_ROWS - 1)
 
 
 def _text(table: LawTable, tolerance: float, remarks: str, *, most: int | None) -> str:
-    made_by = ", ".join(f"{name} {value}" for name, value in table.made_by.items())
-    lines = _comments(f"{_HEAD}\n{remarks}\nMade by: {made_by}")
-    for index, law in enumerate(table.laws):
-        lines += _comments("", *_facts(table, index))
-        sample = sample_patch(table, index, tolerance=tolerance, most=most)
+    lines = _comments(f"{_HEAD}\n{remarks}\nMade by: {made_by(table)}")
+    for place, law in zip(places(table), table.laws, strict=True):
+        lines += _comments("", f"Law of {place.subject} {place.extent}".rstrip())
+        lines += _comments(f"mean plane {law.initial_separation:.9g} mm below the highest point")
+        sample = sample_patch(law, place, tolerance=tolerance, most=most)
         if not len(sample):
             lines += _comments(_OPEN.format(law.first_touch))
             continue
-        name = "PATCH_{}_{}".format(*table.patches.unravel(index))
+        name = f"{place.kind}_{place.label}".upper()
         lines += _interaction(name, law, sample, extended=most is not None)
     return "".join(f"{line}\n" for line in lines)
-
-
-def _facts(table: LawTable, index: int) -> Iterator[str]:
-    """Yield what is known of a patch."""
-    (x0, x1), (y0, y1) = table.patches.bounds(index)
-    law = table[index]
-    ix, iy = table.patches.unravel(index)
-    yield f"Patch ({ix}, {iy}): {x0:.9g} < x < {x1:.9g}, {y0:.9g} < y < {y1:.9g} [mm]"
-    yield f"mean plane {law.initial_separation:.9g} mm below the highest point of the surface"
 
 
 def _interaction(name: str, law: PatchLaw, sample: LawSample, *, extended: bool) -> Iterator[str]:

@@ -13,8 +13,8 @@ import inspect
 from bisect import bisect_right
 from collections.abc import Callable
 
-from geometry import InputError
-from multiscale.exports.sampling import NO_FUNCTION, REMEDY
+from multiscale.exports.places import made_by, places
+from multiscale.exports.sampling import no_function
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 
@@ -81,7 +81,7 @@ _COPIED: tuple[Callable[..., object], ...] = (
 
 
 _HEAD = """\
-Contact law of patch ({ix}, {iy}) of a rough surface, written by patchlaw, for 4C.
+Contact law of {subject} of a rough surface, written by patchlaw, for 4C.
 
     CONTACT CONSTITUTIVE LAWS:
       - LAW: 1
@@ -90,47 +90,39 @@ Contact law of patch ({ix}, {iy}) of a rough surface, written by patchlaw, for 4
           Offset: 0.0
 
 Units: mm, N, MPa. The closure is -(gap + offset). Closure 0: a rigid plane at the height of the
-highest point of the surface. Flat faces of the mesh that just touch stand for this state; the mean
-plane of the patch lies {below:.9g} mm below.
-Patch: {x0:.9g} < x < {x1:.9g}, {y0:.9g} < y < {y1:.9g} [mm].
-{range}
+highest point of the roughness. Flat faces of the mesh that just touch stand for this state; the
+mean plane of the roughness lies {below:.9g} mm below.
+{extent}{range}
 The values are those of patchlaw's own interpolant, to rounding.
 Made by: {made_by}
 """
 _RANGE = """\
 First touch at a closure of {:.9g} mm. The law is known up to {:.9g} mm; beyond, its tangent
 continues."""
-_OPEN = "The patch stays open up to a closure of {:.9g} mm; the pressure is zero at any."
+_OPEN = "The law stays open, its pressure is zero. First touch at a closure of {:.9g} mm."
 
 
 def law_modules(table: LawTable) -> dict[str, str]:
-    """Return the names and texts of modules that evaluate the laws of all patches.
+    """Return the names and texts of modules that evaluate the laws, one each.
 
     Args:
         table: The laws.
 
     Raises:
-        InputError: When the pressure of a patch is a function of closure nowhere.
+        InputError: When the pressure of a law is a function of closure nowhere.
     """
     texts = {}
-    for index, law in enumerate(table.laws):
-        ix, iy = table.patches.unravel(index)
+    for place, law in zip(places(table), table.laws, strict=True):
         if law.is_flat:
-            raise InputError(NO_FUNCTION.format(ix, iy), allowed=REMEDY)
-        (x0, x1), (y0, y1) = table.patches.bounds(index)
+            raise no_function(place)
+        name = f"law_{place.label}.py"
         head = _HEAD.format(
-            ix=ix,
-            iy=iy,
-            x0=x0,
-            x1=x1,
-            y0=y0,
-            y1=y1,
-            name=(name := f"law_{ix}_{iy}.py"),
+            subject=place.subject,
+            name=name,
             below=law.initial_separation,
-            range="The patch stays open: no pressure."
-            if law.is_open
-            else _RANGE.format(*law.range),
-            made_by=", ".join(f"{key} {value}" for key, value in table.made_by.items()),
+            extent=f"Patch: {place.extent}.\n" if place.extent else "",
+            range=(_OPEN if law.is_open else _RANGE).format(*law.range),
+            made_by=made_by(table),
         )
         texts[name] = law_module_text(law, head)
     return texts

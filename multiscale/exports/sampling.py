@@ -8,17 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import InputError
+from multiscale.exports.places import Place
 from multiscale.laws.interpolation import LawPoint
-from multiscale.laws.law_table import LawTable, repaired_law
-from multiscale.laws.patch_law import PatchLaw
+from multiscale.laws.patch_law import PatchLaw, repaired_law
 
 Array = NDArray[np.float64]
 
 LEAST_PRESSURE = 0.01
 """Pressures below this part of the law's largest count as that much in relative errors."""
-
-NO_FUNCTION = "the pressure of patch ({}, {}) is no function of closure from first touch on"
-REMEDY = "csv, or other laws: coupling.kind = consistent, larger patches"
 
 _CANDIDATES = 128  # per interval between two rows of the law
 _FIRST_CANDIDATES = 1024  # in the first, where the pressure grows as the power 3/2
@@ -52,24 +49,29 @@ class LawSample:
 
 
 def sample_patch(
-    table: LawTable, index: int, *, tolerance: float, most: int | None = None
+    law: PatchLaw, place: Place, *, tolerance: float, most: int | None = None
 ) -> LawSample:
-    """Choose rows on the law of a patch, see `sample_law`.
+    """Choose rows on the law of a patch or region, see `sample_law`.
 
     Args:
-        table: The laws.
-        index: Flat index of the patch.
+        law: The law.
+        place: Where it holds.
         tolerance: Largest error, as in `LawSample`.
         most: Rows at most; the tolerance is raised until they suffice.
 
     Raises:
-        InputError: When the pressure is a function of closure nowhere; names the patch.
+        InputError: When the pressure is a function of closure nowhere; names the place.
     """
     try:
-        return sample_law(table[index], tolerance=tolerance, most=most)
+        return sample_law(law, tolerance=tolerance, most=most)
     except InputError:
-        problem = NO_FUNCTION.format(*table.patches.unravel(index))
-        raise InputError(problem, allowed=REMEDY) from None
+        raise no_function(place) from None
+
+
+def no_function(place: Place) -> InputError:
+    """Return the error of a law that contact programs cannot take."""
+    problem = f"the pressure of {place.subject} is no function of closure from first touch on"
+    return InputError(problem, allowed="csv, or consistent laws, or larger patches")
 
 
 def sample_law(law: PatchLaw, *, tolerance: float, most: int | None = None) -> LawSample:

@@ -9,20 +9,23 @@ from io import StringIO
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import InputError
+from geometry import InputError, Regions
 from multiscale.exports.sampling import sample_law
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 
 CSV_COLUMNS = (
-    "ix", "iy", "approach_mm", "closure_mm", "pressure_MPa", "stiffness_MPa_per_mm",
+    "approach_mm", "closure_mm", "pressure_MPa", "stiffness_MPa_per_mm",
     "contact_area_fraction", "separation_mm", "contacts",
 )  # fmt: skip
-"""Columns of ``laws.csv``."""
+"""Columns of ``laws.csv`` after those that say where the law holds: ix and iy, or the region.
+
+Laws of regions have the scatter of pressures between their samples as a last column.
+"""
 
 
 def csv_text(table: LawTable, tolerance: float) -> str:
-    """Return the text of ``laws.csv``: points on the laws, patch by patch, along the approach.
+    """Return the text of ``laws.csv``: points on the laws, one after the other, along the approach.
 
     Where the pressure is a function of closure, rows are chosen as for contact programs; beyond,
     they are the rows of the law. A patch that stays open has none.
@@ -33,10 +36,22 @@ def csv_text(table: LawTable, tolerance: float) -> str:
     """
     text = StringIO()
     writer = csv.writer(text)
-    writer.writerow(CSV_COLUMNS)
+    regions = isinstance(table.patches, Regions)
+    where, scatter = (("region",), ("pressure_scatter_MPa",)) if regions else (("ix", "iy"), ())
+    writer.writerow((*where, *CSV_COLUMNS, *scatter))
     for index, law in enumerate(table.laws):
-        writer.writerows((*table.patches.unravel(index), *row) for row in _rows_of(law, tolerance))
+        place = _place(table, index)
+        for row in _rows_of(law, tolerance):
+            more = (float(law.pressure_scatter(row[1])),) if regions else ()  # over the closure
+            writer.writerow((*place, *row, *more))
     return text.getvalue()
+
+
+def _place(table: LawTable, index: int) -> tuple[int | str, ...]:
+    """Return what says in a row where its law holds."""
+    if isinstance(table.patches, Regions):
+        return (table.patches.names[index],)
+    return table.patches.unravel(index)
 
 
 def _rows_of(law: PatchLaw, tolerance: float) -> Iterator[tuple[float, ...]]:

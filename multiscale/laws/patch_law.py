@@ -163,7 +163,7 @@ class PatchLaw:
         closures = np.asarray(closure, dtype=float)
         if self.is_open:
             return np.zeros(closures.shape)
-        rows = self.rows[: self._rising]
+        rows = self.rows[: self.rising_rows]
         return np.interp(closures, rows.closure, rows.pressure_scatter, left=0.0)
 
     def shifted(self, distance: float) -> PatchLaw:
@@ -231,3 +231,15 @@ class PatchLaws:
     def along(self, approach: Array) -> LawPoint:
         """Return what the laws give at local approaches, shape (N,) [mm]."""
         return self._curves.at(self._index, approach)
+
+
+def repaired_law(law: PatchLaw) -> PatchLaw:
+    """Return a law whose pressure rises; the same one where it does.
+
+    Args:
+        law: The law of a patch alone, as a table from elsewhere may have it.
+    """
+    if np.all(np.diff(law.rows.pressure) >= 0.0):
+        return law
+    rows, change = law.rows.with_rising_pressure()
+    return replace(law, rows=rows, repaired=max(change, law.repaired))

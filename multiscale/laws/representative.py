@@ -45,7 +45,8 @@ def representative_law(
     rises highest above its mean plane.
 
     Args:
-        samples: Periodic surfaces; they count by their areas.
+        samples: Periodic surfaces; they count by their areas. A map that does not continue
+            periodically is `geometry.mirrored` first.
         contact_modulus: E* [MPa].
         largest_pressure: Largest local pressure that the law will be used for [MPa].
         largest_closure: Largest local closure [mm]. Of both, what is reached first ends the law.

@@ -22,6 +22,7 @@ from multiscale.readable import quantity
 from multiscale.results.history import History, with_error
 from multiscale.results.html_page import filled
 from multiscale.run import Run
+from multiscale.setup.mesh_bodies import FaceFacts
 from multiscale.setup.problem import ProblemSetup
 
 LIBRARIES = "numpy scipy dolfinx petsc4py mpi4py gmsh h5py pydantic pint matplotlib".split()
@@ -100,7 +101,10 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
             "summits_in_reach": int(setup.interfering_summits.sum()),
             "border_maxima_in_reach": setup.interfering_border_maxima,
         },
-        "patches": list(setup.patches.grid),
+        "patches": None if setup.samples else list(setup.patches.grid),
+        "regions": list(setup.regions.names) if setup.regions else None,
+        "bodies": [_body(face) for face in (setup.face, setup.counter_face) if face is not None],
+        "contact_modulus_MPa": setup.materials.contact_modulus,
         "micro_model": _micro_model(setup),
         "ranks": 1 if run.comm is None else run.comm.size,
         "threads": os.environ.get("OMP_NUM_THREADS"),
@@ -121,6 +125,20 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
     }
     known: dict[str, Any] = to_jsonable_python(content, inf_nan_mode="null", fallback=str)
     return known
+
+
+def _body(face: FaceFacts) -> dict[str, Any]:
+    """Return what is known of a body and its contact face."""
+    return {
+        "mesh_sha256": face.digest or None,
+        "cells": face.cells,
+        "element": face.element,
+        "unknowns": face.unknowns,
+        "contact_area_mm2": face.area,
+        "contact_lengths_mm": list(face.lengths),
+        "depth_mm": face.depth,
+        "above_contact_plane": face.above,
+    }
 
 
 def _reference(run: Run) -> dict[str, Any] | None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from geometry.collective import on_root, shared
-from multiscale.laws.law_table import write_laws
+from multiscale.laws.law_file import write_laws
 from multiscale.output.report import provenance, report_html
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
 from multiscale.results.history import COLUMNS, History

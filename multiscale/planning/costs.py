@@ -115,9 +115,10 @@ def predicted_cost(setup: ProblemSetup, machine: Machine = THIS_MACHINE) -> Cost
         seconds |= _reference_seconds(setup, setup.meshes, steps, machine)
     else:
         seconds |= _contact_seconds(setup, steps, machine, on_mesh=on_mesh)
-    if isinstance(setup.micro, HalfSpaceModel) and (solutions := _shown_solutions(setup, steps)):
+    on_cells = isinstance(setup.micro, HalfSpaceModel) and not setup.samples
+    if on_cells and (solutions := _shown_solutions(setup, steps)):
         seconds["contact"] = machine.arrays * solutions * solution_time(setup)
-    if isinstance(setup.micro, HalfSpaceModel) and output.check != "none":
+    if on_cells and output.check != "none":
         solutions = (_ERROR_CHECK + setup.uses_laws) * (steps if output.check == "all" else 1)
         seconds["check"] = machine.arrays * solutions * solution_time(setup)
     if output.fields and setup.has_block and not (on_mesh or setup.meshes):
@@ -194,6 +195,9 @@ def step_count(load_history: LoadHistory) -> int:
 def _law_seconds(setup: ProblemSetup) -> float:
     """Return the time of tabulating laws [s], on the machine where it was measured."""
     rows = ROWS["summits" if setup.uses_summits else "cells"]
+    if setup.samples:
+        samples = sum(len(region.surfaces) for region in setup.samples)
+        return rows * _ROW * samples * solution_time(setup)
     if setup.scene.kind == "isolated":
         return rows * setup.interfering_patches * solution_time(setup, one_patch=True)
     return rows * (_ROW * solution_time(setup) + _PATCH_SUMS * setup.patches.count)

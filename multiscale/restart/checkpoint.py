@@ -6,7 +6,7 @@ import json
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -38,8 +38,8 @@ LEAST_INTERVAL = 1.0
 LEAST_RATIO = 20.0
 """Least wall time between two writes over that of a write; so writing takes 5 % at most."""
 
-_COLUMNS = [field.name for field in fields(LoadStep) if field.name != "patches"]
-_PATCH_COLUMNS = [field.name for field in fields(PatchState)]
+_COLUMNS = [one.name for one in fields(LoadStep) if one.name != "patches"]
+_PATCH_COLUMNS = [one.name for one in fields(PatchState)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -50,6 +50,7 @@ class Checkpoint:
         scene: The scene as it was given, as nested dictionaries.
         resolved: What the auto values of the scene became, see `resolved_sections`.
         heights: SHA-256 of the surface's heights.
+        meshes: SHA-256 of the meshes of the bodies.
         laws: Bytes of the law file; empty without laws.
         steps: The accepted load steps.
         position: Where the load history has come to.
@@ -65,6 +66,7 @@ class Checkpoint:
     position: LoadPosition
     state: Arrays
     contacts: tuple[ContactRecord, ...] = ()
+    meshes: list[str] = field(default_factory=list)
 
 
 def checkpoint_of(run: Run, state: Arrays) -> Checkpoint:
@@ -78,6 +80,7 @@ def checkpoint_of(run: Run, state: Arrays) -> Checkpoint:
         scene=run.given.model_dump(by_alias=True, mode="json"),
         resolved=run.resolved,
         heights=run.heights,
+        meshes=run.meshes,
         laws=run.law_bytes,
         steps=tuple(run.steps),
         position=run.position,
@@ -97,7 +100,7 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> Path:
         NotWritten: When the file cannot be written.
     """
     steps = checkpoint.steps
-    facts = {name: getattr(checkpoint, name) for name in ("scene", "resolved", "heights")}
+    facts = {name: getattr(checkpoint, name) for name in ("scene", "resolved", "heights", "meshes")}
     facts["steps"] = [[getattr(step, name) for name in _COLUMNS] for step in steps]
     record = (
         json.dumps(facts, default=np.generic.item),

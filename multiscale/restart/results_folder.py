@@ -147,9 +147,10 @@ def go_on(run: Run, found: Checkpoint, folder: Path) -> None:
         folder: Folder of the results, for messages.
 
     Raises:
-        InputError: When the heights have changed.
+        InputError: When the heights or the meshes have changed.
     """
     _refuse_changed_heights(folder, run, found.heights)
+    _refuse_changed_meshes(folder, run, found.meshes)
     run.resume(found.steps, found.position, found.state, found.laws, found.contacts)
 
 
@@ -164,6 +165,8 @@ def is_finished(folder: Path, run: Run) -> bool:
         facts = json.loads((folder / "provenance.json").read_text(encoding="utf-8"))
         _refuse_changed_keys(folder, run.given, facts["scene_given"])
         _refuse_changed_heights(folder, run, facts["surface"]["heights_sha256"])
+        meshes = [one["mesh_sha256"] for one in facts.get("bodies", ())]
+        _refuse_changed_meshes(folder, run, [one for one in meshes if one])
         return bool(facts["finished"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return False  # InputError is a ValueError
@@ -177,6 +180,19 @@ def _refuse_changed_heights(folder: Path, run: Run, heights: str) -> None:
             "run without --resume to begin anew",
             key="surface.file",
             value=run.given.surface.file,
+        )
+
+
+def _refuse_changed_meshes(folder: Path, run: Run, meshes: list[str]) -> None:
+    """Refuse to go on with bodies other than those that a run began with."""
+    if meshes != run.meshes:
+        body, counter = run.given.body, run.given.counter_body
+        key, section = ("body.mesh", body) if body else ("counter_body.mesh", counter)
+        raise InputError(
+            f"the meshes are not those that the run in {folder} began with; restore them, or run "
+            "without --resume to begin anew",
+            key=key,
+            value=section and section.mesh,
         )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
+from geometry.regions import Regions
 from multiscale.loading.load_step import LoadStep, PatchState
 from multiscale.results.history import PATCH_COLUMNS, History
 
@@ -38,7 +39,11 @@ def read_history(folder: str | Path) -> History:
     try:
         provenance = json.loads(path.read_text(encoding="utf-8"))
         lengths, grid = provenance["surface"]["lengths_mm"], provenance["patches"]
-        patches = PatchGrid(grid=tuple(grid), lengths=tuple(lengths))
+        patches: PatchGrid | Regions
+        if grid is None:
+            patches = Regions(tuple(provenance["regions"]))
+        else:
+            patches = PatchGrid(grid=tuple(grid), lengths=tuple(lengths))
         states = _patch_states(patch_rows, patches.count)
         steps = tuple(_load_step(row, state) for row, state in zip(rows, states, strict=True))
         seconds, notes = provenance["seconds"], tuple(provenance["notes"])

@@ -22,7 +22,7 @@ FLOORS = {
         "blocked_spline collective errors legendre_modes slope_search",
         "checks interpolant materials missing regions",
         "face_frame filters spectrum surface",
-        "facing patches statistics summits synthesis",
+        "facing mirroring patches statistics summits synthesis",
         "plausibility preparation rigid_plane",
         "files",
         "asperities meshes plane_equilibrium",

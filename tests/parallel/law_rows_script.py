@@ -9,7 +9,7 @@ from mpi4py import MPI
 from geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
 from micro import micro_model
 from multiscale.laws.consistent import consistent_laws
-from multiscale.laws.law_table import law_bytes
+from multiscale.laws.law_file import law_bytes
 from multiscale.laws.representative import representative_laws
 
 COMM = MPI.COMM_WORLD

@@ -15,8 +15,7 @@ from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from micro import influence_matrix
 from multiscale.couplings.condensed import equilibrium
-from multiscale.laws.law_table import repaired_law
-from multiscale.laws.patch_law import PatchLaw, PatchLaws
+from multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
 from multiscale.laws.rows import LawRows
 from multiscale.run import Run
 

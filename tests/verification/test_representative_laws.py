@@ -1,5 +1,7 @@
 """Representative laws against closed forms of wavy surfaces, a finite array, and a column."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from block_cases import block_of, interface_of
@@ -7,7 +9,7 @@ from half_space_cases import wave
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from geometry import Control, PatchGrid, Spectrum, Surface, synthesise
+from geometry import Control, PatchGrid, Spectrum, Surface, mirrored, synthesise
 from macro import LawContactProblem
 from micro import HalfSpaceModel
 from multiscale.laws.representative import representative_law
@@ -90,6 +92,27 @@ def test_the_middle_of_a_finite_array():
     made = law.at(0.06 - displacement[inner]).pressure
     assert np.ptp(pressure[inner]) > 0.3 * pressure[middle]
     assert np.abs(made / pressure[inner] - 1.0).max() < 0.05
+
+
+def test_measured_parts_are_mirrored():
+    """Quarters of a surface, as maps that do not continue periodically, against the whole.
+
+    Near full contact the law knows little of what sample it came from, and all of its steps.
+    """
+    spectrum = Spectrum(hurst=0.8, waves=(4, 16), rms_slope=0.1, seed=1)
+    whole = synthesise(spectrum, grid=(96, 96), lengths=(2.0, 2.0))
+    corners = [((i, i + 1.0), (j, j + 1.0)) for i in (0.0, 1.0) for j in (0.0, 1.0)]
+    quarters = [whole.cropped(x=x, y=y) for x, y in corners]
+
+    def separation(samples):
+        law = representative_law(samples, 1.0, largest_pressure=0.05)
+        closure = np.interp(0.05, law.rows.pressure, law.rows.closure)
+        return law.initial_separation - closure
+
+    exact = separation([whole])
+    continued = [replace(quarter, periodic=True) for quarter in quarters]
+    assert separation([mirrored(each) for each in quarters]) == pytest.approx(exact, rel=0.1)
+    assert separation(continued) > 1.2 * exact  # the ridges around them keep the faces apart
 
 
 @pytest.mark.parametrize("mode", ["pointwise", "patchwise"])

@@ -52,9 +52,9 @@ def test_damage_costs_no_memory(tmp_path):
     code = (
         "import resource, sys; from pathlib import Path\n"
         "from geometry.errors import InputError\n"
-        "from multiscale.laws.law_table import read_laws\n"
+        "from multiscale.laws.law_file import read_laws\n"
         "from multiscale.storage import checksummed\n"
-        "from multiscale.laws.law_table import read_laws\n"
+        "from multiscale.laws.law_file import read_laws\n"
         "from multiscale.storage import checksummed\n"
         "def fill(file): file.attrs['format'] = 'patchlaw laws 2'\n"
         "path = Path(sys.argv[1])\n"

@@ -11,7 +11,7 @@ from scene_inputs import BASE
 from stored_inputs import READERS, flipped, originals, read, rewritten
 
 from geometry.errors import InputError
-from multiscale.laws.law_table import read_laws
+from multiscale.laws.law_file import read_laws
 from multiscale.restart.checkpoint import read_checkpoint
 from multiscale.storage import checksum
 

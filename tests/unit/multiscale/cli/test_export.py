@@ -8,7 +8,7 @@ from small_scene import SMALL_SCENE
 
 from multiscale.cli.command_line import main
 from multiscale.exports import FORMATS
-from multiscale.laws.law_table import read_laws
+from multiscale.laws.law_file import read_laws
 
 FILES = {"laws.csv", "laws_4c", "laws_abaqus.inp", "laws_calculix.inp"}
 LAWS = ("laws", "scene.toml", "--set", "coupling.kind=isolated", "patches.grid=[1, 2]", "--out")

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from geometry import InputError, PatchGrid
+from geometry import InputError, PatchGrid, Regions
 from multiscale.exports import FORMATS
 from multiscale.exports.export import export_laws, remove_exports
 from multiscale.exports.sampling import LEAST_PRESSURE, sample_law
@@ -220,9 +220,31 @@ def test_open_patches_have_no_interaction_and_no_pressure(tmp_path):
     table = table_of(law_of([], []), hertzian())
     (path,) = export_laws(table, tmp_path, "calculix")
     assert list(tables_in(path.read_text())) == ["PATCH_1_0"]
-    assert "stays open up to 0.008 mm" in path.read_text()
+    assert "It stays open: no surface interaction" in path.read_text()
     module = module_at(export_laws(table, tmp_path, "4c")[0])
     assert (module.evaluate(-0.5, 0.0), module.evaluate_derivative(-0.5, 0.0)) == (0.0, 0.0)
+
+
+REGIONS = {
+    ("outer ring", "Nabe (\u00d8 12)"): ["outer_ring", "nabe_12"],
+    ("a/b", "a b"): ["0", "1"],  # one label for both
+    ("\u00e4", "b"): ["0", "1"],  # a name without a letter that every program reads
+    ('say """', "b\n*STEP"): ["say", "b_step"],
+}
+
+
+@pytest.mark.parametrize(("names", "labels"), REGIONS.items())
+def test_regions_keep_their_names_where_programs_can_read_them(tmp_path, names, labels):
+    table = LawTable(patches=Regions(names), laws=(hertzian(), rough()), made_by={"of": names[0]})
+    (path,) = export_laws(table, tmp_path, "abaqus")
+    assert list(tables_in(path.read_text("ascii"))) == [f"REGION_{one}".upper() for one in labels]
+    assert "*STEP" not in path.read_text().splitlines()
+    for path, law in zip(export_laws(table, tmp_path, "4c"), table.laws, strict=True):
+        assert path.stem.removeprefix("law_") in labels
+        assert module_at(path).evaluate(-4e-3, 0.0) == pytest.approx(-law.pressure(4e-3), rel=1e-11)
+    (path,) = export_laws(table, tmp_path, "csv")
+    with path.open(encoding="utf-8", newline="") as file:
+        assert list(dict.fromkeys(row["region"] for row in csv.DictReader(file))) == list(names)
 
 
 def test_unknown_formats_are_refused(tmp_path):

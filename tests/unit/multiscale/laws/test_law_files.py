@@ -8,7 +8,8 @@ import pytest
 
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
-from multiscale.laws.law_table import LawTable, read_laws, write_laws
+from multiscale.laws.law_file import read_laws, write_laws
+from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.rows import LawRows, PlanePath
 from multiscale.storage import checksum, checksummed

@@ -1,14 +1,17 @@
 """Representative laws: their ends, the mean over samples, regions, and what they refuse."""
 
+import csv
 from dataclasses import replace
-from io import BytesIO
+from io import BytesIO, StringIO
 
 import numpy as np
 import pytest
 
 from geometry import InputError, Regions, Spectrum, Surface, synthesise
 from micro import HalfSpaceModel
-from multiscale.laws.law_table import LawTable, law_bytes, read_laws
+from multiscale.exports.export import export_texts
+from multiscale.laws.law_file import law_bytes, read_laws
+from multiscale.laws.law_table import LawTable
 from multiscale.laws.representative import representative_law, representative_laws
 
 MODULUS = 4000.0
@@ -205,6 +208,18 @@ def test_a_table_of_regions_survives_a_file(table):
     with pytest.raises(InputError, match="there is no such region") as caught:
         back["outer rings"]
     assert "nearest: outer ring" in str(caught.value)
+
+
+def test_regions_are_exported_by_name(table):
+    (text,) = export_texts(table, "csv").values()
+    rows = list(csv.DictReader(StringIO(text)))
+    assert {row["region"] for row in rows} == {"inner", "outer ring"}
+    last = [row for row in rows if row["region"] == "outer ring"][-1]
+    assert float(last["pressure_MPa"]) == pytest.approx(table["outer ring"].rows.pressure[-1])
+    assert float(last["pressure_scatter_MPa"]) > 0.0
+    (text,) = export_texts(table, "calculix").values()
+    assert "NAME=REGION_INNER" in text and "NAME=REGION_OUTER_RING" in text
+    assert list(export_texts(table, "4c")) == ["laws_4c/law_inner.py", "laws_4c/law_outer_ring.py"]
 
 
 def test_a_report_says_how_samples_scatter(table):

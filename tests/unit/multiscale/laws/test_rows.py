@@ -7,8 +7,9 @@ import pytest
 from scipy.optimize import minimize
 
 from geometry.patches import PatchGrid
-from multiscale.laws.law_table import LawTable, read_laws, repaired_law, write_laws
-from multiscale.laws.patch_law import PatchLaw
+from multiscale.laws.law_file import read_laws, write_laws
+from multiscale.laws.law_table import LawTable
+from multiscale.laws.patch_law import PatchLaw, repaired_law
 from multiscale.laws.rows import LawRows
 
 APPROACH = np.linspace(0.0, 8e-3, 9)

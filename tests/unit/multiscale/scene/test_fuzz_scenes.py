@@ -112,7 +112,7 @@ def test_block_of_a_kilometre_needs_no_layers_to_be_counted(tmp_path):
 @pytest.mark.parametrize(
     ("key", "value", "text"),
     [
-        ("load.approach", "1.1 mm", "[1.1]: presses the block to nothing (allowed: at most the"),
+        ("load.approach", "1.1 mm", "[1.1]: presses the body to nothing (allowed: at most the"),
         ("load.approach", "1e-300 mm", "'1e-300 mm': is out of any scale (allowed: 1e-15 to 1e+15"),
         ("load.approach", 10**400, "…: is not finite"),
         ("load.approach", "9**9**9**9 um", "'9**9**9**9 um': cannot be read as a quantity"),
@@ -131,7 +131,7 @@ def test_force_beyond_the_block(tmp_path):
     data = put(put(BASE, "coupling.kind", "concurrent"), "load", {"force": [1.0, "5 kN"]})
     path = tmp_path / "scene.toml"
     path.write_text(toml(data), encoding="utf-8")
-    message = r"load.force = \[1.0, 5000.0\]: presses the block to nothing \(allowed: at most E t"
+    message = r"load.force = \[1.0, 5000.0\]: presses the body to nothing \(allowed: at most E t"
     with pytest.raises(InputError, match=message):
         make_setup(Scene.load(path))
 

@@ -1,0 +1,159 @@
+"""The file of laws: columns of rows, with units, behind a checksum.
+
+Theory: demos/theory.md, section 10.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import fields
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import h5py
+import numpy as np
+
+from geometry import InputError, PatchGrid, Regions
+from multiscale.laws.law_table import LawTable, part_key
+from multiscale.laws.patch_law import PatchLaw, repaired_law
+from multiscale.laws.rows import LawRows, PlanePath
+from multiscale.storage import checksummed, stored_numbers, verified
+
+FORMAT = "patchlaw laws 3"
+_COLUMNS = {one.metadata.get("stored", one.name): one for one in fields(LawRows)}
+_SCALARS = {
+    "touch": "first_touch",
+    "reach": "initial_separation",
+    "interpolation_error": "interpolation_error",
+    "stiffness_error": "stiffness_error",
+    "warned_from": "warning_pressure",
+    "repaired": "repaired",
+}
+_PATH = "path"
+_PATH_UNITS = {"approach": "mm", "tilt": "1", "force": "N", "moment": "N mm"}
+
+
+def write_laws(path: Path, table: LawTable) -> None:
+    """Write all laws to one HDF5 file, see `law_bytes`.
+
+    Args:
+        path: File to write; one that exists is replaced.
+        table: The laws.
+    """
+    path.write_bytes(law_bytes(table))
+
+
+@lru_cache(maxsize=1)  # every checkpoint asks for the same
+def law_bytes(table: LawTable) -> bytes:
+    """Return the content of a law file.
+
+    It has a group ``patch_IX_IY`` per patch, or ``region_I`` per region, with a dataset per column,
+    and a group for the path of the plane where there is one. A checksum stands before the content;
+    see `multiscale.storage`.
+
+    Args:
+        table: The laws.
+    """
+
+    def fill(file: Any) -> None:
+        file.attrs["format"] = FORMAT
+        if isinstance(table.patches, Regions):
+            file.attrs["regions"] = table.patches.names
+        else:
+            file.attrs["patch_grid"] = table.patches.grid
+            file.attrs["lengths_mm"] = table.patches.lengths
+            file.attrs["origin_mm"] = table.patches.origin
+        file.attrs["force_error"] = table.force_error
+        for name, text in table.made_by.items():
+            file.attrs[f"made_by_{name}"] = text
+        for index, law in enumerate(table.laws):
+            group = file.create_group(table.key(index))
+            for name, column in _COLUMNS.items():
+                values = getattr(law.rows, column.name)
+                if values.any() or not column.metadata.get("optional"):
+                    stored = group.create_dataset(name, data=values)
+                    stored.attrs["unit"] = column.metadata["unit"]
+            for name, attribute in _SCALARS.items():
+                group.attrs[name] = getattr(law, attribute)
+            if np.isfinite(law.sample_area):
+                group.attrs["sample_area_mm2"] = law.sample_area
+        if table.path is not None:
+            group = file.create_group(_PATH)
+            for name, unit in _PATH_UNITS.items():
+                group.create_dataset(name, data=getattr(table.path, name)).attrs["unit"] = unit
+
+    return checksummed(fill)
+
+
+def read_laws(path: str | Path | BinaryIO) -> LawTable:
+    """Read a law file.
+
+    The pressure of a patch alone rises with the approach; where noise in a table from elsewhere
+    makes it fall, it is repaired, and the law states by how much (`PatchLaw.repaired`). Consistent
+    laws are taken as they are: neighbours that take load over make their pressures fall.
+
+    Args:
+        path: The file, by name or open.
+
+    Raises:
+        InputError: When the file cannot be read, is no law file, damaged, lacks anything, or was
+            written before law files had a checksum.
+    """
+    path = Path(path) if isinstance(path, str) else path
+    name = str(path) if isinstance(path, Path) else None
+    if isinstance(path, Path) and not path.is_file():  # reading a pipe would wait for its writer
+        raise InputError("is not a readable law file: there is no such file", file=name)
+    try:
+        with h5py.File(verified(path), "r") as file:
+            if file.attrs.get("format") != FORMAT:
+                raise InputError("is not a law file of patchlaw", file=name)
+            return _table(file)
+    except InputError as error:
+        raise error.located(file=name) from None
+    except Exception as error:  # h5py raises errors of many families
+        raise InputError(f"is not a readable law file: {error}", file=name) from None
+
+
+def _partition(file: Any) -> PatchGrid | Regions:
+    if "regions" in file.attrs:
+        return Regions(tuple(file.attrs["regions"]))
+    patches = PatchGrid(
+        grid=tuple(file.attrs["patch_grid"]),
+        lengths=tuple(file.attrs["lengths_mm"]),
+        origin=tuple(file.attrs["origin_mm"]),
+    )
+    if math.prod(patches.grid) > len(file):
+        raise InputError("lacks laws", value=patches.grid, allowed=f"{len(file)} groups")
+    return patches
+
+
+def _table(file: Any) -> LawTable:
+    patches = _partition(file)
+    made_by = {
+        name.removeprefix("made_by_"): str(text)
+        for name, text in file.attrs.items()
+        if name.startswith("made_by_")
+    }
+    laws = [_law(file[part_key(patches, index)]) for index in range(patches.count)]
+    if made_by.get("coupling") != "consistent":
+        laws = [repaired_law(law) for law in laws]
+    path = {name: stored_numbers(file[_PATH][name]) for name in _PATH_UNITS if _PATH in file}
+    return LawTable(
+        patches=patches,
+        laws=tuple(laws),
+        made_by=made_by,
+        force_error=float(file.attrs["force_error"]),
+        path=PlanePath(**path) if path else None,
+    )
+
+
+def _law(group: Any) -> PatchLaw:
+    found = {
+        one.name: stored_numbers(group[name])
+        for name, one in _COLUMNS.items()
+        if name in group or not one.metadata.get("optional")
+    }
+    scalars = {attribute: float(group.attrs[name]) for name, attribute in _SCALARS.items()}
+    scalars["sample_area"] = float(group.attrs.get("sample_area_mm2", np.nan))
+    return PatchLaw(rows=LawRows(**found), **scalars)

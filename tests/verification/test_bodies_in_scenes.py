@@ -1,0 +1,219 @@
+"""Scenes on bodies from meshes, against blocks, closed forms and each other."""
+
+import numpy as np
+import pytest
+from box_msh import write_box
+from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
+
+from geometry import BlockShape, InputError
+from multiscale import Scene
+from multiscale.run import Run
+
+CELLS, HEIGHT = (6, 6, 4), 1.0
+TICKS = BlockShape(interface=(1.0, 1.0), height=HEIGHT, cells=CELLS).ticks
+E, NU = 4000.0, 0.15
+CONSTANTS = {"young_modulus": E, "poisson_ratio": NU}
+HELD = [{"surface": "bottom"}]
+SPECTRUM = {"hurst": 0.9, "waves": [2, 4], "rms_slope": 0.2, "seed": 3}
+SURFACE = {"spectrum": SPECTRUM, "grid": [16, 16], "lengths": [1, 1]}
+SAMPLE = {**SURFACE, "lengths": [0.1, 0.1]}
+QUIET = {"figures": False, "report": False, "check": "none", "contact": "none"}
+PATCHES = {
+    "surface": SURFACE,
+    "patches": {"grid": [2, 2]},
+    "micro": {"finite_slopes": False},
+    "load": {"approach": "6 um", "steps": 2, "tilt": [1e-3, 0]},
+    "output": QUIET,
+}
+WAYS = {
+    "full": {"newton": "full"},
+    "condensed": {"newton": "condensed"},
+    "pointwise": {"interface": "pointwise"},
+}
+TURN = (Rotation.from_euler("x", -2.0) * Rotation.from_euler("y", 0.7)).as_matrix()
+"""Turns the face out of its plane, but not in it: its first axis stays that nearest to x."""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Folder with the cube, turned and shifted, and its mirror image above it."""
+    place = tmp_path_factory.mktemp("meshes")
+    x, y, z = TICKS
+    write_box(place / "cube.msh", TICKS)
+    write_box(place / "turned.msh", TICKS, turn=TURN, shift=(30.0, -20.0, 10.0))
+    write_box(place / "above.msh", (x, y, -z[::-1]))
+    write_box(place / "halves.msh", TICKS, halves=True)
+    return place
+
+
+def body(folder, name="cube", **changes):
+    found = {"mesh": str(folder / f"{name}.msh"), "contact": "top", "supports": HELD, **CONSTANTS}
+    return found | changes
+
+
+def done(*, table=None, **sections):
+    whole = Run(Scene.from_dict(sections))
+    whole.table = table
+    list(whole.load_steps())
+    return whole
+
+
+def forces(whole):
+    return np.array([step.force_N for step in whole.steps])
+
+
+@pytest.mark.parametrize("name", WAYS)
+def test_a_cube_from_a_file_is_the_block(folder, name):
+    coupling = {"coupling": {"kind": "isolated", "table_tolerance": 1e-2, **WAYS[name]}}
+    block = {"block": {**CONSTANTS, "cells": CELLS}}
+    expected = done(**PATCHES, **coupling, **block)
+    table = expected.table
+    assert forces(expected)[-1] > 0.1
+    found = done(**PATCHES, **coupling, body=body(folder), table=table)
+    assert forces(found) == pytest.approx(forces(expected), rel=1e-10)
+    found = done(**PATCHES, **coupling, body=body(folder, "turned"), table=table)
+    assert forces(found) == pytest.approx(forces(expected), rel=1e-9)
+    np.testing.assert_allclose(found.setup.face.lengths, [1, 1], rtol=1e-12)
+
+
+def test_laws_of_samples_do_not_depend_on_where_the_body_lies(folder):
+    sections = {"law": {"kind": "representative"}, "surface": SAMPLE, "output": QUIET}
+    load = {"load": {"force": "2 N", "steps": 2}}
+    here = done(**sections, **load, body=body(folder))
+    there = done(**sections, **load, body=body(folder, "turned"), table=here.table)
+    approach = [[step.approach_mm for step in whole.steps] for whole in (here, there)]
+    assert approach[1] == pytest.approx(approach[0], rel=1e-9)
+    block = {**CONSTANTS, "cells": CELLS, "lengths": [1, 1], "height": HEIGHT}
+    on_block = done(**sections, **load, block=block, table=here.table)
+    approach = [step.approach_mm for step in on_block.steps]
+    assert approach == pytest.approx([step.approach_mm for step in here.steps], rel=1e-10)
+
+
+def above(folder, **changes):
+    return body(folder, "above", contact="bottom", supports=[{"surface": "top"}], **changes)
+
+
+@pytest.mark.parametrize("name", WAYS)
+def test_two_equal_bodies_are_one_of_half_the_modulus(folder, name):
+    coupling = {"coupling": {"kind": "isolated", "table_tolerance": 1e-2, **WAYS[name]}}
+    one = done(**PATCHES, **coupling, body=body(folder, young_modulus=0.5 * E))
+    two = done(**PATCHES, **coupling, body=body(folder), counter_body=above(folder))
+    assert forces(two) == pytest.approx(forces(one), rel=1e-8)
+    assert two.unknowns in (None, 2 * one.unknowns if one.unknowns else None)
+
+
+ROLLERS = [
+    *HELD,
+    *({"surface": name, "displacement": [0, "free", "free"]} for name in ("left", "right")),
+    *({"surface": name, "displacement": ["free", 0, "free"]} for name in ("front", "back")),
+]
+
+
+def column(law, approach, height=HEIGHT, young_modulus=E):
+    """Return the pressure of a column without lateral strain in series with a law."""
+    confined = young_modulus * (1 - NU) / ((1 + NU) * (1 - 2 * NU))
+    compliance = height / confined
+
+    def excess(pressure):
+        return float(law.pressure(approach - compliance * pressure)) - pressure
+
+    return brentq(excess, 0.0, approach / compliance, xtol=1e-14)
+
+
+def test_a_column_in_series_with_the_law_of_a_sample(folder):
+    found = done(
+        surface=SAMPLE,
+        law={"kind": "representative", "seeds": [1, 2]},
+        body=body(folder, supports=ROLLERS),
+        load={"approach": "6 um", "steps": 2},
+        output=QUIET,
+    )
+    law = found.table.laws[0]
+    expected = [column(law, step.approach_mm) for step in found.steps]
+    assert forces(found) == pytest.approx(expected, rel=1e-10)  # on 1 mm²
+    peaks = [step.peak_pressure_MPa for step in found.steps]
+    assert peaks == pytest.approx(expected, rel=1e-8)  # residual of Newton's method at points
+
+
+def test_regions_are_columns_of_their_own_where_nothing_moves_sideways(folder):
+    smooth = {**SAMPLE, "spectrum": {**SPECTRUM, "rms_slope": 0.1}, "surface": "upper half"}
+    other = {"young_modulus": 2 * E, "poisson_ratio": 0}
+    found = done(
+        surface=SAMPLE,
+        law={"kind": "representative", "regions": [smooth]},
+        body=body(
+            folder,
+            "halves",
+            supports=[*HELD, {"surface": "top", "displacement": [0, 0, "free"]}][:1],
+            materials={"body": {**other, "young_modulus": E}, "other": other},
+            young_modulus=None,
+            poisson_ratio=None,
+        ),
+        load={"approach": "6 um", "steps": 1},
+        output=QUIET,
+    )
+    rows = found.history().patch_records()
+    assert [row["region"] for row in rows] == ["top", "upper half"]
+    assert rows[0]["pressure_MPa"] < rows[1]["pressure_MPa"]
+    areas = np.array([0.5, 0.5])
+    pressures = [row["pressure_MPa"] for row in rows]
+    assert found.steps[0].force_N == pytest.approx(areas @ pressures, rel=1e-12)
+
+
+def test_a_moved_support_is_an_approach(folder):
+    sections = {"law": {"kind": "representative"}, "surface": SAMPLE, "output": QUIET}
+    still = done(**sections, body=body(folder), load={"approach": "6 um", "steps": 1})
+    lifted = [{"surface": "bottom", "displacement": [0, 0, "2 um"]}]
+    found = done(
+        **sections,
+        body=body(folder, supports=lifted),
+        load={"approach": "4 um", "steps": 1},
+        table=still.table,
+    )
+    assert forces(found) == pytest.approx(forces(still), rel=1e-9)
+
+
+def test_a_crown_is_a_gap_of_the_face(folder, tmp_path):
+    """The same parabola as a key, and as nodes of the mesh that lie lower."""
+    sections = {"law": {"kind": "representative"}, "surface": SAMPLE, "output": QUIET}
+    load = {"approach": "6 um", "steps": 1}
+    crowned = {**sections, "law": {"kind": "representative", "crown": ["0.1 m", "inf"]}}
+    flat = done(**sections, body=body(folder), load=load)
+    found = done(**crowned, body=body(folder), load=load)
+    assert forces(found) < 0.95 * forces(flat)
+    half = 0.5 * np.array([step.approach_mm for step in found.steps])
+    assert found.coupling is not None and half > 0.0
+
+
+REFUSED = {
+    "contact": ({"contact": "topp"}, "body.contact = 'topp': the mesh has no surface .*did you me"),
+    "supports": ({"supports": [{"surface": "botom"}]}, "body.supports = 'botom': .*mean 'bottom'"),
+    "free": (
+        {"supports": [{"surface": "bottom", "displacement": ["free", 0, 0]}]},
+        "body.supports: the supports leave the body free to move: translation along x",
+    ),
+    "held contact": ({"supports": [{"surface": "top"}]}, "'top' is the contact face and cannot"),
+    "materials": (
+        {"young_modulus": None, "poisson_ratio": None, "materials": {"bodi": CONSTANTS}},
+        "body.materials = 'bodi': the mesh has no volume of this name; did you mean 'body'",
+    ),
+    "file": ({"mesh": "nowhere.msh"}, "there is no such file"),
+    "place": (
+        {"place": ["0.2 mm", 0]},
+        "body.place: the surface's rectangle, 1 × 1 mm, does not lie on the contact face, which "
+        "covers 80 % of it .*law.kind = 'representative'",
+    ),
+}
+
+
+@pytest.mark.parametrize(("changes", "text"), REFUSED.values(), ids=REFUSED)
+def test_bodies_that_do_not_fit_are_refused(folder, changes, text):
+    with pytest.raises(InputError, match=text):
+        Run(Scene.from_dict({**PATCHES, "body": body(folder, **changes)}))
+
+
+def test_faces_that_do_not_face_each_other_are_refused(folder):
+    upside = body(folder, "above", contact="left", supports=[{"surface": "top"}])
+    with pytest.raises(InputError, match=r"counter_body.contact: does not face the body"):
+        Run(Scene.from_dict({**PATCHES, "body": body(folder), "counter_body": upside}))
