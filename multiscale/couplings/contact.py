@@ -95,7 +95,7 @@ class ContactCoupling:
 
         return on_root(self._comm, solve)
 
-    def _energies(self) -> dict[str, float | None]:
+    def _energies(self) -> dict[str, Any]:
         """Return elastic energy and plastic work at the latest load step, where they are known."""
         state = self.latest
         if not isinstance(state, HalfSpaceState):
