@@ -28,7 +28,7 @@ FLOORS = {
         "asperities meshes plane_equilibrium",
     ],
     "micro": [
-        "closed_forms contact_detail",
+        "closed_forms conductance contact_detail",
         "compliance model",
         "contact interaction",
         "half_space islands",
