@@ -238,6 +238,11 @@ class HalfSpaceModel:
         depth = [] if state.plastic_depth is None else [state.plastic_depth]
         return Pressed(response, state.plane, (state.pressure, state.plane, *depth), state)
 
+    @staticmethod
+    def guess(start: Any) -> Any:
+        """Return what `press` starts from, without the plastic depth that loads before left."""
+        return start and start[:2]
+
     def stiffness(self, state: HalfSpaceState, *, turns: bool) -> tuple[float, int]:
         """Return dF/dδ of a solution with one more linear one; see `MicroModel.stiffness`."""
         return self._contact.stiffness(state, turns=turns)

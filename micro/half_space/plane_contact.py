@@ -214,6 +214,7 @@ class HalfSpaceState:
             y=surface.y,
             pressure=self.pressure,
             gap=self.gap,
+            plastic_depth=self.plastic_depth,
         )
 
     @property

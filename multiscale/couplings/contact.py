@@ -90,20 +90,24 @@ class ContactCoupling:
                 newton_iterations=int(response.iterations[0]),
                 warnings=response.warnings,
                 peak_pressure_MPa=self.latest.peak_pressure,
-                **self._energies(),
+                **self._of_cells(),
             )
 
         return on_root(self._comm, solve)
 
-    def _energies(self) -> dict[str, Any]:
-        """Return elastic energy and plastic work at the latest load step, where they are known."""
+    def _of_cells(self) -> dict[str, Any]:
+        """Return the energies at the latest load step, and what has yielded, where known."""
         state = self.latest
         if not isinstance(state, HalfSpaceState):
             return {}
-        return {
+        found = {
             "elastic_energy_mJ": state.elastic_energy,
             "plastic_work_mJ": state.plastic_work,
         }
+        if state.plastic_depth is not None:
+            found["yielding_area_fraction"] = float(np.mean(state.yielding))
+            found["plastic_depth_mm"] = float(state.plastic_depth.max())
+        return found
 
     @property
     def past(self) -> Any:

@@ -24,13 +24,17 @@ Array = NDArray[np.float64]
 BALANCE = 1e-3
 """Energy that may be missing, relative to the largest, before a run says so. Finite slopes of
 second order are no gradient of an energy; without them it is the residual of the contact."""
+_NO_MOMENT = 1e-6
+"""Work of moments, relative to that of the force, that is rounding."""
 
 
 def with_work(step: LoadStep, before: LoadStep | None) -> LoadStep:
     """Return a load step with the work of the plane since the start.
 
-    Between load steps the work is that of the trapezoidal rule, with its end correction where the
-    stiffness is known and the slopes stay.
+    Up to the first load step it is 3/5 F²/k, as of a force that grows by Hertz' law to the force F
+    and stiffness k, wherever the plane first touched. Between load steps it is that of the
+    trapezoidal rule, with its end correction where the stiffness is known and the slopes stay or
+    have no moment.
 
     Args:
         step: A load step.
@@ -38,19 +42,22 @@ def with_work(step: LoadStep, before: LoadStep | None) -> LoadStep:
     """
     if step.elastic_energy_mJ is None:
         return step
-    stiffness: float | None
+    stiffness = step.stiffness_N_per_mm
     if before is None:
-        motion, load = np.array([step.approach_mm, *step.tilt]), np.zeros(3)
-        done, stiffness = 0.0, 0.0  # nothing is touched
-        if step.force_N == 0.0:
-            motion[:] = 0.0
-    else:
-        motion, load = _motion(step) - _motion(before), _load(before)
-        done, stiffness = before.work_mJ or 0.0, before.stiffness_N_per_mm
-    work = 0.5 * float((load + _load(step)) @ motion)
-    if stiffness is not None and step.stiffness_N_per_mm is not None and not motion[1:].any():
-        work += motion[0] ** 2 * (stiffness - step.stiffness_N_per_mm) / 12.0
-    return replace(step, work_mJ=done + work)
+        return replace(step, work_mJ=_first_work(step, stiffness))
+    motion, load, ahead = _motion(step) - _motion(before), _load(before), _load(step)
+    work = 0.5 * float((load + ahead) @ motion)
+    turning = np.abs(motion[1:]) @ (np.abs(load[1:]) + np.abs(ahead[1:]))
+    earlier = before.stiffness_N_per_mm
+    if earlier is not None and stiffness is not None and turning <= _NO_MOMENT * abs(work):
+        work += motion[0] ** 2 * (earlier - stiffness) / 12.0
+    return replace(step, work_mJ=(before.work_mJ or 0.0) + work)
+
+
+def _first_work(step: LoadStep, stiffness: float | None) -> float:
+    if stiffness:
+        return 0.6 * step.force_N**2 / stiffness
+    return 0.5 * float(_load(step) @ _motion(step)) if step.force_N else 0.0
 
 
 def missing_energy(steps: Sequence[LoadStep]) -> float:

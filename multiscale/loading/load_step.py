@@ -68,6 +68,10 @@ class LoadStep:
             known [mJ].
         plastic_work_mJ: Work of the hardness on the plastic depth, since the start [mJ]; None where
             it is not known.
+        yielding_area_fraction: Area that bears the hardness over nominal contact area; None without
+            a hardness.
+        plastic_depth_mm: Largest plastic depth that the loads so far have left [mm]; None without a
+            hardness.
         work_mJ: Work of the forces on the plane, since the start [mJ]; None where no energy is
             known.
         errors: Causes of the error, and how much each may change the force at this approach [N];
@@ -98,6 +102,8 @@ class LoadStep:
     elastic_energy_mJ: float | None = None
     plastic_work_mJ: float | None = None
     work_mJ: float | None = None
+    yielding_area_fraction: float | None = None
+    plastic_depth_mm: float | None = None
     errors: tuple[tuple[str, float], ...] = ()
 
     @classmethod

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
@@ -146,6 +147,11 @@ class LoadHistory:
     def largest(self) -> float:
         """Largest value of the prescribed quantity."""
         return max(self.points)
+
+    @property
+    def unloads(self) -> bool:
+        """Whether the load falls anywhere."""
+        return any(later < earlier for earlier, later in pairwise(self.points))
 
     def control(self, value: float) -> Control:
         """Return what a load step to a value of the prescribed quantity prescribes."""

@@ -30,7 +30,7 @@ from multiscale.storage import (
     write_bytes,
 )
 
-FORMAT = "patchlaw checkpoint 5"
+FORMAT = "patchlaw checkpoint 6"
 FILE_NAME = "checkpoint.h5"
 
 LEAST_INTERVAL = 1.0

@@ -130,6 +130,8 @@ class History:
     elastic_energy_mJ = Column("Energy of the elastic deformation", "mJ")
     plastic_work_mJ = Column("Work of the hardness on the plastic depth", "mJ")
     work_mJ = Column("Work of the forces on the plane", "mJ")
+    yielding_area_fraction = Column("Area that bears the hardness over nominal contact area")
+    plastic_depth_mm = Column("Largest plastic depth that the loads so far have left", "mm")
 
     steps: tuple[LoadStep, ...]
     patches: PatchGrid | Regions

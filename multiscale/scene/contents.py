@@ -82,7 +82,10 @@ class SceneSections(Section):
     @model_validator(mode="after")
     def _fit_together(self) -> Self:
         """Refuse sections that make no sense together, with the first reason."""
-        of_all = self._problems_of_bodies, self._problems_of_surfaces, self._problems_of_couplings
+        of_all = (
+            *(self._problems_of_bodies, self._problems_of_surfaces, self._problems_of_couplings),
+            self._problems_of_hardness,
+        )
         for problems in of_all:
             for key, text in problems():
                 raise PydanticCustomError("sections", "{text}", {"key": key, "text": text})
@@ -156,6 +159,31 @@ class SceneSections(Section):
             )
         if self.law.representative:
             yield from self._problems_of_representative_laws()
+
+    def _problems_of_hardness(self) -> Iterator[Problem]:
+        """Yield what has no plastic depth, or forgets it."""
+        if self.micro.hardness is None:
+            return
+        if self.micro.model != "half-space":
+            yield (
+                "micro.hardness",
+                f"does not go with micro.model = '{self.micro.model}', which has no cells to yield "
+                "(allowed: micro.model = 'half-space')",
+            )
+        if self.kind in ("isolated", "reference"):
+            yield (
+                "micro.hardness",
+                f"does not go with coupling.kind = '{self.kind}', which is elastic (allowed: "
+                "coupling.kind = 'concurrent', 'consistent' or 'analytic')",
+            )
+        with_laws = self.kind in ("consistent", "representative", "auto")
+        if with_laws and self.loading.load_history.unloads:
+            yield (
+                "micro.hardness",
+                "does not go with a load that turns back where patch laws stand for the contact: "
+                "they are those of rising loads and have no plastic depth (allowed: "
+                "coupling.kind = 'concurrent')",
+            )
 
     def _problems_of_representative_laws(self) -> Iterator[Problem]:
         """Yield the keys that a law of a periodic sample has no use for."""

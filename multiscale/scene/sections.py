@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
@@ -253,6 +254,15 @@ class MicroSection(Section):
     not given they do with half-space contacts, unless laws are isolated."""
     border: Literal["ignore", "include"] = "ignore"
     """Whether maxima on the surface's border carry load."""
+    hardness: Annotated[Pressure, Field(gt=0)] | None = None
+    """Hardness of the softer body, about 2.8 to 3 times its yield strength (Tabor 1951): no contact
+    pressure exceeds it, and what it leaves of the overlap stays as plastic depth. Contacts are
+    elastic when not given. It needs half-space contacts."""
+
+    @property
+    def upper(self) -> float:
+        """Largest contact pressure [MPa]; infinite without a hardness."""
+        return math.inf if self.hardness is None else self.hardness
 
     @model_validator(mode="after")
     def _chooses_or_states(self) -> Self:

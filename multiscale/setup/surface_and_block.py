@@ -219,6 +219,7 @@ def check_load(scene: Scene, surface: Surface, body: Bulk) -> None:
             allowed=f"at least {resolved:.3g} mm, for heights of this size",
             file=scene.file,
         )
+    _check_hardness(scene, body.area)
     if scene.kind == "analytic":
         return
     if loading.force is not None:
@@ -235,6 +236,21 @@ def check_load(scene: Scene, surface: Surface, body: Bulk) -> None:
             allowed=f"at most {named}, {most:.6g} {unit}",
             file=scene.file,
         )
+
+
+def _check_hardness(scene: Scene, area: float) -> None:
+    """Refuse forces whose mean pressure the hardness does not bear anywhere."""
+    force, hardness = scene.loading.force, scene.micro.hardness
+    if force is None or hardness is None or hardness > (mean := max(force) / area):
+        return
+    raise InputError(
+        "leaves no equilibrium: even where all of the face touches, the force of "
+        f"{max(force):.6g} N on {area:.6g} mm² needs a mean pressure of {mean:.6g} MPa",
+        key="micro.hardness",
+        value=f"{hardness:.6g} MPa",
+        allowed=f"> {mean:.6g} MPa, or a smaller load.force",
+        file=scene.file,
+    )
 
 
 @contextmanager
