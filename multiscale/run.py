@@ -132,6 +132,10 @@ class Run:
                 with self.phase("contact"):
                     step = self._recorder.with_stiffness(step, coupling)
                     step = with_work(step, self.steps[-1] if self.steps else None)
+                    if self.scene.conductance is not None:
+                        from multiscale.conductances import conducting  # others do without
+
+                        step = conducting(step, coupling, self.setup)
                 self.steps.append(self._checked(step))
                 self.make_contact(last=self.finished)
                 yield self.steps[-1]
@@ -258,6 +262,10 @@ class Run:
         if not self.setup.samples:
             notes += yielding_notes(self.steps, self.scene.micro.hardness)
         notes += energy_notes(self.steps)
+        if self.scene.conductance is not None:
+            from multiscale.conductances import conductance_notes  # other scenes do without
+
+            notes += conductance_notes(self.steps, with_laws=self.setup.uses_laws)
         return History(
             steps=steps,
             patches=self.setup.regions or self.setup.patches,

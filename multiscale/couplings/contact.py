@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Control, PatchGrid, overlaps
+from geometry import Control, InputError, PatchGrid, overlaps
 from geometry.collective import on_root
 from micro import (
     START_KINDS,
@@ -150,6 +150,25 @@ class ContactCoupling:
     def stiffness(self) -> tuple[float | None, int]:
         """Return dF/dδ at the latest load step, and its iterations; see `HasStiffness`."""
         return on_root(self._comm, lambda: self._model.stiffness(self.latest, turns=self._turns))
+
+    def interface_stiffness(self) -> float:
+        """Return dF/dδ of the contacts at the latest load step on half-spaces alone [N/mm].
+
+        Raises:
+            InputError: When the micro model has no cells.
+
+        Note:
+            Collective.
+        """
+
+        def found() -> float:
+            if not (
+                isinstance(self._model, HalfSpaceModel) and isinstance(self.latest, HalfSpaceState)
+            ):
+                raise InputError("contacts without cells have no conductance")
+            return self._model.interface_stiffness(self.latest)
+
+        return on_root(self._comm, found)
 
     def detail(self, latest: Any) -> ContactDetail:
         """Return the contact of a load step in detail; see `HasContact`."""

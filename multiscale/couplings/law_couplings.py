@@ -113,6 +113,7 @@ class EmbeddedCoupling:
 
         try:
             area_fraction, separation = means("contact_area_fraction"), means("separation")
+            stiffness = means("stiffness")
         except InputError as error:
             falls = not all(law.is_function for law in laws)
             raise beyond_law(control, str(error), self._table, falls=falls) from error
@@ -124,6 +125,7 @@ class EmbeddedCoupling:
             pressure=state.pressure,
             area_fraction=area_fraction,
             separation=separation,
+            stiffness=stiffness,
             **self._of_contacts(state),
             newton_iterations=state.newton_iterations,
             linear_iterations=state.linear_iterations,
@@ -215,6 +217,7 @@ class FreePlaneCoupling:
             area_fraction=point.contact_area_fraction,
             separation=point.separation,
             contacts=point.contacts,
+            stiffness=point.stiffness,
             newton_iterations=evaluations,
         )
 

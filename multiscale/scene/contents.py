@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from multiscale.scene.body_sections import BodySection, CounterBodySection, LawSection
+from multiscale.scene.conductance_section import ConductanceSection
 from multiscale.scene.coupling_sections import CouplingSection, LoadSection, ReferenceSection
 from multiscale.scene.sections import (
     BlockSection,
@@ -59,6 +60,8 @@ class SceneSections(Section):
     """The meshes of ``coupling.kind = "reference"``."""
     loading: Annotated[LoadSection, Field(alias="load")]
     """The motion of the rigid plane, or the force on it."""
+    conductance: ConductanceSection | None = None
+    """Thermal and electrical conductance of the interface, which are not found without it."""
     output: OutputSection = OutputSection()
     """What is written beside the tables of results."""
 
@@ -84,7 +87,7 @@ class SceneSections(Section):
         """Refuse sections that make no sense together, with the first reason."""
         of_all = (
             *(self._problems_of_bodies, self._problems_of_surfaces, self._problems_of_couplings),
-            self._problems_of_hardness,
+            *(self._problems_of_hardness, self._problems_of_conductance),
         )
         for problems in of_all:
             for key, text in problems():
@@ -183,6 +186,24 @@ class SceneSections(Section):
                 "does not go with a load that turns back where patch laws stand for the contact: "
                 "they are those of rising loads and have no plastic depth (allowed: "
                 "coupling.kind = 'concurrent')",
+            )
+
+    def _problems_of_conductance(self) -> Iterator[Problem]:
+        """Yield what does not know the stiffness of the interface alone."""
+        if self.conductance is None:
+            return
+        if self.kind == "reference":
+            yield (
+                "conductance",
+                "does not go with coupling.kind = 'reference', whose meshes do not tell the "
+                "stiffness of the interface from that of the block (allowed: coupling.kind = "
+                "'concurrent', 'consistent', 'isolated' or 'analytic')",
+            )
+        if self.kind in ("concurrent", "analytic", "auto") and self.micro.model != "half-space":
+            yield (
+                "conductance",
+                f"does not go with micro.model = '{self.micro.model}' without laws (allowed: "
+                "micro.model = 'half-space'; or coupling.kind = 'consistent' or 'isolated')",
             )
 
     def _problems_of_representative_laws(self) -> Iterator[Problem]:

@@ -52,7 +52,7 @@ FLOORS = {
         "compiled_forms exports results scene",
         "setup",
         "couplings",
-        "contact_recorder measured_errors",
+        "conductances contact_recorder measured_errors",
         "planning",
         "run",
         "output restart",
