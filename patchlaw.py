@@ -19,11 +19,13 @@ if TYPE_CHECKING:  # what `_HOMES` says, for editors and type checkers
         InputError,
         NotConverged,
         PatchGrid,
+        RigidPlane,
         Spectrum,
         Surface,
         read_surface,
         synthesise,
     )
+    from macro import ContactProblem, Interface, LawOperator, vector_space
     from micro import HalfSpaceModel
     from multiscale import (
         Comparison,
@@ -37,16 +39,18 @@ if TYPE_CHECKING:  # what `_HOMES` says, for editors and type checkers
         make_setup,
         read_history,
         read_laws,
+        representative_law,
         run,
         sweep,
     )
 
 _NAMES = {
-    "geometry": "Control InputError NotConverged PatchGrid Spectrum Surface read_surface "
-    "synthesise",
+    "geometry": "Control InputError NotConverged PatchGrid RigidPlane Spectrum Surface "
+    "read_surface synthesise",
+    "macro": "ContactProblem Interface LawOperator vector_space",
     "micro": "HalfSpaceModel",
     "multiscale": "Comparison History LawTable LoadStep Run Scene compare export_laws make_setup "
-    "read_history read_laws run sweep",
+    "read_history read_laws representative_law run sweep",
 }
 _HOMES = {name: package for package, names in _NAMES.items() for name in names.split()}
 

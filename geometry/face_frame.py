@@ -112,19 +112,19 @@ class FaceFrame:
         return self.axes[2]
 
     def in_plane(self, points: ArrayLike) -> Array:
-        """Return the coordinates along e1 and e2 of points (n, 3) [mm], shape (n, 2) [mm]."""
+        """Return the coordinates along e1 and e2 of points (…, 3) [mm], shape (…, 2) [mm]."""
         return (np.asarray(points, dtype=float) - self.origin) @ self.axes[:2].T
 
     def height(self, points: ArrayLike) -> Array:
-        """Return the heights of points (n, 3) [mm] above the plane along n, shape (n,) [mm]."""
+        """Return the heights of points (…, 3) [mm] above the plane, shape (…) [mm]."""
         return (np.asarray(points, dtype=float) - self.origin) @ self.axes[2]
 
     def in_space(self, places: ArrayLike, height: ArrayLike = 0.0) -> Array:
-        """Return the points in space of coordinates in the plane, shape (n, 3) [mm].
+        """Return the points in space of coordinates in the plane, shape (…, 3) [mm].
 
         Args:
-            places: Coordinates along e1 and e2, shape (n, 2) [mm].
-            height: Heights above the plane, shape (n,) or a number [mm].
+            places: Coordinates along e1 and e2, shape (…, 2) [mm].
+            height: Heights above the plane, shape (…) or a number [mm].
         """
         lifted = np.multiply.outer(np.asarray(height, dtype=float), self.axes[2])
         return self.origin + np.asarray(places, dtype=float) @ self.axes[:2] + lifted

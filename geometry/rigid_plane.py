@@ -101,15 +101,15 @@ class RigidPlane:
     Args:
         approach: δ at the centre of the rectangle [mm].
         tilt: Slopes (tx, ty) [mm/mm].
-        centre: Centre (xc, yc) of the rectangle [mm].
+        centre: Point (xc, yc) that the plane turns about, such as the centre of the rectangle [mm].
 
     Raises:
         InputError: When a number is not finite or the tilt is not a pair.
     """
 
     approach: float
-    tilt: tuple[float, float]
-    centre: tuple[float, float]
+    tilt: tuple[float, float] = (0.0, 0.0)
+    centre: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         _check_approach(self.approach)

@@ -2,7 +2,7 @@
 
 BlockShape → block_mesh → Block (with a Material) → LoadedFace (with a PatchGrid)
 → LawContactProblem (with one ContactLaw per patch) → LawContactState for every load step.
-A TaggedMesh makes a MeshedBody of any shape, which takes the place of the Block.
+A file → read_mesh → TaggedMesh makes a MeshedBody of any shape, which takes the place of the Block.
 
 `face_compliance` is the displacement of the contact face in smooth modes; rough_block_mesh → Block
 → UnilateralContactProblem meshes the roughness itself, as a reference.
@@ -11,10 +11,14 @@ A TaggedMesh makes a MeshedBody of any shape, which takes the place of the Block
 from geometry.materials import Material
 from macro.block import Block
 from macro.body_pair import BodyPair
+from macro.compat import vector_space
 from macro.compliance.face_compliance import FaceCompliance, face_compliance
 from macro.contact.contact_forces import ContactLaw
+from macro.contact.contact_problem import ContactProblem
 from macro.contact.face_pair import FacePair
 from macro.contact.face_regions import FaceRegions
+from macro.contact.interface import Interface
+from macro.contact.law_operator import LawOperator, LawsAtPoints
 from macro.contact.law_problem import LawContactProblem, LawContactState
 from macro.contact.loaded_face import (
     LoadedFace,
@@ -30,7 +34,10 @@ from macro.elastic_body import ElasticBody
 from macro.fields import AtPoints, write_fields, write_rough_fields
 from macro.mesh.block import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
 from macro.mesh.contact_face import ContactFacets, contact_facets
+from macro.mesh.from_file import read_mesh
+from macro.mesh.planar_face import PlanarFace, planar_face
 from macro.mesh.rough_surface import MeshQuality, rough_block_mesh
+from macro.mesh.supports import check_supports
 from macro.mesh.tagged import TaggedMesh
 from macro.meshed_body import MeshedBody, Support, Traction
 
@@ -44,28 +51,37 @@ __all__ = [
     "BodyPair",
     "ContactFacets",
     "ContactLaw",
+    "ContactProblem",
     "ElasticBody",
     "FaceCompliance",
     "FacePair",
     "FaceRegions",
+    "Interface",
     "LawContactProblem",
     "LawContactState",
+    "LawOperator",
+    "LawsAtPoints",
     "LoadedFace",
     "Material",
     "MeshQuality",
     "MeshedBody",
+    "PlanarFace",
     "Support",
     "TaggedMesh",
     "Traction",
     "UnilateralContactProblem",
     "UnilateralContactState",
     "block_mesh",
+    "check_supports",
     "contact_facets",
     "displacements_under",
     "face_compliance",
     "nodal_contact",
     "patch_compliance_matrix",
+    "planar_face",
+    "read_mesh",
     "rough_block_mesh",
+    "vector_space",
     "write_fields",
     "write_rough_fields",
 ]

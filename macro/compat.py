@@ -212,6 +212,29 @@ def lagrange_degree(space: Any) -> int:
     return int(element.degree if isinstance(element.degree, int) else element.degree())
 
 
+_NODES = {
+    ("tetrahedron", 4): 1,
+    ("tetrahedron", 10): 2,
+    ("hexahedron", 8): 1,
+    ("hexahedron", 27): 2,
+}
+
+
+def displacement_degree(space: Any) -> int | None:
+    """Return the degree of a continuous Lagrange space of three components, 1 or 2, else None.
+
+    Args:
+        space: Function space on any mesh.
+    """
+    mesh, nodes = space.mesh, space.dofmap
+    if nodes.index_map_bs != 3 or space.num_sub_spaces != 3 or mesh.geometry.dim != 3:
+        return None
+    layout = nodes.dof_layout
+    if len(layout.entity_dofs(0, 0)) != 1:  # vertices of other elements have no nodes of their own
+        return None
+    return _NODES.get((mesh.topology.cell_name(), layout.num_dofs))
+
+
 def cell_vertices(mesh: Any) -> NDArray[np.int32]:
     """Return the rows of ``mesh.geometry.x`` of every rank-local cell, shape (cells, vertices)."""
     geometry = mesh.geometry
@@ -312,6 +335,62 @@ def assemble_vector(form: Any) -> PETSc.Vec:
     vector = fem_petsc.assemble_vector(form)
     vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
     return vector
+
+
+def petsc_vector(function: Any) -> PETSc.Vec:
+    """Return PETSc's view of a function, ghosts included."""
+    return function.x.petsc_vec if hasattr(function.x, "petsc_vec") else function.vector
+
+
+def assemble_matrix_into(matrix: PETSc.Mat, form: Any, conditions: Sequence[Any]) -> None:
+    """Assemble a compiled bilinear form into the matrix that `assemble_matrix` made for it.
+
+    Args:
+        matrix: The matrix.
+        form: Compiled form.
+        conditions: Dirichlet conditions.
+
+    Note:
+        Collective.
+    """
+    matrix.zeroEntries()
+    fem_petsc.assemble_matrix(matrix, form, list(conditions), 1.0)
+    matrix.assemble()
+
+
+def assemble_vector_into(vector: PETSc.Vec, form: Any) -> None:
+    """Assemble a compiled linear form; ranks have their own contributions, ghosts included.
+
+    Args:
+        vector: A vector that `assemble_vector` made for the form.
+        form: Compiled form.
+    """
+    with vector.localForm() as local:
+        local.set(0.0)
+    fem_petsc.assemble_vector(vector, form)
+
+
+def lift(vector: PETSc.Vec, form: Any, conditions: Sequence[Any], values: PETSc.Vec) -> None:
+    """Add what a step to the prescribed values adds to a residual, before ranks are summed.
+
+    Args:
+        vector: The residual, with this rank's own contributions.
+        form: Compiled form of its derivative.
+        conditions: Dirichlet conditions.
+        values: The values now, ghosts up to date.
+    """
+    fem_petsc.apply_lifting(vector, [form], [list(conditions)], [values], -1.0)
+
+
+def write_misfit(vector: PETSc.Vec, conditions: Sequence[Any], values: PETSc.Vec) -> None:
+    """Write the present less the prescribed values into the constrained rows of a residual.
+
+    Args:
+        vector: The residual.
+        conditions: Dirichlet conditions.
+        values: The values now.
+    """
+    fem_petsc.set_bc(vector, list(conditions), values, -1.0)
 
 
 def collect_garbage(comm: PETSc.Comm) -> None:

@@ -94,7 +94,7 @@ def write_rough_fields(
     Note:
         Collective.
     """
-    block, mesh = problem.block, problem.block.mesh.mesh
+    block, mesh = problem.body, problem.body.mesh.mesh
 
     def functions() -> Iterator[tuple[int, list[Any]]]:
         space = compat.scalar_space(mesh, _file_degree(mesh))
@@ -172,7 +172,7 @@ def _vertex_pressures(problem: UnilateralContactProblem, state: UnilateralContac
     Single nodes of elements of degree 2 have no useful pressures: a vertex of a triangle has no
     tributary area, and one of a square far less than the middle node.
     """
-    block, top = problem.block, problem.top
+    block, top = problem.body, problem.top
     pressures = fem.Function(compat.scalar_space(block.mesh.mesh, 1))
     vertices, cells = compat.cell_nodes(pressures.function_space), compat.cell_nodes(block.space)
     cell_name = block.mesh.mesh.topology.cell_name()

@@ -23,6 +23,7 @@ from micro.closed_forms.love import influence_matrix
 from micro.compliance.body_modes import BodyModes, BodyStresses
 from micro.compliance.finite_slopes import FiniteSlopes, SurfaceStress, coarse_grid
 from micro.compliance.free_sides import FreeSides
+from micro.compliance.rectangle_fields import RectangleFields
 from micro.compliance.rectangle_modes import (
     half_space_modes,
     half_space_stress_modes,
@@ -57,6 +58,7 @@ __all__ = [
     "IslandModel",
     "MicroModel",
     "Pressed",
+    "RectangleFields",
     "Response",
     "RigidPlane",
     "ScaledModel",

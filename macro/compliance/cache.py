@@ -30,7 +30,7 @@ MOST_BYTES = 500_000_000
 
 _FORMAT = 3  # of the files; sources are part of the key anyway
 
-_SOURCES = "macro", "geometry"
+_SOURCES = "macro", "micro", "geometry"
 """Packages whose sources make the cached arrays."""
 
 _TOP = Path(__file__).resolve().parents[2]

@@ -26,7 +26,6 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.rigid_plane import Control
-from macro.block import Block
 from macro.contact.face_nodes import TopNodes
 from macro.contact.node_contact import (
     ContactSolution,
@@ -36,6 +35,7 @@ from macro.contact.node_contact import (
     largest,
     not_found,
 )
+from macro.contact.rough_face import RoughFace
 from macro.linear_solvers.constrained import ConstrainedSolver, contact_tolerance
 
 Array = NDArray[np.float64]
@@ -84,9 +84,9 @@ class PrimalDualActiveSet:
     """Finds contact at the nodes of a rough top; see the module.
 
     Args:
-        block: The block.
-        top: Nodes of its top.
-        plane: The plane over the nodes of the top.
+        face: The rough face.
+        top: Its nodes.
+        plane: The plane over them.
 
     Attributes:
         most_solves: Linear solves of a load step before it fails.
@@ -97,15 +97,15 @@ class PrimalDualActiveSet:
 
     most_solves = 100
 
-    def __init__(self, block: Block, top: TopNodes, plane: PlaneOverNodes) -> None:
-        self._block, self._top, self._plane = block, top, plane
-        self._comm = block.mesh.comm
+    def __init__(self, face: RoughFace, top: TopNodes, plane: PlaneOverNodes) -> None:
+        self._body, self._top, self._plane = face.body, top, plane
+        body, self._comm = face.body, face.body.comm
         # one layer of quadratic elements reaches as far as two of linear ones
-        self._solver = ConstrainedSolver(block.stiffness, block.solver.pc, layers=3 - block.degree)
+        self._solver = ConstrainedSolver(body.stiffness, body.solver.pc, layers=3 - body.degree)
         self._tolerance = contact_tolerance()
-        self._residual = block.stiffness.createVecRight()
-        self._history = Extrapolation(block.owned_dofs, len(top.dofs))
-        modulus, half = block.material.contact_modulus, plane.levers.half
+        self._residual = body.stiffness.createVecRight()
+        self._history = Extrapolation(body.owned_dofs, len(top.dofs))
+        modulus, half = face.modulus, plane.levers.half
         self._zero_force, self._rounding = _NO_FORCE * modulus * half**2, _ROUNDING * half
         self._springs = top.area * modulus * _SOFT / (2.0 * half)
 
@@ -116,7 +116,7 @@ class PrimalDualActiveSet:
             NotConverged: When the active set does not converge, nothing can hold the plane, or a
                 linear solve fails; earlier solutions stay what they were.
         """
-        guess, displacement = self._history.guess(control), self._block.stiffness.createVecRight()
+        guess, displacement = self._history.guess(control), self._body.stiffness.createVecRight()
         displacement.array[:] = guess.displacement
         placed = self._plane.placed(control, guess.plane)
         now = _Iterate(control, placed, displacement, guess.contact > 0.0)
@@ -226,7 +226,7 @@ class PrimalDualActiveSet:
 
     def _update_residual(self, displacement: PETSc.Vec) -> None:
         """Set the residual −K u of a displacement; on the top it is the contact forces."""
-        self._block.stiffness.mult(displacement, self._residual)
+        self._body.stiffness.mult(displacement, self._residual)
         self._residual.scale(-1.0)
 
     def _depth(self, now: _Iterate) -> Array:

@@ -18,14 +18,11 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
-from macro.block import Block
 from macro.contact.augmented_newton import LOOSEST, SPARE, AugmentedLaw, FacetNewton
 from macro.contact.contact_forces import ContactForces
 from macro.contact.equilibrium import Equilibrium
 from macro.contact.face_nodes import TopNodes
-from macro.contact.loaded_face import LoadedFace
 from macro.contact.node_contact import (
     ContactSolution,
     Extrapolation,
@@ -34,6 +31,7 @@ from macro.contact.node_contact import (
     largest,
     not_found,
 )
+from macro.contact.rough_face import RoughFace
 from macro.linear_solvers.constrained import contact_tolerance
 
 Array = NDArray[np.float64]
@@ -63,35 +61,34 @@ class AugmentedLagrangian:
     """Finds contact at the quadrature points of a rough top; see the module.
 
     Args:
-        block: The block.
-        top: Nodes of its top.
-        plane: The plane over the nodes of the top.
+        face: The rough face.
+        top: Its nodes.
+        plane: The plane over them.
 
     Attributes:
         law: Law of the quadrature points.
-        equilibrium: Equations of the block with this law.
+        equilibrium: Equations of the body with this law.
 
     Note:
         Everything here is collective.
     """
 
-    def __init__(self, block: Block, top: TopNodes, plane: PlaneOverNodes) -> None:
-        self._block, self._top, self._plane = block, top, plane
-        whole = PatchGrid(grid=(1, 1), lengths=block.mesh.shape.interface)
-        face = LoadedFace.of_block(block, whole, degree=2 * block.degree)
-        self._sampling = sampling = face.pointwise
+    def __init__(self, face: RoughFace, top: TopNodes, plane: PlaneOverNodes) -> None:
+        self._body, self._top, self._plane = face.body, top, plane
+        body, loaded = face.body, face.loaded(2 * face.body.degree)
+        self._sampling = sampling = loaded.pointwise
         (distance,) = top.with_ghosts(plane.distance)
-        points = face.quadrature
-        unit = block.material.contact_modulus / _facet_sizes(points.cell, points.weight)
+        points = loaded.quadrature
+        unit = face.modulus / _facet_sizes(points.cell, points.weight)
         self._stiff, self._soft = _HARD * unit, _SOFT * unit
         self._tolerance = contact_tolerance()
-        self._penetration = PENETRATION[block.degree]
+        self._penetration = PENETRATION[body.degree]
         self.law = AugmentedLaw(np.sum(points.values * distance[points.nodes], axis=1))
         none = np.zeros_like(points.x)  # the law has the distances between face and plane
-        self._forces = ContactForces(face, sampling, [self.law], none)
-        self.equilibrium = Equilibrium(block, self._forces)
-        self._newton = FacetNewton(self.equilibrium, self.law, face, top, plane)
-        self._history = Extrapolation(block.owned_dofs, len(points.x))
+        self._forces = ContactForces(loaded, sampling, [self.law], none)
+        self.equilibrium = Equilibrium(body, self._forces)
+        self._newton = FacetNewton(self.equilibrium, self.law, loaded, top, plane)
+        self._history = Extrapolation(body.owned_dofs, len(points.x))
 
     def solve(self, control: Control) -> ContactSolution:
         """Find the contact of a load step, with an initial guess from the steps before.
@@ -104,9 +101,9 @@ class AugmentedLagrangian:
         forces, law = self._forces, self.law
         forces.control, forces.plane = control, self._plane.placed(control, guess.plane)
         law.multiplier = np.maximum(guess.contact, 0.0)
-        displacement = self._block.stiffness.createVecRight()
+        displacement = self._body.stiffness.createVecRight()
         displacement.array[:] = guess.displacement
-        comm = self._block.mesh.comm
+        comm = self._body.comm
         steps, spent, tolerance, before = 0, 0, LOOSEST, np.inf
         law.slope, hardest = self._soft, self._stiff
         for _ in range(_MOST_UPDATES):
@@ -139,7 +136,7 @@ class AugmentedLagrangian:
         self._sampling.operator.mult(samples, load)
         nodal_force = -load.array_r[self._top.dofs]
         gap = -self._plane.penetration(plane, -displacement.array_r[self._top.dofs])
-        comm = self._block.mesh.comm
+        comm = self._body.comm
         pressed = largest(nodal_force, comm)
         touching = nodal_force > _NO_FORCE * pressed
         if pressed:

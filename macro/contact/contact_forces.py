@@ -66,6 +66,8 @@ class ContactForces:
         levers: Levers of this rank's samples about the middle of the patches.
         plane: Approach at the middle of the patches [mm] and slopes along x and y, shape (3,).
         control: What the load step prescribes of the plane.
+        slope: p'/w of this rank's samples at the latest `update`, shape (n,) [N/mm⁵].
+        comm: MPI communicator of the mesh.
 
     Note:
         Every method is collective.
@@ -78,17 +80,17 @@ class ContactForces:
         laws: Sequence[ContactLaw],
         gap: Array | None = None,
     ) -> None:
-        self._sampling, self._comm = sampling, face.comm
+        self._sampling, self.comm = sampling, face.comm
         self._pressures = [law.pressure for law in laws]
         self._stiffnesses = [law.stiffness for law in laws]
         patches = face.patches
         self.levers = PlaneLevers.at(
-            sampling.x, sampling.y, patches.lengths, centre=patches.middle, comm=self._comm
+            sampling.x, sampling.y, patches.lengths, centre=patches.middle, comm=self.comm
         )
         self._gap = sampling.depth if gap is None else gap
         self.plane: Array = np.zeros(3)
         self.control = Control(approach=0.0)
-        self._slope: Array = np.zeros(len(sampling.weight))  # p'/w
+        self.slope: Array = np.zeros(len(sampling.weight))  # p'/w
         self._border: Array = np.zeros((len(sampling.weight), 0))  # E
 
     def prescribe(self, control: Control, plane: Array) -> None:
@@ -150,7 +152,7 @@ class ContactForces:
     def update(self, displacement: PETSc.Vec) -> None:
         """Move the derivative to a displacement."""
         stiffness = self.stiffness(self.closure(displacement))
-        self._slope = stiffness / self._sampling.weight
+        self.slope = stiffness / self._sampling.weight
         self._border = self.border(stiffness)
 
     def add_stiffness(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
@@ -158,7 +160,7 @@ class ContactForces:
         operator, samples = self._sampling.operator, self._sampling.values
         operator.multTranspose(x, samples)
         stretch = samples.array_r
-        pressure = self._slope * stretch
+        pressure = self.slope * stretch
         if self._border.shape[1]:
             pressure -= self._border @ self.levers.summed(self._border.T @ stretch)
         samples.array[:] = pressure
@@ -169,11 +171,11 @@ class ContactForces:
 
         What a law raises on one rank is raised on all.
         """
-        return together(self._comm, lambda: self._sampling.by_patch(self._pressures, closure))
+        return together(self.comm, lambda: self._sampling.by_patch(self._pressures, closure))
 
     def stiffness(self, closure: Array) -> Array:
         """Return the laws' stiffnesses dp/dc likewise, shape (n,) [MPa/mm]."""
-        return together(self._comm, lambda: self._sampling.by_patch(self._stiffnesses, closure))
+        return together(self.comm, lambda: self._sampling.by_patch(self._stiffnesses, closure))
 
     def loads(self, pressure: Array) -> Array:
         """Return force and first moments about the middle of pressures, shape (3,) [N, N mm].

@@ -1,4 +1,4 @@
-"""The nodes of a block's top, the triangles between them, and their shares of the patches.
+"""The nodes of a rough face, the triangles between them, and their shares of the patches.
 
 Theory: section 12 of ``demos/theory.md``.
 """
@@ -19,10 +19,9 @@ from scipy.spatial import cKDTree
 
 from geometry.patches import PatchGrid
 from macro import compat
-from macro.block import Block
 from macro.contact.facet_area import FacetLattice, covered, facet_lattice
-from macro.mesh.block import TOP
-from macro.mesh.contact_face import top_facets, triangle_areas
+from macro.contact.rough_face import RoughFace
+from macro.mesh.contact_face import triangle_areas
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -32,21 +31,21 @@ _NO_AREA = 1e-9
 
 
 class TopNodes:
-    """Nodes of a block's top, and areas, patch sums and regions of contact from nodal values.
+    """Nodes of a rough face, and areas, patch sums and regions of contact from nodal values.
 
     The force and the area of a node on the border of patches are divided equally between the two or
     four patches there. Facets are divided into triangles between neighbouring nodes; squares are
     divided along both diagonals, with half the weight each.
 
     Args:
-        block: The block.
-        patches: Patches on its top.
+        face: The face, the top of its body.
+        patches: Patches on it, in its frame.
 
     Attributes:
         dofs: Vertical degrees of freedom of this rank's nodes of the top, shape (n,).
-        x: Abscissae of this rank's nodes, shape (n,) [mm].
+        x: Abscissae of this rank's nodes in the frame of the face, shape (n,) [mm].
         y: Their ordinates [mm].
-        height: Their heights [mm].
+        height: Their heights above its plane [mm].
         area: Their tributary areas, the integrals of their basis functions over the plane [mm²];
             none at the vertices of quadratic triangles.
         patches: The patches.
@@ -55,40 +54,42 @@ class TopNodes:
         Everything here is collective. A rank may have no node.
     """
 
-    def __init__(self, block: Block, patches: PatchGrid) -> None:
-        self._block, self.patches = block, patches
-        space = block.space
-        nodes = fem.locate_dofs_topological(space, 2, block.mesh.facet_tags.find(TOP))
+    def __init__(self, face: RoughFace, patches: PatchGrid) -> None:
+        self._face, self._body, self.patches = face, face.body, patches
+        space, tags = self._body.space, self._body.mesh.facet_tags
+        nodes = fem.locate_dofs_topological(space, 2, tags.find(face.marker))
         nodes = np.sort(nodes[nodes < space.dofmap.index_map.size_local])
         self.dofs = 3 * nodes + 2
-        self.x, self.y, self.height = space.tabulate_dof_coordinates()[nodes].T.copy()
+        points = space.tabulate_dof_coordinates()[nodes]
+        self.x, self.y = face.frame.in_plane(points).T.copy()
+        self.height = face.frame.height(points)
         self.area = self._areas()
         self._patch_areas = self.patch_sums(self.area)
 
     @cached_property
     def facets(self) -> Index:
         """Rank-local nodes of every facet of this rank's cells, shape (facets, nodes)."""
-        facets = top_facets(self._block.mesh)
-        cells = compat.cell_nodes(self._block.space)[facets.cell]
+        facets = self._face.facets
+        cells = compat.cell_nodes(self._body.space)[facets.cell]
         return np.take_along_axis(cells, self._lattice.nodes[facets.side], axis=1)
 
     @cached_property
     def triangles(self) -> tuple[Index, Array]:
         """Rank-local nodes of the triangles, shape (m, 3), and their weighted areas (m,) [mm²]."""
         triangles = self.facets[:, self._lattice.corners].reshape(-1, 3)
-        place = self._block.space.tabulate_dof_coordinates()[triangles, :2]
+        place = self._body.space.tabulate_dof_coordinates()[triangles, :2]
         weight = np.tile(self._lattice.weight, len(self.facets))
         return triangles, weight * triangle_areas(place)
 
     @cached_property
     def edges(self) -> Array:
         """Lengths of the edges opposite the triangles' corners, in the plane, (m, 3) [mm]."""
-        place = self._block.space.tabulate_dof_coordinates()[self.triangles[0], :2]
+        place = self._body.space.tabulate_dof_coordinates()[self.triangles[0], :2]
         return np.linalg.norm(np.roll(place, -1, axis=1) - np.roll(place, 1, axis=1), axis=2)
 
     @cached_property
     def _lattice(self) -> FacetLattice:
-        return facet_lattice(self._block.mesh.mesh.topology.cell_name(), self._block.degree)
+        return facet_lattice(self._body.mesh.mesh.topology.cell_name(), self._body.degree)
 
     def covered_area(self, touching: NDArray[np.bool_], nodal_force: Array, gap: Array) -> float:
         """Return the contact area, whose border may lie within facets; see `covered` [mm²].
@@ -99,11 +100,11 @@ class TopNodes:
             gap: Their gaps, shape (n,) [mm].
         """
         triangles, area = self.triangles
-        pressure = nodal_force / (self._thirds * self._block.material.contact_modulus)
+        pressure = nodal_force / (self._thirds * self._face.modulus)
         values = self.with_ghosts(touching.astype(float), pressure, gap)
         flags, pressure, gap = (value[triangles] for value in values)
         share = covered(flags > 0.5, pressure, gap, self.edges)
-        return float(self._block.mesh.comm.allreduce(float(area @ share)))
+        return float(self._body.comm.allreduce(float(area @ share)))
 
     def with_ghosts(self, *values: Array) -> list[Array]:
         """Return nodal values by rank-local node of the space, including ghosts.
@@ -111,10 +112,10 @@ class TopNodes:
         Args:
             values: Up to three fields of this rank's nodes of the top, shape (n,) each.
         """
-        owned = np.zeros(self._block.owned_dofs)
+        owned = np.zeros(self._body.owned_dofs)
         for axis, part in enumerate(values):
             owned[self.dofs - 2 + axis] = part
-        everywhere = self._block.function(owned).x.array
+        everywhere = self._body.function(owned).x.array
         return [everywhere[axis::3].copy() for axis in range(len(values))]
 
     def pressure(self, nodal_force: Array) -> Array:
@@ -157,7 +158,7 @@ class TopNodes:
         nodes, linked = self._numbers(self.facets[some]), linked[some]
         hub = np.where(linked, nodes, -1).max(axis=1, initial=-1)  # one node of every facet
         pairs = np.stack([np.broadcast_to(hub[:, None], nodes.shape)[linked], nodes[linked]])
-        pairs = np.concatenate(self._block.mesh.comm.allgather(pairs), axis=1)
+        pairs = np.concatenate(self._body.comm.allgather(pairs), axis=1)
         names, ends = np.unique(pairs, return_inverse=True)
         found = np.full(len(self.dofs), -1, dtype=np.intp)
         if not len(names):
@@ -177,7 +178,7 @@ class TopNodes:
         centres = self.patches.centres[empty]
         tree = cKDTree(np.stack([self.x, self.y], axis=1))
         apart = tree.query(centres)[0] if tree.n else np.full(len(centres), np.inf)
-        least = np.min(self._block.mesh.comm.allgather(apart), axis=0)
+        least = np.min(self._body.comm.allgather(apart), axis=0)
         # all nodes at the smallest distance
         near = tree.query_ball_point(centres, (1.0 + 1e-9) * least) if tree.n else []
         rows = np.concatenate([np.empty(0, dtype=np.intp), *map(np.asarray, near)]).astype(np.intp)
@@ -201,10 +202,10 @@ class TopNodes:
         return coo_array((entries, (rows, columns)), shape=(count, self.patches.count)).tocsr()
 
     def _areas(self) -> Array:
-        space, mesh = self._block.space, self._block.mesh
+        space, mesh = self._body.space, self._body.mesh
         test = ufl.TestFunction(space)
         ds = ufl.Measure("ds", domain=mesh.mesh, subdomain_data=mesh.facet_tags)
-        form = compat.compile_form(test[2] * ufl.FacetNormal(mesh.mesh)[2] * ds(TOP))
+        form = compat.compile_form(test[2] * ufl.FacetNormal(mesh.mesh)[2] * ds(self._face.marker))
         return compat.assemble_vector(form).array_r[self.dofs].copy()
 
     @cached_property
@@ -220,7 +221,7 @@ class TopNodes:
             nodes: Rank-local nodes of the top, any shape.
             values: Values for them, of the same shape.
         """
-        vector = self._block.stiffness.createVecRight()
+        vector = self._body.stiffness.createVecRight()
         rows = (3 * self._numbers(nodes).astype(np.int64) + 2).astype(PETSc.IntType)
         vector.setValues(rows.ravel(), values.ravel(), addv=True)
         vector.assemble()
@@ -228,8 +229,8 @@ class TopNodes:
 
     def _numbers(self, nodes: Index) -> Index:
         """Return the global numbers of rank-local nodes."""
-        index_map = self._block.space.dofmap.index_map
+        index_map = self._body.space.dofmap.index_map
         return index_map.local_to_global(nodes.ravel().astype(np.int32)).reshape(nodes.shape)
 
     def _sum(self, values: Array) -> Array:
-        return self._block.mesh.comm.allreduce(values, op=MPI.SUM)
+        return self._body.comm.allreduce(values, op=MPI.SUM)

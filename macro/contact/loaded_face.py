@@ -184,9 +184,15 @@ class LoadedFace:
     @cached_property
     def quadrature(self) -> FacetQuadrature:
         """Quadrature points of this rank."""
+        return facet_quadrature(
+            self.facets, self.space, self.patches, degree=self.quadrature_degree
+        )
+
+    @property
+    def quadrature_degree(self) -> int:
+        """Polynomial degree that the quadrature is exact for."""
         hexahedral = self.space.mesh.topology.cell_name() == "hexahedron"
-        degree = self.degree or (4 if hexahedral else 2) * compat.lagrange_degree(self.space)
-        return facet_quadrature(self.facets, self.space, self.patches, degree=degree)
+        return self.degree or (4 if hexahedral else 2) * compat.lagrange_degree(self.space)
 
     @cached_property
     def areas(self) -> Array:

@@ -141,14 +141,24 @@ class NewtonSolver:
     ) -> None:
         self._problem.update_tangent(displacement)
         if self.forcing:
-            now, wanted = self._residuals[-1], snes.getTolerances()[0]
-            snes.ksp.setTolerances(rtol=max(min(_LOOSEST, now), _SPARE * wanted / now))
+            wanted = snes.getTolerances()[0]
+            snes.ksp.setTolerances(rtol=newton_tolerance(self._residuals[-1], wanted))
 
     def _converged(self, snes: PETSc.SNES, _its: int, norms: tuple[float, float, float]) -> int:
         scale = self._problem.scale
         self._residuals.append(norms[2] / scale if scale > 0.0 else norms[2])
         done = norms[2] <= snes.getTolerances()[0] * scale
         return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE) if done else 0
+
+
+def newton_tolerance(now: float, wanted: float) -> float:
+    """Return the relative tolerance of a Newton step's linear solve, see `NewtonSolver`.
+
+    Args:
+        now: Relative residual before the step.
+        wanted: Relative residual that the steps aim at.
+    """
+    return max(min(_LOOSEST, now), _SPARE * wanted / now)
 
 
 class _SharedPreconditioner:

@@ -1,4 +1,4 @@
-"""A block whose rough top is meshed, under a rigid plane: one load step at a time.
+"""A body whose rough face is meshed, under a rigid plane: one load step at a time.
 
 Theory: section 12 of ``demos/theory.md``.
 """
@@ -22,6 +22,8 @@ from macro.contact.active_set import PrimalDualActiveSet
 from macro.contact.augmented_lagrangian import AugmentedLagrangian
 from macro.contact.face_nodes import TopNodes
 from macro.contact.node_contact import ContactSolution, PlaneOverNodes
+from macro.contact.rough_face import RoughFace
+from macro.elastic_body import ElasticBody
 
 Array = NDArray[np.float64]
 Method = Literal["active-set", "augmented-lagrangian"]
@@ -41,7 +43,7 @@ class UnilateralContactState:
         force: Normal force from the nodes [N].
         moment: First moments of the contact forces along x and y, about the middle of the
             interface, shape (2,) [N mm].
-        reaction: Force that the bottom bears [N]; equals ``force`` in equilibrium.
+        reaction: Force that the supports bear [N]; equals ``force`` in equilibrium.
         contact_area: Tributary area of the nodes in contact [mm²].
         contact_area_fine: Area whose border lies between nodes, see `covered` [mm²].
         nodes: Number of nodes in contact.
@@ -83,17 +85,18 @@ class UnilateralContactState:
 
 
 class UnilateralContactProblem:
-    """A block with a rough top, pressed by a rigid plane.
+    """A body with a rough face, its top, pressed by a rigid plane.
 
     Args:
-        block: The block; its top is where the mesh puts it.
-        reference_height: Height of the highest point of the top, from which the approach counts
-            [mm].
+        body: A block whose top is rough, or the rough face of any body.
+        reference_height: Height of the highest point above the plane of the face's frame, from
+            which the approach counts [mm].
         method: ``"active-set"``: no node of the top penetrates; ``"augmented-lagrangian"``: no
             quadrature point of its facets does.
         patches: Patches on the top, for forces and areas by patch; None: one of the whole top.
 
     Attributes:
+        body: The body.
         top: Nodes of the top, of this rank.
         method: The method that finds the contact.
 
@@ -107,7 +110,7 @@ class UnilateralContactProblem:
 
     def __init__(
         self,
-        block: Block,
+        body: Block | RoughFace,
         reference_height: float,
         *,
         method: Method = "active-set",
@@ -119,21 +122,16 @@ class UnilateralContactProblem:
                 value=method,
                 allowed=", ".join(get_args(Method)),
             )
-        lengths = block.mesh.shape.interface
-        patches = patches or PatchGrid(grid=(1, 1), lengths=lengths)
-        require_inside(lengths, patches)
-        if block.mesh.shape.margin:
-            raise InputError(
-                "the plane presses on the whole top, which has no margin",
-                value=block.mesh.shape.margin,
-                allowed="0 mm",
-            )
-        self.block, self.top = block, TopNodes(block, patches)
-        self._plane = PlaneOverNodes(
-            self.top.x, self.top.y, reference_height - self.top.height, lengths, block.mesh.comm
-        )
+        face = body if isinstance(body, RoughFace) else RoughFace.of_block(body)
+        patches = patches or face.whole
+        require_inside(face.lengths, patches)
+        self.body, self.top = face.body, TopNodes(face, patches)
+        x, y, distance = self.top.x, self.top.y, reference_height - self.top.height
+        if self.body.preload is not None:  # moved by its supports or other loads before contact
+            distance = distance - self.body.preload[self.top.dofs]
+        self._plane = PlaneOverNodes(x, y, distance, face.lengths, self.body.comm)
         kind = PrimalDualActiveSet if method == "active-set" else AugmentedLagrangian
-        self.method: PrimalDualActiveSet | AugmentedLagrangian = kind(block, self.top, self._plane)
+        self.method: PrimalDualActiveSet | AugmentedLagrangian = kind(face, self.top, self._plane)
 
     def solve(self, control: Control) -> UnilateralContactState:
         """Find the contact of one load step, with an initial guess from the steps before.
@@ -149,8 +147,8 @@ class UnilateralContactProblem:
             NotConverged: When an iteration fails, or nothing can hold the plane; the earlier
                 solutions stay what they were, so that a smaller step can be tried.
         """
-        state = _state(self.block, self.top, self._plane, self.method.solve(control))
-        compat.collect_garbage(self.block.stiffness.comm)
+        state = _state(self.body, self.top, self._plane, self.method.solve(control))
+        compat.collect_garbage(self.body.stiffness.comm)
         return state
 
 
@@ -189,17 +187,17 @@ def nodal_contact(problem: UnilateralContactProblem, state: UnilateralContactSta
     """
     top, force = problem.top, np.maximum(state.nodal_force, 0.0)
     own = (top.x, top.y, force, top.area, top.pressure(force), state.gap, state.region)
-    parts = problem.block.mesh.comm.allgather(own)
+    parts = problem.body.comm.allgather(own)
     columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
     order = np.lexsort((columns[1], columns[0]))
     return NodalContact(*(column[order] for column in columns))
 
 
 def _state(
-    block: Block, top: TopNodes, plane: PlaneOverNodes, found: ContactSolution
+    body: ElasticBody, top: TopNodes, plane: PlaneOverNodes, found: ContactSolution
 ) -> UnilateralContactState:
     """Return the state of a solution; collective."""
-    displacement = block.stiffness.createVecRight()
+    displacement = body.stiffness.createVecRight()
     displacement.array[:] = found.displacement
     downward = -found.displacement[top.dofs]
     gap = -plane.penetration(found.plane, downward)
@@ -210,15 +208,15 @@ def _state(
     weight = np.stack([top.area, top.area * gap, area, touching], axis=1)
     region, contacts = top.regions(touching)
     pressure = float(top.pressure(nodal_force).max(initial=0.0))
-    whole, volume, contact, nodes = block.mesh.comm.allreduce(weight.sum(axis=0), op=MPI.SUM)
+    whole, volume, contact, nodes = body.comm.allreduce(weight.sum(axis=0), op=MPI.SUM)
     return UnilateralContactState(
         approach=float(found.plane[0]),
         tilt=(float(found.plane[1]), float(found.plane[2])),
-        displacement=found.displacement,
+        displacement=found.displacement + (0.0 if body.preload is None else body.preload),
         nodal_force=found.nodal_force,
         force=float(loads[0]),
         moment=loads[1:],
-        reaction=block.reaction(displacement),
+        reaction=body.reaction(displacement),
         contact_area=float(contact),
         contact_area_fine=top.covered_area(touching, nodal_force, np.maximum(gap, 0.0)),
         nodes=round(nodes),
@@ -232,5 +230,5 @@ def _state(
         reason=found.reason,
         gap=gap,
         region=region,
-        peak_pressure=block.mesh.comm.allreduce(pressure, op=MPI.MAX),
+        peak_pressure=body.comm.allreduce(pressure, op=MPI.MAX),
     )

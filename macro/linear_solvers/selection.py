@@ -25,8 +25,9 @@ from petsc4py import PETSc
 from geometry.materials import Material
 from geometry.meshes.block import BlockShape
 from geometry.meshes.refined_block import RefinedShape
+from macro.linear_solvers.algebraic import algebraic_options
 from macro.linear_solvers.multigrid import Lattice, coarser_grids
-from macro.linear_solvers.multigrid_degrees import QUADRATIC_DEFAULTS, vertex_grid
+from macro.linear_solvers.multigrid_degrees import quadratic_options, vertex_grid
 from macro.linear_solvers.options import DIRECT_DEFAULTS, PREFIX, linear_solver
 
 COMPRESSIBLE = 0.45
@@ -106,9 +107,11 @@ def body_solver(
     requested = PETSc.Options(PREFIX).getString("pc_type", "")
     if not requested and poisson_ratio > COMPRESSIBLE and matrix.getSize()[0] <= FACTORISED:
         return linear_solver(matrix, preconditioner=DIRECT_DEFAULTS)
+    hexahedral = space.mesh.topology.cell_name() == "hexahedron"
     if degree == 2 and requested in ("", "mg"):
-        return linear_solver(matrix, vertex_grid(matrix, space, free), QUADRATIC_DEFAULTS)
-    return linear_solver(matrix)
+        options = quadratic_options(hexahedral=hexahedral)
+        return linear_solver(matrix, vertex_grid(matrix, space, free), options)
+    return linear_solver(matrix, preconditioner=algebraic_options(hexahedral=hexahedral))
 
 
 def smoothing(poisson_ratio: float, *, hexahedral: bool) -> Mapping[str, object]:

@@ -32,6 +32,7 @@ class FacetQuadrature:
         weight: Weights, whose sum over a patch and all ranks is its area, shape (n,) [mm²].
         patch: Flat index of the patch, ascending, shape (n,).
         cell: Rank-local cell that the point belongs to, shape (n,).
+        reference: Places on the reference cell, shape (n, 3).
         nodes: Rank-local nodes of that cell, shape (n, m).
         values: Basis functions of these nodes, shape (n, m).
     """
@@ -42,6 +43,7 @@ class FacetQuadrature:
     weight: Array
     patch: NDArray[np.intp]
     cell: NDArray[np.int32]
+    reference: Array
     nodes: NDArray[np.int32]
     values: Array
 
@@ -136,6 +138,7 @@ def facet_quadrature(
     positions = (triangles[:, :1] + np.einsum("qk,nkj->nqj", points, edges)).reshape(-1, 2)
     facet, patch = np.repeat(facet, len(weights)), np.repeat(patch, len(weights))
     local = facets.local(facet, positions)
+    reference = facets.pull_back(facet, local)
     return FacetQuadrature(
         x=positions[:, 0],
         y=positions[:, 1],
@@ -143,11 +146,10 @@ def facet_quadrature(
         weight=np.multiply.outer(2.0 * triangle_areas(triangles), weights).ravel(),
         patch=patch,
         cell=facets.cell[facet],
+        reference=reference,
         nodes=compat.cell_nodes(space)[facets.cell[facet]],
         values=compat.lagrange_values(
-            space.mesh.topology.cell_name(),
-            compat.lagrange_degree(space),
-            facets.pull_back(facet, local),
+            space.mesh.topology.cell_name(), compat.lagrange_degree(space), reference
         ),
     )
 

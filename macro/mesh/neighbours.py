@@ -81,6 +81,28 @@ def facets_between_ranks(mesh: Any) -> tuple[Ints, Ints, Ints]:
     return known[common], cell[common], side[common]
 
 
+def outer_sides(mesh: Any) -> tuple[Ints, Ints]:
+    """Return the outer facets of the cells that this rank owns.
+
+    Args:
+        mesh: dolfinx mesh.
+
+    Returns:
+        The cell of every facet and its index there, shapes (n,).
+
+    Note:
+        Collective.
+    """
+    facet, cell, side = _sides(mesh)
+    single = np.ones(len(facet), dtype=bool)
+    single[1:] &= facet[1:] != facet[:-1]
+    single[:-1] &= facet[:-1] != facet[1:]
+    _, others, places = facets_between_ranks(mesh)
+    sides = len(compat.reference_facets(mesh.topology.cell_name())[1])
+    single &= ~np.isin(sides * cell + side, sides * others + places)
+    return cell[single], side[single]
+
+
 def _sides(mesh: Any) -> tuple[Ints, Ints, Ints]:
     """Return the facets of all owned cells by ascending facet, the cells, and the places there."""
     topology = mesh.topology

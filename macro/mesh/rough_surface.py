@@ -1,4 +1,4 @@
-"""Meshes of a block whose top is the rough surface itself.
+"""Meshes of bodies whose contact face is the rough surface itself.
 
 Theory: section 12 of ``demos/theory.md``.
 """
@@ -32,6 +32,12 @@ _STEEPEST = 2.0
 
 _LEAST_BENT = 0.3
 """Relative volume below which the edges of a quadratic tetrahedron are made straight."""
+
+_FLAT = 1e-9
+"""Distance from a face, relative to the body, that is rounding."""
+
+_NODES_OF_CURVED = 10
+"""Nodes of a quadratic tetrahedron."""
 
 _EDGES = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])
 """Ends of a quadratic tetrahedron's edges, in dolfinx's order of the nodes 4 … 9 between them."""
@@ -78,19 +84,42 @@ def rough_block_mesh(
     Note:
         Collective.
     """
-    _check_cover(shape, surface)
-    _check_depth(shape, surface)
+    check_cover(shape, surface)
+    _check_depth(shape.height, surface)
     flat = block_mesh(shape, comm)
-    points = flat.mesh.geometry.x
+    return flat, move_onto(flat.mesh, surface, shape.height)
+
+
+def move_onto(mesh: Any, surface: Surface, depth: float) -> MeshQuality:
+    """Move the nodes below a planar face onto the roughness; see `rough_block_mesh`.
+
+    The face is the rectangle [0, Lx] × [0, Ly] at z = 0. Down to a depth below it the body must be
+    a block with vertical sides; the movement decays to that depth, and nothing moves below it.
+
+    Args:
+        mesh: The dolfinx mesh of a body with a flat face.
+        surface: The rough surface, which covers the face.
+        depth: Height of the block under the face [mm].
+
+    Raises:
+        InputError: When the body is no such block below the face, a valley is too deep for it, the
+            roughness is too steep for the mesh, or it turns a cell inside out.
+
+    Note:
+        Collective.
+    """
+    points, comm = mesh.geometry.x, mesh.comm
+    _check_depth(depth, surface)
+    _check_sides(mesh, surface, depth)
     x, y = (np.clip(points[:, k], 0.0, surface.lengths[k]) for k in (0, 1))
     rise = surface.height_at(x, y) - surface.mean_height if len(points) else np.empty(0)
     moved = points.copy()
-    moved[:, 2] += rise * (1.0 + points[:, 2] / shape.height) ** _DECAY
-    if isinstance(shape, RefinedShape) and shape.degree == 2:
-        _straighten(flat, moved)
+    moved[:, 2] += rise * np.maximum(1.0 + points[:, 2] / depth, 0.0) ** _DECAY
+    if compat.cell_vertices(mesh).shape[1] == _NODES_OF_CURVED:
+        _straighten(mesh, moved)
     quality = MeshQuality(
-        thinnest=float(comm.allreduce(_volumes(flat, moved).min(initial=np.inf), op=MPI.MIN)),
-        steepest=float(comm.allreduce(_steepest(flat, rise), op=MPI.MAX)),
+        thinnest=float(comm.allreduce(_volumes(mesh, moved).min(initial=np.inf), op=MPI.MIN)),
+        steepest=float(comm.allreduce(_steepest(mesh, depth, rise), op=MPI.MAX)),
     )
     if quality.steepest > _STEEPEST:
         raise InputError(
@@ -105,10 +134,19 @@ def rough_block_mesh(
             allowed=f"cells that keep {_LEAST_VOLUME:.0%} of their volume at every node",
         )
     points[:] = moved
-    return flat, quality
+    return quality
 
 
-def _check_cover(shape: BlockShape | RefinedShape, surface: Surface) -> None:
+def check_cover(shape: BlockShape | RefinedShape, surface: Surface) -> None:
+    """Refuse a surface that is not the top of a block.
+
+    Args:
+        shape: The flat block.
+        surface: The rough surface.
+
+    Raises:
+        InputError: When the rectangles differ, or the block has a margin.
+    """
     if shape.margin or not np.allclose(shape.interface, surface.lengths, rtol=1e-9, atol=0.0):
         raise InputError(
             "the rough surface must cover the block's top",
@@ -117,25 +155,40 @@ def _check_cover(shape: BlockShape | RefinedShape, surface: Surface) -> None:
         )
 
 
-def _check_depth(shape: BlockShape | RefinedShape, surface: Surface) -> None:
+def _check_depth(depth: float, surface: Surface) -> None:
     valley = surface.mean_height - float(surface.heights.min())
-    deepest = (1.0 - _LEAST_VOLUME) * shape.height / _DECAY
+    deepest = (1.0 - _LEAST_VOLUME) * depth / _DECAY
     if valley > deepest:
         raise InputError(
             "a valley of the roughness is too deep for the block",
             value=valley,
-            allowed=f"{deepest:.6g} mm below the mean, for a block {shape.height:g} mm high",
+            allowed=f"{deepest:.6g} mm below the mean, for a block {depth:g} mm high",
         )
 
 
-def _straighten(flat: BlockMesh, moved: Array) -> None:
+def _check_sides(mesh: Any, surface: Surface, depth: float) -> None:
+    """Refuse bodies that are wider, or higher, than the block under their face; collective."""
+    points, slack = mesh.geometry.x, _FLAT * max(*surface.lengths, depth)
+    above = points[points[:, 2] > -depth + slack]
+    beyond = np.maximum(-above, above - np.array([*surface.lengths, 0.0]))
+    beyond[:, 2] = above[:, 2]
+    worst = mesh.comm.allreduce(float(beyond.max(initial=0.0)), op=MPI.MAX)
+    if worst > slack:
+        raise InputError(
+            "the body is wider than its rough face within the depth that the roughness decays in",
+            value=worst,
+            allowed=f"a block of {surface.lengths} mm, from z = 0 to {-depth:g} mm",
+        )
+
+
+def _straighten(mesh: Any, moved: Array) -> None:
     """Move the middle nodes of edges onto the chord in cells that bend too much, on all ranks."""
-    cells, names = compat.cell_vertices(flat.mesh), flat.mesh.geometry.input_global_indices
+    cells, names = compat.cell_vertices(mesh), mesh.geometry.input_global_indices
     done: Array = np.empty(0, dtype=np.int64)
     while True:
         middles = cells[:, 4:]
-        found = np.unique(np.asarray(names)[middles[_volumes(flat, moved) < _LEAST_BENT]])
-        straight = np.union1d(done, np.concatenate(flat.comm.allgather(found)))
+        found = np.unique(np.asarray(names)[middles[_volumes(mesh, moved) < _LEAST_BENT]])
+        straight = np.union1d(done, np.concatenate(mesh.comm.allgather(found)))
         if len(straight) == len(done):
             return
         done = straight
@@ -144,27 +197,27 @@ def _straighten(flat: BlockMesh, moved: Array) -> None:
         moved[middles[cell, edge], 2] = moved[ends, 2].mean(axis=1)
 
 
-def _volumes(flat: BlockMesh, moved: Array) -> Array:
+def _volumes(mesh: Any, moved: Array) -> Array:
     """Return each cell's smallest ratio of the volumes at its nodes after and before a movement.
 
     Nodes move along z alone, which changes one row of the Jacobian matrix.
     """
-    cells, points = compat.cell_vertices(flat.mesh), flat.mesh.geometry.x
+    cells, points = compat.cell_vertices(mesh), mesh.geometry.x
     x, y, before, after = (row[cells] for row in (*points.T, moved[:, 2]))
     smallest = np.full(len(cells), np.inf)
-    degree = 2 if cells.shape[1] == 10 else 1
-    for slopes in compat.lagrange_gradients(flat.mesh.topology.cell_name(), degree):
+    degree = 2 if cells.shape[1] == _NODES_OF_CURVED else 1
+    for slopes in compat.lagrange_gradients(mesh.topology.cell_name(), degree):
         normal = np.cross(x @ slopes, y @ slopes)
         volumes = (np.einsum("ci,ci->c", normal, z @ slopes) for z in (after, before))
         np.minimum(smallest, np.divide(*volumes), out=smallest)
     return smallest
 
 
-def _steepest(flat: BlockMesh, rise: Array) -> float:
+def _steepest(mesh: Any, depth: float, rise: Array) -> float:
     """Return the largest slope between horizontal neighbours on the top."""
-    points = flat.mesh.geometry.x
-    cells = compat.cell_vertices(flat.mesh)
-    top = np.abs(points[:, 2]) < 1e-9 * flat.shape.height
+    points = mesh.geometry.x
+    cells = compat.cell_vertices(mesh)
+    top = np.abs(points[:, 2]) < _FLAT * depth
     cells = cells[top[cells].any(axis=1)]
     i, j = np.triu_indices(cells.shape[1], 1)
     a, b = cells[:, i].ravel(), cells[:, j].ravel()

@@ -41,7 +41,7 @@ fifth as high as wide. In cubes, half of it makes −10 to 1 %, no cut-off 5 to 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FreeSides:
-    """The four free sides of a rectangle on top of a block.
+    """Free sides of a rectangle on top of a block: all four of them, or some.
 
     Pressures continue periodically along a side, with twice its length as period. The decay length
     is less than that, so the continuation hardly matters.
@@ -52,6 +52,7 @@ class FreeSides:
         decay_length: λ [mm].
         share: E* of the contact over that of the block alone; less than 1 where a second body gives
             way too. Displacements are those for pressures over E* of the contact.
+        present: Whether the low x, high x, low y and high y sides are there.
 
     Raises:
         InputError: When a length is not positive, or ν out of its range.
@@ -61,6 +62,7 @@ class FreeSides:
     poisson_ratio: float
     decay_length: float
     share: float = 1.0
+    present: tuple[bool, bool, bool, bool] = (True, True, True, True)
 
     def __post_init__(self) -> None:
         given = (*self.lengths, self.decay_length)
@@ -127,8 +129,13 @@ class FreeSides:
         total += self._by_two(1, y, x).transpose(2, 0, 3, 1)
         return np.asarray(total.reshape(patches.count, patches.count))
 
+    def pair(self, axis: int) -> tuple[bool, bool]:
+        """Return whether the low and the high side across an axis are there."""
+        low, high = self.present[2 * axis : 2 * axis + 2]
+        return low, high
+
     def _by_two(self, axis: int, across: Array, along: Array) -> Array:
-        """Return what two opposite sides add, by intervals across and along them."""
+        """Return what two opposite sides add, those that are there, by intervals."""
         length, period = self.lengths[axis], 2.0 * self.lengths[1 - axis]
         widths, middles = np.diff(along), 0.5 * (along[1:] + along[:-1])
         waves = np.arange(int(np.ceil(_SHORTEST * period / widths.min())))
@@ -137,7 +144,8 @@ class FreeSides:
         near = means_over(nodes, across).toarray()
         far = means_over(nodes, length - across[::-1]).toarray()[::-1]
         lines = sum(
-            means @ compliance @ (means * np.diff(across)[:, None]).T for means in (near, far)
+            float(there) * (means @ compliance @ (means * np.diff(across)[:, None]).T)
+            for means, there in zip((near, far), self.pair(axis), strict=True)
         )
         # cosine series of the period: means of waves over intervals
         mean = np.exp(2j * np.pi / period * np.multiply.outer(waves, middles))

@@ -216,7 +216,8 @@ def _along(sides: FreeSides, axis: int, lines: Array, far: float) -> Array:
     # cosine series of period 2 L, of which the load takes one half
     lines = lines * np.where(waves == 0, 0.5, 1.0)[:, None, None] / length
     parity = np.arange(count) % 2
-    lines *= 1.0 + far * np.where(parity[:, None] == parity, 1.0, -1.0)
+    low, high = sides.pair(axis)
+    lines *= float(low) + high * far * np.where(parity[:, None] == parity, 1.0, -1.0)
     cosines, sines = _waves(waves, count) * length
     seen = (cosines, sines) if far > 0.0 else (sines, -cosines)
     both = sum(

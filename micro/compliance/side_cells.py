@@ -66,7 +66,8 @@ class _SidePair:
         step, period = length / rows, 2 * cells
         nodes = distance_nodes((_NEAREST_STRESS if stress else _NEAREST) * step, length)
         lower = means_over(nodes, np.linspace(0.0, length, rows + 1))
-        means = csr_array(hstack([lower, lower[::-1]]))
+        low, high = (float(there) for there in sides.pair(axis))
+        means = csr_array(hstack([low * lower, high * lower[::-1]]))
         parts = []
         # waves on twice the length of a side that cells take for the same, some running backwards
         for shift in (-period, 0, period):

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from geometry import InputError
 from micro import MicroModel
+from multiscale.couplings.body import has_body_term
 from multiscale.couplings.condensed import CondensedCoupling
 from multiscale.couplings.contact import ContactCoupling
 from multiscale.couplings.law_couplings import EmbeddedCoupling, FreePlaneCoupling
@@ -159,12 +160,15 @@ def make_table(
     if kind == "isolated":
         ends, love = setup.largest_closures, setup.scene.coupling.love
         return isolated_laws(model, setup.patches, closure_ends=ends, love=love, **common)
-    load_history = setup.scene.loading.load_history
+    load_history, displacements = setup.scene.loading.load_history, None
+    if has_body_term(setup):  # otherwise rows are those of a half-space, and so are closures
+        dense = newton_choice(setup).condensed
+        displacements = patch_displacements(setup, comm, dense=dense)
     return consistent_laws(
         model,
         setup.patches,
         largest=load_history.control(load_history.largest),
-        displacements=patch_displacements(setup, comm, dense=newton_choice(setup).condensed),
+        displacements=displacements,
         pointwise=setup.scene.coupling.interface == "pointwise",
         **common,
     )

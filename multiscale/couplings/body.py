@@ -1,8 +1,4 @@
-"""The block of a scene: its terms in the contact problem, and its compliance.
-
-The body correction is what the block adds to the compliance of a half-space. In Legendre modes of
-the block's top it is the compliance of the block, from finite elements, less that of the
-half-space, and less the effect of free sides where they are a term of their own.
+"""The body of a scene under a contact: a block, or a mesh.
 
 Theory: demos/theory.md, sections 5, 6 and 11.
 """
@@ -13,65 +9,25 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from geometry import InputError, Material, Surface
+from geometry import InputError, Material
 from geometry.checks import process_memory
-from micro import (
-    BodyModes,
-    BodyStresses,
-    FreeSides,
-    HalfSpaceModel,
-    SurfaceStress,
-    coarse_grid,
-    half_space_modes,
-    half_space_stress_modes,
-    influence_matrix,
-    side_modes,
-    side_stress_modes,
-    side_stresses,
+from micro import FreeSides, HalfSpaceModel
+from multiscale.couplings.face_terms import (
+    CUBE_MODES,
+    DECAY_LENGTH,
+    FLATNESS_POWER,
+    LEAST_WITH_MARGIN,
+    LEAST_WITH_SIDES,
+    FaceTerms,
 )
+from multiscale.couplings.mesh_body import MeshTerms
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.surface_and_block import block_section
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from geometry import BlockShape, PatchGrid
+    from geometry import BlockShape
     from macro import FaceCompliance
     from macro.block import Sides
-
-Array = NDArray[np.float64]
-
-_DECAY_LENGTH = 0.25
-"""Decay length of the effect of free sides in the micro model, relative to the shortest side of
-the block."""
-
-_CUBE_MODES = 8
-"""Modes along a side of a cube whose free sides are a term of their own. On Set 1's recipe (seed 1,
-8 µm) the force with 6, 8, 10 and 14 differs by 0.04, 0.012, 0.009 and 0.005 % from that with 20. On
-a ball in the middle, near a side, cut by a side and by a corner 8 are within 0.003, 0.002, 0.02 and
-0.1 %, 6 within 3 %."""
-
-_FLATNESS_POWER = 0.42
-"""Power of the shape's width by its depth that modes grow with: a block 0.3, 0.1 and 0.05 mm high
-and 1 mm wide needs 13, 21 and 28 for 0.1 to 0.2 %."""
-
-_LEAST_WITH_SIDES = 16
-"""Modes at least where they describe free sides too: with 16 on a cube Set 1's recipe is 0.4 % off,
-a ball that a side cuts in half 3 % (with 8: 1.7 and 14 %; with 24: 0.15 and 0.6 %)."""
-
-_LEAST_WITH_MARGIN = 12
-"""Modes at least where the block is wider than the contact: with a margin of 0.05 mm on a cube 8
-are up to 1.2 % off, 12 up to 0.1 %; a corner 0.7 %."""
-
-_MODES_OF_CORNERS = 12
-"""Modes for many patches where free sides are a term of their own: of 16 × 16 patches the one in
-the corner is 0.3 % off with 8 and less than 0.1 % with 12."""
-
-_MODES_PER_PATCH, _MOST_MODES = 2, 32
-"""Modes per patch along a side where they describe free sides too, and their largest number. Of
-4 × 4, 8 × 8 and 16 × 16 patches 16, 16 and 24 modes leave 0.01, 0.07 and 0.3 % of the largest
-entry."""
 
 _BYTES = 190.0
 """Memory of solving for K × K modes over K⁴: free blocks 100 and 200 times as wide as high, with 56
@@ -79,7 +35,7 @@ and 75 modes, take 1.8 and 5.8 GB (and 15 and 48 s)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Body:
+class Body(FaceTerms):
     """An elastic block under a contact.
 
     Args:
@@ -105,11 +61,11 @@ class Body:
     def modes(self) -> int:
         """Modes along a side that resolve the body correction; see the constants above."""
         flatness = max(self.lengths) / min(*self.lengths, self.shape.height)
-        count = _CUBE_MODES * flatness**_FLATNESS_POWER
+        count = CUBE_MODES * flatness**FLATNESS_POWER
         if self.shape.margin:
-            count = max(count, _LEAST_WITH_MARGIN)
+            count = max(count, LEAST_WITH_MARGIN)
         elif self.side_term is None:
-            count = max(count, _LEAST_WITH_SIDES)
+            count = max(count, LEAST_WITH_SIDES)
         return math.ceil(round(count, 6))
 
     def face(self, comm: Any, *, modes: int | None = None) -> FaceCompliance:
@@ -132,7 +88,7 @@ class Body:
         count = modes or self.modes
         needed, memory = _BYTES * float(count) ** 4, process_memory()
         if needed > memory:
-            ratio = ((memory / _BYTES) ** 0.25 / _CUBE_MODES) ** (1.0 / _FLATNESS_POWER)
+            ratio = ((memory / _BYTES) ** 0.25 / CUBE_MODES) ** (1.0 / FLATNESS_POWER)
             raise InputError(
                 f"the compliance of so flat a block, in {count} modes a side, needs about "
                 f"{needed / 1e9:.3g} GB of memory",
@@ -151,80 +107,43 @@ class Body:
             use_cache=True,
         )
 
-    def term(self, face: FaceCompliance, *, higher: float = 0.0) -> BodyModes:
-        """Return the body correction.
-
-        Args:
-            face: Compliance of the top.
-            higher: Height that is added to the block, to first order [mm].
-        """
-        half_space = half_space_modes(self.lengths, face.count)
-        if self.side_term is not None:
-            half_space = half_space + side_modes(self.side_term, face.count)
-        whole = face.normal + higher * face.growth
-        compliance = whole - half_space / self.material.contact_modulus
-        origin = -self.shape.margin, -self.shape.margin
-        return BodyModes(self.lengths, compliance, origin)
-
-    def stresses(self, face: FaceCompliance, surface: Surface) -> list[SurfaceStress]:
-        """Return the stresses in the contact face beyond those of the half-space.
-
-        Args:
-            face: Compliance of the top.
-            surface: The rough surface, whose cells fill the contact face.
-        """
-        grid, count = coarse_grid(surface), face.count
-        without = half_space_stress_modes(self.lengths, self.material.poisson_ratio, count)
-        found: list[SurfaceStress] = []
-        if self.side_term is not None:
-            spacing = surface.lengths[0] / grid[0], surface.lengths[1] / grid[1]
-            found.append(side_stresses(self.side_term, spacing))
-            without = without + side_stress_modes(self.side_term, count)
-        own = BodyStresses(self.lengths, grid, face.stresses - without, self.shape.margin)
-        return [*found, own]
-
-    def patch_compliance(self, patches: PatchGrid, comm: Any) -> Array:
-        """Return the whole compliance of the block under its patches.
-
-        Args:
-            patches: N patches of the contact face; free sides with a term of their own bound it.
-            comm: MPI communicator; None for this process alone.
-
-        Returns:
-            Mean displacement of patch i by unit pressure on patch j, shape (N, N) [mm/MPa].
-
-        Note:
-            Collective. On 1 to 256 patches of a free cube entries are within 0.1 % of the largest
-            one's limit.
-        """
-        modulus, count = self.material.contact_modulus, self.modes
-        half_space = influence_matrix(patches) / (np.pi * modulus)
-        if self.side_term is not None:
-            half_space += self.side_term.patch_compliance(patches) / modulus
-            count = max(count, min(max(patches.shape), _MODES_OF_CORNERS))
-        else:
-            count = max(count, min(_MODES_PER_PATCH * max(patches.shape), _MOST_MODES))
-        correction = self.term(self.face(comm, modes=count))
-        return np.asarray(half_space + correction.patch_compliance(patches))
+    @property
+    def margin(self) -> float:
+        """Width by which the top exceeds the contact on every side [mm]."""
+        return self.shape.margin
 
 
-def scene_body(setup: ProblemSetup, *, side_term: bool | None = None) -> Body:
-    """Return the block of a scene.
+def has_body_term(setup: ProblemSetup) -> bool:
+    """Tell whether contact problems of the whole surface know the body of a scene.
 
     Args:
-        setup: The problem set up from the scene, of a coupling with a block.
+        setup: The problem set up from the scene.
+    """
+    return setup.has_block
+
+
+def scene_body(setup: ProblemSetup, *, side_term: bool | None = None) -> FaceTerms:
+    """Return the body of a scene.
+
+    Args:
+        setup: The problem set up from the scene, of a coupling with a body.
         side_term: Whether free sides that bound the interface are a term of their own; by default
             they are in half-space models.
+
+    Note:
+        Collective where the body is a mesh.
     """
-    block, lengths, shape = block_section(setup.scene), setup.surface.lengths, setup.shape
     if side_term is None:
         side_term = isinstance(setup.micro, HalfSpaceModel)
+    if setup.bodies.first is not None:
+        return MeshTerms.of(setup.bodies.first, setup.surface.lengths, side_term=side_term)
+    block, lengths, shape = block_section(setup.scene), setup.surface.lengths, setup.shape
     sides = None
     if side_term and block.sides == "free" and not shape.margin:
         sides = FreeSides(
             lengths=lengths,
             poisson_ratio=block.poisson_ratio,
-            decay_length=_DECAY_LENGTH * min(*lengths, shape.height),
+            decay_length=DECAY_LENGTH * min(*lengths, shape.height),
         )
     material = setup.materials.first
     return Body(shape=shape, material=material, sides=block.sides, side_term=sides)

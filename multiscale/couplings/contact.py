@@ -24,7 +24,7 @@ from micro import (
 )
 from micro.contact_detail import ContactDetail
 from micro.model import SolvedContact
-from multiscale.couplings.body import scene_body
+from multiscale.couplings.body import has_body_term, scene_body
 from multiscale.loading.load_step import LoadStep
 from multiscale.setup.problem import ProblemSetup
 from multiscale.storage import Arrays, packed, unpacked
@@ -200,7 +200,7 @@ def contact_model(setup: ProblemSetup, comm: Any, put_on_body: OnBody | None = N
     if isinstance(model, HalfSpaceModel):
         put_on_body = put_on_body or on_body(setup, comm, half_space=isolated)
         return put_on_body(model, SLOPES if setup.finite_slopes else 0)
-    if isolated or not setup.has_block:
+    if isolated or not has_body_term(setup):
         return model
     body = scene_body(setup)
     return replace(model, body=body.term(body.face(comm)))  # type: ignore[type-var]
@@ -228,7 +228,7 @@ def on_body(
     Note:
         Collective.
     """
-    body = None if half_space or not setup.has_block else scene_body(setup)
+    body = None if half_space or not has_body_term(setup) else scene_body(setup)
     if body is not None and face is None:
         face = body.face(comm)
     material, counter = setup.materials.first, setup.counter_surface

@@ -62,7 +62,7 @@ class ReferenceCoupling:
     @property
     def blocks(self) -> list[Block]:
         """The rough blocks, the finest last."""
-        return [problem.block for problem in self._problems]
+        return [problem.body for problem in self._problems]
 
     @property
     def latest(self) -> UnilateralContactState:

@@ -68,7 +68,7 @@ def law_bytes(table: LawTable) -> bytes:
         for name, text in table.made_by.items():
             file.attrs[f"made_by_{name}"] = text
         for index, law in enumerate(table.laws):
-            group = file.create_group(table.key(index))
+            group = file.create_group(part_key(table.patches, index))
             for name, column in _COLUMNS.items():
                 values = getattr(law.rows, column.name)
                 if values.any() or not column.metadata.get("optional"):

@@ -68,23 +68,6 @@ class LawTable:
             raise InputError("these laws are not those of patches", value=self.patches.names)
         return self.patches
 
-    def key(self, index: int) -> str:
-        """Return the name of a patch or region in files, see `part_key`."""
-        return part_key(self.patches, index)
-
-    def label(self, index: int) -> str:
-        """Return the name of a patch or region in sentences, in ASCII."""
-        if isinstance(self.patches, Regions):
-            return f"region {self.patches.names[index]!a}"
-        return f"patch {self.patches.unravel(index)}"
-
-    def place(self, index: int) -> str:
-        """Return where a patch is; of a region, which one."""
-        if isinstance(self.patches, Regions):
-            return f"number {index} of {self.patches.count}"
-        (x0, x1), (y0, y1) = self.patches.bounds(index)
-        return f"{x0:.9g} < x < {x1:.9g}, {y0:.9g} < y < {y1:.9g} [mm]"
-
     def notes(self, tolerance: float) -> Iterator[str]:
         """Yield what a report says of the laws: their errors, and whether they were repaired.
 

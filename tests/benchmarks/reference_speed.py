@@ -69,7 +69,7 @@ def curve(surface, shape, approaches):
     block = UnilateralContactProblem(Block(mesh, MATERIAL), surface.highest - surface.mean_height)
     setup, counts = clock.lap(), per_solve(block)
     say(
-        f"{block.block.dofs} unknowns, {1e3 * characteristic_size(shape):.2f} µm: "
+        f"{block.body.dofs} unknowns, {1e3 * characteristic_size(shape):.2f} µm: "
         f"mesh {meshing:.1f} s, matrix and preconditioner {setup:.1f} s, {memory():.2f} GB"
     )
     say("  µm    force [N]   area [%]  nodes  active sets  iterations of each solve   wall [s]")

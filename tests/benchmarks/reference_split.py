@@ -75,7 +75,7 @@ def meshed(surface, approach, scale, edges, meshes):
         mesh, _ = rough_block_mesh(shape, top, COMM)
         block = UnilateralContactProblem(Block(mesh, MATERIAL), top.highest - top.mean_height)
         forces.append(block.solve(Control(approach=approach * scale)).force / scale)
-        unknowns.append(block.block.dofs)
+        unknowns.append(block.body.dofs)
     return np.array(forces), [characteristic_size(shape) for shape in shapes], unknowns
 
 

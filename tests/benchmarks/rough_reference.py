@@ -47,7 +47,7 @@ def report(surface, name, shape, scale):
         sets = [state.active_sets for state in states]
         cycles = [state.linear_iterations for state in states]
         print(
-            f"{name}, {1e3 * characteristic_size(shape):5.2f} µm, {block.block.dofs:7d} unknowns, "
+            f"{name}, {1e3 * characteristic_size(shape):5.2f} µm, {block.body.dofs:7d} unknowns, "
             f"heights × {scale:3.1f}: F = {told} N, active sets {sets}, cycles {cycles}, "
             f"{time.process_time() - start:.1f} s of this rank",
             flush=True,

@@ -20,7 +20,7 @@ EXAMPLES = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
 
 def shown_by(example):
     """Return the lines that an example prints."""
-    assert len(example.splitlines()) <= 20
+    assert len(example.splitlines()) <= 25
     shown = subprocess.run(
         [sys.executable, "-c", example], cwd=ROOT, capture_output=True, text=True, check=False
     )
@@ -41,10 +41,9 @@ def test_scene_shown_first_is_the_one_that_is_run_first():
     assert tomllib.loads(shown) == scene
 
 
-def test_example_of_a_part():
+def test_example_of_an_own_problem():
     (line,) = shown_by(EXAMPLES[1])
-    force, area = map(float, re.findall(r"\d+\.\d+", line))
-    assert 0.1 < force < 10.0 and 0.0 < area < 0.1  # a few per cent of 1 mm² touch
+    assert f"`{line}`" in TEXT
 
 
 def test_readme_is_short():

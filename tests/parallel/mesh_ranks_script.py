@@ -15,6 +15,7 @@ from mesh_facts import cells_of, faces_of, measures_of
 from geometry import BlockShape, PatchGrid
 from macro import BOTTOM, SIDES, TOP, Block, Material, block_mesh, compat
 from macro.contact.face_nodes import TopNodes
+from macro.contact.rough_face import RoughFace
 
 COMM = MPI.COMM_WORLD
 WIDE = {"margin": 0.4, "margin_cells": 2, "margin_grading": 3.0, "grading": 5.0}
@@ -64,7 +65,7 @@ def regions(patterns):
     shape = BlockShape(interface=(8.0, 7.0), height=1.0, cells=(8, 7, 1))
     mesh = block_mesh(shape, COMM)
     block = Block(mesh, Material(young_modulus=1.0, poisson_ratio=0.3))
-    top = TopNodes(block, PatchGrid(grid=(1, 1), lengths=(8.0, 7.0)))
+    top = TopNodes(RoughFace.of_block(block), PatchGrid(grid=(1, 1), lengths=(8.0, 7.0)))
     at = np.rint(top.x).astype(int), np.rint(top.y).astype(int)
     return [top.regions(pattern[at])[1] for pattern in patterns]
 

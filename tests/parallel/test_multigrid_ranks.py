@@ -13,7 +13,7 @@ def found(mpirun):
 KINDS = {
     **dict.fromkeys(["graded", "margin", "quadratic", "tetrahedra", "column"], "mg"),
     **{"stiff volume": "mg", "incompressible": "cholesky"},
-    **{"refined": "mg", "refined, linear": "gamg", "refined, incompressible": "cholesky"},
+    **{"refined": "mg", "refined, linear": "hypre", "refined, incompressible": "cholesky"},
 }
 
 

@@ -31,13 +31,14 @@ def write_msh2(path, points, elements, names=(), first=1):
         lines += [f'{dimension} {group} "{name}"' for dimension, group, name in names]
         lines += ["$EndPhysicalNames"]
     lines += ["$Nodes", str(len(points))]
-    lines += [f"{first + k} {x!r} {y!r} {z!r}" for k, (x, y, z) in enumerate(np.float64(points))]
+    for k, point in enumerate(np.asarray(points, float).tolist()):
+        lines.append(" ".join([str(first + k), *map(repr, point)]))
     lines += ["$EndNodes", "$Elements", str(len(elements))]
     for k, (kind, group, entity, rows) in enumerate(elements):
         assert len(rows) == KINDS[kind]
         nodes = " ".join(str(first + row) for row in rows)
         lines.append(f"{k + 1} {kind} 2 {group} {entity} {nodes}")
-    path.write_text("\n".join([*lines, "$EndElements", ""]).replace("np.float64", ""))
+    path.write_text("\n".join([*lines, "$EndElements", ""]))
     return path
 
 

@@ -30,7 +30,7 @@ def problem(shape, method, surface=SPHERE, sides="free", **options):
 
 def at_points(found, state):
     """Return depths and pressures of the quadrature points."""
-    method, displacement = found.method, found.block.stiffness.createVecRight()
+    method, displacement = found.method, found.body.stiffness.createVecRight()
     displacement.array[:] = state.displacement
     closure = method.equilibrium.forces.closure(displacement)
     return closure - method.law.distance, method.law.pressure(closure)

@@ -7,6 +7,7 @@ from mpi4py import MPI
 from geometry import BlockShape, PatchGrid
 from macro import Block, Material, block_mesh
 from macro.contact.face_nodes import TopNodes
+from macro.contact.rough_face import RoughFace
 
 MATERIAL = Material(young_modulus=4e3, poisson_ratio=0.2)
 
@@ -14,7 +15,7 @@ MATERIAL = Material(young_modulus=4e3, poisson_ratio=0.2)
 def top_of(element="Q1", cells=(6, 4, 1), grid=(2, 2)):
     shape = BlockShape(interface=(3.0, 2.0), height=1.0, cells=cells, element=element)
     block = Block(block_mesh(shape, MPI.COMM_SELF), MATERIAL)
-    return TopNodes(block, PatchGrid(grid=grid, lengths=(3.0, 2.0)))
+    return TopNodes(RoughFace.of_block(block), PatchGrid(grid=grid, lengths=(3.0, 2.0)))
 
 
 @pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2"])

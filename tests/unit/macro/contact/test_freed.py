@@ -58,13 +58,13 @@ def test_a_rough_block_leaves_nothing_of_a_load_step(kept, method):
     rough = rough_block(method)
     for approach in (6e-3, 9e-3):
         assert rough.solve(Control(approach=approach)).nodes > 0
-        assert kept(rough.block.stiffness.comm) + kept(PETSc.COMM_SELF) == 0
+        assert kept(rough.body.stiffness.comm) + kept(PETSc.COMM_SELF) == 0
 
 
 @pytest.mark.parametrize("method", ["active-set", "augmented-lagrangian"])
 def test_fields_do_not_pile_up_within_a_load_step(kept, monkeypatch, method):
     rough = rough_block(method)
-    comm, free, found = rough.block.stiffness.comm, compat.collect_garbage, []
+    comm, free, found = rough.body.stiffness.comm, compat.collect_garbage, []
 
     def counted(of):
         found.append(kept(comm))

@@ -45,7 +45,7 @@ def options():
     [
         ("Q1", 0.495, "mg"),
         ("Q2", 0.4999, "cholesky"),
-        ("P1*", 0.45, "gamg"),  # * without a lattice
+        ("P1*", 0.45, "hypre"),  # * without a lattice
         ("P2*", 0.45, "mg"),
         ("P1*", 0.46, "cholesky"),
         ("P2*", 0.46, "cholesky"),
@@ -58,7 +58,7 @@ def test_choice(iterations, element, ratio, kind):
         assert iterations(block) <= 2
 
 
-@pytest.mark.parametrize(("element", "kind"), [("Q1", "mg"), ("P1*", "gamg"), ("P2*", "mg")])
+@pytest.mark.parametrize(("element", "kind"), [("Q1", "mg"), ("P1*", "hypre"), ("P2*", "mg")])
 def test_what_is_too_large_is_not_factorised(monkeypatch, iterations, element, kind):
     monkeypatch.setattr(block_solver, "FACTORISED", 100)
     blocks = [make(element, ratio) for ratio in (0.4975, 0.499375)]

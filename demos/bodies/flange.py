@@ -1,0 +1,88 @@
+"""Mesh of a bolted pipe flange with a raised face.
+
+Dimensions in mm, close to a DN 50 flange of PN 40. The axis is z, and the raised face looks up:
+
+    disc         diameter 165, 18 thick, from z = 0 to z = 18
+    raised face  ring of diameters 55 … 102, 2 high; contact face at z = 20
+    bore         diameter 55
+    bolt holes   4, diameter 18, on a circle of diameter 125, at 45° to the axes
+    washers      rings of diameters 18 … 30 on the rear at z = 0, where the bolts' heads pull:
+                 452.4 mm² each
+    neck         pipe of diameters 55 … 71, 40 long, below z = 0; its end holds the flange
+
+Run it as `.venv/bin/python demos/bodies/flange.py`; `--size` is the length of edges at the outer
+rim of the raised face [mm], where it will touch, `--out` the file. It writes physical names: volume `flange`, surfaces `raised face`,
+`washers` and `pipe end`.
+"""
+
+import argparse
+from math import cos, pi, sin
+from pathlib import Path
+
+import gmsh
+
+DISC, RAISED, NECK = 18.0, 2.0, 40.0
+TOP = DISC + RAISED
+BORE, OUTER, FACE, PIPE = 27.5, 82.5, 51.0, 35.5
+BOLTS, HOLE, WASHER = 62.5, 9.0, 15.0
+
+
+def cylinder(z: float, height: float, radius: float, x: float = 0.0, y: float = 0.0) -> tuple:
+    """Return an upright cylinder."""
+    return 3, gmsh.model.occ.addCylinder(x, y, z, 0, 0, height, radius)
+
+
+def surfaces(z: float, reach: float) -> list[int]:
+    """Return the surfaces in the plane across z within a distance of the axis."""
+    box = (-reach, -reach, z - 1e-3, reach, reach, z + 1e-3)
+    return [tag for _, tag in gmsh.model.getEntitiesInBoundingBox(*box, 2)]
+
+
+def name(dimension: int, tags: list[int], label: str) -> None:
+    """Make a physical group with a name."""
+    group = gmsh.model.addPhysicalGroup(dimension, tags)
+    gmsh.model.setPhysicalName(dimension, group, label)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--size", type=float, default=1.5)
+    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".msh"))
+    choice = parser.parse_args()
+    gmsh.initialize(["", "-v", "2"])
+    occ = gmsh.model.occ
+    solid, _ = occ.fuse(
+        [cylinder(0, DISC, OUTER)], [cylinder(DISC, RAISED, FACE), cylinder(-NECK, NECK, PIPE)]
+    )
+    places = [
+        (BOLTS * cos(pi * k / 2 + pi / 4), BOLTS * sin(pi * k / 2 + pi / 4)) for k in range(4)
+    ]
+    holes = [cylinder(-1, DISC + 2, HOLE, x, y) for x, y in places]
+    solid, _ = occ.cut(solid, [cylinder(-NECK - 1, NECK + TOP + 2, BORE), *holes])
+    rings = []
+    for x, y in places:
+        disc, hole = ((2, occ.addDisk(x, y, 0, radius, radius)) for radius in (WASHER, HOLE))
+        rings += occ.cut([disc], [hole])[0]
+    _, pieces = occ.fragment(solid, rings)  # the rings become surfaces of the rear
+    occ.synchronize()
+
+    name(3, [tag for _, tag in pieces[0]], "flange")
+    name(2, surfaces(TOP, FACE + 1), "raised face")
+    name(2, [tag for ring in pieces[1:] for _, tag in ring], "washers")
+    name(2, surfaces(-NECK, PIPE + 1), "pipe end")
+
+    gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
+    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 24)  # edges around a full circle
+    field = gmsh.model.mesh.field.add("MathEval")  # coarser with the distance from the face's rim
+    away = f"(({TOP} - z)^2 + ({FACE} - (x^2 + y^2)^0.5)^2)^0.5"
+    gmsh.model.mesh.field.setString(field, "F", f"{choice.size} * (1 + 0.12 * {away})")
+    gmsh.model.mesh.field.setAsBackgroundMesh(field)
+    gmsh.model.mesh.generate(3)
+    gmsh.write(str(choice.out))
+    nodes = len(gmsh.model.mesh.getNodes()[0])
+    print(f"{choice.out}: {nodes} nodes, {sum(map(len, gmsh.model.mesh.getElements(3)[1]))} cells")
+    gmsh.finalize()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,96 @@
+"""Mesh of a quarter of a mechanical seal's ring, of hexahedra.
+
+Dimensions in mm. The axis is z, and the narrow sealing face looks up:
+
+    ring      radii 20 … 26, 8 high, from z = 0 to z = 8
+    nose      radii 22 … 24.5, 2 high: its top at z = 10 is the sealing face
+    shoulder  the ring's top outside the nose, radii 24.5 … 26, which the sealed fluid presses on
+    seat      the ring's bottom, radii 20 … 22, which the ring stands on
+
+A quarter is meshed: `plane x` and `plane y` are the planes of symmetry x = 0 and y = 0.
+
+Run it as `.venv/bin/python demos/bodies/seal_ring.py`; `--size` is the length of edges [mm] in the
+section, `--out` the file. It writes physical names: volume `ring`, surfaces `sealing face`,
+`shoulder`, `seat`, `plane x` and `plane y`.
+"""
+
+import argparse
+from math import ceil, pi
+from pathlib import Path
+
+import gmsh
+
+RADII = (20.0, 22.0, 24.5, 26.0)
+RING, NOSE = 8.0, 2.0
+TOP = RING + NOSE
+SLOWER = 4.0
+"""Length of cells around the axis over that in the section."""
+
+
+def section(size: float) -> list[tuple[int, int]]:
+    """Return the section in the xz plane as rectangles that share their sides, cut into squares."""
+    occ = gmsh.model.occ
+    blocks = [(*RADII[k : k + 2], 0.0, RING) for k in range(3)] + [(RADII[1], RADII[2], RING, TOP)]
+    faces = []
+    for left, right, low, high in blocks:
+        corners = [(left, low), (right, low), (right, high), (left, high)]
+        points = [occ.addPoint(x, 0, z) for x, z in corners]
+        lines = [occ.addLine(points[k], points[(k + 1) % 4]) for k in range(4)]
+        faces.append((2, occ.addPlaneSurface([occ.addCurveLoop(lines)])))
+    faces, _ = occ.fragment(faces, [])
+    occ.synchronize()
+    for _, line in gmsh.model.getEntities(1):
+        length = occ.getMass(1, line)
+        gmsh.model.mesh.setTransfiniteCurve(line, ceil(length / size - 1e-9) + 1)
+    for _, face in faces:
+        gmsh.model.mesh.setTransfiniteSurface(face)
+        gmsh.model.mesh.setRecombine(2, face)
+    return faces
+
+
+def surfaces(low: tuple[float, float, float], high: tuple[float, float, float]) -> list[int]:
+    """Return the surfaces within a box."""
+    box = [*(value - 1e-3 for value in low), *(value + 1e-3 for value in high)]
+    return [tag for _, tag in gmsh.model.getEntitiesInBoundingBox(*box, 2)]
+
+
+def between(z: float, inner: float, outer: float) -> list[int]:
+    """Return the surfaces in a plane across z between two radii."""
+    inside = set(surfaces((0, 0, z), (inner, inner, z)))
+    return [tag for tag in surfaces((0, 0, z), (outer, outer, z)) if tag not in inside]
+
+
+def name(dimension: int, tags: list[int], label: str) -> None:
+    """Make a physical group with a name."""
+    group = gmsh.model.addPhysicalGroup(dimension, tags)
+    gmsh.model.setPhysicalName(dimension, group, label)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--size", type=float, default=0.25)
+    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".msh"))
+    choice = parser.parse_args()
+    gmsh.initialize(["", "-v", "2"])
+    layers = ceil(0.5 * pi * RADII[1] / (SLOWER * choice.size))
+    gmsh.model.occ.revolve(
+        section(choice.size), 0, 0, 0, 0, 0, 1, 0.5 * pi, [layers], recombine=True
+    )
+    gmsh.model.occ.synchronize()
+
+    name(3, [tag for _, tag in gmsh.model.getEntities(3)], "ring")
+    name(2, between(TOP, RADII[1], RADII[2]), "sealing face")
+    name(2, between(RING, RADII[2], RADII[3]), "shoulder")
+    name(2, between(0.0, RADII[0], RADII[1]), "seat")
+    name(2, surfaces((0, 0, 0), (0, RADII[3], TOP)), "plane x")
+    name(2, surfaces((0, 0, 0), (RADII[3], 0, TOP)), "plane y")
+
+    gmsh.model.mesh.generate(3)
+    gmsh.write(str(choice.out))
+    nodes = len(gmsh.model.mesh.getNodes()[0])
+    print(f"{choice.out}: {nodes} nodes, {sum(map(len, gmsh.model.mesh.getElements(3)[1]))} cells")
+    gmsh.finalize()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,120 @@
+# %% [markdown]
+# # A large crowned face: where does roughness change Hertz?
+#
+# What one learns: how a face of 20 mm gets the law of a roughness of 0.1 mm from a few periodic
+# samples, how large these must be, and when the pressure under a slightly crowned face is still
+# that of Hertz: where α = σ R/a² is below a twentieth (Greenwood & Tripp 1967).
+#
+#     samples → pressure over closure, mean and scatter → every quadrature point of a smooth face,
+#     (periodic half-space)                               closure = approach − crown − displaced
+#
+# Run time: one minute. `--quick` for coarser meshes, `--out DIR` for the folder of the figure.
+
+# %%
+import argparse
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from mpi4py import MPI
+
+from geometry import BlockShape, Control, Material, PatchGrid, Spectrum, synthesise
+from macro import Block, LawContactProblem, LoadedFace, block_mesh
+from multiscale import representative_law
+
+parser = argparse.ArgumentParser()
+parser.add_argument("--quick", action="store_true")
+parser.add_argument("--out", type=Path, default=Path("results/large_face"))
+choice = parser.parse_args()
+
+STEEL = Material(young_modulus=210e3, poisson_ratio=0.3)
+ROUGHNESS = 1e-3  # rms height [mm]
+LONGEST = 0.1  # longest wave [mm]
+RADIUS = 2000.0  # of the crown [mm]
+FACE = 20.0  # side of the face [mm]
+FORCES = (30.0, 300.0, 3000.0, 20000.0)  # [N]
+LARGEST = 600.0  # local pressure [MPa]
+CELLS = 17 if choice.quick else 41
+
+
+# %% [markdown]
+# Samples as long as 1 and 4 of the longest waves; six of each.
+def samples(waves):
+    """Return six samples that are as long as a number of the longest waves."""
+    band = (waves, 8 * waves)
+    sides = (waves * LONGEST, waves * LONGEST)
+    for seed in range(1, 7):
+        spectrum = Spectrum(hurst=0.8, waves=band, rms_slope=0.1, seed=seed)
+        surface = synthesise(spectrum, grid=(32 * waves, 32 * waves), lengths=sides)
+        yield surface.scaled(ROUGHNESS / float(surface.heights.std()))
+
+
+laws = {
+    waves: representative_law(list(samples(waves)), STEEL.contact_modulus, largest_pressure=LARGEST)
+    for waves in (1, 4)
+}
+for waves, law in laws.items():
+    rows = law.rows
+    scatter = np.interp(50.0, rows.pressure, rows.pressure_scatter) / 50.0
+    print(f"samples of {waves} longest waves: {scatter:.0%} scatter of the pressure at 50 MPa")
+
+# %% [markdown]
+# The crowned face: a flat mesh, and the crown as a gap that adds to the closure. Strips across the
+# face tell the force per length; Hertz' is a parabola.
+shape = BlockShape(
+    interface=(FACE, FACE),
+    height=2.0 * FACE,
+    cells=(CELLS, CELLS, CELLS // 3),
+    grading=10.0,
+    margin=FACE,
+    margin_cells=4,
+    margin_grading=4.0,
+)
+block = Block(block_mesh(shape, MPI.COMM_SELF), STEEL)
+strips = PatchGrid(grid=(CELLS, 1), lengths=(FACE, FACE))
+law = laws[4]
+problem = LawContactProblem(
+    LoadedFace.of_block(block, strips),
+    [law] * CELLS,
+    "pointwise",
+    crown=lambda x, y: ((x - 0.5 * FACE) ** 2 + (y - 0.5 * FACE) ** 2) / (2.0 * RADIUS),
+)
+problem.start_from(np.ones(CELLS))  # a first guess for the steep law: uniform pressure
+found = []
+print("| force [N] | α | effective radius over Hertz' | middle line over Hertz' | Newton |")
+print("|---|---|---|---|---|")
+for force in FORCES:
+    state = problem.solve(Control(force=force))
+    line = state.pressure * FACE  # force per length [N/mm]
+    hertz = (0.75 * force * RADIUS / STEEL.contact_modulus) ** (1 / 3)
+    alpha = ROUGHNESS * RADIUS / hertz**2
+    middle = 0.75 * force / hertz  # of Hertz' parabola; its radius is (3/4) force / middle
+    ratio = line[CELLS // 2] / middle
+    found.append((force, alpha, hertz, middle, line))
+    steps = state.newton_iterations
+    print(f"| {force:g} | {alpha:.3f} | {1 / ratio:.3f} | {ratio:.3f} | {steps} |")
+
+# %%
+figure = Figure(figsize=(10.0, 4.0), layout="constrained")
+left, right = figure.subplots(1, 2)
+for waves, law in laws.items():
+    separation = 1e3 * (law.initial_separation - law.rows.closure)
+    (curve,) = left.plot(separation, law.rows.pressure, label=f"samples of {waves} longest waves")
+    band = [law.rows.pressure + sign * law.rows.pressure_scatter for sign in (-1.0, 1.0)]
+    left.fill_between(separation, *band, color=curve.get_color(), alpha=0.2)
+left.set(xlabel="mean separation [µm]", ylabel="pressure [MPa]", yscale="log", ylim=(0.1, LARGEST))
+along = np.linspace(-2.5, 2.5, 400)
+right.plot(along, np.maximum(1.0 - along**2, 0.0), "k--", lw=1.0, label="Hertz")
+for _, alpha, hertz, middle, line in found:
+    right.plot((strips.centres[:, 0] - 0.5 * FACE) / hertz, line / middle, label=f"α = {alpha:.2f}")
+right.set(xlabel="x over Hertz' radius", ylabel="force per length over Hertz'", xlim=(-2.5, 2.5))
+for axes in (left, right):
+    axes.legend(frameon=False, fontsize="small")
+    axes.grid(alpha=0.3)
+choice.out.mkdir(parents=True, exist_ok=True)
+figure.savefig(choice.out / "large_face.png", dpi=110)
+
+# %%
+peaks = [line[CELLS // 2] / middle for _, _, _, middle, line in found]
+assert np.all(np.diff(peaks) > 0.0)  # rough faces spread the pressure, less under larger loads
+assert abs(peaks[-1] - 1.0) < 0.07  # up to α = 0.05 (Greenwood, Johnson & Matsubara 1984)

@@ -1,0 +1,332 @@
+"""Compliance of a rectangle on the contact face of a meshed body, in Legendre modes.
+
+The displacement by a mode of pressure is that of a half-space, in closed form, and a correction u:
+the half-space's tractions are taken off the body's outer surface, its displacements off the
+supports, and where the body has other elastic constants than under the rectangle, its stresses
+count with the difference. The correction is smooth, so that the user's mesh resolves it. Where the
+body rises above the plane of its face the half-space ends there; then the modes load the mesh
+itself, and their displacements are as good as the mesh under them.
+
+Theory: section 6 of ``demos/theory.md``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.sparse import csr_matrix
+
+from geometry.errors import InputError
+from geometry.face_frame import FaceFrame
+from geometry.materials import Material
+from geometry.patches import PatchGrid
+from macro import compat
+from macro.compliance.face_compliance import FaceCompliance
+from macro.compliance.face_moments import FaceMoments
+from macro.elastic_body import ElasticBody
+from macro.elasticity import stiffness_form
+from macro.linear_solvers.node_matrices import distributed
+from macro.linear_solvers.options import DIRECT_DEFAULTS, linear_solver, solve_linear
+from macro.mesh.contact_face import ContactFacets
+from macro.mesh.outer_facets import OuterFacets, outer_facets
+from macro.meshed_body import MeshedBody
+
+Array = NDArray[np.float64]
+
+MOST_DOFS = 500_000
+"""Degrees of freedom up to which linear elements are raised to quadratic ones."""
+_FACTORISED = 100_000
+"""Degrees of freedom up to which the stiffness is factorised: 10⁵ take 5 s and 1 GB."""
+_FLAT = 1e-9
+"""Height below the plane, relative to the rectangle, that is rounding."""
+_BATCH = 20_000
+"""Points of the surface whose fields are evaluated at once."""
+_MORE = 4
+"""Degree of the quadrature of tractions beyond that of two basis functions."""
+_SAME = 1e-9
+"""Relative difference of elastic constants that is rounding."""
+
+
+class HalfSpaceFields(Protocol):
+    """Fields in a half-space under the modes, in the coordinates of the rectangle."""
+
+    @property
+    def count(self) -> int:
+        """Modes K along a side."""
+        ...
+
+    def __call__(self, points: Array, /) -> tuple[Array, Array]:
+        """Return displacements (n, 3, K²) [mm] and stresses (n, 3, 3, K²) [MPa] at points."""
+        ...
+
+    def modes(self) -> tuple[Array, Array]:
+        """Return displacements (K², K²) [mm/N] and stresses (3, K², K²) [1/mm²] in modes."""
+        ...
+
+
+def from_outside(facets: ContactFacets, length: float) -> ContactFacets:
+    """Return a counter-body's facets in a frame of its own, turned about the y axis.
+
+    Args:
+        facets: In the frame of the face of the body that it is pressed on.
+        length: Length Lx of the rectangle, from the origin of that frame: x becomes Lx − x [mm].
+    """
+    e1, e2, normal = facets.frame.axes
+    origin = facets.frame.in_space([length, 0.0])
+    x, y = np.moveaxis(facets.corners, -1, 0)
+    return replace(
+        facets,
+        frame=FaceFrame(origin=origin, axes=np.stack([-e1, e2, -normal])),
+        corners=np.stack([length - x, y], axis=-1),
+    )
+
+
+def turned(face: FaceCompliance) -> FaceCompliance:
+    """Return the compliance of a face as seen with its x axis turned round.
+
+    Args:
+        face: With x counted from the other end of the rectangle.
+    """
+    odd = np.kron((-1.0) ** np.arange(face.count), np.ones(face.count))
+    signs = np.multiply.outer(odd, odd)
+    shear = np.array([1.0, 1.0, -1.0])[:, None, None]
+    return FaceCompliance(
+        normal=signs * face.normal,
+        growth=signs * face.growth,
+        stresses=shear * signs * face.stresses,
+    )
+
+
+def raised(body: ElasticBody) -> ElasticBody:
+    """Return the body with quadratic elements, if it is not too large; else the body itself."""
+    if isinstance(body, MeshedBody) and body.degree == 1 and 8 * body.dofs <= MOST_DOFS:
+        return replace(body, order=2)
+    return body
+
+
+def mesh_face_compliance(
+    body: ElasticBody,
+    facets: ContactFacets,
+    rectangle: PatchGrid,
+    material: Material,
+    count: int,
+    fields: HalfSpaceFields | None,
+) -> FaceCompliance:
+    """Solve for the response of a rectangle on a body's face to every mode of pressure.
+
+    Args:
+        body: The body.
+        facets: Facets of its contact face, in its frame.
+        rectangle: Patches that fill the rectangle, in that frame.
+        material: Elastic constants under the rectangle.
+        count: Modes K along a side of the rectangle.
+        fields: The half-space of that material under the modes, where the body lies on one side of
+            the plane of its face; None to load the mesh by the modes themselves.
+
+    Returns:
+        The compliance, the same on every rank.
+
+    Raises:
+        NotConverged: When a linear solve fails.
+
+    Note:
+        Collective. One solve for each of the K² modes.
+    """
+    if count < 1 or (fields is not None and fields.count != count):
+        raise InputError("a face has one mode at least", value=count, allowed="K ≥ 1")
+    moments = FaceMoments(body, facets, rectangle, count)
+    loads = (
+        _Pressures(body, moments)
+        if fields is None
+        else _Corrections(body, facets, rectangle, material, fields)
+    )
+    solver = _solver(body)
+    load, solution = body.stiffness.createVecs()
+    found = np.zeros((4, count**2, count**2))
+    for mode in range(count**2):
+        held = loads.write(mode, load)
+        solve_linear(solver, load, solution)
+        total = body.function(solution.array_r)
+        if held is not None:
+            total.x.array[:] += held.x.array
+        found[:, :, mode] = moments.of(total)
+        compat.collect_garbage(solution.comm)
+    area = float(np.prod(rectangle.lengths))
+    # per unit moment: a mode has the moment A, and its own displacements' moments are over A
+    return _gathered(found / area, area, material, fields)
+
+
+def _gathered(
+    found: Array, area: float, material: Material, fields: HalfSpaceFields | None
+) -> FaceCompliance:
+    """Return the whole response from the moments of displacements and strains."""
+    normal, xx, yy, xy = found
+    nu, modulus = material.poisson_ratio, material.young_modulus
+    plane = modulus / (1.0 - nu**2)
+    stresses = np.stack([plane * (xx + nu * yy), plane * (yy + nu * xx), modulus / (1.0 + nu) * xy])
+    one = np.eye(len(normal)) / area
+    if fields is not None:
+        below, beside = fields.modes()
+        normal, stresses = normal + below, stresses + beside
+    else:  # Hooke's law with σ_zz = −p
+        stresses[:2] -= nu / (1.0 - nu) * one
+    xx, yy, xy = stresses
+    strain = (
+        xx.T @ (xx - nu * yy) + yy.T @ (yy - nu * xx) + 2.0 * (1.0 + nu) * xy.T @ xy
+    ) / modulus
+    growth = one / modulus - area * strain
+    return FaceCompliance(
+        normal=0.5 * (normal + normal.T), growth=0.5 * (growth + growth.T), stresses=stresses
+    )
+
+
+class _Loads:
+    """Sums loads of the nodes over the ranks, and leaves out supported components."""
+
+    def __init__(self, body: ElasticBody, nodes: NDArray[np.int32]) -> None:
+        self.body = body
+        self.nodes = np.unique(nodes)  # of this rank, that bear loads
+        numbers = body.space.dofmap.index_map.local_to_global(self.nodes.astype(np.int32))
+        columns = (3 * np.asarray(numbers, np.int64)[:, None] + np.arange(3)).ravel()
+        size = len(columns), 3 * body.space.dofmap.index_map.size_global
+        ones = np.ones(len(columns)), columns, np.arange(len(columns) + 1)
+        self._sum = distributed(csr_matrix(ones, shape=size), body.owned_dofs, body.comm)
+        self._local, self._free = self._sum.createVecLeft(), body.free
+
+    def write_sum(self, local: Array, load: PETSc.Vec) -> None:
+        """Write the load of all ranks, from this rank's (n, 3) at its nodes."""
+        self._local.array[:] = local.ravel()
+        self._sum.multTranspose(self._local, load)
+
+    def leave_out_supports(self, load: PETSc.Vec) -> None:
+        """Write zeros where components are supported."""
+        load.pointwiseMult(load, self._free)
+
+
+class _Pressures(_Loads):
+    """The modes themselves as loads."""
+
+    def __init__(self, body: ElasticBody, moments: FaceMoments) -> None:
+        super().__init__(body, moments.points.nodes)
+        self._moments = moments
+
+    def write(self, mode: int, load: PETSc.Vec) -> Any:
+        """Write the load of a mode."""
+        local = self._moments.load(mode).reshape(-1, 3)[self.nodes]
+        self.write_sum(local, load)
+        self.leave_out_supports(load)
+
+
+class _Corrections(_Loads):
+    """What a half-space under the modes does wrong on a body's surface."""
+
+    def __init__(
+        self,
+        body: ElasticBody,
+        facets: ContactFacets,
+        rectangle: PatchGrid,
+        material: Material,
+        fields: HalfSpaceFields,
+    ) -> None:
+        frame = facets.frame.moved(*rectangle.origin)
+        outer = outer_facets(body.space, 2 * body.degree + _MORE)
+        level = np.abs(frame.height(outer.points.reshape(-1, 3))).reshape(outer.weights.shape)
+        off = level.max(axis=1, initial=0.0) > _FLAT * max(rectangle.lengths)
+        outer = outer.among(off)
+        super().__init__(body, outer.nodes[outer.on_facet])
+        self._frame, self._fields, self._material = frame, fields, material
+        self._tractions = self._integrated(outer)
+        self._held = fem.Function(body.space)
+        dofs = [condition.dof_indices()[0] for condition in body.conditions]
+        self._supported = np.unique(np.concatenate([np.empty(0, np.int32), *dofs]))
+        self._support_nodes, self._row = np.unique(self._supported // 3, return_inverse=True)
+        self._displacements = self._displacement(self._support_nodes)
+        self._product = compat.compile_form(ufl.action(body.form, self._held))
+
+    def write(self, mode: int, load: PETSc.Vec) -> Any:
+        """Write the load of a mode, and return the displacements that the supports prescribe."""
+        self.write_sum(self._tractions[..., mode], load)
+        values = -self._displacements[self._row.ravel(), self._supported % 3, mode]
+        self._held.x.array[:] = 0.0
+        self._held.x.array[self._supported] = values
+        load.axpy(-1.0, compat.assemble_vector(self._product))
+        if self._elsewhere is not None:
+            form, function, nodes, displacements = self._elsewhere
+            function.x.array.reshape(-1, 3)[nodes] = displacements[..., mode]
+            load.axpy(-1.0, compat.assemble_vector(form))
+        self.leave_out_supports(load)
+        return self._held
+
+    def _integrated(self, outer: OuterFacets) -> Array:
+        """Return the forces at the nodes by the half-space's tractions, (nodes, 3, K²) [N]."""
+        count, points = outer.weights.shape
+        total = np.zeros((len(self.nodes), 3 * self._fields.count**2))
+        place = np.searchsorted(self.nodes, outer.nodes)
+        for part in np.array_split(np.arange(count), -(-count * points // _BATCH) or 1):
+            stress = self._fields(self._local_places(outer.points[part].reshape(-1, 3)))[1]
+            normals = outer.normals[part].reshape(-1, 3) @ self._frame.axes.T
+            tractions = np.einsum("nijk,nj->nik", stress, normals)
+            tractions = np.einsum("ia,nik->nak", self._frame.axes, tractions)
+            tractions *= -outer.weights[part].reshape(-1, 1, 1)
+            values = outer.values[outer.side[part]] * outer.on_facet[part][:, None]
+            rows = np.repeat(place[part], points, axis=0)
+            starts = np.arange(len(rows) + 1) * rows.shape[1]
+            flat = (values.reshape(rows.shape).ravel(), rows.ravel() % len(self.nodes), starts)
+            shape = csr_matrix(flat, shape=(len(rows), len(self.nodes)))
+            total += shape.T @ tractions.reshape(len(rows), -1)
+        return total.reshape(len(self.nodes), 3, -1)
+
+    def _displacement(self, nodes: NDArray[np.intp]) -> Array:
+        """Return the half-space's displacements of nodes, shape (n, 3, K²) [mm]."""
+        places = self.body.space.tabulate_dof_coordinates()[nodes]
+        found = np.empty((len(nodes), 3, self._fields.count**2))
+        for part in np.array_split(np.arange(len(nodes)), -(-len(nodes) // _BATCH) or 1):
+            local = self._fields(self._local_places(places[part]))[0]
+            found[part] = np.einsum("ia,nik->nak", self._frame.axes, local)
+        return found
+
+    def _local_places(self, points: Array) -> Array:
+        """Return points in the coordinates of the rectangle."""
+        return np.column_stack([self._frame.in_plane(points), self._frame.height(points)])
+
+    @cached_property
+    def _elsewhere(self) -> tuple[Any, Any, NDArray[np.intp], Array] | None:
+        """Where the body has other elastic constants: the form of the difference.
+
+        It acts on a function, whose nodes there get the displacements of the half-space.
+        """
+        body = self.body
+        differences = [
+            np.asarray(values, float) - own
+            for values, own in zip(body.cell_lame, self._material.lame, strict=True)
+        ]
+        size = sum(self._material.lame)
+        other = np.abs(differences[0]) + np.abs(differences[1]) > _SAME * size
+        if not body.comm.allreduce(bool(other.any())):
+            return None
+        constant = compat.scalar_space(body.mesh.mesh, 0, "DG")
+        rows = compat.cell_nodes(constant)[:, 0]
+        lame = []
+        for values in differences:
+            function = fem.Function(constant)
+            function.x.array[rows] = np.where(other, values, 0.0)
+            lame.append(function)
+        displacement = fem.Function(body.space)
+        form = stiffness_form(body.space, (lame[0], lame[1]), body.quadrature_degree)
+        nodes = np.unique(compat.cell_nodes(body.space)[np.flatnonzero(other)])
+        action = compat.compile_form(ufl.action(form, displacement))
+        return action, displacement, nodes, self._displacement(nodes)
+
+
+def _solver(body: ElasticBody) -> PETSc.KSP:
+    """Return a factorisation where many loads pay for it and it fits, else the body's solver."""
+    if body.dofs > _FACTORISED:
+        return body.solver
+    return linear_solver(body.stiffness, preconditioner=DIRECT_DEFAULTS)

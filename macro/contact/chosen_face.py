@@ -1,0 +1,164 @@
+"""The contact face in a user's own mesh: found by number, by name or as facets, and checked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from dolfinx import mesh as dmesh
+from numpy.typing import NDArray
+
+from geometry.collective import together
+from geometry.errors import InputError
+from geometry.face_frame import FaceFrame
+from macro import compat
+from macro.mesh.contact_face import ContactFacets, contact_facets
+from macro.mesh.planar_face import planar_face
+from macro.mesh.tagged import TaggedMesh
+
+Array = NDArray[np.float64]
+
+_PARALLEL = 1e-6
+"""Largest deviation of a given frame's normal from that of the face."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChosenFace:
+    """A planar contact face in its frame.
+
+    Args:
+        facets: This rank's facets of it.
+        marked: Facet tags whose marker 1 stands for the face.
+        lower: Lower corner of its bounding rectangle in the frame, shape (2,) [mm].
+        lengths: Sides of that rectangle [mm].
+    """
+
+    facets: ContactFacets
+    marked: Any
+    lower: Array
+    lengths: tuple[float, float]
+
+    def moved(self, x: float, y: float) -> ChosenFace:
+        """Return the same face with its coordinates counted from a point of them [mm]."""
+        shift = np.array([x, y])
+        facets = replace(
+            self.facets,
+            frame=self.facets.frame.moved(x, y),
+            corners=self.facets.corners - shift,
+        )
+        return replace(self, facets=facets, lower=self.lower - shift)
+
+
+def check_space(space: Any) -> None:
+    """Refuse a space whose functions are no displacements as contact takes them.
+
+    Args:
+        space: Function space of the displacements.
+
+    Raises:
+        InputError: On all ranks.
+    """
+    fits = compat.displacement_degree(space) is not None
+    straight = fits and compat.cell_vertices(space.mesh).shape[1] in (4, 8)
+    if not straight:
+        raise InputError(
+            "the space of the displacements does not fit" if not fits else "the cells are curved",
+            value=str(space.ufl_element()),
+            allowed="a continuous Lagrange space of degree 1 or 2 with three components, on "
+            "tetrahedra or hexahedra with straight edges",
+        )
+
+
+def chosen_face(
+    space: Any,
+    tags: Any,
+    tag: int | str | NDArray[Any],
+    names: Mapping[str, Any] | None = None,
+    frame: FaceFrame | None = None,
+) -> ChosenFace:
+    """Return the contact face that tags and a tag choose.
+
+    Args:
+        space: Vector space of the displacements.
+        tags: The mesh's facet tags; or what dolfinx read from a file, or a `TaggedMesh`, that has
+            ``facet_tags`` and names. None where the facets themselves are given.
+        tag: Number or name of the face, or this rank's facets, shape (n,), of which a rank may
+            have none.
+        names: Numbers of the named faces, where the tags know none.
+        frame: Coordinates on the face; None: those of `FaceFrame.through`.
+
+    Raises:
+        InputError: On all ranks, when the space, the face or the frame does not fit.
+
+    Note:
+        Collective.
+    """
+    check_space(space)
+    mesh = space.mesh
+    mesh.topology.create_connectivity(2, 3)
+    if isinstance(tag, str | int | np.integer):
+        tagged, name = _tagged(mesh, tags, names), str(tag)
+        number = tagged.facet_tag(tag if isinstance(tag, str) else int(tag))
+        given = np.asarray(tagged.facet_tags.find(number))
+    else:
+        given, name = together(mesh.comm, lambda: _given(mesh, tag)), "given by its facets"
+    facets = _on_all_ranks(mesh, given)
+    marked = dmesh.meshtags(mesh, 2, facets, np.ones(len(facets), np.int32))
+    found = planar_face(TaggedMesh(mesh=mesh, facet_tags=marked), 1, name=name)
+    if frame is None:
+        placed = contact_facets(mesh, facets, found.frame)
+        return ChosenFace(facets=placed, marked=marked, lower=np.zeros(2), lengths=found.lengths)
+    if np.abs(frame.normal - found.frame.normal).max() > _PARALLEL:
+        raise InputError(
+            "the frame's normal is not that of the face",
+            value=frame.normal.tolist(),
+            allowed=f"{found.frame.normal.tolist()}, out of the body",
+        )
+    placed = contact_facets(mesh, facets, frame)
+    corners = placed.corners.reshape(-1, 2)
+    ends = mesh.comm.allgather((corners.min(axis=0), corners.max(axis=0)) if len(corners) else None)
+    lower, upper = (np.array([end[k] for end in ends if end is not None]) for k in (0, 1))
+    corner, other = lower.min(axis=0), upper.max(axis=0)
+    lengths = (float(other[0] - corner[0]), float(other[1] - corner[1]))
+    return ChosenFace(facets=placed, marked=marked, lower=corner, lengths=lengths)
+
+
+def _tagged(mesh: Any, tags: Any, names: Mapping[str, Any] | None) -> TaggedMesh:
+    """Return tags with the names that they know, or are given."""
+    known = names or getattr(tags, "facet_names", None) or _groups(tags)
+    return TaggedMesh(
+        mesh=mesh, facet_tags=getattr(tags, "facet_tags", tags), facet_names=dict(known)
+    )
+
+
+def _groups(tags: Any) -> dict[str, int]:
+    """Return the names of surfaces in what the newest dolfinx reads from gmsh."""
+    groups = getattr(tags, "physical_groups", None) or {}
+    return {name: int(group.tag) for name, group in groups.items() if int(group.dim) == 2}
+
+
+def _given(mesh: Any, facets: Any) -> NDArray[np.int32]:
+    """Return the given facets, ascending, each once."""
+    given = np.unique(np.asarray(facets, dtype=np.int64).ravel())
+    numbers = mesh.topology.index_map(2)
+    count = numbers.size_local + numbers.num_ghosts
+    if len(given) and (given[0] < 0 or given[-1] >= count):
+        raise InputError(
+            "the facets of the contact face are not in the mesh",
+            value=int(given[-1]),
+            allowed=f"this rank's facets, 0 … {count - 1}",
+        )
+    return given.astype(np.int32)
+
+
+def _on_all_ranks(mesh: Any, facets: NDArray[Any]) -> NDArray[np.int32]:
+    """Return this rank's facets among those that any rank gives, ascending.
+
+    Whoever marks a facet may not have its cell.
+    """
+    numbers = mesh.topology.index_map(2)
+    chosen = mesh.comm.allgather(numbers.local_to_global(facets.astype(np.int32)))
+    local = np.arange(numbers.size_local + numbers.num_ghosts, dtype=np.int32)
+    return local[np.isin(numbers.local_to_global(local), np.concatenate(chosen))]

@@ -1,0 +1,275 @@
+"""A user's own variational problem with rough interfaces, solved by Newton's method.
+
+Theory: section 11 of ``demos/theory.md``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import ufl
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from geometry.errors import InputError, NotConverged
+from macro import compat
+from macro.contact.contact_tangent import ContactTangent
+from macro.contact.interface import Interface
+from macro.contact.newton import NONLINEAR_DEFAULTS, NewtonReport, newton_tolerance
+from macro.elasticity import rigid_body_modes
+from macro.linear_solvers.options import (
+    ALGEBRAIC_DEFAULTS,
+    KRYLOV_DEFAULTS,
+    PREFIX,
+    default_options,
+    reason_name,
+)
+
+Array = NDArray[np.float64]
+
+_INNER = 1e-3
+"""Share of the inner forces J u that residuals are compared with where contact forces are less."""
+
+_SMALL = 3000
+"""Largest number of unknowns that is factorised by default. The coarse grids of smaller problems
+have too few nodes for the rigid body modes of PETSc 3.18."""
+
+_FACTORISED = {"pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
+
+_REMEDIES = {
+    "DIVERGED_LINEAR_SOLVE": "another linear solver by petsc_options: {'pc_type': 'lu'}, or "
+    "{'ksp_type': 'gmres'} where the tangent is not symmetric; and supports that hold the body",
+    "DIVERGED_LINE_SEARCH": "start from a nearer solution: smaller steps of load or approach",
+    "DIVERGED_MAX_IT": "start from a nearer solution: smaller steps of load or approach",
+}
+_USUAL = "see that residual, laws and fields are finite, and take smaller steps of load or approach"
+
+
+class ContactProblem:
+    """Find u with F(u; v) = the work of the contact pressures, under Dirichlet conditions.
+
+    The tangent is exact: that of F, assembled, plus that of the interfaces, which is applied
+    without being assembled. F's own is assembled anew when a function or constant in it has
+    changed, so that linear materials keep matrix and preconditioner. Steps towards prescribed
+    values that the initial guess misses are part of Newton's first step.
+
+    Args:
+        residual: F(u; v) as UFL: internal less external virtual work, in N and mm.
+        displacement: u, a Function; it holds the initial guess, and the solution afterwards.
+        bcs: Dirichlet conditions.
+        interfaces: The interfaces; their conditions are set to `bcs`.
+        tangent: Derivative of the residual as UFL; None: `ufl.derivative`.
+        petsc_options: Options of the solvers without a prefix, such as ``{"pc_type": "lu"}``. By
+            default conjugate gradients with smoothed aggregation and rigid body modes, or with a
+            factorisation of small problems. What stands behind ``-patchlaw_`` on the command line
+            wins.
+        in_matrix: Whether the tangents of pointwise interfaces are assembled too, so that the
+            preconditioner knows them: needed where only contact holds the body. The preconditioner
+            is made anew in every Newton step then.
+
+    Attributes:
+        displacement: u.
+        interfaces: The interfaces.
+        report: Iterations and residuals of the latest solve; None before.
+
+    Raises:
+        InputError: On all ranks, when an interface is that of another space, or F is not in u.
+
+    Note:
+        Construction and all methods are collective. A change of the mesh is not seen.
+    """
+
+    def __init__(
+        self,
+        residual: Any,
+        displacement: Any,
+        bcs: Sequence[Any] = (),
+        interfaces: Interface | Sequence[Interface] = (),
+        tangent: Any = None,
+        *,
+        petsc_options: Mapping[str, object] | None = None,
+        in_matrix: bool = False,
+    ) -> None:
+        self.displacement, self._bcs = displacement, list(bcs)
+        self.interfaces = [interfaces] if isinstance(interfaces, Interface) else list(interfaces)
+        self.report: NewtonReport | None = None
+        space = displacement.function_space
+        if any(interface.space is not space for interface in self.interfaces):
+            raise InputError("an interface is that of another space than the displacement's")
+        if displacement not in residual.coefficients():
+            raise InputError("the residual does not depend on the displacement")
+        for interface in self.interfaces:
+            interface.constrain(self._bcs)
+        tangent = ufl.derivative(residual, displacement) if tangent is None else tangent
+        tangent = ufl.algorithms.expand_derivatives(tangent)  # linear ones lose the displacement
+        self._ingredients = [*tangent.coefficients(), *tangent.constants()]
+        self._form, self._slope = compat.compile_form(residual), compat.compile_form(tangent)
+        self._residual = compat.assemble_vector(self._form)
+        self._matrix = compat.assemble_matrix(self._slope, self._bcs)
+        self._known = self._values()
+        nodes = space.tabulate_dof_coordinates()[: space.dofmap.index_map.size_local]
+        self._matrix.setNearNullSpace(rigid_body_modes(nodes, self._comm))
+        self._in_matrix = [each for each in self.interfaces if in_matrix and each.assembles]
+        applied = [each for each in self.interfaces if each not in self._in_matrix]
+        self._tangent = ContactTangent(self._matrix, applied)
+        self._norms: list[float] = []
+        self._contact = self._matrix.createVecRight()
+        self._inner = self._contact.duplicate()
+        usual = _FACTORISED if self._matrix.getSize()[0] <= _SMALL else ALGEBRAIC_DEFAULTS
+        given = dict(petsc_options or {})
+        self._options = {**KRYLOV_DEFAULTS, **NONLINEAR_DEFAULTS, **usual, **given}
+        self._forcing = not given.keys() & {"ksp_rtol", "snes_ksp_ew"}
+        self._snes = self._solver()
+
+    def solve(self) -> int:
+        """Solve from the displacement as it is.
+
+        Returns:
+            The number of Newton steps. Displacement and interfaces hold the solution.
+
+        Raises:
+            NotConverged: With the name of the reason and a remedy; the displacement is what it was
+                before. Also when a closure is beyond the table of a law (``LAW_RANGE``); then the
+                displacement is the solution on the tangents of the laws.
+        """
+        start = self.displacement.x.array.copy()
+        planes = [interface.forces.plane for interface in self.interfaces]
+        self._norms = []
+        solution = compat.petsc_vector(self.displacement).copy()
+        try:
+            with default_options(PREFIX, self._options):
+                self._snes.solve(None, solution)
+            self._require_convergence()
+        except Exception:
+            self.displacement.x.array[:] = start
+            for interface, plane in zip(self.interfaces, planes, strict=True):
+                interface.forces.plane = plane
+            raise
+        self._take(solution)
+        compat.collect_garbage(solution.comm)
+        self._finish()
+        return int(self._snes.its)
+
+    def reaction(self) -> Array:
+        """Return the force that the supports bear, at the latest solution, shape (3,) [N].
+
+        It is the sum of F less contact over the constrained unknowns, component by component.
+        """
+        self._write_forces()
+        compat.assemble_vector_into(self._residual, self._form)
+        self._sum(self._residual)
+        forces = self._residual.array_r - self._contact.array_r
+        held = np.zeros(len(forces), dtype=bool)
+        for condition in self._bcs:
+            dofs, _ = condition.dof_indices()
+            held[dofs[dofs < len(held)]] = True
+        own = np.where(held, forces, 0.0).reshape(-1, 3).sum(axis=0)
+        return np.asarray(self._comm.allreduce(own))
+
+    @property
+    def _comm(self) -> Any:
+        return self.displacement.function_space.mesh.comm
+
+    def _solver(self) -> PETSc.SNES:
+        snes = PETSc.SNES().create(self._comm)
+        snes.setOptionsPrefix(PREFIX)
+        snes.setFunction(self._write_residual, self._contact.duplicate())
+        snes.setJacobian(self._update_tangent, self._tangent.shell, self._matrix)
+        snes.setConvergenceTest(self._converged)
+        with default_options(PREFIX, self._options):
+            snes.setFromOptions()
+        user = PETSc.Options(PREFIX)
+        self._forcing &= not (user.hasName("ksp_rtol") or user.hasName("snes_ksp_ew"))
+        return snes
+
+    def _write_residual(self, _snes: Any, x: PETSc.Vec, residual: PETSc.Vec) -> None:
+        self._take(x)
+        now = compat.petsc_vector(self.displacement)
+        compat.assemble_vector_into(self._residual, self._form)
+        compat.lift(self._residual, self._slope, self._bcs, now)
+        self._sum(self._residual)
+        self._write_forces()
+        self._residual.axpy(-1.0, self._contact)
+        compat.write_misfit(self._residual, self._bcs, now)
+        residual.array[:] = self._residual.array_r
+
+    def _write_forces(self) -> None:
+        """Write the contact forces of all interfaces, those on constrained unknowns included."""
+        self._contact.set(0.0)
+        for interface in self.interfaces:
+            interface.add_forces(self.displacement, self._contact)
+
+    def _update_tangent(self, snes: PETSc.SNES, _x: Any, _shell: Any, _matrix: Any) -> None:
+        values = self._values()
+        same = all(map(np.array_equal, values, self._known))
+        if self._in_matrix or not self._comm.allreduce(same, min):
+            compat.assemble_matrix_into(self._matrix, self._slope, self._bcs)
+            self._known = values
+        for interface in self.interfaces:
+            if interface in self._in_matrix:
+                interface.add_tangent(self.displacement, self._matrix)
+            else:
+                interface.move_tangent(self.displacement)
+        if self._forcing:
+            snes.ksp.setTolerances(rtol=newton_tolerance(self._norms[-1], snes.getTolerances()[0]))
+
+    def _converged(self, snes: PETSc.SNES, _its: int, norms: tuple[float, float, float]) -> int:
+        self._matrix.mult(compat.petsc_vector(self.displacement), self._inner)
+        scale = max(self._contact.norm(), _INNER * self._inner.norm())
+        self._norms.append(norms[2] / scale if scale > 0.0 else norms[2])
+        done = norms[2] <= snes.getTolerances()[0] * scale
+        return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE) if done else 0
+
+    def _require_convergence(self) -> None:
+        snes = self._snes
+        if snes.reason >= 0:
+            return
+        reason = reason_name(PETSc.SNES.ConvergedReason, snes.reason)
+        remedy = _REMEDIES.get(reason, _USUAL)
+        if reason == "DIVERGED_LINEAR_SOLVE":
+            reason += f" ({reason_name(PETSc.KSP.ConvergedReason, snes.ksp.reason)})"
+        loads = ", ".join(str(interface.forces.control) for interface in self.interfaces)
+        raise NotConverged(
+            f"the body at {loads}", reason=reason, iterations=int(snes.its), remedy=remedy
+        )
+
+    def _finish(self) -> None:
+        """Note iterations, evaluate the interfaces, and check the ranges of their laws."""
+        self.report = NewtonReport(
+            iterations=int(self._snes.its),
+            linear_iterations=int(self._snes.getLinearSolveIterations()),
+            residuals=np.array(self._norms),
+            reason=reason_name(PETSc.SNES.ConvergedReason, self._snes.reason),
+        )
+        for interface in self.interfaces:
+            interface.evaluate(self.displacement)
+        for interface in self.interfaces:
+            try:
+                interface.check_range()
+            except InputError as error:
+                raise NotConverged(
+                    f"the laws at {interface.forces.control}",
+                    reason=f"LAW_RANGE: {error}",
+                    iterations=self.report.iterations,
+                    remedy="make the laws up to a larger approach",
+                ) from error
+
+    def _take(self, x: PETSc.Vec) -> None:
+        """Put a vector of PETSc into the displacement."""
+        values = self.displacement.x.array
+        values[: x.local_size] = x.array_r[: x.local_size]
+        self.displacement.x.scatter_forward()
+
+    def _values(self) -> list[Array]:
+        """Return all that the tangent depends on."""
+        return [
+            np.array(each.x.array if hasattr(each, "x") else each.value)
+            for each in self._ingredients
+        ]
+
+    @staticmethod
+    def _sum(vector: PETSc.Vec) -> None:
+        """Add the contributions of all ranks."""
+        vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)

@@ -1,0 +1,368 @@
+"""A rough interface in a user's own dolfinx problem: residual and tangent of contact laws.
+
+Theory: section 11 of ``demos/theory.md``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from geometry.collective import together
+from geometry.errors import InputError
+from geometry.face_frame import FaceFrame
+from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control, RigidPlane
+from macro import compat
+from macro.contact.chosen_face import ChosenFace, chosen_face
+from macro.contact.contact_forces import ContactForces, ContactLaw
+from macro.contact.contact_tangent import ContactTangent, free_unknowns
+from macro.contact.interface_laws import InterfaceLaws, laws_on_face
+from macro.contact.interface_state import InterfaceState
+from macro.contact.loaded_face import LoadedFace, Mode
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class _Displacements:
+    """What `LoadedFace` needs of a body: the space of its displacements."""
+
+    space: Any
+
+
+class Interface:
+    """Contact laws between a planar face of a body and a rigid plane, as a term of its equations.
+
+    The body, its material and its supports are the user's; displacements are in mm and stresses in
+    MPa, so that forces are in N. With the displacements u the closure at a point of the face is
+    c = δ − g + n·u, with the approach δ of the plane, the macroscopic gap g and the normal n out of
+    the body. The laws give the pressure p(c). The residual is −B p(c), where B p is the nodal load,
+    to be added to internal less external forces.
+
+    Args:
+        space: The space of the displacements: continuous Lagrange of degree 1 or 2, three
+            components, on tetrahedra or hexahedra.
+        facet_tags: The facet tags of its mesh; or an object that has them as ``facet_tags`` beside
+            names: a `TaggedMesh`, or what the newest dolfinx reads from gmsh. None where `tag` are
+            the facets.
+        tag: The face by number, by name, or as an array of this rank's facets.
+        laws: A table of laws per patch, such as a `LawTable`; one law for the whole face, such as
+            a representative one; or one law per patch beside `patches`.
+        indenter: Approach and tilt of the plane (`RigidPlane`, centre in coordinates of the
+            face), or what is prescribed of it (`Control`: a force, a free tilt). It may be set
+            anew for every load step.
+        mode: ``"patchwise"``: the closure averaged over a patch gives one pressure for it, the
+            default of laws per patch; ``"pointwise"``: a law holds at every quadrature point, the
+            default of one law.
+        patches: Patches in coordinates of the face; by default those of the table, in the middle
+            of the face's bounding rectangle, or one patch on that rectangle.
+        frame: Coordinates of the face; by default `FaceFrame.through`.
+        bcs: Dirichlet conditions of the user's problem. What contact adds to the rows, and columns,
+            that they constrain is left out. A `ContactProblem` hands in its own.
+        crown: Depth of the face below its plane at points (x, y) of the plane, beside that of the
+            mesh [mm]; None: none.
+        names: Number of every named face, where the tags know no names.
+
+    Attributes:
+        frame: Coordinates of the face.
+        patches: The patches in them.
+        mode: How the laws are evaluated.
+        laws: One law per patch.
+        marked: Facet tags whose marker 1 stands for the face.
+        sampling: The samples that laws are evaluated at.
+        forces: The forces of the laws, with the plane.
+
+    Raises:
+        InputError: On all ranks, when the space, the face, the laws or the patches do not fit.
+
+    Note:
+        Construction and all methods are collective, whether a rank owns facets or not. Results are
+        those of the latest `evaluate`, and the same on every rank unless they say so.
+    """
+
+    def __init__(
+        self,
+        space: Any,
+        facet_tags: Any,
+        tag: int | str | NDArray[Any],
+        *,
+        laws: Any,
+        indenter: RigidPlane | Control,
+        mode: Mode | None = None,
+        patches: PatchGrid | None = None,
+        frame: FaceFrame | None = None,
+        bcs: Sequence[Any] = (),
+        crown: Callable[[Array, Array], Array] | None = None,
+        names: Mapping[str, Any] | None = None,
+    ) -> None:
+        self.space = space
+        face = chosen_face(space, facet_tags, tag, names, frame)
+        chosen = laws_on_face(laws, patches, mode, face.lower, face.lengths)
+        if frame is None and chosen.shift.any():
+            face = face.moved(*chosen.shift)
+        self._make(face, chosen, crown)
+        self._free: PETSc.Vec | None = None
+        self._tangents: list[ContactTangent] = []
+        self._state: InterfaceState | None = None
+        self.constrain(bcs)
+        self.indenter = indenter
+
+    def _make(self, face: ChosenFace, chosen: InterfaceLaws, crown: Any) -> None:
+        self.frame, self.patches, self.mode = face.facets.frame, chosen.patches, chosen.mode
+        self.laws: tuple[ContactLaw, ...] = chosen.laws
+        self._face = LoadedFace(_Displacements(self.space), face.facets, chosen.patches)
+        sampling = self._face.sampling(chosen.mode)
+        self.sampling, self.marked, self._crown = sampling, face.marked, crown
+        gap = together(self.comm, lambda: sampling.depth + self.crown_at(sampling.x, sampling.y))
+        self.forces = ContactForces(self._face, sampling, chosen.laws, gap)
+        self._load = sampling.operator.createVecLeft()
+
+    @property
+    def comm(self) -> Any:
+        """Communicator of the mesh."""
+        return self.space.mesh.comm
+
+    @property
+    def indenter(self) -> RigidPlane | Control:
+        """The plane, or what is prescribed of it; setting a force of zero is collective."""
+        return self._indenter
+
+    @indenter.setter
+    def indenter(self, indenter: RigidPlane | Control) -> None:
+        if not isinstance(indenter, RigidPlane | Control):
+            raise InputError(
+                "the indenter is no plane",
+                value=indenter,
+                allowed="RigidPlane(approach=…) or Control(force=…)",
+            )
+        self.forces.prescribe(_prescribed(indenter, self.patches.middle), self.forces.plane)
+        self._indenter = indenter
+
+    @property
+    def assembles(self) -> bool:
+        """Whether `add_tangent` gives the whole tangent: pointwise laws, the plane not free."""
+        return self.mode == "pointwise" and not self.forces.control.free.any()
+
+    @property
+    def quadrature_degree(self) -> int:
+        """Polynomial degree that the quadrature on the face is exact for."""
+        return self._face.quadrature_degree
+
+    def crown_at(self, x: Array, y: Array) -> Array:
+        """Return the depth of the crown at points of the plane, shapes (n,) [mm]."""
+        depth = np.zeros(len(x)) if self._crown is None else self._crown(x, y)
+        return np.broadcast_to(np.asarray(depth, dtype=np.float64), x.shape)
+
+    def approach_at(self, x: Array, y: Array) -> Array:
+        """Return the approach of the plane, where it is now, at points of it, shapes (n,) [mm]."""
+        (approach, tx, ty), (xc, yc) = self.forces.plane, self.patches.middle
+        return np.asarray(approach + tx * (x - xc) + ty * (y - yc))
+
+    def constrain(self, bcs: Sequence[Any]) -> None:
+        """Leave out what contact adds to unknowns that Dirichlet conditions constrain.
+
+        Args:
+            bcs: The conditions; none: nothing is left out.
+        """
+        self._free = free_unknowns(self.space, bcs, self._load) if bcs else None
+        self.__dict__.pop("_points_by_free", None)
+
+    def add_residual(self, x: Any, residual: PETSc.Vec) -> None:
+        """Add −B p(c(u)) to a residual of internal less external forces [N].
+
+        Args:
+            x: Displacements, as a Function or a vector of PETSc [mm].
+            residual: The residual, contributions of all ranks added; ghosts are left alone.
+        """
+        self._write_load(x)
+        if self._free is not None:
+            self._load.pointwiseMult(self._load, self._free)
+        residual.axpy(-1.0, self._load)
+
+    def add_forces(self, x: Any, load: PETSc.Vec) -> None:
+        """Add the nodal forces B p(c(u)) to a load, also at constrained unknowns [N].
+
+        Args:
+            x: Displacements, as a Function or a vector of PETSc [mm].
+            load: The load.
+        """
+        self._write_load(x)
+        load.axpy(1.0, self._load)
+
+    def add_tangent(self, x: Any, matrix: PETSc.Mat) -> None:
+        """Add the derivative of `add_residual` to an assembled matrix of elasticity [N/mm].
+
+        Its entries are those of nodes that share a facet, where such a matrix has entries already.
+
+        Args:
+            x: Displacements, as a Function or a vector of PETSc [mm].
+            matrix: The matrix; assembled before and afterwards.
+
+        Raises:
+            InputError: Where the tangent has other entries: `tangent` serves there.
+        """
+        if not self.assembles:
+            raise InputError(
+                "the tangent couples all nodes of a patch, or of the face, and fits no matrix",
+                value=f"mode {self.mode!r} under {self.forces.control}",
+                allowed="pointwise laws under a plane in a given place; else Interface.tangent",
+            )
+        self.move_tangent(x)
+        rows = self._points_by_free
+        scaled = rows.copy()
+        stiffness = rows.createVecLeft()
+        stiffness.array[:] = self.forces.slope
+        scaled.diagonalScale(L=stiffness)
+        added = rows.transposeMatMult(scaled)
+        matrix.axpy(1.0, added, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+
+    def tangent(self, matrix: PETSc.Mat) -> PETSc.Mat:
+        """Return a PETSc shell that applies a matrix plus the derivative of `add_residual`.
+
+        It stands for the state last given to `move_tangent`, and for what the matrix holds when it
+        is applied. The interface keeps it alive.
+
+        Args:
+            matrix: The user's own tangent, such as the matrix of elasticity.
+        """
+        self._tangents.append(ContactTangent(matrix, [self]))
+        return self._tangents[-1].shell
+
+    def move_tangent(self, x: Any) -> None:
+        """Move the derivative to displacements, a Function or a vector of PETSc [mm]."""
+        self.forces.update(self._vector(x))
+
+    def add_product(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Add the product of the derivative with a vector x to y, as a shell does."""
+        if self._free is None:
+            self.forces.add_stiffness(x, y)
+            return
+        masked, product = x.duplicate(), self._load
+        masked.pointwiseMult(x, self._free)
+        product.set(0.0)
+        self.forces.add_stiffness(masked, product)
+        product.pointwiseMult(product, self._free)
+        y.axpy(1.0, product)
+
+    def evaluate(self, x: Any) -> InterfaceState:
+        """Evaluate the contact at displacements; the properties then give its parts.
+
+        Args:
+            x: Displacements, as a Function or a vector of PETSc [mm].
+        """
+        closure = self.forces.closure(self._vector(x))
+        self._state = InterfaceState.of(
+            self.forces, self.sampling, self.laws, self._face.areas, self.patches, closure
+        )
+        return self._state
+
+    def check_range(self) -> None:
+        """Refuse closures of the latest `evaluate` beyond the tables of the laws.
+
+        Laws are continued by their tangents there. Laws without ``at`` have no range.
+
+        Raises:
+            InputError: With the largest closure and the range of that law.
+        """
+        closure, checks = self.closure, [getattr(law, "at", np.asarray) for law in self.laws]
+
+        def check() -> None:
+            for i in np.unique(self.sampling.patch):
+                checks[i](closure[self.sampling.patch == i])
+
+        together(self.comm, check)
+
+    @property
+    def state(self) -> InterfaceState:
+        """The contact at the latest `evaluate`.
+
+        Raises:
+            InputError: Before that.
+        """
+        if self._state is None:
+            raise InputError("nothing is solved or evaluated on this interface yet")
+        return self._state
+
+    @property
+    def force(self) -> float:
+        """Force on the face against its normal [N]."""
+        return self.state.force
+
+    @property
+    def moment(self) -> Array:
+        """First moments of the pressures about the middle of the patches, shape (2,) [N mm]."""
+        return self.state.moment
+
+    @property
+    def area(self) -> float | None:
+        """Real contact area [mm²]; None where a law does not know it."""
+        return self.state.area
+
+    @property
+    def patch_pressure(self) -> Array:
+        """Mean pressures of the patches, shape (N,) [MPa]."""
+        return self.state.patch_pressure
+
+    @property
+    def patch_closure(self) -> Array:
+        """Mean closures of the patches, shape (N,) [mm]."""
+        return self.state.patch_closure
+
+    @property
+    def closure(self) -> Array:
+        """Closures of this rank's samples, patches or quadrature points, shape (n,) [mm]."""
+        return self.state.closure
+
+    @property
+    def pressure(self) -> Array:
+        """Pressures of this rank's samples, shape (n,) [MPa]."""
+        return self.state.pressure
+
+    @property
+    def points(self) -> Array:
+        """Places of this rank's samples in coordinates of the face, shape (n, 2) [mm]."""
+        return np.column_stack((self.sampling.x, self.sampling.y))
+
+    @property
+    def plane(self) -> RigidPlane:
+        """The plane, also where it follows from loads; its centre is the middle of the patches."""
+        return self.state.plane
+
+    @cached_property
+    def _points_by_free(self) -> PETSc.Mat:
+        """The rows w φ n of the points for unconstrained unknowns, shape (points, unknowns)."""
+        rows = self._face.points_by_dofs
+        if self._free is None:
+            return rows
+        rows = rows.copy()
+        rows.diagonalScale(R=self._free)
+        return rows
+
+    def _write_load(self, x: Any) -> None:
+        self.forces.write(self._vector(x), self._load)
+
+    def _vector(self, x: Any) -> PETSc.Vec:
+        """Return displacements as a vector of PETSc."""
+        vector = compat.petsc_vector(x) if hasattr(x, "function_space") else x
+        if vector.getSizes() != self._load.getSizes():
+            raise InputError(
+                "the displacements are those of another space",
+                value=vector.getSize(),
+                allowed=f"{self._load.getSize()} unknowns",
+            )
+        return vector
+
+
+def _prescribed(indenter: RigidPlane | Control, middle: Array) -> Control:
+    """Return what an indenter prescribes of the plane at the middle of the patches."""
+    if isinstance(indenter, Control):
+        return indenter
+    x, y = middle
+    return Control(approach=float(indenter.at(x, y)), tilt=indenter.tilt)

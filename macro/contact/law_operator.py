@@ -1,0 +1,171 @@
+"""Laws of an interface as an external operator of UFL, by the package dolfinx-external-operator.
+
+Theory: section 11 of ``demos/theory.md``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from numpy.typing import NDArray
+
+from geometry.errors import InputError
+from macro.contact.interface import Interface
+from macro.mesh.facet_nodes import facet_nodes
+
+Array = NDArray[np.float64]
+
+PACKAGE = "dolfinx_external_operator"
+
+
+class LawsAtPoints:
+    """Pressures of an interface as functions of n·u at given points of its face.
+
+    They follow the interface's indenter as it is when they are called. The normal n points out of
+    the body; off the patches there is no pressure.
+
+    Args:
+        interface: The interface; it must be pointwise, and its plane in a given place.
+        points: The points, shape (m, q, 3): q on each of m facets [mm].
+
+    Raises:
+        InputError: When the interface is patchwise.
+    """
+
+    def __init__(self, interface: Interface, points: Array) -> None:
+        if interface.mode != "pointwise":
+            raise InputError(
+                "an external operator holds at points", value=interface.mode, allowed="pointwise"
+            )
+        self._interface = interface
+        self._shape = np.shape(points)[:2]
+        flat = np.reshape(points, (-1, 3))
+        places = interface.frame.in_plane(flat)
+        self._x, self._y = places.T
+        patches = interface.patches
+        self._inside = np.ones(len(flat), dtype=bool)
+        for values, borders in zip(places.T, (patches.borders_x, patches.borders_y), strict=True):
+            self._inside &= (values >= borders[0]) & (values <= borders[-1])
+        self._patch = np.zeros(len(flat), dtype=np.intp)
+        self._patch[self._inside] = patches.index_of(*places[self._inside].T)
+        self._gap = interface.crown_at(self._x, self._y) - interface.frame.height(flat)
+
+    def external_function(self, derivatives: tuple[int, ...]) -> Callable[[Array], Array]:
+        """Return the pressure, or its derivative, as the package asks for it.
+
+        Args:
+            derivatives: (0,) for p [MPa], (1,) for dp/d(n·u) [MPa/mm].
+
+        Returns:
+            A function of n·u at the points, shape (m, q) [mm]; its values have shape (m q,).
+
+        Raises:
+            InputError: When it is another derivative.
+        """
+        if derivatives not in ((0,), (1,)):
+            raise InputError("no such derivative", value=derivatives, allowed="(0,), (1,)")
+        name = "stiffness" if derivatives == (1,) else "pressure"
+        return lambda outward: self._values(name, np.asarray(outward, dtype=np.float64))
+
+    def _values(self, name: str, outward: Array) -> Array:
+        interface = self._interface
+        if interface.forces.control.free.any():
+            raise InputError(
+                "an external operator needs the plane in its place",
+                value=str(interface.forces.control),
+                allowed="RigidPlane(approach=…)",
+            )
+        closure = interface.approach_at(self._x, self._y) - self._gap + outward.ravel()
+        values = np.zeros(len(closure))
+        for i in np.unique(self._patch[self._inside]):
+            part = self._inside & (self._patch == i)
+            values[part] = getattr(interface.laws[i], name)(closure[part])
+        return values
+
+
+class LawOperator:
+    """An interface as a term of UFL: p n·v over the face, with p an external operator of n·u.
+
+    Add ``operator.pressure * ufl.inner(operator.normal, v) * operator.measure`` to the residual,
+    hand form and derivative to the package's ``replace_external_operators``, compile them with
+    ``entity_maps=operator.entity_maps``, and evaluate operands with
+    ``entities=operator.entities`` before every assembly.
+
+    Args:
+        interface: The interface, pointwise.
+        displacement: u, a Function in its space.
+        degree: Degree of the quadrature on the facets, which patches' borders do not cut; None:
+            that of the interface.
+
+    Attributes:
+        pressure: p, a ``FEMExternalOperator``.
+        normal: n, out of the body, as UFL.
+        measure: The measure on the face.
+        entity_maps: For ``dolfinx.fem.form``.
+        entities: Cell and local facet of every facet, shape (m, 2).
+
+    Raises:
+        InputError: Without the package, or on a dolfinx that it does not serve.
+
+    Note:
+        Construction is collective. Import the package before the first form is made: UFL counts
+        its types, to which the package adds one.
+    """
+
+    def __init__(self, interface: Interface, displacement: Any, degree: int | None = None) -> None:
+        try:
+            package = import_module(PACKAGE)
+        except ImportError as error:
+            raise InputError(
+                f"external operators need the package dolfinx-external-operator ({error}); "
+                "Interface.add_residual and ContactProblem do without it"
+            ) from error
+        if not hasattr(dmesh, "EntityMap"):
+            raise InputError(
+                "external operators on a face need dolfinx 0.10 or newer; Interface.add_residual "
+                "and ContactProblem do without them"
+            )
+        mesh, facets = interface.space.mesh, interface.marked.find(1)
+        degree = interface.quadrature_degree if degree is None else degree
+        surface, mapped, *_ = dmesh.create_submesh(mesh, 2, facets)
+        self.entities = _cell_facets(mesh, surface, mapped)
+        elements = import_module("basix.ufl")  # not there with the oldest dolfinx
+        element = elements.quadrature_element(surface.basix_cell(), value_shape=(), degree=degree)
+        space = fem.functionspace(surface, element)
+        self.laws = LawsAtPoints(interface, self._points(mesh, space))
+        self.normal = ufl.as_vector(interface.frame.normal.tolist())
+        self.entity_maps = [mapped]
+        self.measure = ufl.Measure(
+            "ds",
+            domain=mesh,
+            subdomain_data=interface.marked,
+            subdomain_id=1,
+            metadata={"quadrature_degree": degree},
+        )
+        self.pressure = package.FEMExternalOperator(
+            ufl.inner(self.normal, displacement),
+            function_space=space,
+            external_function=self.laws.external_function,
+        )
+
+    def _points(self, mesh: Any, space: Any) -> Array:
+        """Return the quadrature points on all facets, shape (m, q, 3) [mm]."""
+        local = space.element.interpolation_points
+        if not len(self.entities):
+            return np.empty((0, len(local), 3))
+        place = fem.Expression(ufl.SpatialCoordinate(mesh), local)
+        return np.reshape(place.eval(mesh, self.entities), (len(self.entities), len(local), 3))
+
+
+def _cell_facets(mesh: Any, surface: Any, mapped: Any) -> NDArray[np.int32]:
+    """Return the cell and the local facet in it of every cell of a surface, shape (m, 2)."""
+    cells = surface.topology.index_map(2)
+    own = np.arange(cells.size_local + cells.num_ghosts, dtype=np.int32)
+    found = facet_nodes(mesh, mapped.sub_topology_to_topology(own, False))
+    return np.column_stack((found.cell, found.side)).astype(np.int32)

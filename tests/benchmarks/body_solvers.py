@@ -1,0 +1,190 @@
+"""Solvers of bodies whose mesh is no lattice: iterations, times and memory on machine parts.
+
+Run by hand: `.venv/bin/python tests/benchmarks/body_solvers.py [PART …] [--scale 1.5]`, also under
+mpirun; ``--scale 2`` halves the cells. Every part is written by gmsh, read, assembled and solved to
+1e-8 under a load of all frequencies. Iterations with the options of the body and with PETSc's
+smoothed aggregation; times are CPU seconds of the slowest rank; memory is that of all ranks, per
+unknown, beyond what they had before. ``--steps 8`` presses the part instead, under a plane and one
+pointwise law, and prints the time of every phase.
+"""
+
+import os
+
+os.environ["OMP_NUM_THREADS"] = "1"
+
+import argparse
+import ctypes
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from body_meshes import HEIGHTS, Part, write_part
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from geometry import PatchGrid
+from geometry.collective import on_root
+from geometry.rigid_plane import Control
+from macro import LawContactProblem, LoadedFace, Material, compat
+from macro.linear_solvers.options import PREFIX
+from macro.mesh.from_file import read_mesh
+from macro.mesh.planar_face import planar_face
+from macro.meshed_body import MeshedBody, Support
+
+COMM = MPI.COMM_WORLD
+STEEL, LINING, SOFT, RUBBERY = (
+    Material(young_modulus=modulus, poisson_ratio=ratio)
+    for modulus, ratio in ((210e3, 0.3), (5e3, 0.3), (500.0, 0.3), (500.0, 0.45))
+)
+PARTS = {
+    # part, element degree, material of the second volume, whether on rollers
+    "pad, 42:1": (Part(name="pad", cells="tet", size=1.6), 1, LINING, False),
+    "pad, 420:1": (Part(name="pad", cells="tet", size=1.6), 1, SOFT, False),
+    "pad, 420:1, rollers": (Part(name="pad", cells="tet", size=1.6), 1, SOFT, True),
+    "pad, nu 0.45": (Part(name="pad", cells="tet", size=1.6), 1, RUBBERY, True),
+    "pad, P2": (Part(name="pad", cells="tet", size=3.0), 2, SOFT, False),
+    "pad, Q1": (Part(name="pad", cells="hex", size=1.8), 1, SOFT, True),
+    "pad, Q2": (Part(name="pad", cells="hex", size=3.6), 2, SOFT, False),
+    "flange": (Part(name="flange", cells="tet", size=2.2), 1, STEEL, False),
+    "flange, P2": (Part(name="flange", cells="tet", size=4.4), 2, STEEL, False),
+    "flange, Q1": (Part(name="flange", cells="hex", size=2.2), 1, STEEL, False),
+    "L": (Part(name="L", cells="tet", size=1.4), 1, STEEL, False),
+    "L, Q2": (Part(name="L", cells="hex", size=3.6), 2, STEEL, True),
+    "ring 8:1": (Part(name="ring", cells="layers", size=0.6, flat=8), 1, STEEL, True),
+    "ring 16:1": (Part(name="ring", cells="layers", size=0.8, flat=16), 1, STEEL, True),
+    "ring 8:1, P2": (Part(name="ring", cells="layers", size=1.0, flat=8), 2, STEEL, True),
+    "ring 8:1, Q1": (Part(name="ring", cells="hex", size=0.5, flat=8), 1, STEEL, True),
+    "ring 20:1, Q1": (Part(name="ring", cells="hex", size=0.7, flat=20), 1, STEEL, True),
+    "ring 8:1, Q2": (Part(name="ring", cells="hex", size=1.2, flat=8), 2, STEEL, True),
+}
+
+
+class Law:
+    """p = 10 GPa/mm² c², about that of a rough steel surface."""
+
+    def pressure(self, closure):
+        return 1e4 * np.maximum(closure, 0.0) ** 2
+
+    def stiffness(self, closure):
+        return 2e4 * np.maximum(closure, 0.0)
+
+
+def memory(*, restart=False):
+    """Return the largest memory of all ranks together, since a restart [B]."""
+    if restart:
+        ctypes.CDLL("libc.so.6").malloc_trim(0)
+        Path("/proc/self/clear_refs").write_text("5")
+    shown = Path("/proc/self/status").read_text().splitlines()
+    (peak,) = (line.split()[1] for line in shown if line.startswith("VmHWM"))
+    return 1024 * np.array(COMM.allgather(int(peak)))
+
+
+def timed(work):
+    """Return what work returns, CPU and wall seconds of the slowest rank, and memory per rank."""
+    before = memory(restart=True)
+    began = time.process_time(), time.perf_counter()
+    found = work()
+    spent = time.process_time() - began[0], time.perf_counter() - began[1]
+    return found, *(COMM.allreduce(part, op=MPI.MAX) for part in spent), memory() - before
+
+
+def body_of(tagged, degree, second, rollers):
+    """Return a part's body, clamped, or on rollers on three planes."""
+    names = tagged.facet_names
+    materials = dict(zip(sorted(tagged.cell_names.values()), (STEEL, second), strict=False))
+    held = [Support(tag=names["support"], displacement=(None if rollers else 0.0,) * 2 + (0.0,))]
+    if rollers:
+        held.append(Support(tag=names["x"], displacement=(0.0, None, None)))
+        held.append(Support(tag=names["y"], displacement=(None, 0.0, None)))
+    only = next(iter(materials.values()))
+    return MeshedBody(tagged, materials if len(materials) > 1 else only, held, order=degree)
+
+
+def iterations(body, solver):
+    """Solve to 1e-8 under random forces."""
+    load = body.stiffness.createVecRight()
+    load.array[:] = np.random.default_rng(COMM.rank).standard_normal(body.owned_dofs)
+    load.pointwiseMult(load, body.free)
+    found = load.duplicate()
+    solver.setTolerances(rtol=1e-8)
+    solver.solve(load, found)
+    return solver.its if solver.reason > 0 else -1
+
+
+def solve(name, tagged, body, *, aggregation):
+    """Print one line of the table."""
+    assembly = timed(lambda: body.stiffness)
+    setup = timed(lambda: body.solver)
+    run = timed(lambda: iterations(body, body.solver))
+    other = ""
+    if aggregation:
+        vars(body).pop("solver")
+        PETSc.Options(PREFIX)["pc_type"] = "gamg"
+        second = timed(lambda: body.solver)
+        third = timed(lambda: iterations(body, body.solver))
+        other = f"{third[0]:7d} {second[1]:7.2f} {third[1]:7.2f}"
+        PETSc.Options(PREFIX).delValue("pc_type")
+    if COMM.rank == 0:
+        sizes = " ".join(f"{part[3].sum() / body.dofs:6.0f}" for part in (assembly, setup))
+        print(
+            f"{name:22s} {body.dofs:8d} {run[0]:6d} {setup[1]:7.2f} {run[1]:7.2f}   {sizes}{other}",
+            flush=True,
+        )
+
+
+def press(name, tagged, body, steps):
+    """Press the part step by step, and print the time and memory of every phase."""
+    face = planar_face(tagged, tagged.facet_names["contact"])
+
+    def solved():
+        for step in range(1, steps + 1):
+            yield problem.solve(Control(approach=0.02 * step / steps))
+
+    lines = [("assembly", timed(lambda: body.stiffness)), ("set-up", timed(lambda: body.solver))]
+    patches = PatchGrid(grid=(1, 1), lengths=face.lengths)
+    problem, *spent = timed(
+        lambda: LawContactProblem(
+            LoadedFace(body, face.facets_of(body), face.frame, patches), [Law()], "pointwise"
+        )
+    )
+    lines.append(("law on the face", (None, *spent)))
+    states, *spent = timed(lambda: list(solved()))
+    lines.append((f"{steps} load steps", (None, *spent)))
+    if COMM.rank == 0:
+        print(f"{name}, {body.dofs} unknowns")
+        for phase, (_, cpu, wall, used) in lines:
+            print(f"  {phase:16s} {cpu:7.2f} s CPU {wall:7.2f} s   {used / 1e9} GB")
+        print("  Newton", [s.newton_iterations for s in states],
+              "linear", [s.linear_iterations for s in states], "force", states[-1].force)  # fmt: skip
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("parts", nargs="*")
+    parser.add_argument("--scale", type=float, default=1.0)
+    parser.add_argument("--steps", type=int, default=0)
+    parser.add_argument("--aggregation", action="store_true", help="beside PETSc's GAMG")
+    choice = parser.parse_args()
+    if COMM.rank == 0 and not choice.steps:
+        print("part                   unknowns  iter. set-up[s] solve[s]  matrix, set-up [B]   GAMG")
+    for name in choice.parts or PARTS:
+        part, *rest = PARTS[name]
+        part = Part(name=part.name, cells=part.cells, size=part.size / choice.scale, flat=part.flat)
+        with tempfile.TemporaryDirectory() as folder:
+            path = COMM.bcast(Path(folder) / "part.msh")
+            on_root(COMM, lambda part=part, path=path: write_part(part, path))
+            tagged, cpu, wall, used = timed(lambda path=path: read_mesh(path, COMM))
+            COMM.Barrier()
+        if COMM.rank == 0:
+            print(f"# {name}: read in {wall:.1f} s, {used / 1e9} GB", flush=True)
+        body = body_of(tagged, *rest)
+        if choice.steps:
+            press(name, tagged, body, choice.steps)
+        else:
+            solve(name, tagged, body, aggregation=choice.aggregation)
+        compat.collect_garbage(PETSc.COMM_WORLD)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,92 @@
+"""The meshes in demos/bodies have the dimensions and names that their scripts say."""
+
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from macro import compat
+from macro.mesh.from_file import read_mesh
+from macro.mesh.planar_face import planar_face
+
+BODIES = Path(__file__).parents[2] / "demos" / "bodies"
+SECTOR = (143.0**2 - 100.0**2) / 2.0 * math.radians(56.0)  # of the lining, seen from above
+PLATE = (146.0**2 - 97.0**2) / 2.0 * math.radians(64.0)
+PISTON = math.pi * (22.0**2 - 15.0**2)
+
+
+def ring(inner, outer, share=1.0):
+    return share * math.pi * (outer**2 - inner**2)
+
+
+CASES = {  # edges; contact face; volumes; areas
+    "brake_pad": (
+        5.0,
+        "pad face",
+        {"back plate": 5.0 * PLATE, "lining": 10.0 * SECTOR - 18.0 * 43.0 - 2.0 * 8.0 * 43.0},
+        {
+            "pad face": SECTOR - (3.0 + 2.0 * 4.0) * 43.0,
+            "piston": PISTON,
+            "back": PLATE - PISTON,
+        },
+    ),
+    "flange": (
+        4.0,
+        "raised face",
+        {
+            "flange": 18.0 * (ring(27.5, 82.5) - 4.0 * ring(0.0, 9.0))
+            + 2.0 * ring(27.5, 51.0)
+            + 40.0 * ring(27.5, 35.5)
+        },
+        {
+            "raised face": ring(27.5, 51.0),
+            "washers": 4.0 * ring(9.0, 15.0),
+            "pipe end": ring(27.5, 35.5),
+        },
+    ),
+    "seal_ring": (
+        0.5,
+        "sealing face",
+        {"ring": 8.0 * ring(20.0, 26.0, 0.25) + 2.0 * ring(22.0, 24.5, 0.25)},
+        {
+            "sealing face": ring(22.0, 24.5, 0.25),
+            "shoulder": ring(24.5, 26.0, 0.25),
+            "seat": ring(20.0, 22.0, 0.25),
+            "plane x": 6.0 * 8.0 + 2.5 * 2.0,
+            "plane y": 6.0 * 8.0 + 2.5 * 2.0,
+        },
+    ),
+}
+
+
+@pytest.mark.parametrize("body", CASES)
+def test_bodies_have_their_dimensions(body, tmp_path):
+    size, face, volumes, areas = CASES[body]
+    path = tmp_path / "body.msh"
+    words = [sys.executable, BODIES / f"{body}.py", "--size", str(size), "--out", path]
+    subprocess.run(words, check=True, capture_output=True)
+    tagged = read_mesh(path, MPI.COMM_SELF)
+    assert set(tagged.cell_names) == set(volumes)
+    assert set(tagged.facet_names) == set(areas)
+    corners = tagged.mesh.geometry.x[compat.cell_vertices(tagged.mesh)]
+    for name, volume in volumes.items():
+        of_volume = corners[tagged.cell_tags.values == tagged.cell_names[name]]
+        # chords instead of arcs
+        assert sum(map(_volume, of_volume)) == pytest.approx(volume, rel=0.02)
+    for name, area in areas.items():
+        found = planar_face(tagged, tagged.facet_tag(name), name=name)
+        assert found.area == pytest.approx(area, rel=0.02)
+        if name == face:
+            assert found.frame.normal.tolist() == [0.0, 0.0, 1.0]
+
+
+def _volume(corners):
+    """Return the volume of a tetrahedron, or of a hexahedron as five of them."""
+    if len(corners) == 4:
+        return abs(np.linalg.det(corners[1:] - corners[0])) / 6.0
+    five = [(0, 1, 2, 4), (3, 1, 2, 7), (5, 1, 4, 7), (6, 2, 4, 7), (1, 2, 4, 7)]
+    return sum(_volume(corners[list(part)]) for part in five)

@@ -1,0 +1,30 @@
+"""The page on users' own dolfinx problems is true: its example runs and prints what it says."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "demos" / "own_problem.md").read_text(encoding="utf-8")
+EXAMPLE = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)[0]
+
+
+def test_example_runs_and_prints_what_the_page_says():
+    code = [line for line in EXAMPLE.splitlines() if line]
+    assert len(code) <= 25
+    shown = subprocess.run(
+        [sys.executable, "-c", EXAMPLE], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert shown.returncode == 0, shown.stderr
+    (line,) = shown.stdout.splitlines()
+    said = re.search(r"It prints `(.*?)`", PAGE)
+    assert line == said.group(1)
+
+
+def test_example_runs_on_two_ranks(mpirun, tmp_path):
+    script = tmp_path / "own.py"
+    script.write_text(EXAMPLE, encoding="utf-8")
+    done = mpirun(2, script)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert len(set(done.stdout.split("\n")) - {""}) == 1  # every rank prints the same

@@ -1,0 +1,95 @@
+"""A user's problems with rough interfaces on all ranks, printed as JSON; for the test beside."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from user_problems import HEXAHEDRA, LAWS, PATCHES, TETRAHEDRA, TOP, box, clamped, elastic, marked
+
+from geometry.errors import InputError
+from geometry.meshes.block import BlockShape
+from geometry.rigid_plane import Control, RigidPlane
+from macro import (
+    Block,
+    ContactProblem,
+    Interface,
+    LawContactProblem,
+    LoadedFace,
+    Material,
+    block_mesh,
+    compat,
+)
+
+COMM = MPI.COMM_WORLD
+CONTROLS = {
+    "placed": Control(approach=8e-3, tilt=(2e-3, -1e-3)),
+    "free": Control(force=6.0, tilt=None),
+}
+
+
+def cube(element, mode):
+    """Return the forces of a block, and their differences to those of the same as user code."""
+    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(4, 4, 3), element=element)
+    block = Block(block_mesh(shape, COMM), Material(young_modulus=4000.0, poisson_ratio=0.15))
+    problem = LawContactProblem(LoadedFace.of_block(block, PATCHES), LAWS, mode)
+    space = compat.vector_space(block.mesh.mesh, int(element[1]))
+    nodes = fem.locate_dofs_geometrical(space, lambda x: np.isclose(x[2], -1.0))
+    support = fem.dirichletbc(np.zeros(3, PETSc.ScalarType), nodes, space)
+    u, found = fem.Function(space), {}
+    for name, control in CONTROLS.items():
+        options = {"patches": PATCHES, "mode": mode, "indenter": control}
+        rough = Interface(space, block.mesh.facet_tags, 2, laws=LAWS, **options)
+        ContactProblem(elastic(u, degree=block.quadrature_degree), u, [support], rough).solve()
+        state = problem.solve(control)
+        found[f"{element} {mode} {name}"] = [
+            rough.force,
+            rough.force / state.force - 1.0,
+            float(np.abs(rough.patch_pressure - state.pressure).max()),
+        ]
+    return found
+
+
+def bar():
+    """A long bar: contact at one end, where most ranks have no facets; in the matrix or not."""
+    lengths, found = (0.5, 0.5, 4.0), {}
+    mesh = box(cells=(2, 2, 24), cell=HEXAHEDRA, comm=COMM, lengths=lengths)
+    tags, space = marked(mesh, lengths), compat.vector_space(mesh, 1)
+    for in_matrix in (False, True):
+        u = fem.Function(space)
+        rough = Interface(space, tags, TOP, laws=LAWS[0], indenter=RigidPlane(approach=2e-2))
+        given = len(rough.sampling.weight)
+        problem = ContactProblem(elastic(u), u, [clamped(space, tags)], rough, in_matrix=in_matrix)
+        problem.solve()
+        found[f"bar {in_matrix}"] = [rough.force, problem.reaction()[2] / rough.force - 1.0]
+    return found, COMM.allgather(given)
+
+
+def refusals():
+    """Return what all ranks say of a face that is not there, and of a wrong facet on the last."""
+    mesh = box(cell=TETRAHEDRA, comm=COMM)
+    tags, space, told = marked(mesh), compat.vector_space(mesh, 1), []
+    wrong = np.array([10**6] if COMM.rank == COMM.size - 1 else [], dtype=np.int32)
+    for given, tag in ((tags, 99), (None, wrong)):
+        try:
+            Interface(space, given, tag, laws=LAWS[0], indenter=RigidPlane(approach=0.0))
+        except InputError as error:
+            told.append(str(error))
+    return COMM.allgather(told)
+
+
+if __name__ == "__main__":
+    result = {}
+    for element, mode in zip(("P1", "P2", "Q1", "Q2"), 2 * ("patchwise", "pointwise"), strict=True):
+        result |= cube(element, mode)
+    ends, facets = bar()
+    errors = refusals()
+    if COMM.rank == 0:
+        values = {"values": result, "bar": ends, "facets": facets, "errors": errors}
+        sys.stdout.write(json.dumps(values) + "\n")

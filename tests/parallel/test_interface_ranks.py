@@ -1,0 +1,40 @@
+"""Rough interfaces in a user's problem on 1 to 4 ranks: the block's own forces, everywhere."""
+
+import pytest
+from on_ranks import OnRanks
+
+RANKS = [1, 2, pytest.param(3, marks=pytest.mark.long), pytest.param(4, marks=pytest.mark.long)]
+
+
+@pytest.fixture(scope="module")
+def on_ranks(mpirun):
+    return OnRanks(mpirun, "interface_ranks_script.py")
+
+
+@pytest.mark.parametrize("ranks", RANKS)
+def test_user_code_gives_the_blocks_force_on_any_ranks(on_ranks, ranks):
+    one = on_ranks[1]["values"]
+    for name, (force, apart, pressures) in on_ranks[ranks]["values"].items():
+        assert abs(apart) < 1e-10, name
+        assert pressures < 1e-8, name
+        assert force == pytest.approx(one[name][0], rel=2e-10), name
+
+
+@pytest.mark.parametrize("ranks", RANKS)
+def test_ranks_may_have_no_facets(on_ranks, ranks):
+    found = on_ranks[ranks]
+    assert len(found["facets"]) == ranks
+    if ranks > 2:
+        assert min(found["facets"]) == 0
+    (force, _), (assembled, _) = found["bar"].values()
+    assert force == pytest.approx(assembled, rel=1e-9)
+    assert force == pytest.approx(on_ranks[1]["bar"]["bar False"][0], rel=1e-9)
+    assert all(abs(apart) < 1e-8 for _, apart in found["bar"].values())
+
+
+@pytest.mark.parametrize("ranks", RANKS)
+def test_all_ranks_refuse_together(on_ranks, ranks):
+    errors = on_ranks[ranks]["errors"]
+    assert errors == [errors[0]] * ranks
+    assert "has no facets" in errors[0][0]
+    assert "are not in the mesh" in errors[0][1]

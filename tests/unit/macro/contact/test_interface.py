@@ -1,0 +1,341 @@
+"""Interfaces in a user's problem: what they accept and refuse, tangents, options, failures."""
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+from petsc4py import PETSc
+from user_problems import BOTTOM, LAWS, PATCHES, TOP, PowerLaw, box, clamped, elastic, marked
+
+from geometry.errors import InputError, NotConverged
+from geometry.face_frame import FaceFrame
+from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control, RigidPlane
+from macro import ContactProblem, Interface, LawOperator, LawsAtPoints, TaggedMesh, compat
+from macro.contact import law_operator
+
+try:  # before any form is made, for UFL numbers its types when they are imported
+    import dolfinx_external_operator as package
+except ImportError:
+    package = None
+
+LAW, PLANE = PowerLaw(3e3), RigidPlane(approach=6e-3)
+TILTED = RigidPlane(approach=8e-3, tilt=(2e-3, -1e-3), centre=(0.5, 0.5))
+
+
+@dataclass(frozen=True)
+class Table:
+    """What `Interface` sees of a law table."""
+
+    patches: object
+    laws: tuple
+
+
+@dataclass(frozen=True)
+class Tabulated(PowerLaw):
+    """A law that knows its area, up to a closure."""
+
+    def at(self, closure, *, extend=False):
+        if not extend and np.any(closure > 5e-3):
+            raise InputError(
+                "closure beyond the end of the patch law", value=float(np.max(closure))
+            )
+        return SimpleNamespace(contact_area_fraction=np.clip(closure / 0.01, 0.0, 1.0))
+
+
+@pytest.fixture(scope="module")
+def body():
+    mesh = box(cells=(4, 4, 2))
+    return SimpleNamespace(mesh=mesh, tags=marked(mesh), space=compat.vector_space(mesh, 1))
+
+
+def displacement(space, size=1e-3):
+    """A field without symmetry."""
+    u = fem.Function(space)
+    u.interpolate(
+        lambda x: size * np.array([np.sin(3 * x[0]), x[1] * x[2], np.cos(2 * x[0]) - x[1] ** 2])
+    )
+    return u
+
+
+def test_a_face_is_told_by_number_name_or_facets(body):
+    space, tags = body.space, body.tags
+    named = TaggedMesh(mesh=body.mesh, facet_tags=tags, facet_names={"pad": TOP, "back": BOTTOM})
+    group = SimpleNamespace(dim=2, tag=TOP)
+    read = SimpleNamespace(facet_tags=tags, physical_groups={"pad": group})
+    ways = [(tags, TOP, {}), (tags, "pad", {"names": {"pad": TOP}}), (None, tags.find(TOP), {})]
+    ways += [(named, "pad", {}), (read, "pad", {})]
+    forces = []
+    for given, tag, options in ways:
+        rough = Interface(space, given, tag, laws=LAW, indenter=PLANE, **options)
+        forces.append(rough.evaluate(displacement(space)).force)
+    assert forces == [forces[0]] * len(ways)
+    with pytest.raises(InputError, match=r"no surface of this name; did you mean 'pad'\?"):
+        Interface(space, named, "pat", laws=LAW, indenter=PLANE)
+
+
+@pytest.mark.parametrize(
+    ("tag", "problem"),
+    [
+        (99, "'99' has no facets"),
+        (np.array([], int), "has no facets"),
+        (np.array([10**6]), "not in"),
+    ],
+)
+def test_a_face_that_is_not_there(body, tag, problem):
+    with pytest.raises(InputError, match=problem):
+        Interface(body.space, body.tags, tag, laws=LAW, indenter=PLANE)
+
+
+def test_faces_and_spaces_that_do_not_fit(body):
+    around = dmesh.locate_entities_boundary(body.mesh, 2, lambda x: (x[2] > -1e-9) | (x[0] < 1e-9))
+    with pytest.raises(InputError, match="given by its facets' is not planar"):
+        Interface(body.space, None, around, laws=LAW, indenter=PLANE)
+    every = np.arange(body.mesh.topology.index_map(2).size_local)
+    with pytest.raises(InputError, match="facets inside the body"):
+        Interface(body.space, None, every, laws=LAW, indenter=PLANE)
+    scalar = compat.scalar_space(body.mesh, 1)
+    square = dmesh.create_unit_square(MPI.COMM_SELF, 2, 2)
+    broken = compat.scalar_space(body.mesh, 1, "DG")
+    for space in (
+        scalar,
+        compat.vector_space(body.mesh, 3),
+        compat.vector_space(square, 1),
+        broken,
+    ):
+        with pytest.raises(InputError, match="space of the displacements does not fit"):
+            Interface(space, body.tags, TOP, laws=LAW, indenter=PLANE)
+    down = FaceFrame(origin=np.zeros(3), axes=np.diag([1.0, -1.0, -1.0]))
+    with pytest.raises(InputError, match="frame's normal is not that of the face"):
+        Interface(body.space, body.tags, TOP, laws=LAW, indenter=PLANE, frame=down)
+
+
+def test_laws_and_planes_that_do_not_fit(body):
+    def make(**options):
+        return Interface(body.space, body.tags, TOP, **{"laws": LAW, "indenter": PLANE} | options)
+
+    with pytest.raises(InputError, match="every patch needs a law"):
+        make(laws=LAWS[:3], patches=PATCHES)
+    with pytest.raises(InputError, match="laws of patches need the patches"):
+        make(laws=LAWS)
+    with pytest.raises(InputError, match="the interface has no laws"):
+        make(laws="laws.h5")
+    with pytest.raises(InputError, match="unknown interface"):
+        make(mode="nodewise")
+    with pytest.raises(InputError, match="the indenter is no plane"):
+        make(indenter=6e-3)
+    with pytest.raises(InputError, match="a table of several regions"):
+        make(laws=Table(SimpleNamespace(names=("a", "b")), (LAW, LAW)))
+    assert make(laws=Table(SimpleNamespace(names=("a",)), (LAW,))).mode == "pointwise"
+    with pytest.raises(InputError, match="nothing is solved or evaluated"):
+        _ = make().force
+
+
+def test_a_smaller_table_lies_in_the_middle_of_the_face(body):
+    table = Table(PatchGrid(grid=(2, 2), lengths=(0.5, 0.5)), tuple(LAWS))
+    rough = Interface(body.space, body.tags, TOP, laws=table, indenter=PLANE)
+    assert rough.mode == "patchwise"
+    np.testing.assert_allclose(rough.frame.origin, [0.25, 0.25, 0.0], atol=1e-15)
+    state = rough.evaluate(fem.Function(body.space))
+    np.testing.assert_allclose(state.patch_closure, PLANE.approach, rtol=1e-12)
+    expected = [float(law.pressure(np.array(PLANE.approach))) for law in LAWS]
+    assert state.force == pytest.approx(0.0625 * sum(expected), rel=1e-12)
+
+
+def test_crown_and_centre_are_in_coordinates_of_the_face(body):
+    crown = lambda x, y: 1e-3 * (x - 0.5) ** 2  # noqa: E731
+    spring = PowerLaw(1e3, power=1.0)
+    plane = RigidPlane(approach=5e-3, tilt=(1e-3, 2e-3), centre=(0.2, 0.3))
+    rough = Interface(body.space, body.tags, TOP, laws=spring, indenter=plane, crown=crown)
+    force = rough.evaluate(fem.Function(body.space)).force
+    assert force == pytest.approx(1e3 * (5e-3 + 1e-3 * 0.3 + 2e-3 * 0.2 - 1e-3 / 12.0), rel=1e-12)
+    x, y = rough.points.T
+    np.testing.assert_allclose(rough.closure, plane.at(x, y) - crown(x, y), rtol=1e-12)
+
+
+@pytest.mark.parametrize("mode", ["patchwise", "pointwise"])
+@pytest.mark.parametrize(
+    "indenter", [TILTED, Control(force=5.0, tilt=None)], ids=["placed", "free"]
+)
+def test_tangent_is_the_derivative_of_the_residual(body, mode, indenter):
+    space, u = body.space, displacement(body.space)
+    options = {"mode": mode, "patches": PATCHES, "indenter": indenter}
+    rough = Interface(space, body.tags, TOP, laws=LAWS, bcs=[clamped(space, body.tags)], **options)
+    form = ufl.derivative(elastic(u), u)
+    matrix = compat.assemble_matrix(compat.compile_form(form), [clamped(space, body.tags)])
+    shell = rough.tangent(matrix)
+    rough.move_tangent(u)
+    step = displacement(space)
+    step.x.array[:] = np.random.default_rng(3).standard_normal(len(step.x.array))
+    direction = compat.petsc_vector(step).copy()
+    product, plain = matrix.createVecLeft(), matrix.createVecLeft()
+    shell.mult(direction, product)
+    matrix.mult(direction, plain)
+    product.axpy(-1.0, plain)
+    change, residuals, width = direction.duplicate(), [], 1e-9
+    for sign in (1.0, -1.0):
+        moved = fem.Function(space)
+        moved.x.array[:] = u.x.array + sign * width * step.x.array
+        residuals.append(matrix.createVecLeft())
+        residuals[-1].set(0.0)
+        rough.add_residual(moved, residuals[-1])
+    change = (residuals[0].array_r - residuals[1].array_r) / (2.0 * width)
+    np.testing.assert_allclose(product.array_r, change, atol=2e-5 * np.abs(change).max())
+    if rough.assembles:
+        rough.add_tangent(u, matrix)
+        added = matrix.createVecLeft()
+        matrix.mult(direction, added)
+        added.axpy(-1.0, plain)
+        np.testing.assert_allclose(
+            added.array_r, product.array_r, atol=1e-12 * np.abs(change).max()
+        )
+    else:
+        with pytest.raises(InputError, match=r"fits no matrix \(allowed: .*Interface\.tangent"):
+            rough.add_tangent(u, matrix)
+
+
+def test_the_edge_of_a_held_face_is_left_out(body):
+    space, u = body.space, displacement(body.space)
+    held = clamped(space, body.tags, tag=TOP)
+    rough = Interface(space, body.tags, TOP, laws=LAW, indenter=PLANE, bcs=[held])
+    residual = compat.petsc_vector(u).duplicate()
+    residual.set(0.0)
+    rough.add_residual(u, residual)
+    assert rough.evaluate(u).force > 0.0
+    assert residual.norm() == 0.0
+    rough.constrain([])
+    rough.add_residual(compat.petsc_vector(u), residual)
+    assert -residual.array_r[2::3].sum() == pytest.approx(-rough.force, rel=1e-12)
+    other = fem.Function(compat.vector_space(body.mesh, 2))
+    with pytest.raises(InputError, match="displacements are those of another space"):
+        rough.add_residual(other, residual)
+
+
+def test_area_and_range_of_laws(body):
+    space = body.space
+    laws = Tabulated(3e3)
+    rough = Interface(space, body.tags, TOP, laws=laws, indenter=RigidPlane(approach=4e-3))
+    assert rough.evaluate(fem.Function(space)).area == pytest.approx(0.4)
+    rough.check_range()
+    u = fem.Function(space)
+    problem = ContactProblem(elastic(u), u, [clamped(space, body.tags)], rough)
+    problem.solve()
+    rough.indenter = RigidPlane(approach=9e-3)
+    with pytest.raises(NotConverged, match=r"LAW_RANGE: 0\.00.*larger approach"):
+        problem.solve()
+    assert rough.closure.max() > 5e-3
+    plain = Interface(space, body.tags, TOP, laws=LAW, indenter=PLANE)
+    assert plain.evaluate(u).area is None
+
+
+def test_failure_is_named_and_keeps_the_displacement(body):
+    space = body.space
+    u = fem.Function(space)
+    rough = Interface(space, body.tags, TOP, laws=LAW, indenter=PLANE)
+    support = clamped(space, body.tags)
+    problem = ContactProblem(elastic(u), u, [support], rough)
+    problem.solve()
+    known, force = u.x.array.copy(), rough.force
+    few = ContactProblem(elastic(u), u, [support], rough, petsc_options={"snes_max_it": 1})
+    rough.indenter = RigidPlane(approach=9e-3)
+    with pytest.raises(
+        NotConverged, match=r"approach 0\.009 mm .*DIVERGED_MAX_IT after 1 .*nearer"
+    ):
+        few.solve()
+    np.testing.assert_array_equal(u.x.array, known)
+    rough.indenter = PLANE
+    assert problem.solve() == 0
+    assert rough.force == pytest.approx(force, rel=1e-12)
+    loose = ContactProblem(
+        elastic(u), u, [support], rough, petsc_options={"pc_type": "jacobi", "ksp_max_it": 1}
+    )
+    rough.indenter = RigidPlane(approach=9e-3)
+    with pytest.raises(NotConverged, match=r"DIVERGED_LINEAR_SOLVE \(DIVERGED_.*petsc_options"):
+        loose.solve()
+
+
+def test_problems_that_do_not_fit(body):
+    u, other = fem.Function(body.space), fem.Function(compat.vector_space(body.mesh, 1))
+    rough = Interface(body.space, body.tags, TOP, laws=LAW, indenter=PLANE)
+    with pytest.raises(InputError, match="that of another space"):
+        ContactProblem(elastic(other), other, [], rough)
+    with pytest.raises(InputError, match="does not depend on the displacement"):
+        ContactProblem(elastic(displacement(body.space)), u, [], rough)
+
+
+def test_linear_bodies_keep_their_matrix(body, monkeypatch):
+    made = []
+    monkeypatch.setattr(compat, "assemble_matrix_into", lambda *_: made.append(1))
+    space, u = body.space, fem.Function(body.space)
+    rough = Interface(space, body.tags, TOP, laws=LAW, indenter=PLANE)
+    problem = ContactProblem(elastic(u), u, [clamped(space, body.tags)], rough)
+    for approach in (4e-3, 6e-3):
+        rough.indenter = RigidPlane(approach=approach)
+        problem.solve()
+    assert made == []
+    assert not PETSc.Options().getAll().keys() & {"patchlaw_pc_type"}
+
+
+def test_callables_are_what_the_package_of_external_operators_asks_for(body):
+    """Values on quadrature points, flat, and their derivative."""
+    rough = Interface(
+        body.space, body.tags, TOP, laws=LAWS, patches=PATCHES, mode="pointwise", indenter=TILTED
+    )
+    points = np.random.default_rng(1).uniform(0.0, 1.0, (5, 3, 3)) * [1.0, 1.0, 0.0]
+    points[-1, -1, 0] = 1.5  # off the patches
+    laws = LawsAtPoints(rough, points)
+    outward = np.random.default_rng(2).uniform(-2e-3, 2e-3, (5, 3))
+    pressure = laws.external_function((0,))(outward)
+    closure = TILTED.at(points[..., 0], points[..., 1]) + outward
+    index = 2 * (points[..., 0] > 0.5) + (points[..., 1] > 0.5)
+    expected = np.array(
+        [LAWS[i].pressure(c) for i, c in zip(index.flat, closure.flat, strict=True)]
+    )
+    expected[-1] = 0.0
+    assert pressure.shape == (15,)
+    np.testing.assert_allclose(pressure, expected, rtol=1e-13)
+    ends = [laws.external_function((0,))(outward + sign * 1e-8) for sign in (1.0, -1.0)]
+    slope = laws.external_function((1,))(outward)
+    np.testing.assert_allclose(slope, (ends[0] - ends[1]) / 2e-8, rtol=1e-5, atol=1e-3)
+    with pytest.raises(InputError, match="no such derivative"):
+        laws.external_function((2,))
+    rough.indenter = Control(force=1.0)
+    with pytest.raises(InputError, match="needs the plane in its place"):
+        laws.external_function((0,))(outward)
+    patchwise = Interface(body.space, body.tags, TOP, laws=LAWS, patches=PATCHES, indenter=PLANE)
+    with pytest.raises(InputError, match="holds at points"):
+        LawsAtPoints(patchwise, points)
+
+
+def test_external_operators_need_a_package(body, monkeypatch):
+    monkeypatch.setattr(law_operator, "PACKAGE", "no_such_package")
+    rough = Interface(body.space, body.tags, TOP, laws=LAW, indenter=PLANE)
+    with pytest.raises(InputError, match="need the package dolfinx-external-operator"):
+        LawOperator(rough, fem.Function(body.space))
+
+
+def test_external_operator_assembles_the_same(body):
+    if package is None or not hasattr(dmesh, "EntityMap"):
+        pytest.skip("external operators on a face need their package and dolfinx 0.10")
+    space, u = body.space, displacement(body.space)
+    rough = Interface(
+        space, body.tags, TOP, laws=LAWS, patches=PATCHES, mode="pointwise", indenter=TILTED
+    )
+    operator = LawOperator(rough, u)
+    test = ufl.TestFunction(space)
+    term = operator.pressure * ufl.inner(operator.normal, test) * operator.measure
+    form, operators = package.replace_external_operators(term)
+    compiled = fem.form(form, entity_maps=operator.entity_maps)
+    values = package.evaluate_operands(operators, entities=operator.entities)
+    package.evaluate_external_operators(operators, values)
+    found = compat.assemble_vector(compiled)
+    residual = found.duplicate()
+    residual.set(0.0)
+    rough.add_residual(u, residual)
+    residual.axpy(-1.0, found)
+    assert residual.norm() < 1e-13 * found.norm()

@@ -1,0 +1,74 @@
+"""Small elastic problems as users write them in dolfinx, without any part of patchlaw."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from geometry.patches import PatchGrid
+from macro import compat
+
+HEXAHEDRA, TETRAHEDRA = dmesh.CellType.hexahedron, dmesh.CellType.tetrahedron
+TOP, BOTTOM = 7, 3
+PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
+
+
+@dataclass(frozen=True)
+class PowerLaw:
+    """p = k <c − c0>^m."""
+
+    k: float
+    touch: float = 0.0
+    power: float = 1.5
+
+    def pressure(self, closure):
+        return self.k * np.maximum(closure - self.touch, 0.0) ** self.power
+
+    def stiffness(self, closure):
+        over = np.maximum(closure - self.touch, 0.0)
+        return self.power * self.k * over ** (self.power - 1.0) * (closure > self.touch)
+
+
+LAWS = [PowerLaw(k, touch) for k, touch in ((3e4, 0.0), (1e4, 2e-3), (5e4, 4e-3), (2e4, 1e-3))]
+
+
+def box(cells=(4, 4, 3), cell=TETRAHEDRA, comm=MPI.COMM_SELF, lengths=(1.0, 1.0, 1.0)):
+    """A box below the plane z = 0, from (0, 0)."""
+    lower, upper = np.array([0.0, 0.0, -lengths[2]]), np.array([lengths[0], lengths[1], 0.0])
+    return dmesh.create_box(comm, [lower, upper], list(cells), cell)
+
+
+def marked(mesh, lengths=(1.0, 1.0, 1.0)):
+    """Facet tags of top and bottom; call it before the mesh is turned."""
+    top = dmesh.locate_entities_boundary(mesh, 2, lambda x: np.isclose(x[2], 0.0))
+    bottom = dmesh.locate_entities_boundary(mesh, 2, lambda x: np.isclose(x[2], -lengths[2]))
+    facets = np.concatenate([top, bottom])
+    values = np.repeat(np.array([TOP, BOTTOM], np.int32), [len(top), len(bottom)])
+    order = np.argsort(facets)
+    return dmesh.meshtags(mesh, 2, facets[order], values[order])
+
+
+def clamped(space, tags, value=(0.0, 0.0, 0.0), tag=BOTTOM):
+    """All displacements of a face prescribed."""
+    space.mesh.topology.create_connectivity(2, 3)
+    nodes = fem.locate_dofs_topological(space, 2, tags.find(tag))
+    return fem.dirichletbc(np.array(value, dtype=PETSc.ScalarType), nodes, space)
+
+
+def elastic(displacement, young=4000.0, poisson=0.15, degree=None, thermal=0.0):
+    """Inner virtual work of a linear elastic body; Young's modulus may be UFL, thermal a strain."""
+    space = displacement.function_space
+    test = ufl.TestFunction(space)
+    lame = young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson))
+    shear = young / (2.0 * (1.0 + poisson))
+    strain = ufl.sym(ufl.grad(displacement)) - thermal * ufl.Identity(3)
+    stress = lame * ufl.tr(strain) * ufl.Identity(3) + 2.0 * shear * strain
+    degree = 2 * compat.lagrange_degree(space) if degree is None else degree
+    dx = ufl.Measure("dx", domain=space.mesh, metadata={"quadrature_degree": degree})
+    return ufl.inner(stress, ufl.sym(ufl.grad(test))) * dx
