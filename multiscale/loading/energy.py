@@ -22,9 +22,9 @@ from multiscale.loading.load_step import LoadStep
 Array = NDArray[np.float64]
 
 BALANCE = 1e-3
-"""Energy that may be missing, relative to the largest, before a run says so. In 150 load steps on 64²
-cells (half-space and cube, level and free planes) no bound was broken; work and energy differed by
-6e-5, 6e-4 and 1e-3 at rms gradients of 0.2, 0.4 and 0.8, whose second order is no gradient of an
+"""Energy that may be missing, relative to the largest, before a run says so. In 150 load steps on
+64² cells (half-space and cube, level and free planes) no bound was broken; work and energy differed
+by 6e-5, 6e-4 and 1e-3 at rms gradients of 0.2, 0.4 and 0.8, whose second order is no gradient of an
 energy, and by 5e-6 without finite slopes, which the trapezoidal rule leaves."""
 _NO_MOMENT = 1e-6
 """Work of moments, relative to that of the force, that is rounding."""
