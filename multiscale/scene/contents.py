@@ -13,6 +13,7 @@ from multiscale.scene.conductance_section import ConductanceSection
 from multiscale.scene.coupling_sections import CouplingSection, LoadSection, ReferenceSection
 from multiscale.scene.sections import (
     BlockSection,
+    CounterSurfaceSection,
     MicroSection,
     Number,
     OutputSection,
@@ -38,7 +39,7 @@ class SceneSections(Section):
     Without it, ``auto`` means 2 %."""
     surface: SurfaceSection
     """The rough surface."""
-    counter_surface: SurfaceSection | None = None
+    counter_surface: CounterSurfaceSection | None = None
     """Roughness of the other side, which is smooth without this section: heights as measured on it,
     facing up, on the grid of ``[surface]``. It is laid on the surface turned about the y axis, so
     that at x and Lx − x the two heights add."""

@@ -29,6 +29,7 @@ _UNITS = {
     "W/m/K": _Unit('"50 W/m/K"', (1e-9, 1e9), {"W/m/K": 1.0}),
     "ohm*m": _Unit('"1.7e-8 ohm m"', (1e-15, 1e25), {"ohm m": 1.0}),
     "K": _Unit('"300 K"', (1e-9, 1e9), {"K": 1.0}),
+    "deg": _Unit('"90 deg"', (1e-9, 1e6), {"deg": 1.0}),
     "s": _Unit('"55 min"', (1e-3, 1e12), {"s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0}),
 }
 """Target units in pint's notation; an empty one is a ratio.
@@ -208,6 +209,7 @@ Approaches = Annotated[
 Forces = Annotated[
     tuple[float, ...], _parser("N", parse_turning_points), _schema("N", several=True)
 ]
+Angle = Annotated[float, _parser("deg"), _schema("deg")]
 ThermalConductivity = Annotated[float, _parser("W/m/K"), _schema("W/m/K")]
 Temperature = Annotated[float, _parser("K"), _schema("K")]
 OneOrTwoConductivities = Annotated[

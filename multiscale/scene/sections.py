@@ -13,7 +13,7 @@ from geometry.files.content import LENGTH_UNITS, length_unit
 from geometry.preparation import Preparation
 from geometry.spectrum import LARGEST_SEED, Spectrum
 from multiscale.scene.height_map import HeightsOfArray
-from multiscale.scene.quantities import Length, Pressure, Slope, SpectralAmplitude
+from multiscale.scene.quantities import Angle, Length, Pressure, Slope, SpectralAmplitude
 
 Auto = Literal["auto"]
 """Value of a key that is left to the plan."""
@@ -179,6 +179,25 @@ class SurfaceSection(Section):
             long=self.filter.long,
             resample=self.resample,
         )
+
+
+class CounterSurfaceSection(SurfaceSection):
+    """Roughness of the other side, and how it lies on the surface.
+
+    Its other keys are those of ``[surface]``.
+    """
+
+    shift: tuple[Length, Length] = (0.0, 0.0)
+    """Way along x and y that it is moved, once it lies on the surface: over the borders of a
+    periodic map, or over a map that is larger than the surface."""
+    rotation: Angle = 0.0
+    """Angle that it is turned by about its middle, from x to y as seen from above, before it is
+    moved. Quarters of a turn are exact; others interpolate, on a periodic or larger map."""
+
+    @property
+    def is_moved(self) -> bool:
+        """Whether it is shifted or turned."""
+        return any(self.shift) or self.rotation != 0.0
 
 
 class BlockSection(Section):
