@@ -26,7 +26,7 @@ if TYPE_CHECKING:  # what `_HOMES` says, for editors and type checkers
         synthesise,
     )
     from macro import ContactProblem, Interface, LawOperator, vector_space
-    from micro import HalfSpaceModel, conductance_per_area, pair_conductivity
+    from micro import HalfSpaceModel
     from multiscale import (
         Comparison,
         History,
@@ -48,7 +48,7 @@ _NAMES = {
     "geometry": "Control InputError NotConverged PatchGrid RigidPlane Spectrum Surface "
     "read_surface synthesise",
     "macro": "ContactProblem Interface LawOperator vector_space",
-    "micro": "HalfSpaceModel conductance_per_area pair_conductivity",
+    "micro": "HalfSpaceModel",
     "multiscale": "Comparison History LawTable LoadStep Run Scene compare export_laws make_setup "
     "read_history read_laws representative_law run sweep",
 }

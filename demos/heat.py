@@ -26,6 +26,7 @@ from petsc4py import PETSc
 
 import patchlaw as pl
 from macro.compat import assemble_matrix, assemble_vector, compile_form, scalar_space
+from micro.conductance import conductance_per_area, pair_conductivity
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -95,8 +96,8 @@ rows = []
 for force in forces:
     rough.indenter = pl.Control(force=force)
     problem.solve()
-    k = pl.pair_conductivity([PAD, STEEL])
-    h = 1e-6 * pl.conductance_per_area(law.stiffness(rough.patch_closure), MODULUS, k)  # W/mm²/K
+    k = pair_conductivity([PAD, STEEL])
+    h = 1e-6 * conductance_per_area(law.stiffness(rough.patch_closure), MODULUS, k)  # W/mm²/K
     through = 1.0 / np.maximum(h * area, 1e-15)
     heat = np.linalg.solve(R + np.diag(through), np.ones(len(h)))  # W per patch and K
     series = 1.0 / (solid / (area * len(h)) + 1.0 / (h * area).sum())  # isothermal faces

@@ -32,7 +32,6 @@ from micro.compliance.rectangle_modes import (
 )
 from micro.compliance.side_cells import SideStresses, side_stresses
 from micro.compliance.slopes_of_bodies import SlopesOfBodies
-from micro.conductance import conductance_per_area, pair_conductivity
 from micro.half_space.contact_spots import Contacts, find_contacts
 from micro.half_space.model import HalfSpaceModel
 from micro.half_space.plane_contact import HalfSpaceState
@@ -68,13 +67,11 @@ __all__ = [
     "SurfaceStress",
     "choose",
     "coarse_grid",
-    "conductance_per_area",
     "find_contacts",
     "half_space_modes",
     "half_space_stress_modes",
     "influence_matrix",
     "micro_model",
-    "pair_conductivity",
     "side_modes",
     "side_stress_modes",
     "side_stresses",

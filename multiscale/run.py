@@ -33,6 +33,13 @@ from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
 from multiscale.storage import Arrays, digest
 
+_AFTER_UNLOADING = (
+    "errors of load steps after unloading are not measured: the plastic depth there is that of the "
+    "load steps before"
+)
+_BACK = 1.0 - 1e-6
+"""Share of the largest approach so far below which a load step counts as unloaded."""
+
 
 class Run:
     """One scene, from its problem setup to its history.
@@ -169,10 +176,8 @@ class Run:
         check = self.scene.output.check
         wanted = check == "all" or (check == "last" and self.finished)
         if wanted and self._has_unloaded(step):
-            self._notes.append(
-                f"errors of load step {step.step} not measured: it depends on the load steps "
-                "before it, by their plastic depth"
-            )
+            if _AFTER_UNLOADING not in self._notes:
+                self._notes.append(_AFTER_UNLOADING)
             return step
         if not wanted or (body := self.make_body()) is None:
             return step
@@ -186,7 +191,7 @@ class Run:
     def _has_unloaded(self, step: LoadStep) -> bool:
         """Tell whether the plastic depth at a load step is not that of rising loads."""
         before = max((each.approach_mm for each in self.steps), default=0.0)
-        return self.scene.micro.hardness is not None and step.approach_mm < before
+        return self.scene.micro.hardness is not None and step.approach_mm < _BACK * before
 
     @property
     def times(self) -> dict[str, float]:

@@ -113,11 +113,14 @@ class PlaneContact:
     def interface_stiffness(self, state: HalfSpaceState) -> float:
         """Return dF/dδ of the contacts on half-spaces, without finite body and slopes [N/mm].
 
+        Cells that yield conduct as the others: it is the elastic stiffness, that of unloading.
+
         Args:
             state: A solution.
         """
         alone = replace(self.compliance, sides=None, body=None, slopes=None)
-        return replace(self, compliance=alone).stiffness(state, turns=False)[0]
+        elastic = replace(self, compliance=alone, upper=np.inf)
+        return elastic.stiffness(state, turns=False)[0]
 
     @property
     def _units(self) -> Array:

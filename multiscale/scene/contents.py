@@ -200,6 +200,14 @@ class SceneSections(Section):
                 "stiffness of the interface from that of the block (allowed: coupling.kind = "
                 "'concurrent', 'consistent', 'isolated' or 'analytic')",
             )
+        with_laws = self.kind not in ("concurrent", "analytic")
+        if self.micro.hardness is not None and with_laws:
+            yield (
+                "conductance",
+                "does not go with micro.hardness where patch laws stand for the contact: their "
+                "stiffness is that of contacts that yield, which conduct all the same (allowed: "
+                "coupling.kind = 'concurrent')",
+            )
         if self.kind in ("concurrent", "analytic", "auto") and self.micro.model != "half-space":
             yield (
                 "conductance",

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geometry import Spectrum, Surface, synthesise
+from geometry import Control, Spectrum, Surface, synthesise
 from geometry.errors import InputError
 from micro import HalfSpaceModel
 from micro.conductance import (
@@ -74,3 +74,18 @@ def test_air_gap_and_radiation():
     assert gap_conductance(1e-2, 0.026) == pytest.approx(2600.0)  # 26 mW/m/K over 10 µm
     # black faces at 300 K: 4 σ T³ = 6.12 W/m²/K (Incropera, table of radiation coefficients)
     assert gap_conductance(1.0, 0.0, 300.0, 1.0) == pytest.approx(6.124, rel=1e-3)
+
+
+def test_contacts_that_yield_conduct_as_others():
+    """Unloading begins on the same cells, which then bear less than the hardness."""
+    spectrum = Spectrum(hurst=0.8, waves=(2, 10), rms_slope=0.2, seed=5)
+    rough = synthesise(spectrum, grid=(48, 48), lengths=(1.0, 1.0))
+    model = HalfSpaceModel(rough, contact_modulus=MODULUS, upper=150.0, tolerance=1e-10)
+    pressed = model.press(Control(approach=8e-3))
+    state = pressed.state
+    assert np.count_nonzero(state.yielding) > 0.3 * np.count_nonzero(state.in_contact)
+    step = 1e-8
+    back = model.press(Control(approach=8e-3 - step), start=pressed.start).state
+    rate = (state.force - back.force) / step
+    assert model.interface_stiffness(state) == pytest.approx(rate, rel=1e-3)
+    assert model.stiffness(state, turns=False)[0] < 0.9 * rate

@@ -155,3 +155,5 @@ def test_couplings_without_a_stiffness_of_the_interface_are_refused():
         scene("reference")
     with pytest.raises(InputError, match=r"with micro.model = 'elliptic' without laws"):
         scene("concurrent", micro={"model": "elliptic"})
+    with pytest.raises(InputError, match="stiffness is that of contacts that yield"):
+        scene("consistent", micro={"hardness": "1 GPa"})
