@@ -8,7 +8,7 @@ import pytest
 
 from geometry.errors import InputError
 from micro import HalfSpaceModel
-from multiscale import Run, Scene, make_setup, run
+from multiscale import Run, Scene, make_setup, run, sweep
 from multiscale.couplings.fields import FieldRecord
 from multiscale.loading.energy import BALANCE, missing_energy
 from multiscale.output.results import write_results
@@ -203,3 +203,11 @@ def test_hardness_below_the_mean_pressure_has_no_equilibrium():
     (step,) = run(scene("analytic", hardness="21 MPa", load=load))
     assert step.force_N == pytest.approx(20.0, rel=1e-12)
     assert step.yielding_area_fraction > 0.9
+
+
+def test_forces_under_a_hardness_are_not_scaled_with_the_modulus():
+    one = scene(load={"approach": 0.008, "steps": 1})
+    found = sweep(one, {"block.young_modulus": ["4 GPa", "8 GPa"]}).force_N.ravel()
+    (alone,) = run(one.with_({"block.young_modulus": "8 GPa"}))
+    assert found[1] == pytest.approx(alone.force_N, rel=1e-12)
+    assert found[1] < 1.95 * found[0]
