@@ -4,9 +4,11 @@ Both programs take rows of pressure and overclosure, the first without pressure,
 linearly. Beyond the last row Abaqus continues the last line. CalculiX (2.20) keeps the last
 pressure, so that a last row continues the tangent there; it stores 200 rows at most.
 
-Conductance per area over pressure is a further table of the same surface interaction. Both programs
-take rows of conductance and contact pressure, Abaqus with the parameter PRESSURE. Abaqus continues
-the first and last values. Units are those of mm, N, s and K: 1 W/m²K is 0.001 N/(mm s K).
+Conductance per area over pressure is a further table of the same surface interaction, for Abaqus
+with the parameter PRESSURE; it continues the first and last values. CalculiX (2.20) finds the
+pressure behind a conductance from linear and exponential overclosures alone: of a tabular one it
+takes the first row, without heat. Its table is therefore a comment, from which the user takes a
+value. Units are those of mm, N, s and K: 1 W/m²K is 0.001 N/(mm s K).
 """
 
 from __future__ import annotations
@@ -24,6 +26,9 @@ from multiscale.laws.patch_law import PatchLaw
 _CALCULIX_ROWS = 200
 _HEAT, _PER_W_PER_M2K = "thermal_conductance_W_per_m2K", 1e-3
 _HEAT_UNITS = "Conductance of the contacts [N/(mm s K) = mW/(mm2 K)] over pressure [MPa]:"
+_BY_HAND = """
+CalculiX does not know the pressure of such a law in its heat conduction, and would take the first
+row, without heat. Write *GAP CONDUCTANCE with the value at your pressure below it."""
 
 _HEAD = f"""\
 Contact laws of a rough surface, written by patchlaw.
@@ -45,11 +50,13 @@ class Heat(NamedTuple):
     """Gap conductance of surface interactions.
 
     Attributes:
-        keyword: The keyword that opens its table.
+        remark: What is said before its table, as a comment.
+        mark: What every line of the table begins with.
         conducts: Conductances per area at stiffnesses; None writes no table.
     """
 
-    keyword: str
+    remark: str
+    mark: str
     conducts: Conducts | None
 
     def lines(self, law: PatchLaw, sample: LawSample) -> Iterator[str]:
@@ -64,12 +71,12 @@ class Heat(NamedTuple):
         found = self.conducts(law.along(sample.approach).stiffness).get(_HEAT)
         if found is None:
             return
-        yield from _comments(_HEAT_UNITS)
-        yield self.keyword
+        yield from _comments(f"{_HEAT_UNITS}{self.remark}")
+        yield f"{self.mark}*GAP CONDUCTANCE, PRESSURE"
         rows = zip(
             np.maximum(_PER_W_PER_M2K * found, 0.0).tolist(), sample.pressure.tolist(), strict=True
         )
-        yield from (f"{conductance:.12e}, {pressure:.12e}" for conductance, pressure in rows)
+        yield from (f"{self.mark}{heat:.12e}, {pressure:.12e}" for heat, pressure in rows)
 
 
 def abaqus_text(table: LawTable, tolerance: float, conducts: Conducts | None = None) -> str:
@@ -83,7 +90,7 @@ def abaqus_text(table: LawTable, tolerance: float, conducts: Conducts | None = N
     Raises:
         InputError: When the pressure of a law is a function of closure nowhere.
     """
-    return _text(table, tolerance, _ABAQUS, None, Heat("*GAP CONDUCTANCE, PRESSURE", conducts))
+    return _text(table, tolerance, _ABAQUS, None, Heat("", "", conducts))
 
 
 def calculix_text(table: LawTable, tolerance: float, conducts: Conducts | None = None) -> str:
@@ -97,9 +104,7 @@ def calculix_text(table: LawTable, tolerance: float, conducts: Conducts | None =
     Raises:
         InputError: When the pressure of a law is a function of closure nowhere.
     """
-    return _text(
-        table, tolerance, _CALCULIX, _CALCULIX_ROWS - 1, Heat("*GAP CONDUCTANCE", conducts)
-    )
+    return _text(table, tolerance, _CALCULIX, _CALCULIX_ROWS - 1, Heat(_BY_HAND, "** ", conducts))
 
 
 def _text(table: LawTable, tolerance: float, remarks: str, most: int | None, heat: Heat) -> str:
